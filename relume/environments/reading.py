@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from relume.environments.model import Environment
 from relume.environments.radiance_header import read_header
 from relume.errors import SceneError
-from relume.imageio.linear import EXR_MAGIC, check_claim, read_pixels
+from relume.imageio.linear import EXR_MAGIC, check_claim, read_strips
 from relume.imageio.primaries import convert
 from relume.imageio.shrink import shrink
 from relume.remarks import Remark, simplified, wrong
@@ -22,6 +21,7 @@ MAX_WIDTH, MAX_HEIGHT = 16_384, 8_192
 OF_SCENES = 4096  # texels of 0.09°, some hundred bytes each while a bake divides them into light
 MAX_FILE_BYTES = 400_000_000
 MAX_RADIANCE = 1e6
+_ROWS_AT_ONCE = 64
 
 
 def read_environment(source: str | Path | bytes, name: str, most_width: int = OF_SCENES) -> Environment:
@@ -40,28 +40,86 @@ def read_environment(source: str | Path | bytes, name: str, most_width: int = OF
     Raises:
         SceneError: no such file, neither format, empty, damaged, too large, not 2:1, or without any light.
     """
-    data, what = _read_bytes(source, name), f"environment {name!r}"
+    data = _read_bytes(source, name)
     if not data:
         raise SceneError(f"environment {name!r} is empty: 0 bytes; export or download it again")
+    reading = _Reading(name, most_width)
     if data.startswith(b"#?"):
-        pixels, said = _read_radiance(data, name, what)
+        reading.radiance(data)
     elif data.startswith(EXR_MAGIC):
-        pixels, said = read_pixels(data, ".exr", what, partial(_check_size, name)), ()
+        reading.strips(data, ".exr")
     else:
         raise SceneError(f"environment {name!r} is neither Radiance .hdr nor OpenEXR; convert it to one of them")
-    return _reduced(_repaired(pixels, name, said), most_width)
+    return _reduced(reading.environment(), reading.width, most_width)
 
 
-def _read_radiance(data: bytes, name: str, what: str) -> tuple[F32, tuple[Remark, ...]]:
-    """Texels in linear Rec. 709, and what is to be said of them."""
-    header = read_header(data, name)
-    _check_size(name, header.width, header.height)
-    check_claim(header.width * header.height * 12, data, what)
-    pixels = read_pixels(data, ".hdr", what, partial(_check_size, name))
-    if header.to_rec_709 is not None:
-        convert(pixels, header.to_rec_709)
-    odd = simplified(f"environment {name!r} tells primaries that are no colours; it is read as linear Rec. 709")
-    return pixels, (odd,) * header.has_odd_primaries
+class _Reading:
+    """A map on its way: strip after strip is repaired, and reduced as many times as a whole number says.
+
+    Attributes:
+        width: of the map in the file.
+    """
+
+    def __init__(self, name: str, most_width: int) -> None:
+        self._name, self._most_width = name, most_width
+        self._parts: list[F32] = []
+        self._said: list[Remark] = []
+        self._num_broken = self._num_negative = self._num_texels = 0
+        self._is_bright = False
+        self.width, self._times = 0, 1
+
+    def radiance(self, data: bytes) -> None:
+        """Read a Radiance file."""
+        header = read_header(data, self._name)
+        _check_size(self._name, header.width, header.height)
+        check_claim(header.width * header.height * 12, data, f"environment {self._name!r}")
+        self.strips(data, ".hdr", header.to_rec_709)
+        if header.has_odd_primaries:
+            told = f"environment {self._name!r} tells primaries that are no colours; it is read as linear Rec. 709"
+            self._said.append(simplified(told))
+
+    def strips(self, data: bytes, suffix: str, matrix: NDArray[np.float64] | None = None) -> None:
+        """Read all strips. matrix: what converts their colours, where the reader does not know it"""
+        for strip in read_strips(data, suffix, f"environment {self._name!r}", self._rows):
+            if matrix is not None:
+                convert(strip, matrix)
+            height, width, _ = strip.shape
+            self._parts.append(shrink(self._repaired(strip), (width // self._times, height // self._times)))
+
+    def _rows(self, width: int, height: int) -> int:
+        _check_size(self._name, width, height)
+        self.width, times = width, max(1, width // self._most_width)
+        if times == 1 or height % times:
+            return height
+        self._times = times
+        return min(height, times * max(1, _ROWS_AT_ONCE // times))
+
+    def _repaired(self, pixels: F32) -> F32:
+        broken = np.logical_not(np.isfinite(pixels).all(axis=-1, keepdims=True))
+        self._num_texels += broken.size
+        if broken.any():
+            self._num_broken += int(broken.sum())
+            pixels = np.where(broken, np.float32(0), pixels)
+        self._num_negative += int((pixels < 0).any(axis=-1).sum())
+        self._is_bright |= bool((pixels > MAX_RADIANCE).any())
+        np.clip(pixels, 0, MAX_RADIANCE, out=pixels)  # in place: a map that is not reduced may have 1.6 GB
+        return pixels
+
+    def environment(self) -> Environment:
+        """What was read, and what is to be said of it."""
+        what, said = f"environment {self._name!r}", list(self._said)
+        if self._num_broken == self._num_texels:
+            raise SceneError(f"no texel of {what} is a finite number; render or export it again")
+        if self._num_broken:
+            said.append(wrong(f"{self._num_broken:,} texels of {what} are not finite; they are black now"))
+        if self._num_negative:
+            said.append(simplified(f"{self._num_negative:,} texels of {what} are negative; they are 0 there now"))
+        if self._is_bright:
+            said.append(simplified(f"{what} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that"))
+        pixels = self._parts[0] if len(self._parts) == 1 else np.concatenate(self._parts)
+        if not pixels.any():
+            raise SceneError(f"{what} is black everywhere; choose one with light in it")
+        return Environment(self._name, pixels, tuple(said))
 
 
 def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
@@ -89,35 +147,10 @@ def _check_size(name: str, width: int, height: int) -> None:
         raise SceneError(f"environment {name!r} is {width}×{height}; an equirectangular map is twice as wide as high")
 
 
-def _repaired(pixels: F32, name: str, said: tuple[Remark, ...]) -> Environment:
-    warnings = [*said]
-    broken = np.logical_not(np.isfinite(pixels).all(axis=-1, keepdims=True))
-    if broken.all():
-        raise SceneError(f"no texel of environment {name!r} is a finite number; render or export it again")
-    if broken.any():
-        warnings.append(
-            wrong(f"{int(broken.sum()):,} texels of environment {name!r} are not finite; they are black now")
-        )
-        pixels = np.where(broken, np.float32(0), pixels)
-    negative = (pixels < 0).any(axis=-1)
-    if negative.any():
-        warnings.append(
-            simplified(f"{int(negative.sum()):,} texels of environment {name!r} are negative; they are 0 there now")
-        )
-    if (pixels > MAX_RADIANCE).any():
-        warnings.append(
-            simplified(f"environment {name!r} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that")
-        )
-    np.clip(pixels, 0, MAX_RADIANCE, out=pixels)  # in place: a map of 16k is 1.6 GB
-    if not pixels.any():
-        raise SceneError(f"environment {name!r} is black everywhere; choose one with light in it")
-    return Environment(name, pixels, tuple(warnings))
-
-
-def _reduced(environment: Environment, most_width: int) -> Environment:
-    height, width, _ = environment.radiance.shape
+def _reduced(environment: Environment, width: int, most_width: int) -> Environment:
+    """At most so wide. width: in the file, of which whole parts are reduced already"""
     if width <= most_width:
         return environment
     size = most_width, most_width // 2
-    said = simplified(f"environment {environment.name!r} is {width}×{height}; it is kept as {size[0]}×{size[1]}")
-    return Environment(environment.name, shrink(environment.radiance, size), (*environment.warnings, said))
+    told = f"environment {environment.name!r} is {width}×{width // 2}; it is kept as {size[0]}×{size[1]}"
+    return Environment(environment.name, shrink(environment.radiance, size), (*environment.warnings, simplified(told)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +21,7 @@ MAX_EXPANSION = 1_000  # deflate packs zeros 1,032 : 1; no photograph comes near
 FREE_BYTES = 64 << 20  # may be claimed by any file, however small
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 CheckSize = Callable[[int, int], None]
+ChooseRows = Callable[[int, int], int]
 
 
 def check_claim(claimed_bytes: int, data: bytes, what: str) -> None:
@@ -56,6 +57,23 @@ def read_pixels(data: bytes, suffix: str, what: str, check_size: CheckSize) -> F
     Raises:
         SceneError: damaged, too large, or of no plain image.
     """
+
+    def all_rows(width: int, height: int) -> int:
+        check_size(width, height)
+        return height
+
+    (pixels,) = read_strips(data, suffix, what, all_rows)
+    return pixels
+
+
+def read_strips(data: bytes, suffix: str, what: str, choose_rows: ChooseRows) -> Iterator[F32]:
+    """The same a few rows at a time, from the top.
+
+    Args:
+        data, suffix, what: as of `read_pixels`.
+        choose_rows: of an image of some width and height, how many rows are wanted at once, at most all of them; raises
+            SceneError where it is not taken. Those of an image of tiles come all at once.
+    """
     handle, path = tempfile.mkstemp(suffix=suffix)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -65,7 +83,7 @@ def read_pixels(data: bytes, suffix: str, what: str, check_size: CheckSize) -> F
             _forget_error(oiio.geterror)
             raise SceneError(f"{what} is damaged or not what its first bytes say; export it again")
         try:
-            return _read_open_image(image, data, what, check_size)
+            yield from _read_open_image(image, data, what, choose_rows)
         except UnicodeDecodeError:  # names in the header that are no text
             raise SceneError(f"{what} is damaged; export it again") from None
         finally:
@@ -74,9 +92,9 @@ def read_pixels(data: bytes, suffix: str, what: str, check_size: CheckSize) -> F
         Path(path).unlink()
 
 
-def _read_open_image(image: oiio.ImageInput, data: bytes, what: str, check_size: CheckSize) -> F32:
+def _read_open_image(image: oiio.ImageInput, data: bytes, what: str, choose_rows: ChooseRows) -> Iterator[F32]:
     spec = image.spec()
-    check_size(spec.width, spec.height)
+    rows = choose_rows(spec.width, spec.height)
     if spec.depth != 1 or spec.deep or not 1 <= spec.nchannels <= 16:
         raise SceneError(f"{what} is deep or has {spec.nchannels} channels; save it as plain RGB")
     matrix = _primaries_of(spec, what)
@@ -87,15 +105,20 @@ def _read_open_image(image: oiio.ImageInput, data: bytes, what: str, check_size:
         raise SceneError(f"{what} has channels between its RGB; save it as plain RGB")
     _check_tiles(spec, data, what)
     check_claim(spec.width * spec.height * (last + 1 - first) * 4, data, what)
-    pixels = image.read_image(0, 0, first, last + 1, oiio.FLOAT)
-    if pixels is None:
-        _forget_error(image.geterror)
-        raise SceneError(f"{what} ends early or is damaged; export it again")
-    found = np.asarray(pixels, np.float32)
-    found = found if order == [first, first + 1, first + 2] else found[..., [channel - first for channel in order]]
-    if matrix is not None and last > first:  # grey has no primaries
-        convert(found, matrix)
-    return found
+    for start in range(0, spec.height, spec.height if spec.tile_width else rows):
+        if spec.tile_width:
+            pixels = image.read_image(0, 0, first, last + 1, oiio.FLOAT)
+        else:
+            stop = min(start + rows, spec.height)
+            pixels = image.read_scanlines(0, 0, spec.y + start, spec.y + stop, 0, first, last + 1, oiio.FLOAT)
+        if pixels is None:
+            _forget_error(image.geterror)
+            raise SceneError(f"{what} ends early or is damaged; export it again")
+        found = np.asarray(pixels, np.float32)
+        found = found if order == [first, first + 1, first + 2] else found[..., [c - first for c in order]]
+        if matrix is not None and last > first:  # grey has no primaries
+            convert(found, matrix)
+        yield found
 
 
 def _primaries_of(spec: oiio.ImageSpec, what: str) -> NDArray[np.float64] | None:

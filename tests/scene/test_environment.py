@@ -125,9 +125,19 @@ def test_real_environments_are_read(shared_data: Path) -> None:
 
 
 def test_maps_wider_than_asked_for_are_means_and_say_so(tmp_path: Path) -> None:
-    pixels = np.random.default_rng(3).uniform(0, 9, (32, 64, 3)).astype(np.float32)
+    """They are read in strips, and what is repaired in one is counted with all."""
+    pixels = np.random.default_rng(3).uniform(0, 9, (192, 384, 3)).astype(np.float32)
+    pixels[[3, 150], 7], pixels[[4, 70, 190], 9] = np.nan, -1
     path = written(tmp_path / "sky.exr", pixels)
-    environment = read_environment(path, "sky", 16)
-    np.testing.assert_allclose(environment.radiance, pixels.reshape(8, 4, 16, 4, 3).mean(axis=(1, 3)), rtol=1e-5)
-    assert environment.warnings == ("environment 'sky' is 64×32; it is kept as 16×8",)
-    assert not read_environment(path, "sky").warnings
+    repaired = np.maximum(np.nan_to_num(pixels), 0)
+    for width, said in ((96, "96×48"), (150, "150×75")):
+        environment = read_environment(path, "sky", width)
+        assert environment.radiance.mean() == pytest.approx(repaired.mean(), rel=5e-3)
+        assert environment.warnings == (
+            "2 texels of environment 'sky' are not finite; they are black now",
+            "3 texels of environment 'sky' are negative; they are 0 there now",
+            f"environment 'sky' is 384×192; it is kept as {said}",
+        )
+    quarter = read_environment(path, "sky", 96).radiance
+    np.testing.assert_allclose(quarter, repaired.reshape(48, 4, 96, 4, 3).mean(axis=(1, 3)), rtol=1e-5)
+    assert len(read_environment(path, "sky").warnings) == 2
