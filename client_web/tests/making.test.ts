@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { followMakings, forgetMaking, isInTheMaking, makings, makingWords, stopMaking } from "../src/library/making";
+import { followMakings, forgetMaking, importImages, isInTheMaking, makings, makingWords, stopMaking } from "../src/library/making";
 import type { BtfWorkBody } from "../src/protocol";
 import { libraryOpen } from "../src/state/panels";
 
@@ -86,6 +86,32 @@ describe("textures in the making", () => {
       "DELETE /api/materials/btf-works/b",
       "DELETE /api/materials/btf-works/a?forget=true",
     ]);
+  });
+
+  it("that somebody else has removed go from the list, twice", async () => {
+    vi.stubGlobal("fetch", () => Promise.resolve(new Response("{}", { status: 404 })));
+    makings.value = [work("a", { state: "failed" }), work("b", { state: "failed" })];
+    await forgetMaking("a");
+    await forgetMaking("b");
+    expect(makings.value).toEqual([]);
+  });
+
+  it("that failed are forgotten when their file is sent again", async () => {
+    const asked = serve([]);
+    class Sent {
+      status = 202;
+      responseText = JSON.stringify(work("c", { name: "Felt" }));
+      upload = {};
+      onload = () => undefined;
+      open = () => undefined;
+      send = () => this.onload();
+    }
+    vi.stubGlobal("XMLHttpRequest", Sent);
+    const failed = { state: "failed", name: "Felt" } as const;
+    makings.value = [work("a", failed), work("b", { ...failed, geometry: "mesh" }), work("d", { name: "Felt" })];
+    await importImages(new File([], "Felt.zip"));
+    expect(makings.value.map(({ id }) => id)).toEqual(["b", "d"]);
+    expect(asked).toEqual(["DELETE /api/materials/btf-works/a?forget=true"]);
   });
 
   it("say how far they are, and why they failed", () => {

@@ -69,7 +69,7 @@ function OfMesh() {
         a mesh of yours…
       </button>
       <label title="Side of the square that repeats; empty: the mesh is as wide as it">
-        repeats every
+        period
         <input
           ref={period}
           type="number"

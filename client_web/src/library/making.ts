@@ -1,6 +1,6 @@
 /** Textures from all sides in the making: rendered or imported by the server, followed while the library is open. */
 import { signal } from "@preact/signals";
-import { forgetBtfWork, listBtfWorks, resumeBtfWork, startBtf, stopBtfWork } from "../net/api";
+import { ApiError, forgetBtfWork, listBtfWorks, resumeBtfWork, startBtf, stopBtfWork } from "../net/api";
 import { uploadBtf, uploadGeometry } from "../net/upload";
 import type { BtfWorkBody, SyntheticBtfRequest } from "../protocol";
 import { libraryOpen } from "../state/panels";
@@ -63,7 +63,9 @@ export const makeOfMesh = (file: File, period: number | null) => sent((told) => 
 async function sent(upload: (told: (share: number) => void) => Promise<BtfWorkBody>): Promise<void> {
   sendingImages.value = 0;
   try {
-    await upload((share) => (sendingImages.value = share));
+    const { name, geometry } = await upload((share) => (sendingImages.value = share));
+    const isBefore = (work: BtfWorkBody) => work.state === "failed" && work.name === name && work.geometry === geometry;
+    for (const { id } of makings.value.filter(isBefore)) await forget(id); // what was wrong with the file has been read
   } finally {
     sendingImages.value = null;
   }
@@ -82,10 +84,16 @@ export async function goOnMaking(id: string): Promise<void> {
 }
 
 export async function forgetMaking(id: string): Promise<void> {
-  await attempt(async () => {
+  await attempt(() => forget(id));
+}
+
+async function forget(id: string): Promise<void> {
+  try {
     await forgetBtfWork(id);
-    makings.value = makings.value.filter((work) => work.id !== id);
-  });
+  } catch (error) {
+    if (!(error instanceof ApiError && error.status === 404)) throw error; // else somebody else has forgotten it
+  }
+  makings.value = makings.value.filter((work) => work.id !== id);
 }
 
 export function makingWords({ state, progress, seconds_left, problem }: BtfWorkBody): string {
