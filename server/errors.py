@@ -53,6 +53,10 @@ class BusyError(RelumeError):
     """The server has all it can take; later it may have room."""
 
 
+class NearlyFullError(RelumeError):
+    """The disk has less room than the server is to leave."""
+
+
 class TooLargeError(RelumeError):
     """More was sent than is taken."""
 
@@ -115,6 +119,7 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (InUseError, Row(409, "in-use", "In use", CLOSE_NOT_READY)),
     (LeavingError, Row(503, "leaving", "Being stopped", CLOSE_RESTART)),
     (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
+    (NearlyFullError, Row(507, "disk", "Disk is nearly full", CLOSE_INTERNAL)),
     (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),
     (PreconditionFailedError, Row(412, "changed", "Changed in the meantime", CLOSE_POLICY)),
     (PreconditionRequiredError, Row(428, "precondition-required", "Precondition required", CLOSE_POLICY)),

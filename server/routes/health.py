@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from sqlalchemy import select
 
-from server.errors import BusyError
+from server.errors import NearlyFullError
 from server.library.disk import free_bytes
 from server.services import Shared
 from worker.database.models import BakeRow
@@ -28,7 +28,7 @@ def readyz(services: Shared) -> dict[str, str]:
         session.execute(select(BakeRow.id).limit(1))
     free = free_bytes(services.settings.data)
     if free < services.settings.least_free_bytes:
-        raise BusyError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
+        raise NearlyFullError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
     return {"status": "ready"}
 
 

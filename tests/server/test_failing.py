@@ -43,7 +43,7 @@ def test_a_damaged_database_is_said_in_one_sentence_and_one_line(
 def test_a_disk_that_is_nearly_full_is_not_ready(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
     answer = client.get("/readyz")
-    assert answer.status_code == 503
+    assert (answer.status_code, answer.json()["title"]) == (507, "Disk is nearly full")
     assert "12 MB left" in answer.json()["detail"]
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, 1 << 40))
     assert client.get("/readyz").status_code == 200

@@ -39,28 +39,19 @@ def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
     raise TimeoutError(url)
 
 
-def test_scenes_of_other_formats_are_told_apart_by_content(client: TestClient) -> None:
-    obj = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-    created = client.post("/api/scenes", files={"scene": ("Leaf.obj", obj)})
-    assert created.status_code == 201, created.text
-    body = created.json()
-    assert body["name"] == "Leaf"
-    assert body["variants"] == []
-    assert ["m.mtl" in warning for warning in body["warnings"]] == [True]
-    assert body["remarks"] == [{"text": body["warnings"][0], "effect": "wrong"}]
-    refused = client.post("/api/scenes", files={"scene": ("evil.obj", obj.replace(b"m.mtl", b"../environment.hdr"))})
-    assert refused.status_code == 422
-    assert "outside the folder" in refused.json()["detail"]
-
-
-def test_files_come_with_a_scene_under_the_names_that_it_gives_them(client: TestClient) -> None:
-    obj = b"mtllib looks/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl Red\nf 1 2 3\n"
+def test_scenes_of_other_formats_are_told_apart_by_content_and_files_come_with_them(client: TestClient) -> None:
+    obj = b"mtllib gone.mtl\nmtllib looks/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl Red\nf 1 2 3\n"
     beside = ("leaf/looks/m.mtl", b"newmtl Red\nKd 1 0 0\n")
     created = client.post("/api/scenes", files=[("scene", ("leaf/Leaf.obj", obj)), ("companions", beside)])
     assert created.status_code == 201, created.text
     body = created.json()
-    assert (body["name"], body["warnings"]) == ("Leaf", [])
+    assert (body["name"], body["variants"]) == ("Leaf", [])
     assert body["materials"][0]["terms"][0]["color"] == [1, 0, 0]
+    assert ["gone.mtl" in warning for warning in body["warnings"]] == [True]
+    assert body["remarks"] == [{"text": body["warnings"][0], "effect": "wrong"}]
+    refused = client.post("/api/scenes", files={"scene": ("evil.obj", obj.replace(b"gone.mtl", b"../environment.hdr"))})
+    assert refused.status_code == 422
+    assert "outside the folder" in refused.json()["detail"]
 
 
 def test_built_in_scenes_are_listed_and_taken_by_name(client: TestClient) -> None:
