@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { baseTexture, withBaseImage, withoutBaseImage, withTexture } from "../src/images/colour";
+import { baseTexture, mapNamed, withBaseImage, withoutBaseImage, withTexture } from "../src/images/colour";
 import type { ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -37,4 +37,11 @@ test("terms that share a channel change their texture together; others stay", ()
     term("lambert", IMAGE),
     term("lambert", IMAGE),
   ]);
+});
+
+test("maps that are no colours are known by their names", () => {
+  const named = ["oak_rough_2k.jpg", "Metal049A_1K-JPG_Metalness.jpg", "rust_arm_4k.png", "bricks-normalGL.png", "wall_AO.png"];
+  expect(named.map(mapNamed)).toEqual(["roughness", "metal", "roughness and metal", "bumps", "occlusion"]);
+  const colours = ["rough_plaster_diff_2k.jpg", "Metal049A_1K-JPG_Color.jpg", "armchair.webp", "rough.png", "IMG_1234.jpg"];
+  expect(colours.map(mapNamed)).toEqual(colours.map(() => null));
 });

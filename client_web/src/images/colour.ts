@@ -47,3 +47,24 @@ export function withoutBaseImage(terms: readonly Term[], own: readonly Term[]): 
     return { ...term, texture: before?.texture ?? null, color: before?.color ?? term.color };
   });
 }
+
+/** Last words of file names, as libraries of textures write them, and what such images are maps of. */
+const MAPS: readonly (readonly [RegExp, string])[] = [
+  [/^(rough(ness)?|gloss(iness)?)$/, "roughness"],
+  [/^(metal(lic|ness)?)$/, "metal"],
+  [/^(arm|orm|rma|metallicroughness)$/, "roughness and metal"],
+  [/^(nor|nrm|normals?|bump|height|disp(lacement)?)(gl|dx)?$/, "bumps"],
+  [/^(ao|ambientocclusion|occlusion)$/, "occlusion"],
+];
+
+/** What an image is a map of, by its name, where that is no colour; sizes such as 2k are no words of it. */
+export function mapNamed(file: string): string | null {
+  const plain = file.replace(/\.\w+$/, "").replace(/([a-z])([A-Z])/g, "$1 $2");
+  const words = plain
+    .toLowerCase()
+    .split(/[^a-z]+/)
+    .filter((word) => word.length > 1);
+  if (words.length < 2) return null;
+  const ends = [words.slice(-1), words.slice(-2)].map((last) => last.join(""));
+  return MAPS.find(([name]) => ends.some((end) => name.test(end)))?.[1] ?? null;
+}

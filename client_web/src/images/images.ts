@@ -9,7 +9,7 @@ import type { ImageBody } from "../protocol";
 import { defaultLook, look } from "../state/look";
 import { select, selectedMaterial } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
-import { withBaseImage, withoutBaseImage } from "./colour";
+import { mapNamed, withBaseImage, withoutBaseImage } from "./colour";
 
 export const IMAGE_TYPES = ["image/png", "image/jpeg", "image/webp"];
 export const images = signal<readonly ImageBody[]>([]);
@@ -72,7 +72,10 @@ export async function takeImages(files: readonly File[]): Promise<void> {
   const file = files.find(isImageFile);
   if (file === undefined) return;
   if (material === null) return note("Drop the image on an object, or choose a material first; it takes what comes next.");
-  await sendOnto(material, file);
+  const map = mapNamed(file.name);
+  if (map === null) return sendOnto(material, file);
+  const told = `“${file.name}” looks like a map of ${map}. Those are part of a bake: import the scene with it, and bake again.`;
+  note(told, { label: "Use as colour", run: () => void sendOnto(material, file) });
 }
 
 /** Delete an image once that was confirmed; the material shows its own again. What saved looks show stays. */
