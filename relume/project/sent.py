@@ -65,29 +65,30 @@ def evenly(radiance: F32) -> Sent:
     )
 
 
-def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32) -> Sent:
+def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, *, to_narrow_lobes: bool = True) -> Sent:
     """Put together what cells send.
 
     Args:
         even: as in `Sent`. rows: the cells that send more one way than another. (G,)
         frame: their tangents and bitangents. (G, 2, 3) float32. vectors: L_j of each. (G, 3, J) float32
+        to_narrow_lobes: False where only cells look it up, which see widely: `smooth` is `table` then.
     """
     lobe = np.full(NO_CELL + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
     scale = np.empty((len(rows), 3), np.float32)
-    table, smooth = np.empty((2, len(rows), SIDE * SIDE, 3), np.int16)
-    means = np.stack([grid_means(), no_rings()[:, None] * grid_means()])
+    means = np.stack([grid_means(), no_rings()[:, None] * grid_means()][: 1 + to_narrow_lobes])
+    tables = np.empty((len(means), len(rows), SIDE * SIDE, 3), np.int16)
 
     def fill(start: int, stop: int) -> None:
-        values = vectors[start:stop] @ means[:, None]  # (2, cells, 3, squares)
+        values = vectors[start:stop] @ means[:, None]  # (tables, cells, 3, squares)
         largest = np.maximum(values.max(axis=(0, 3)), -values.min(axis=(0, 3)))
         scale[start:stop] = np.maximum(largest, np.float32(1e-30)) / np.float32(_STEPS)
         values /= scale[start:stop, :, None]
         np.rint(values, out=values)
-        table[start:stop], smooth[start:stop] = values.transpose(0, 1, 3, 2)
+        tables[:, start:stop] = values.transpose(0, 1, 3, 2)
 
     for_ranges(fill, len(rows), _ROWS_A_RANGE)
-    return Sent(even, lobe, frame, scale, table, smooth)
+    return Sent(even, lobe, frame, scale, tables[0], tables[-1])
 
 
 @lru_cache(maxsize=1)

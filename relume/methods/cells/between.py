@@ -39,9 +39,10 @@ class Leaving(NamedTuple):
     rows: NDArray[np.intp]
     vectors: F32
 
-    def sent(self, cells: CellLight) -> Sent:
-        """As rays look it up."""
-        return sent_by(_padded(self.even), self.rows, cells.frames[self.rows], self.vectors)
+    def sent(self, cells: CellLight, *, to_narrow_lobes: bool = True) -> Sent:
+        """As rays look it up. to_narrow_lobes: whether rays of pictures do"""
+        frames = cells.frames[self.rows]
+        return sent_by(_padded(self.even), self.rows, frames, self.vectors, to_narrow_lobes=to_narrow_lobes)
 
     def less(self, other: Leaving) -> Leaving:
         """The difference to another, whose rows may be others."""
@@ -62,7 +63,7 @@ def sent_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, fir
     links, rho = cells.links, reflecting.reflectance
 
     def arriving(now: Leaving) -> Arrived:
-        return cells.arriving(now.sent(cells), now.rows)
+        return cells.arriving(now.sent(cells, to_narrow_lobes=False), now.rows)
 
     return _between(cells, reflecting, arrived, first, last, arriving, lambda even, num: bounced(links, rho, even, num))
 
@@ -76,7 +77,7 @@ def quickly_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, 
     links, few, rho = cells.links, cells.few_links, reflecting.reflectance
 
     def arriving(now: Leaving) -> Arrived:
-        return arriving_quickly(cells, now.sent(cells), now.rows)
+        return arriving_quickly(cells, now.sent(cells, to_narrow_lobes=False), now.rows)
 
     return _between(
         cells, reflecting, arrived, first, last, arriving, lambda even, num: preview_bounced(links, few, rho, even, num)
