@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -52,12 +53,18 @@ def rooms_of(one: str, other: str) -> tuple[str, str] | None:
 
 
 def arrows() -> Arrows:
+    return {room: set(targets) for room, targets in _all_arrows().items()}
+
+
+@cache
+def _all_arrows() -> Arrows:
+    """They cost seconds to find."""
     known, found = modules(), defaultdict(set)
     for name, path in known.items():
         for target in imported(path, known):
             if (pair := rooms_of(name, target)) is not None:
                 found[pair[0]].add(pair[1])
-    return found
+    return dict(found)
 
 
 def circle_in(found: Arrows) -> list[str] | None:

@@ -58,8 +58,8 @@ def local_transforms(nodes: Sequence[Node]) -> F64:
     """The matrix of each node, or its translation · rotation · scale. (n, 4, 4)"""
     transforms = np.tile(np.eye(4), (len(nodes), 1, 1))
     turns, scales, moves = (
-        np.array([getattr(node, name) for node in nodes], np.float64).reshape(len(nodes), -1)
-        for name in ("rotation", "scale", "translation")
+        np.array([getattr(node, name) for node in nodes], np.float64).reshape(-1, size)
+        for name, size in (("rotation", 4), ("scale", 3), ("translation", 3))
     )
     transforms[:, :3, :3] = rotations(turns) * scales[:, None, :]
     transforms[:, :3, 3] = moves
