@@ -120,7 +120,7 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
     if active is None and all(_is_flat(bands[curve.name]) for curve in curves):
         # nothing depends on an angle; with any other curve flat ones stay, for every angle decides where triangles are
         # divided, and a curve that becomes flat must not change that
-        constant = np.prod([bands[curve.name].mean(axis=1) for curve in curves], axis=0)
+        constant = np.prod([constant, *(bands[curve.name].mean(axis=1) for curve in curves)], axis=0)
         curves = []
     given = [bands[curve.name] for curve in curves]
     several = [rows for rows in given if rows.ndim == 3]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sessions import settle
 from tiny_scenes import looking, quad, scene_of, sphere, studio
 
 from relume.bake import Recipe
@@ -14,6 +15,7 @@ from relume.look import validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.picture.light import light_of
+from relume.picture.picture import Picture
 from relume.project.texels import texel_numpy, texel_rows
 from relume.render.image import render_image
 from relume.scene.model import Material
@@ -174,8 +176,24 @@ def test_surfaces_without_places_in_textures_take_a_projection(small_btf, tmp_pa
 
 
 @pytest.mark.parametrize("method", ["gather", "surface"])
-def test_other_methods_show_it_too(small_btf, tmp_path, method):
+def test_other_methods_show_it_too_and_follow_a_hand(small_btf, tmp_path, method):
     bake = opened(floor(), tmp_path, method)
     picture = render_image(bake, "front", covered(bake, small_btf.record, scale=3.0))
     assert np.isfinite(picture).all()
     assert picture[..., :3].mean() > 0.01
+    if method == "surface":
+        return
+    live = Picture(bake, "front", bake.memory)
+    live.set_look(covered(bake, small_btf.record, scale=3.0))
+    settle(live)
+    for red in (0.8, 0.4):  # its light follows by rows, of a term without curves
+        look = covered(bake, small_btf.record, (red, 1, 1), scale=3.0)
+        live.set_look(look, hand="/materials/Floor/terms/0/color")
+        while (job := live.next_job()) is not None:
+            live.install(job, job.make(lambda share: None, lambda: False))
+        live.advance(None)
+        live.set_look(look)
+        settle(live)
+        np.testing.assert_allclose(
+            live.image()[..., :3], render_image(bake, "front", look)[..., :3], rtol=1e-4, atol=1e-5
+        )
