@@ -5,6 +5,8 @@ Those of the environment are the same for all points; parts of a lamp are other 
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,6 +83,11 @@ class ListedLights:
         self.first = np.empty(POINTS_A_BLOCK + 1, np.int64)
         self.light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
+
+    @cached_property
+    def brings(self) -> F32:
+        """What the lights bring, and how wide they are: irradiance and radius. (M, 4)"""
+        return np.concatenate([self.irradiance, self._lights.radius[:, None]], axis=1)
 
     def list(self, start: int, stop: int, visible: Bits) -> tuple[F32, F32]:
         """List the lights of points [start, stop), a block of them at most.

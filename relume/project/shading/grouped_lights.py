@@ -34,7 +34,6 @@ class GroupedLights:
     ) -> None:
         self._receivers, self._contraction, self._groups = receivers, contraction, groups
         self._listed = ListedLights(term, contraction, groups.lights, receivers)
-        self._brings = np.concatenate([self._listed.irradiance, groups.lights.radius[:, None]], axis=1)
         self._words, self._whole = np.empty(num_lights, np.uint64), np.empty(groups.lights.num_lights, np.uint64)
 
     def add(self, start: int, stop: int, out: F32) -> Bits:
@@ -46,16 +45,14 @@ class GroupedLights:
             The lights that are left, as in `Receivers`. (stop - start, bytes) uint8
         """
         r, c, groups, listed = self._receivers, self._contraction, self._groups, self._listed
-        left, whole = (
-            np.empty_like(r.visible[start:stop]),
-            np.empty((stop - start, (len(self._whole) + 7) // 8), np.uint8),
-        )
+        left = np.empty_like(r.visible[start:stop])
+        whole = np.empty((stop - start, (len(self._whole) + 7) // 8), np.uint8)
         into_words(r.visible[start:stop], self._words)
         take_whole(self._words, groups.first, groups.part, self._whole)
         into_rows(self._words, left)
         into_rows(self._whole, whole)
         shading, wo = listed.list(start, stop, whole)
-        lights = groups.lights.by_light, self._brings, groups.between
+        lights = groups.lights.by_light, listed.brings, groups.between
         add_groups(
             r.normal, r.tangent, (listed.first, listed.light, shading), wo, lights, (groups.first, groups.part),
             c.axes, c.whole, start, stop, left, out,

@@ -11,39 +11,14 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.project.shading.boxes import CHUNK, evaluate, look_up, look_up_middles, sum_up, turn, weigh
+from relume.project.shading.boxes import CHUNK, evaluate, look_up, sum_up, turn
+from relume.project.shading.listed import evaluate_listed, least_of, room, scales_of, set_aside
 
-_ZERO, _ONE, _HALF, _QUARTER = np.float32(0), np.float32(1), np.float32(0.5), np.float32(0.25)
+_ONE, _HALF, _QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _MAX_DEPTH = 6
-# Triangles are divided whose error may be above both: a share of what they bring, and of all that the point receives.
-_TOLERANCE, _TOLERANCE_OF_ALL = np.float32(0.02), np.float32(1e-3)
 _ALONE = np.empty(0, np.float32)  # these are no groups
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _set_aside(value, weight, error, num, least, which):  # type: ignore[no-untyped-def]
-    """List the triangles to be divided, and let them bring nothing as they are; returns their number.
-
-    Args:
-        value, weight, error: as from `evaluate` and `weigh`; errors are spoilt. least: what may be wrong.
-        which: written. (> num,)
-    """
-    blue_row = value.shape[0] - 1
-    red, green, blue = value[0], value[blue_row // 2], value[blue_row]
-    for n in range(num):
-        brought = weight[0, n] * red[n] + weight[1, n] * green[n] + weight[2, n] * blue[n]
-        error[n] = _ONE if (error[n] > _TOLERANCE) & (error[n] * brought > least) else _ZERO
-    count = 0
-    for n in range(num):
-        which[count] = n
-        count += int(error[n])
-    for row in range(blue_row + 1):
-        of_row = value[row]
-        for n in range(num):
-            of_row[n] *= _ONE - error[n]
-    return count
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -98,7 +73,7 @@ def _add_divided(curves, scale, wo, num, least, generations, scratch, total):  #
     """Add triangles that are divided: the first `num` of the first generation, and what comes of them.
 
     Args:
-        curves, scale, wo, scratch: as in `evaluate`. least: as in `_set_aside`.
+        curves, scale, wo, scratch: as in `evaluate`. least: as in `set_aside`.
         generations: local, weight, radius, which, value and error of each, written but for the first's first three.
         total: added to. (3,)
     """
@@ -119,17 +94,9 @@ def _add_divided(curves, scale, wo, num, least, generations, scratch, total):  #
         evaluate(curves, scale, wo, local[to], radius[to], _ALONE, parts, scratch, value[to], error[to])
         done[to] = count[to] = 0
         if to < _MAX_DEPTH:
-            count[to] = _set_aside(value[to], weight[to], error[to], parts, least, which[to])
+            count[to] = set_aside(value[to], weight[to], error[to], parts, least, which[to])
         sum_up(value[to], weight[to], parts, total)
         level = to
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _scratch(num, num_rows):  # type: ignore[no-untyped-def]
-    """Make room for `num` chunks of triangles: weight, radius, which are divided, value, error."""
-    weight, radius = np.empty((num, 3, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
-    value, error = np.empty((num, num_rows, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
-    return weight, radius, np.empty((num, CHUNK + 1), np.int64), value, error
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -145,14 +112,12 @@ def shade_points(  # type: ignore[no-untyped-def]
         curves: see `evaluate`.
         out: added to; what is there is part of what a point receives. (points, 3, ≥ 1) float32
     """
-    num_curves, num_rows = axes.shape[0], 1
-    scale, wo = np.empty(num_curves, np.float32), np.empty((num_curves, 3), np.float32)
-    for k in range(num_curves):
-        num_rows = max(num_rows, curves[2][k])
-        scale[k] = curves[3][k] / (np.pi / 2)
-    weight, reach, which, value, error = _scratch(nodes.shape[0] // CHUNK + 1, num_rows)
+    num_curves, (scale, num_rows) = axes.shape[0], scales_of(curves)
+    wo, lights = np.empty((num_curves, 3), np.float32), (nodes, brings, _ALONE)
+    chunks = room(nodes.shape[0] // CHUNK + 1, num_rows)
+    weight, reach, which, value, error = chunks
     local, scratch = np.empty((_MAX_DEPTH + 1, 3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
-    of_parts, total = _scratch(_MAX_DEPTH + 1, num_rows), np.empty(3, np.float32)
+    of_parts, total = room(_MAX_DEPTH + 1, num_rows), np.empty(3, np.float32)
     chosen, generations = np.empty(CHUNK, np.int32), (local, *of_parts)
     for p in range(start, stop):
         begin, end = first[p - start], first[p - start + 1]
@@ -162,26 +127,30 @@ def shade_points(  # type: ignore[no-untyped-def]
             for axis in range(3):
                 wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
         total[:] = 0
-        for chunk in range((end - begin + CHUNK - 1) // CHUNK):
-            at = begin + chunk * CHUNK
-            num = min(CHUNK, end - at)
-            if num_curves > 0:
-                look_up_middles(nodes, light, at, num, local[0])
-                turn(normal[p], tangent[p], 3, num, local[0])
-            weigh(brings, light, shading, at, num, weight[chunk], reach[chunk])
-            evaluate(curves, scale, wo, local[0], reach[chunk], _ALONE, num, scratch, value[chunk], error[chunk])
-            sum_up(value[chunk], weight[chunk], num, total)
+        evaluate_listed(
+            normal[p],
+            tangent[p],
+            (light, shading),
+            begin,
+            end,
+            lights,
+            curves,
+            scale,
+            wo,
+            local[0],
+            scratch,
+            chunks,
+            total,
+        )
         if num_curves == 0:
             out[p - start, :, 0] += total
             continue
-        for channel in range(3):  # what is there already counts as well
-            total[channel] += abs(out[p - start, channel, 0])
-        least = _TOLERANCE_OF_ALL * (total[0] + total[1] + total[2])
+        least = least_of(total, out[p - start, :, 0])  # what is there already counts as well
         total[:] = 0
         for chunk in range((end - begin + CHUNK - 1) // CHUNK):
             at = begin + chunk * CHUNK
             num = min(CHUNK, end - at)
-            divided = _set_aside(value[chunk], weight[chunk], error[chunk], num, least, which[chunk])
+            divided = set_aside(value[chunk], weight[chunk], error[chunk], num, least, which[chunk])
             sum_up(value[chunk], weight[chunk], num, total)
             if divided == 0:
                 continue

@@ -36,7 +36,6 @@ class Shader:
     def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
         self._contraction, self._lights, self._receivers = contraction, lights, receivers
         self._listed = ListedLights(term, contraction, lights, receivers)
-        self._brings = np.concatenate([self._listed.irradiance, lights.radius[:, None]], axis=1)
         is_even = term.is_lambertian and contraction.kinds.size == 0
         self._even = EvenShader(term, contraction.constant, lights) if is_even else None
         groups = lights.groups if contraction.kinds.size else None  # nothing else tells how a quotient varies
@@ -75,6 +74,6 @@ class Shader:
             visible = self._grouped.add(block, end, here) if self._grouped else r.visible[block:end]
             shading, wo = listed.list(block, end, visible)
             shade_points(
-                r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.by_light, self._brings,
+                r.normal, r.tangent, listed.first, listed.light, shading, wo, self._lights.by_light, listed.brings,
                 c.axes, c.whole, block, end, here,
             )  # fmt: skip
