@@ -28,6 +28,7 @@ from relume.store import bake_here
 
 _MOVED = 0.01  # of the distance to the target, each frame
 _MEMORY = 4 << 30
+_GOLDEN = 0.618
 
 
 class Drag(NamedTuple):
@@ -88,6 +89,7 @@ class MovingScene:
         bake_here(METHODS["surface"], self._scene, self.recipe, path)
         self.bake_s = time.perf_counter() - began
         self.num_bytes = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+        self._num_drags = 0
         self.opened = open_bake(path, Memory(_MEMORY))
         assert isinstance(self.opened, MovingViews)
         self.moving = self.opened
@@ -139,14 +141,17 @@ class MovingScene:
             frames: how many. change: of the look's document, by the share of the way. is_watched: somebody waits.
             beside: what else happens to the picture in each frame.
         Returns:
-            Seconds from each look to its frame.
+            Seconds from each look to its frame. No two drags come to the same values: what an edit is projected to is
+            found in each.
         """
-        looks = [
-            self.look(lambda document, k=k: change(document, k / frames))  # type: ignore[misc]
-            for k in range(frames + 1)
-        ]
 
         def drag() -> Drag:
+            self._num_drags += 1
+            shift = self._num_drags * _GOLDEN % 1
+            looks = [
+                self.look(lambda document, k=k: change(document, (k + shift) / (frames + 1)))  # type: ignore[misc]
+                for k in range(frames + 1)
+            ]
             picture = self.picture(looks[-1], is_watched=is_watched)
 
             def begin(k: int) -> None:

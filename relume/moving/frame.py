@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
@@ -45,6 +46,13 @@ class Projected(NamedTuple):
     lobes: Lobes
 
 
+def _projected(terms: Sequence[Mapping[str, Any]], before: Projected | None) -> Projected:
+    """Project the terms of one. before: what has been projected of it."""
+    if before is not None and before.terms == terms:
+        return before
+    return Projected(terms, tables_of([terms]), lobes_of([terms]))
+
+
 class Materials(NamedTuple):
     """What materials send.
 
@@ -64,10 +72,11 @@ class Materials(NamedTuple):
     images: tuple[Images, ...]
 
     @classmethod
-    def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]], before: Sequence[Projected] = ()) -> Self:
-        """Project the terms of each, of a complete look. before: what has been projected, material for material."""
-        known = {k: one for k, one in enumerate(before) if one.terms == terms[k]}
-        each = [known.get(k) or Projected(one, tables_of([one]), lobes_of([one])) for k, one in enumerate(terms)]
+    def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]], before: Self | None = None) -> Self:
+        """Project the terms of each, of a complete look. before: those of another, which hold what has not changed."""
+        each = [_projected(these, one) for these, one in zip(terms, before.each if before else [None] * len(terms))]
+        if before is not None and all(map(operator.is_, each, before.each)):
+            return before
         tables, lobes = Tables.joined([one.tables for one in each]), Lobes.joined([one.lobes for one in each])
         sends, with_lobe = np.asarray((tables.of >= 0).any(axis=2)), lobes.of >= 0
         sends[with_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.of[with_lobe]]

@@ -66,7 +66,7 @@ class MovingPicture:
         self._drawn: Drawn | None = None
         self._part: tuple[Seen, bytes, Shown] | None = None
         self._seen: tuple[int, Seen] | None = None
-        self._materials: tuple[Any, Materials] | None = None
+        self._materials: tuple[Look | None, Materials | None] = None, None
         self._vectors, self._everywhere = LiveVectors(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
         self._shares: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
@@ -308,11 +308,13 @@ class MovingPicture:
         return found
 
     def _materials_of(self, shown: Look) -> Materials:
-        terms = [[dict(term) for term in documents_of(shown, name)] for name in self._transfer.material_names]
-        if self._materials is None or self._materials[0] != terms:
-            self._materials = terms, Materials.of(terms, () if self._materials is None else self._materials[1].each)
-            self._num_materials += 1
-        return self._materials[1]
+        before_of, before = self._materials
+        if before is None or before_of is not shown:
+            found = Materials.of([documents_of(shown, name) for name in self._transfer.material_names], before)
+            self._num_materials += found is not before
+            self._materials = shown, found
+            return found
+        return before
 
     def _vectors_now(self, is_needed: NDArray[np.uint8]) -> Arriving:
         """Light vectors in the light of the look; where they may be rough, of what is needed alone."""

@@ -15,7 +15,7 @@ from relume.methods.registry import METHODS, open_bake
 from relume.moving import frame as frame_module
 from relume.moving.basis import lobes as lobes_module
 from relume.moving.basis.lobes import is_narrow, lobes_of
-from relume.moving.basis.out_factors import NUM_ROWS
+from relume.moving.basis.out_factors import NUM_ROWS, of_white
 from relume.moving.basis.rows import LEAST_COSINE
 from relume.moving.evaluate import Sent
 from relume.moving.highlights.between_points import add_sky_in_highlights
@@ -68,7 +68,7 @@ def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball
         return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
 
     kept = error()
-    monkeypatch.setattr(lobes_module, "_has_highlight", lambda term: False)
+    monkeypatch.setattr(lobes_module, "_has_highlight", lambda known: False)
     assert kept < 0.08
     assert error() > 2.5 * kept
 
@@ -173,7 +173,7 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_less_what_pi
 
 def test_what_the_in_basis_cannot_tell_is_a_lobe_alone(shiny_ball):
     surface, rng = shiny_ball[0].surface, np.random.default_rng(7)
-    assert is_narrow(NARROW)
+    assert is_narrow(of_white(NARROW))
     lobes = lobes_of([[NARROW, GLOSSY]])
     assert lobes.most.tolist() == [1]
     num = surface.points.num_points

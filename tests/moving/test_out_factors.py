@@ -8,7 +8,7 @@ from test_zernike import hemisphere
 from relume.basis.zernike import NUM_FUNCTIONS, in_basis
 from relume.brdf.evaluate import eval_brdf
 from relume.moving.basis.lobes import is_narrow, lobes_of
-from relume.moving.basis.out_factors import NUM_ROWS, cosines, out_factors, turned
+from relume.moving.basis.out_factors import NUM_ROWS, cosines, of_white, out_factors, turned
 from relume.moving.basis.tables import tables_of
 
 
@@ -77,7 +77,7 @@ def test_terms_of_one_texture_are_summed_and_others_kept_apart():
         document("lambert", texture="diffuse", color=[0, 0, 1.0]),
         document("ward_anisotropic", params={"alpha_x": 0.9, "alpha_y": 0.5}),
     ]
-    assert not is_narrow(terms[-1])
+    assert not is_narrow(of_white(terms[-1]))
     tables = tables_of([terms, []])
     of = [[0, 0, -1, -1, -1, -1], [1, -1, -1, -1, -1, -1], [-1] * 6]
     assert tables.of.tolist() == [of, [[-1] * 6] * 3]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from relume.basis.zernike import NUM_FUNCTIONS, num_functions
 from relume.moving.basis.lobes import is_narrow
-from relume.moving.basis.out_factors import out_factors
+from relume.moving.basis.out_factors import of_white
 
 BOUND = 0.05
 
@@ -29,6 +29,7 @@ class InOut(NamedTuple):
 
 def in_out(term_document: Mapping[str, Any]) -> InOut:
     """Of one term of a complete look."""
-    missed = out_factors(term_document).missed_by_degree
+    known = of_white(term_document)
+    missed = known.missed_by_degree
     needed = next((num_functions(degree) for degree, share in enumerate(missed) if share <= BOUND), None)
-    return InOut(NUM_FUNCTIONS, missed[-1], needed, is_narrow(term_document))
+    return InOut(NUM_FUNCTIONS, missed[-1], needed, is_narrow(known))

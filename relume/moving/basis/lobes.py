@@ -20,6 +20,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from itertools import compress
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -80,9 +81,8 @@ class Lobes(NamedTuple):
         return joined._replace(of=np.concatenate(of).astype(np.int32))
 
 
-def is_narrow(term_document: Mapping[str, Any]) -> bool:
-    """Whether the in-basis cannot tell a term."""
-    known = of_white(term_document)
+def is_narrow(known: OutFactors) -> bool:
+    """Whether the in-basis cannot tell a term. known: its factors"""
     return known.missed > _bound_of(known)
 
 
@@ -90,20 +90,23 @@ def _bound_of(known: OutFactors) -> float:
     return NARROW if known.is_isotropic else _NARROW_UNEVEN
 
 
-def _has_highlight(term_document: Mapping[str, Any]) -> bool:
+def _has_highlight(known: OutFactors) -> bool:
     degree, bound = _DIRECTED
-    return of_white(term_document).missed_by_degree[degree] > bound
+    return known.missed_by_degree[degree] > bound
 
 
-def are_lobes(terms: Sequence[Mapping[str, Any]]) -> list[bool]:
-    """Tell which terms of a material its lobe stands for: narrow ones; if there are none, those with a highlight."""
-    narrow = [is_narrow(term) for term in terms]
-    return narrow if any(narrow) else [_has_highlight(term) for term in terms]
+def are_lobes(known: Sequence[OutFactors]) -> list[bool]:
+    """Tell which terms of a material its lobe stands for: narrow ones; if there are none, those with a highlight.
+
+    Args:
+        known: the factors of each.
+    """
+    narrow = [is_narrow(one) for one in known]
+    return narrow if any(narrow) else [_has_highlight(one) for one in known]
 
 
-def _most_of(terms: Sequence[Mapping[str, Any]]) -> float:
+def _most_of(known: Sequence[OutFactors]) -> float:
     """What the in-basis is believed: any multiple where it misses nothing, none where it misses `NARROW`."""
-    known = [of_white(term) for term in terms]
     return max(1.0, min(_bound_of(one) / max(one.missed, _LEAST_MISSED) for one in known) ** 2)
 
 
@@ -118,13 +121,14 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
     shape: list[F64] = []
     most: list[float] = []
     for index, terms in enumerate(materials):
-        seen = [term for term, is_lobe in zip(terms, are_lobes(terms), strict=True) if is_lobe]
-        if not seen:
+        known = [of_white(term) for term in terms]
+        is_seen = are_lobes(known)
+        if not any(is_seen):
             continue
         of[index] = len(albedo)
-        most.append(_most_of(seen))
+        most.append(_most_of([*compress(known, is_seen)]))
         by_group, about = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros((NUM_ROWS, 6))
-        for term in seen:
+        for term in compress(terms, is_seen):
             found = _lobe_of(json.dumps({**term, "color": [1.0, 1.0, 1.0], "texture": None}, sort_keys=True))
             sent = found[:, :3] * np.asarray(term["color"], np.float64)
             by_group[:, group_of(term)] += sent

@@ -120,17 +120,17 @@ def _seen_from(phi: F64) -> F64:
 
 
 @lru_cache(maxsize=1)
-def _even_quadrature() -> tuple[Quadrature, F64, F64]:
+def _even_quadrature() -> tuple[Quadrature, F32, F32]:
     """Where isotropic terms are evaluated; weights (n,); weighed functions of the ladder's cosine parts, (n, rungs)."""
     wi, weight, functions = _disc(is_half=True)
     weighed = weight[:, None] * functions[:, ladder().cosine]
-    return Quadrature(wi, _seen_from(np.zeros(1))), weight, np.ascontiguousarray(weighed)
+    return Quadrature(wi, _seen_from(np.zeros(1))), weight.astype(np.float32), np.ascontiguousarray(weighed, np.float32)
 
 
 def _projected_even(document: Mapping[str, Any]) -> tuple[F64, F64]:
     """Project an isotropic term seen from all rows and φo = 0: factors (rows, 1, 3, K), energies (rows, 1)."""
     quadrature, weight, weighed = _even_quadrature()
-    value = quadrature.values(document)  # (channels, rows, n)
+    value = quadrature.values(document).astype(np.float32)  # (channels, rows, n)
     table = np.zeros((NUM_ROWS, 1, 3, NUM_FUNCTIONS))
     table[..., ladder().cosine] = np.swapaxes(value @ weighed, 0, 1)[:, None]
     return table, np.broadcast_to(value**2 @ weight, (3, NUM_ROWS)).sum(axis=0)[:, None]

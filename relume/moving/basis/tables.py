@@ -58,13 +58,10 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
     uneven: list[F32] = []
     of = np.full((len(materials), NUM_GROUPS, 6), -1, np.int32)
     for index, terms in enumerate(materials):
-        lobes = are_lobes(terms)
+        found_of = [out_factors(term) for term in terms]
+        every = [*zip(map(group_of, terms), found_of, are_lobes(found_of), strict=True)]
         for group in range(NUM_GROUPS):
-            shared = [
-                (out_factors(term).table, is_lobe, is_narrow(term))
-                for term, is_lobe in zip(terms, lobes, strict=True)
-                if group_of(term) == group
-            ]
+            shared = [(one.table, is_lobe, is_narrow(one)) for of_group, one, is_lobe in every if of_group == group]
             plain = [table for table, is_lobe, _ in shared if not is_lobe]
             told = [table for table, is_lobe, narrow in shared if is_lobe and not narrow]
             others = [table * _WINDOWS for table, is_lobe, _ in shared if is_lobe]
