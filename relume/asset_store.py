@@ -14,7 +14,6 @@ import json
 import logging
 import os
 import re
-import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -26,7 +25,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from relume.errors import NotFoundError, ParameterError, RelumeError
-from relume.replacing import replacing
+from relume.replacing import remove_folder, replacing
 
 log = logging.getLogger(__name__)
 
@@ -183,7 +182,7 @@ class AssetStore:
 
     def remove(self, folder: Path, identity: str) -> None:
         """Delete a thing; looks that name it are refused from now on. Raises NotFoundError."""
-        shutil.rmtree(self.path(folder, identity))
+        remove_folder(self.path(folder, identity))
 
     def damaged(self, path: Path) -> RelumeError:
         """The error to raise."""

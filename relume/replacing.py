@@ -1,8 +1,11 @@
-"""Files that are never half there: the one way in which relume writes a file that others may read meanwhile."""
+"""Files and folders that are never half there: the one way in which relume writes a file that others may read, and
+deletes a folder that they may.
+"""
 
 from __future__ import annotations
 
 import os
+import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +14,7 @@ from pathlib import Path
 from relume.errors import DiskFullError, RelumeError, is_no_room
 
 UNFINISHED = ".unfinished-*"
-"""Names of files that a killed process left."""
+"""Names of files and folders that a killed process left."""
 
 
 @contextmanager
@@ -26,7 +29,7 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         DiskFullError: there is no room for it. RelumeError: it cannot be written. Other errors than OSError pass.
     """
-    unfinished = path.with_name(UNFINISHED.replace("*", uuid.uuid4().hex + path.suffix.lower()))
+    unfinished = _unfinished(path)
     try:
         yield unfinished
         with unfinished.open("rb") as file:
@@ -39,3 +42,20 @@ def replacing(path: Path) -> Iterator[Path]:
         raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def remove_folder(path: Path) -> None:
+    """Delete a folder, which is gone at once: who comes while its files are deleted finds none, not some.
+
+    Args:
+        path: of the folder.
+    Raises:
+        OSError: it is not there, or may not be moved. What can be moved but not deleted is left under another name.
+    """
+    unfinished = _unfinished(path)
+    path.rename(unfinished)
+    shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _unfinished(path: Path) -> Path:
+    return path.with_name(UNFINISHED.replace("*", uuid.uuid4().hex + path.suffix.lower()))

@@ -19,7 +19,7 @@ from server.access.access import Access
 from server.apart.pool import Pool
 from server.apart.step import Batches
 from server.files.importers import Importers
-from server.files.importing import remove_stray_uploads
+from server.files.importing import remove_strays
 from server.files.thumbnails import Thumbnails
 from server.library.caretaker import Caretaker
 from server.library.disk import free_bytes
@@ -110,7 +110,7 @@ async def open_services(
 ) -> AsyncIterator[Services]:
     """Open everything; close it in the reverse order."""
     settings.data.mkdir(parents=True, exist_ok=True)
-    remove_stray_uploads(settings.data, older_than_s=2 * settings.import_seconds)
+    remove_strays(settings.data, older_than_s=2 * settings.import_seconds)
     library = open_library(settings.cache_bytes, settings.cache_floor_bytes)
     threads = Threads()
     service = await asyncio.to_thread(bakes, settings)

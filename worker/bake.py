@@ -22,6 +22,7 @@ from sqlalchemy.exc import IntegrityError
 from relume.bake import Task
 from relume.errors import CancelledError, ChunkDamagedError, DiskFullError, RelumeError, StorageError, is_no_room
 from relume.folders import folder_bytes
+from relume.replacing import remove_folder
 from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
 from worker.database.patience import Given, Result, patiently
@@ -266,6 +267,7 @@ def check_published(path: Path) -> bool:
     try:
         open_store(path)
     except RelumeError:
-        shutil.rmtree(path, ignore_errors=True)
+        with suppress(OSError):
+            remove_folder(path)
         return False
     return True

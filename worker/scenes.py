@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from sqlalchemy.exc import IntegrityError
 
 from relume.errors import NotFoundError
 from relume.remarks import Remark, remark_of
+from relume.replacing import remove_folder
 from relume.scene.archive import save_scene
 from relume.scene.model import Scene
 from relume.scene.projected import are_projected
@@ -115,14 +117,20 @@ def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
         ledger.cancel(status.id)
     for identity in ledger.delete_bakes(scene_id):
         forget(bake_path(data_dir, identity))
-        shutil.rmtree(bake_path(data_dir, identity), ignore_errors=True)
+        _remove(bake_path(data_dir, identity))
         shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
     with ledger.sessions.begin() as session:
         session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
         if (row := session.get(SceneRow, scene_id)) is not None:
             session.delete(row)
     forget(scene_path(data_dir, scene_id))
-    shutil.rmtree(scene_path(data_dir, scene_id), ignore_errors=True)
+    _remove(scene_path(data_dir, scene_id))
+
+
+def _remove(store: Path) -> None:
+    """Delete a store that no ledger names any more, where there is one."""
+    with suppress(OSError):
+        remove_folder(store)
 
 
 def _record(row: SceneRow) -> SceneRecord:

@@ -74,7 +74,8 @@ class Materials(NamedTuple):
     @classmethod
     def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]], before: Self | None = None) -> Self:
         """Project the terms of each, of a complete look. before: those of another, which hold what has not changed."""
-        each = [_projected(these, one) for these, one in zip(terms, before.each if before else [None] * len(terms))]
+        known = before.each if before is not None else [None] * len(terms)
+        each = [_projected(these, one) for these, one in zip(terms, known, strict=True)]
         if before is not None and all(map(operator.is_, each, before.each)):
             return before
         tables, lobes = Tables.joined([one.tables for one in each]), Lobes.joined([one.lobes for one in each])

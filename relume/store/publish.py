@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import warnings
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import zarr
 from zarr.storage import LocalStore
 
 from relume.errors import ChunkDamagedError, StoreError
-from relume.replacing import UNFINISHED, replacing
+from relume.replacing import UNFINISHED, remove_folder, replacing
 from relume.store.files import read_json
 from relume.store.reader import Reader, open_staging, rows_per_shard
 from relume.store.schema import MANIFEST_NAME, SCHEMA_VERSION
@@ -44,7 +43,7 @@ def publish(staging: Path, target: Path) -> int:
     num_bytes = _write_manifest(staging)
     target.parent.mkdir(parents=True, exist_ok=True)
     if target.exists():
-        shutil.rmtree(target)
+        remove_folder(target)
     staging.rename(target)
     return num_bytes
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from relume.errors import DiskFullError, RelumeError, is_no_room
+from relume.replacing import UNFINISHED
 
 if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
     from relume.scene.model import Scene
@@ -84,9 +85,9 @@ class ImportRequest:
         )
 
 
-def remove_stray_uploads(data: Path, older_than_s: float) -> None:
-    """Delete uploads that a killed server left behind; younger ones may be another server's."""
-    for folder in data.glob(f"{UPLOAD_PREFIX}*"):
+def remove_strays(data: Path, older_than_s: float) -> None:
+    """Delete uploads, and what was being deleted, that a killed server left; younger ones may be another server's."""
+    for folder in [*data.glob(f"{UPLOAD_PREFIX}*"), *data.glob(f"*/{UNFINISHED}/")]:
         with suppress(OSError):
             if time.time() - folder.stat().st_mtime > older_than_s:
                 shutil.rmtree(folder)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from relume.errors import DiskFullError, RelumeError
-from relume.replacing import UNFINISHED, replacing
+from relume.replacing import UNFINISHED, remove_folder, replacing
+from server.files.importing import remove_strays
 
 
 def write(path: Path, raised: BaseException | None = None) -> None:
@@ -60,3 +61,20 @@ def test_a_full_disk_is_said_in_a_sentence(tmp_path: Path, monkeypatch: pytest.M
 def test_a_missing_folder_is_said_in_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(RelumeError, match="check the folder"):
         write(tmp_path / "nowhere" / "a.bin")
+
+
+def test_a_folder_is_gone_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "kept.zarr"
+    folder.mkdir()
+    (folder / "one").write_text("1")
+    found: list[bool] = []
+    monkeypatch.setattr("shutil.rmtree", lambda path, **_: found.append(folder.exists() or not (path / "one").exists()))
+    remove_folder(folder)  # as if it were killed then
+    assert found == [False]
+    remove_strays(tmp_path.parent, older_than_s=3600)
+    assert len(list(tmp_path.glob(UNFINISHED))) == 1
+    monkeypatch.undo()
+    remove_strays(tmp_path.parent, older_than_s=-1)
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(FileNotFoundError):
+        remove_folder(folder)
