@@ -14,8 +14,13 @@ import relume.operators.shade
 from relume.project.projector import Projector
 
 
+def leaves(term, contraction, lights, receivers, beside=None):
+    """As fine beside any other light."""
+    return Projector(term, contraction, lights, receivers)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def by_leaves() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(relume.operators.shade, "Shader", Projector)
+        patch.setattr(relume.operators.shade, "Shader", leaves)
         yield

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,16 +67,18 @@ def shaded_rows(
     receivers: Receivers,
     start: int,
     stop: int,
+    beside: F32 | None = None,
 ) -> F32:
     """Contract all curves of a term at receivers [start, stop). (stop - start, 3)
 
     Args:
         contractions: of the term's curves, none of them free, from `contract_levels`.
-        lights, receivers: what arrives, and where.
+        lights, receivers: what arrives, and where. beside: as `Shader` takes it.
     """
     if term.texels is not None and receivers.uv is not None:
         return texel_rows(term.texels, lights, receivers, start, stop)
-    return project_levels(term, contractions, lights, receivers, start, stop, Shader)[:, 0]
+    shader = Shader if beside is None else partial(Shader, beside=beside)
+    return project_levels(term, contractions, lights, receivers, start, stop, shader)[:, 0]
 
 
 def shade(

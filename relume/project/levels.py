@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -75,7 +75,7 @@ def project_levels(
     receivers: Receivers,
     start: int,
     stop: int,
-    projector: type[Projector | Shader] = Projector,
+    projector: Callable[[Term, Contraction, TriangleLights, Receivers], Projector | Shader] = Projector,
 ) -> F32:
     """`Projector.project`, or that of another projector, with the curves of each point's level.
 

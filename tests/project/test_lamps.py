@@ -89,6 +89,17 @@ def test_a_lamp_that_nobody_sees_gives_nothing():
     assert not Shader(term, contract(term, bands, None), NO_LIGHTS, hidden).project(0, SIDE**2).any()
 
 
+def test_beside_other_light_a_lamp_is_found_less_finely():
+    """To a thousandth of all; the other light is in none of it."""
+    term, bands = curves_of("ggx", ROOM["ggx"])
+    contraction, receivers = contract(term, bands, None), floor_under(make_local(PANEL))
+    beside = np.full((SIDE**2, 3), 2.0, np.float32)
+    alone = Shader(term, contraction, NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
+    found = Shader(term, contraction, NO_LIGHTS, receivers, beside).project(0, SIDE**2)[:, 0]
+    away = np.abs(found - alone)
+    assert 1e-6 < away.max() < 1e-3 * (2 + alone.max())
+
+
 def panel_in(columns, rows):
     """Triangles that the panel is made of. (2 columns · rows, 3, 3)"""
     corner, (e, f) = rectangle(PANEL)

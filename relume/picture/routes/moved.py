@@ -91,21 +91,23 @@ class MovedLights:
             return
         local = self._images.transfer.local
         rays = [local.preview_rays(source, light.visible[rows]) for source, light in lights]
-        out += self._shaded(material, live, rays).image
+        out += self._shaded(material, live, rays, Shaded(out).rows(material.num_samples)).image
 
     def _roughly(self, geometry: LightGeometry) -> PreviewLight:
         transfer, view = self._images.transfer, self._images.view
         key = transfer.key, "moved light", view.name, geometry
         return self._images.cache.passing.keep(key, lambda: transfer.local.preview(geometry, self._points()))
 
-    def _shaded(self, material: MaterialImage, live: LiveTerm, rays: list[LocalRays]) -> Shaded:
-        """What rays bring a term, in the threads of frames."""
+    def _shaded(
+        self, material: MaterialImage, live: LiveTerm, rays: list[LocalRays], beside: F32 | None = None
+    ) -> Shaded:
+        """What rays bring a term, in the threads of frames. beside: what is shown already, see `Shader`"""
         points = replace(self._receivers(material), rays=rays)
         contractions = contract_levels(live.term, live.target, None)
         rows = np.empty((material.num_samples, 3), np.float32)
 
         def add(start: int, stop: int) -> None:
-            rows[start:stop] = shaded_rows(live.term, contractions, NO_LIGHTS, points, start, stop)
+            rows[start:stop] = shaded_rows(live.term, contractions, NO_LIGHTS, points, start, stop, beside)
 
         for_shares(add, len(rows))
         return Shaded.of(rows)

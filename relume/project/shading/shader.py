@@ -31,10 +31,19 @@ class Shader:
         term: the BRDF term. contraction: its curves, none of them free and each of one setting, from `contract`.
         lights: triangles of the environment; `receivers` tell which of them each point sees.
         receivers: all points, and what arrives at them.
+        beside: what the term makes of other light, where that is known: beside much of it little need be found less
+            finely. (n, 3) float32
     """
 
-    def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
-        self._contraction, self._lights, self._receivers = contraction, lights, receivers
+    def __init__(
+        self,
+        term: Term,
+        contraction: Contraction,
+        lights: TriangleLights,
+        receivers: Receivers,
+        beside: F32 | None = None,
+    ) -> None:
+        self._contraction, self._lights, self._receivers, self._beside = contraction, lights, receivers, beside
         self._listed = ListedLights(term, contraction, lights, receivers)
         is_even = term.is_lambertian and contraction.kinds.size == 0
         self._even = EvenShader(term, contraction.constant, lights) if is_even else None
@@ -45,15 +54,16 @@ class Shader:
 
     def project(self, start: int, stop: int) -> F32:
         """Shade points [start, stop). (stop - start, 1, 3) float32, as `Projector.project` returns it"""
-        out = np.zeros((stop - start, 3, 1), np.float32)
-        if self._even is None:
+        beside = np.zeros((stop - start, 3), np.float32) if self._beside is None else self._beside[start:stop]
+        out = np.array(beside[..., None], order="C")
+        if self._even is not None:
+            out[:, :, 0] += self._even.shade(self._receivers, start, stop)
+        elif self._lights.num_lights:
             self._add_listed(start, stop, out)
-        else:
-            out[:, :, 0] = self._even.shade(self._receivers, start, stop)
         self._rays.add(start, stop, out)
         for lamp in self._lamps:
             self._add_lamp(lamp, start, stop, out)
-        return out.transpose(0, 2, 1)
+        return (out - beside[..., None]).transpose(0, 2, 1)
 
     def _add_lamp(self, lamp: ListedLamp, start: int, stop: int, out: F32) -> None:
         r, c = self._receivers, self._contraction
