@@ -25,6 +25,9 @@ def check_encoder() -> str:
 def write_video(frames: Path, fps: int, target: Path, cancelled: Callable[[], bool]) -> None:
     """Encode 0000.png, 0001.png, … of a folder as H.264; the file appears whole or not at all.
 
+    Its colours are those of Rec. 709 by that standard's matrix, with sRGB's curve, and the file says so: of a file that
+    does not, players guess by its size.
+
     Args:
         frames: the folder. fps: frames a second. target: file that ends in .mp4.
         cancelled: asked now and then.
@@ -32,11 +35,13 @@ def write_video(frames: Path, fps: int, target: Path, cancelled: Callable[[], bo
         ParameterError: there is no encoder. CancelledError: `cancelled` said so. RelumeError: it failed.
     """
     even = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # its colours are halved both ways
+    matrix = "scale=out_color_matrix=bt709:out_range=tv"
     with replacing(target) as unfinished:
         command = [
             check_encoder(), "-nostdin", "-y", "-loglevel", "error",
             "-framerate", str(fps), "-i", str(frames / "%04d.png"),
-            "-vf", even, "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p",
+            "-vf", f"{even},{matrix}", "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p",
+            "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-color_range", "tv",
             "-movflags", "+faststart", "-f", "mp4", str(unfinished),
         ]  # fmt: skip
         # nothing of it is a user's but a number

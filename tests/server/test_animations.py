@@ -2,6 +2,7 @@
 
 import math
 import shutil
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import numpy as np
 import OpenImageIO
 import pytest
 from fastapi.testclient import TestClient
+from PIL import Image
 from test_end_to_end import wait_until_done
 from test_moving_eyes import SIZE, bake, client, eye, scene
+
+from server.files.video import write_video
 
 __all__ = ["bake", "client", "scene"]  # fixtures
 
@@ -173,6 +177,23 @@ def test_a_video_is_made_where_there_is_an_encoder(
     assert answer.headers["content-type"] == "video/mp4"
     assert answer.content[4:8] == b"ftyp"
     assert len(client.get(f"{url}/frames/4").content) > 100
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed: no video can be made")
+def test_a_video_shows_the_colours_of_its_frames_and_says_by_which_matrix(tmp_path: Path) -> None:
+    colours = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [200, 100, 50], [30, 180, 160]], np.uint8)
+    for k in range(2):
+        Image.fromarray(np.kron(colours[None], np.ones((33, 33, 1), np.uint8))).save(tmp_path / f"{k:04d}.png")
+    write_video(tmp_path, 25, tmp_path / "video.mp4", lambda: False)
+    read = ["ffmpeg", "-loglevel", "info", "-i", str(tmp_path / "video.mp4"), "-frames:v", "1"]
+    matrix = [
+        "-vf",
+        "scale=in_color_matrix=bt709:in_range=tv,format=rgb24",
+    ]
+    done = subprocess.run([*read, *matrix, str(tmp_path / "seen.png")], capture_output=True, text=True, check=True)
+    assert "yuv420p(tv, bt709/bt709/iec61966-2-1" in done.stderr
+    seen = np.asarray(Image.open(tmp_path / "seen.png"))[16, 16::33][: len(colours)]
+    assert np.abs(seen.astype(int) - colours).max() <= 4
 
 
 def test_looks_of_frames_are_told_as_they_will_be_rendered(
