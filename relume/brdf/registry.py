@@ -19,6 +19,7 @@ from relume.brdf.terms.measured import MEASURED_HD, MEASURED_HF, MEASURED_LV
 from relume.brdf.terms.oren_nayar import OREN_NAYAR
 from relume.brdf.terms.phong import PHONG
 from relume.brdf.terms.schlick import SCHLICK
+from relume.brdf.terms.sheen import SHEEN
 from relume.brdf.terms.ward import WARD
 from relume.brdf.terms.ward_anisotropic import WARD_ANISOTROPIC
 from relume.brdf.terms.ward_duer import WARD_DUER
@@ -26,7 +27,7 @@ from relume.brdf.terms.ward_duer import WARD_DUER
 _ALL = (
     LAMBERT, OREN_NAYAR,
     PHONG, BLINN_PHONG, LAFORTUNE, WARD, WARD_DUER, WARD_ANISOTROPIC, ASHIKHMIN_SHIRLEY,
-    COOK_TORRANCE, SCHLICK, BEARD_MAXWELL, GGX, GGX_MULTIPLE,
+    COOK_TORRANCE, SCHLICK, BEARD_MAXWELL, GGX, GGX_MULTIPLE, SHEEN,
     MEASURED_LV, MEASURED_HD, MEASURED_HF, MEASURED_BTF,
 )  # fmt: skip
 

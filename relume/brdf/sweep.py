@@ -13,7 +13,10 @@ _FROM_A_PLANE = (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
 
 
 def moved_curves(term: Term, parameter: str) -> tuple[Curve, ...]:
-    """The curves inside the transport that read a parameter; those of the outgoing angle multiply finished samples."""
+    """The curves inside the transport that a parameter alone moves; those of the outgoing angle multiply finished
+    samples, and what is fixed moves more than curves."""
+    if parameter in term.fixed:
+        return ()
     return tuple(curve for curve in term.curves if parameter in curve.parameters and not curve.outgoing)
 
 

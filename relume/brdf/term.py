@@ -111,11 +111,12 @@ class Term:
             loops; zero where either direction is below the horizon. With three channels, three values, channels first.
         source: the equation it is built from.
         texture: the texture channel it takes by default, "diffuse" or "specular".
-        fixed: parameters that no curve reads: they shape the quotient or an angle, and changing one freezes anew.
+        fixed: parameters that shape the quotient or an angle, whatever curves read them: changing one freezes anew.
         settle: `fixed_values` -> the fields of this declaration that they change; as declared they hold for the
             defaults.
         num_channels: of the quotient, 1 or 3.
         is_lambertian: whether the quotient is one value above the horizon.
+        is_steep: whether the quotient, times cos θi, varies with the light where no curve tells that anything does.
         data: where documents must name something measured that is kept there; it is fixed at freeze too.
         texels: where each place of a surface has a BRDF of its own, of which the quotient is the mean; from `settle`.
         width: the parameter that maps of roughness scale, and the power of a roughness that it grows with.
@@ -133,6 +134,7 @@ class Term:
     settle: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
     num_channels: int = 1
     is_lambertian: bool = False
+    is_steep: bool = False
     data: AssetStore | None = None
     texels: Any = None
     width: tuple[str, float] | None = None

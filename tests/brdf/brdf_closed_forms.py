@@ -139,10 +139,27 @@ def oren_nayar(wi, wo, sigma, albedo):
     return np.maximum(once + twice, 0) / np.pi
 
 
+def sheen(wi, wo, roughness):
+    """KHR_materials_sheen, D and V as the specification's appendix writes them."""
+    alpha = roughness**2
+    sine2 = 1 - half_vector(wi, wo)[..., 2] ** 2
+    fibres = (2 + 1 / alpha) * sine2 ** (0.5 / alpha) / (2 * np.pi)
+
+    def exponent(x):
+        one, other = (25.3245, 3.32435, 0.16801, -1.27393, -4.85967), (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
+        a, b, c, d, e = (1 - (1 - alpha) ** 2) * np.array(other) + (1 - alpha) ** 2 * np.array(one)
+        return a / (1 + b * x**c) + d * x + e
+
+    def hidden(cosine):
+        return np.where(cosine < 0.5, np.exp(exponent(cosine)), np.exp(2 * exponent(0.5) - exponent(1 - cosine)))
+
+    return fibres / ((1 + hidden(wi[..., 2]) + hidden(wo[..., 2])) * 4 * wi[..., 2] * wo[..., 2])
+
+
 CLOSED_FORMS = {
     f.__name__: f
     for f in (
         lambert, oren_nayar, phong, blinn_phong, lafortune, ward, ward_duer, ward_anisotropic, ashikhmin_shirley,
-        cook_torrance, schlick, beard_maxwell, ggx,
+        cook_torrance, schlick, beard_maxwell, ggx, sheen,
     )
 }  # fmt: skip

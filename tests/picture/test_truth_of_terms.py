@@ -35,6 +35,7 @@ CASES = {
     "beard_maxwell": ({"sigma": 0.2, "tau": 20.0}, UNMASKED),
     "ggx": ({"roughness": 0.45, "f0": 0.4}, HIGHLIGHT),
     "ggx_multiple": ({"roughness": 0.9, "f0": 0.9}, SHADOWS),
+    "sheen": ({"roughness": 0.6}, UNMASKED),
 }
 
 

@@ -47,7 +47,8 @@ class Shader:
         self._listed = ListedLights(term, contraction, lights, receivers)
         is_even = term.is_lambertian and contraction.kinds.size == 0
         self._even = EvenShader(term, contraction.constant, lights) if is_even else None
-        groups = lights.groups if contraction.kinds.size else None  # nothing else tells how a quotient varies
+        is_told = contraction.kinds.size > 0 and not term.is_steep  # by curves, how the term varies within a group
+        groups = lights.groups if is_told else None
         self._grouped = groups and GroupedLights(term, contraction, groups, lights.num_lights, receivers)
         self._rays = RayProjector(term, contraction, receivers, POINTS_A_BLOCK)
         self._lamps = listed_lamps(term, contraction, receivers)

@@ -233,9 +233,7 @@ class MaterialReader:
         tint = np.array(sheen.sheenColorFactor) * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {what}")
         r, g, b = (round(float(value), 6) for value in tint)
         if r + g + b > 0:
-            self._warnings.append(
-                simplified(f"the sheen of {what} is four drawn curves; its masking is a product of two of them")
-            )
+            self._warnings.append(simplified(f"what lies under the sheen of {what} is dimmed by two curves' product"))
         return Over(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
 
     def _anisotropy(self, layers: Layers, what: str) -> tuple[float, float]:

@@ -2,8 +2,8 @@
 
 Base: lambert times the mean of (1 - F) of what is not metal, and ggx, F = f90 · schlick(f0 / f90). Anisotropic:
 ashikhmin_shirley instead of ggx, its exponents from the widths of the facet distribution, n = 2/α² - 2 (Walter 2007,
-section 5.2). Clearcoat: a second ggx; sheen: drawn curves. What lies under a coat or sheen is dimmed by what these
-reflect towards the viewer, by a factor on its curve of θo.
+section 5.2). Clearcoat: a second ggx. What lies under a coat is dimmed by what that reflects towards the viewer, by a
+factor on its curve of θo; what lies under a sheen on that of θi, too.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from relume.brdf.fresnel import schlick
 from relume.brdf.mirror import SOFT
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Term
-from relume.scene.gltf.sheen import sheen_albedo, sheen_term
+from relume.scene.gltf.sheen import below_sheen, sheen_term
 from relume.scene.model import Texture
 
 F64 = NDArray[np.float64]
@@ -73,11 +73,13 @@ def make_terms(surface: Surface, over: Over) -> Terms:
         _highlight(surface, over.anisotropy) | {"texture": textures["specular"]},
     ]
     if any(over.sheen):
-        layers = _under(layers, lambda theta: max(over.sheen) * sheen_albedo(theta, over.sheen_roughness))
+        layers = [_below_sheen(layer, over) for layer in layers]
         layers.append(sheen_term(over.sheen, over.sheen_roughness))
     if over.coat > 0:
         params = _within(TERMS["ggx"], roughness=over.coat_roughness, f0=COAT_F0)
-        layers = _under(layers, lambda theta: over.coat * schlick(np.cos(theta), COAT_F0))
+        layers = [
+            _dimmed(layer, "theta_o", lambda angle: 1 - over.coat * schlick(np.cos(angle), COAT_F0)) for layer in layers
+        ]
         layers.append({"model": "ggx", "color": [over.coat] * 3, "params": params, "texture": None})
     return tuple(layers)
 
@@ -111,19 +113,22 @@ def _within(term: Term, **values: Any) -> dict[str, Any]:
     return held
 
 
-def _under(layers: list[dict[str, Any]], reflected: Callable[[F64], F64]) -> list[dict[str, Any]]:
-    """Layers below one that reflects this share of the light towards a viewer, by θo."""
-    return [layer | {"curves": _dimmed(layer, reflected)} for layer in layers]
+def _below_sheen(layer: dict[str, Any], over: Over) -> dict[str, Any]:
+    """What a layer sends through a sheen."""
+    by_light = any(curve.name == "theta_i" for curve in TERMS[layer["model"]].curves)
+    light, view = below_sheen(max(over.sheen), over.sheen_roughness, by_light=by_light)
+    layer = _dimmed(layer, "theta_i", light) if by_light else layer
+    return _dimmed(layer, "theta_o", view)
 
 
-def _dimmed(layer: dict[str, Any], reflected: Callable[[F64], F64]) -> dict[str, Any]:
-    """The curves of a layer, its curve of θo dimmed."""
-    num_bands = TERMS[layer["model"]].curve("theta_o").num_bands
-    keep = band_averages(lambda theta: np.clip(1 - reflected(theta), 0, 1), num_bands)
+def _dimmed(layer: dict[str, Any], name: str, kept: Callable[[F64], F64]) -> dict[str, Any]:
+    """A layer with a curve of which this share is kept."""
+    num_bands = TERMS[layer["model"]].curve(name).num_bands
+    keep = band_averages(lambda theta: np.clip(kept(theta), 0, 1), num_bands)
     curves = layer.get("curves", {})
-    drawn = curves.get("theta_o", {"factors": [1.0] * num_bands, "channels": "rgb"})
+    drawn = curves.get(name, {"factors": [1.0] * num_bands, "channels": "rgb"})
     kind = "bands" if "bands" in drawn else "factors"
-    return {**curves, "theta_o": {**drawn, kind: np.round(np.array(drawn[kind]) * keep, 6).tolist()}}
+    return layer | {"curves": {**curves, name: {**drawn, kind: np.round(np.array(drawn[kind]) * keep, 6).tolist()}}}
 
 
 def _rounded(color: Any) -> list[float]:
