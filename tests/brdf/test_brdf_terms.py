@@ -27,7 +27,7 @@ def random_params(model, rng):
     return params
 
 
-def directional_albedo(document, theta_o, num=300):
+def directional_albedo(document, theta_o, num=200):
     """∫ f cos θi dωi by Gauss-Legendre in cos θi and even steps in φ."""
     x, w = np.polynomial.legendre.leggauss(num)
     mu = 0.5 * (x + 1)
