@@ -25,6 +25,7 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
     from pydantic import ValidationError
 
     from relume.errors import ParameterError
+    from relume.imageio.ocio.current import use
     from server.library.shelves import shelves
     from server.settings import Settings
 
@@ -38,6 +39,7 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
     settings.data.mkdir(parents=True, exist_ok=True)
     for store, folder in shelves(settings.data):
         store.use(folder)
+    use(settings.ocio, settings.ocio_space)
     return settings
 
 

@@ -25,10 +25,12 @@ def demo(
 ) -> None:
     """Bake the built-in scene if it is not there, serve it, and open the editor."""
     from cli.data_folder import open_settings
+    from relume.imageio.ocio.current import current
     from server.app import serve
 
     settings = open_settings(data, port=port)
     check_port(settings.host, settings.port)
+    current()  # what is wrong with a config is said before anything runs
     threading.Thread(target=_bake, args=(settings, browser), name="relume-demo", daemon=True).start()
     serve(settings)
 

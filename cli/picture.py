@@ -36,6 +36,7 @@ def save_exr(
     layering: Any,
     precision: Literal["half", "float"],
     stills: Any = None,
+    color_space: str | None = None,
 ) -> None:
     """Render a look, with the layers that are asked for, see `relume.exr.layers`, and say how far it is."""
     from rich.console import Console
@@ -44,12 +45,14 @@ def save_exr(
     from relume.exr.attributes import attributes_of
     from relume.exr.layers import layers_for
     from relume.exr.picture import export_exr
+    from relume.exr.space import space_called
     from relume.picture.transfer import Axis
     from relume.render.image import render_image
 
     of = transfer.views[view]
     layers = layers_for(layering, look, reflects=Axis.BOUNCES in transfer.axes)
-    attributes = attributes_of(origin, of.camera, (of.width, of.height), look, layers)
+    space = space_called(color_space)
+    attributes = attributes_of(origin, of.camera, (of.width, of.height), look, layers, space)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("render", total=1.0)
         export_exr(
@@ -60,4 +63,5 @@ def save_exr(
             attributes,
             precision,
             lambda share: progress.update(bar, completed=share),
+            space,
         )

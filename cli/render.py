@@ -26,6 +26,10 @@ def render(
         bool, typer.Option("--light-groups", help="EXR: layers of direct and of reflected light of each light instead.")
     ] = False,
     full_float: Annotated[bool, typer.Option("--float", help="EXR: full floats instead of half ones.")] = False,
+    color_space: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="EXR: a linear colour space of the config RELUME_OCIO. [default: Rec. 709]"),
+    ] = None,
     turntable: Annotated[
         int | None,
         typer.Option(metavar="N", help="N frames once around as PNG, of a moving bake, into a folder."),
@@ -58,8 +62,10 @@ def render(
     else:
         check_frames(output, turntable, resume)
     is_exr = turntable is None and output.suffix.lower() == ".exr"
-    if (layers or light_groups or full_float) and not is_exr:
-        raise ParameterError("--output", output.name, "a file name that ends in .exr, for layers and --float")
+    if (layers or light_groups or full_float or color_space) and not is_exr:
+        raise ParameterError(
+            "--output", output.name, "a file name that ends in .exr, for layers, --float, --color-space"
+        )
     layering = _layering(layers, light_groups)
     partial = read_look(look)
     service = open_bakes(open_settings(data))
@@ -83,7 +89,7 @@ def render(
         elif is_exr:
             origin = Origin(record.id, record.name, bake.id)
             precision: Literal["half", "float"] = "float" if full_float else "half"
-            save_exr(output, transfer, view_name, document, origin, layering, precision, stills=stills)
+            save_exr(output, transfer, view_name, document, origin, layering, precision, stills, color_space)
         else:
             image = render_image(transfer, view_name, document, for_display=True, stills=stills)
             save(output, image, document)

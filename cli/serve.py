@@ -25,6 +25,7 @@ Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Port to listen
 def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, scheduler: Scheduler = None) -> None:
     """Serve the editor and the API, with an embedded worker unless --scheduler names a cluster."""
     from cli.data_folder import open_settings
+    from relume.imageio.ocio.current import current
     from server.app import serve as run_server
     from worker.database import open_database
 
@@ -33,6 +34,7 @@ def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, schedule
     settings = open_settings(folder, database=data if is_url else None, host=host, port=port, scheduler=scheduler)
     check_port(settings.host, settings.port)
     open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
+    current()  # likewise
     where = address(settings.host, settings.port)
     run_server(settings, tell_started=lambda: typer.echo(f"relume listens on {where}", err=True))
 

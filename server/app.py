@@ -10,6 +10,7 @@ from importlib.metadata import version
 import uvicorn
 from fastapi import FastAPI
 
+from relume.imageio.ocio.current import current, using
 from server import errors
 from server.access.gate import Gate
 from server.guard import Guard
@@ -24,6 +25,7 @@ from server.routes import (
     built_ins,
     cameras,
     client,
+    color,
     comments,
     comparisons,
     finder,
@@ -49,6 +51,7 @@ ROUTE_GROUPS = (
     comments,
     finder,
     built_ins,
+    color,
     models,
     materials,
     btfs,
@@ -88,7 +91,8 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with shelves_at(settings.data):
+        with shelves_at(settings.data), using(settings.ocio, settings.ocio_space):
+            current()  # what is wrong with it is said now
             opening = open_services(settings, metrics, leave, open_library, open_bakes, open_batches, clock)
             async with opening as services:
                 app.state.services = services

@@ -35,6 +35,10 @@ Network = Annotated[str, AfterValidator(_check_network)]
 """An IP address, or a network as 10.0.0.0/8."""
 
 
+Config = Annotated[str | None, AfterValidator(lambda text: None if text == "none" else text)]
+"""What OpenColorIO takes for a config, or "none"."""
+
+
 class Settings(BaseSettings):
     """Settings of one server process; unknown RELUME_ variables are left to the other parts."""
 
@@ -45,6 +49,12 @@ class Settings(BaseSettings):
     host: str = Field(default="127.0.0.1", description="address to listen on")
     port: int = Field(default=8420, ge=0, le=65535, description="port to listen on")
     scheduler: str | None = Field(default=None, description="tcp://… of a Dask scheduler; unset: an embedded worker")
+    ocio: Config = Field(
+        default_factory=lambda: os.environ.get("OCIO") or None,
+        validate_default=True,
+        description="OpenColorIO config: .ocio or .ocioz file, ocio://… of a built-in one, or none; unset: OCIO",
+    )
+    ocio_space: str | None = Field(default=None, description="the config's name of linear Rec. 709, if it is not found")
     client: Path = Field(
         default=Path(__file__).resolve().parent.parent / "client_web" / "dist", description="the built editor"
     )

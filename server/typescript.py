@@ -14,13 +14,27 @@ from pydantic.json_schema import models_json_schema
 
 from relume.brdf.document import MAX_CURVE_VALUE, MAX_POINTS
 from relume.checks import MAX_COLOR
+from relume.imageio.ocio.lut import GAIN, SIZE
 from relume.look import LightLook, Look
 from relume.look.document import DEFAULTS, MAX_TERMS, RANGES
 from relume.look.lights import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.checks import MAX_LIGHT_NAME, MAX_LIGHTS
 from server.ts_syntax import interface, literal, union
-from server.wire import access, bodies, btfs, cameras, comments, message, models, protocol, renders, rooms, surface
+from server.wire import (
+    access,
+    bodies,
+    btfs,
+    cameras,
+    color,
+    comments,
+    message,
+    models,
+    protocol,
+    renders,
+    rooms,
+    surface,
+)
 
 CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
@@ -74,6 +88,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     cameras.FinderBody,
     cameras.PlaceBody,
     bodies.BuiltInBody,
+    color.ColorBody,
     models.ModelBody,
     models.InOutBody,
     models.AlbedoBody,
@@ -108,6 +123,8 @@ def generate_protocol() -> str:
         parts.append(f"export const {name} = {literal(value)};")
     parts.append(f"export const MAX_PERSON_NAME = {rooms.MAX_PERSON_NAME};")
     parts.append(f"export const MAX_COMMENT = {comments.MAX_COMMENT};")
+    parts.append(f"export const LUT_SIZE = {literal(SIZE)};")
+    parts.append(f"export const LUT_GAIN = {literal(GAIN)};")
     for mode, of_mode in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in of_mode], by_alias=True)  # type: ignore[misc]
         parts.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))

@@ -18,10 +18,10 @@ export interface DirectionalLook {
   direction: [number, number, number];
 }
 
-/** How radiance becomes a picture: `exposure` in stops, then the tone map. */
+/** How radiance becomes a picture: `exposure` in stops, then the tone map, or a view of an OpenColorIO config. */
 export interface DisplayLook {
   exposure: number;
-  tone_map: "agx" | "filmic" | "none";
+  tone_map: "agx" | "filmic" | "none" | OcioView;
 }
 
 /** A curve drawn by hand: `points`, [degrees, value], or `bands`, J values or three times J; or a change to one of them or to what the parameters give: `factors` and `offsets` of bands, `handles`, [degrees, was, becomes]. */
@@ -66,6 +66,12 @@ export interface MeshLook {
   emission: [number, number, number];
   kind: "mesh";
   material: string;
+}
+
+/** A view of a display of the server's OpenColorIO config, in the place of a tone map. */
+export interface OcioView {
+  display: string;
+  view: string;
 }
 
 /** Shines alike in all directions; emission is radiant intensity, W/sr. */

@@ -17,6 +17,10 @@ export const MAX_PERSON_NAME = 40;
 
 export const MAX_COMMENT = 2000;
 
+export const LUT_SIZE = 65;
+
+export const LUT_GAIN = 128;
+
 /** client → server: this frame was received and shown. */
 export interface AckMessage {
   type: "ack";
@@ -147,7 +151,7 @@ export interface ProbeMessage {
   y: number;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the values. Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709. Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
 export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
@@ -160,6 +164,7 @@ export interface RenderRequest {
   name?: string | null;
   layers?: boolean | "light_groups";
   precision?: "half" | "float";
+  color_space?: string | null;
   fps?: number;
   exact?: boolean;
 }
@@ -337,6 +342,16 @@ export interface CameraInfo {
   yfov: number;
 }
 
+/** Without a config all of it is null or empty. `id` changes with the config; `default`: the view that the config shows unasked; `working`: its name of linear Rec. 709; `spaces`: its linear colour spaces, in which EXR files may be rendered. */
+export interface ColorBody {
+  id: string | null;
+  name: string | null;
+  working: string | null;
+  displays: DisplayBody[];
+  default: ViewBody | null;
+  spaces: string[];
+}
+
 /** A comment. `picture`: address of the picture of the moment, relative to the server, null where there is none. */
 export interface CommentBody {
   id: string;
@@ -377,6 +392,12 @@ export interface CurveMessage {
   bands: number[][];
   generated: number[][];
   max_degrees: number;
+}
+
+/** A display and its views, in the config's order. */
+export interface DisplayBody {
+  name: string;
+  views: string[];
 }
 
 /** The answer to a dry run: nothing was queued. */
@@ -843,6 +864,12 @@ export interface TruthFigures {
 export interface TruthPlanBody {
   passes: number;
   seconds: number;
+}
+
+/** A view of a display, as looks name it in `display.tone_map`. */
+export interface ViewBody {
+  display: string;
+  view: string;
 }
 
 /** A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere. Then `bounds` are the lowest and the highest corner of what there is to see, metres. */

@@ -9,6 +9,7 @@ export type {
   BakeRequest,
   BtfWorkBody,
   BuiltInBody,
+  ColorBody,
   CameraEntry,
   CommentBody,
   CommentRequest,
@@ -52,8 +53,8 @@ export type {
   TruthRequest,
   Turntable,
 } from "./protocol.gen";
-export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, TransportLook as Transport } from "./look.gen";
-export { MAX_COMMENT, MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
+export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, OcioView, TransportLook as Transport } from "./look.gen";
+export { LUT_GAIN, LUT_SIZE, MAX_COMMENT, MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VIEWS_SHOWN, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];

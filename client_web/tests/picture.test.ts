@@ -1,13 +1,13 @@
 import { crc32, deflateSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
-import { srgbDecode, srgbEncode, toDisplay } from "../src/color/tonemap";
+import { srgbDecode, srgbEncode, toDisplay, type ShownToneMap } from "../src/color/tonemap";
 import { decodeIds } from "../src/picture/png16";
 import { FIT, fitWidth, pan, shownWidth, toPicture, toScreen, zoomAt } from "../src/picture/transform";
 import type { Rgb } from "../src/protocol";
 
 describe("tone maps", () => {
   // what the server's own tone map gives at +0.5 stops
-  const reference: [string, Rgb, Rgb][] = [
+  const reference: [ShownToneMap, Rgb, Rgb][] = [
     ["none", [0.18, 0.18, 0.18], [0.54157, 0.54157, 0.54157]],
     ["none", [1, 0.2, 0.05], [1, 0.56835, 0.29484]],
     ["agx", [0.18, 0.18, 0.18], [0.55915, 0.55923, 0.55924]],

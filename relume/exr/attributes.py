@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.exr.layers import Layer
-from relume.imageio.primaries import REC_709
+from relume.exr.space import OURS, Space
 from relume.look import Look
 from relume.scene.model import Camera
 
 F64 = NDArray[np.float64]
 
-UNITS = "radiance in W/(sr m^2), linear Rec. 709; lengths in m, right-handed, +Y up; angles in degrees"
+UNITS = "radiance in W/(sr m^2), {space}; lengths in m, right-handed, +Y up; angles in degrees"
 _FLIP_Z = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
@@ -37,7 +37,7 @@ class Origin:
 
 
 def attributes_of(
-    origin: Origin, camera: Camera, size: tuple[int, int], look: Look, layers: Sequence[Layer]
+    origin: Origin, camera: Camera, size: tuple[int, int], look: Look, layers: Sequence[Layer], space: Space = OURS
 ) -> dict[str, str | float | F64]:
     """Attributes of an OpenEXR file; those with a colon are ours, and but for plain text they hold JSON.
 
@@ -47,19 +47,22 @@ def attributes_of(
         size: width and height, in pixels.
         look: that is shown, whole.
         layers: of the file, besides the picture itself; what each holds is listed by its name.
+        space: that its values are in.
     """
     environment = look.environment.map
     seen_from = {"view": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
     return {
         "Software": f"relume {version('relume')}",
-        "chromaticities": np.array(REC_709),
+        "chromaticities": np.array(space.chromaticities),
+        **({} if space.interop is None else {"oiio:ColorSpace": space.interop}),
         "worldToCamera": world_to_camera(camera),
         "worldToNDC": world_to_ndc(camera, size),
         "screenWindowWidth": 2 * float(np.tan(camera.yfov / 2)) * size[0] / size[1],
         "relume:camera": _json(seen_from),
         "relume:look": _json(look.model_dump(mode="json", exclude_unset=True)),  # only grounds may name `catcher`
         "relume:environment": "of the scene" if environment is None else environment,
-        "relume:units": UNITS,
+        **({} if space is OURS else {"relume:colorSpace": _json(space.name)}),
+        "relume:units": UNITS.format(space="linear Rec. 709" if space is OURS else "linear as chromaticities say"),
         "relume:scene": origin.scene,
         "relume:sceneName": _json(origin.scene_name),
         "relume:bake": origin.bake,

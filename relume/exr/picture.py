@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.exr.layers import Layer
+from relume.exr.space import OURS, Space
 from relume.imageio.exr import LARGEST_HALF, Attributes, Precision, channels_of, write_exr
 from relume.look import Look
 
@@ -26,6 +27,7 @@ def export_exr(
     attributes: Attributes,
     precision: Precision = "half",
     progress: Progress = lambda share: None,
+    space: Space = OURS,
 ) -> None:
     """Render a look and its layers, one after another, and write them; no more than one is in memory at a time.
 
@@ -36,6 +38,7 @@ def export_exr(
         attributes: of the file, as `attributes_of` makes them.
         precision: of the values.
         progress: called with the share done, in [0, 1].
+        space: that the values are written in, as `attributes` says.
     Raises:
         RelumeError: the file cannot be written. What `render` raises; then there is no file.
     """
@@ -47,7 +50,7 @@ def export_exr(
             def share_of_all(share: float, k: int = k) -> None:
                 progress((k + share) / len(pictures))
 
-            image = render(of, share_of_all)
+            image = space.converted(render(of, share_of_all))
             image = image[..., :3] if name else image  # coverage is the picture's
             channels += channels_of(_on_disk(Path(folder) / f"{k}.npy", image, precision), name)
         write_exr(path, channels, attributes, precision)

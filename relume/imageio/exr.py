@@ -56,7 +56,6 @@ def write_scanlines(path: Path, channels: Channels, attributes: Attributes, prec
     specification = OpenImageIO.ImageSpec(width, height, len(channels), _TYPES[precision])
     specification.channelnames = tuple(name for name, _ in channels)
     specification.attribute("compression", "zip")
-    specification.attribute("oiio:ColorSpace", "lin_rec709_scene")
     for name, value in attributes.items():
         _add(specification, name, value)
     output = OpenImageIO.ImageOutput.create(str(path))

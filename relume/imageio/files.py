@@ -12,6 +12,7 @@ from PIL import Image
 
 from relume.errors import ParameterError, ShapeMismatchError
 from relume.imageio.exr import channels_of, write_scanlines
+from relume.imageio.ocio.view import OcioView
 from relume.imageio.tonemap import tone_map
 from relume.replacing import replacing
 
@@ -30,7 +31,7 @@ def png_bytes(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     return buffer.getvalue()
 
 
-def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: str = "agx") -> None:
+def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: str | OcioView = "agx") -> None:
     """Write a picture in the format that its name ends in; the file appears whole or not at all.
 
     Args:
@@ -52,11 +53,11 @@ def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: st
         write(unfinished, image, exposure, tone_map_name)
 
 
-def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
-    write_scanlines(path, channels_of(image), {}, "float")
+def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
+    write_scanlines(path, channels_of(image), {"oiio:ColorSpace": "lin_rec709_scene"}, "float")
 
 
-def _displayed(image: F32, exposure: float, tone_map_name: str) -> NDArray[np.uint8]:
+def _displayed(image: F32, exposure: float, tone_map_name: str | OcioView) -> NDArray[np.uint8]:
     """What the screen shows of the surfaces themselves, and how much of each pixel they cover."""
     alpha = np.clip(image[..., 3:], 0, 1)
     surfaces = image[..., :3] if image.shape[2] == 3 else image[..., :3] / np.maximum(alpha, 1e-6)
@@ -64,15 +65,15 @@ def _displayed(image: F32, exposure: float, tone_map_name: str) -> NDArray[np.ui
     return np.concatenate([to_bytes(shown), to_bytes(alpha)], axis=-1)
 
 
-def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
+def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
     path.write_bytes(png_bytes(_displayed(image, exposure, tone_map_name)))
 
 
-def _write_webp(path: Path, image: F32, exposure: float, tone_map_name: str) -> None:
+def _write_webp(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
     Image.fromarray(_displayed(image, exposure, tone_map_name)).save(path, "WEBP", quality=92, method=4)
 
 
-_WRITERS: dict[str, Callable[[Path, F32, float, str], None]] = {
+_WRITERS: dict[str, Callable[[Path, F32, float, str | OcioView], None]] = {
     ".exr": _write_exr,
     ".png": _write_png,
     ".webp": _write_webp,

@@ -7,7 +7,7 @@ from XYZ by the inverse for Rec. 709. So the file's white stays white.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,21 @@ from numpy.typing import NDArray
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
-REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""x and y of red, green, blue and white (ITU-R BT.709-6), in the order of both formats."""
+Chromaticities = tuple[float, float, float, float, float, float, float, float]
+"""x and y of red, green, blue and white, in the order of both formats."""
+
+REC_709: Chromaticities = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+"""ITU-R BT.709-6."""
+
+KNOWN: Mapping[str, Chromaticities] = {
+    "lin_rec709_scene": REC_709,
+    "lin_ap0_scene": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),  # ACES2065-1
+    "lin_ap1_scene": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),  # ACEScg
+    "lin_rec2020_scene": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
+    "lin_p3d65_scene": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
+    "lin_adobergb_scene": (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.3290),
+}
+"""Linear spaces in use, by the ids that files name them by (ASWF Color Interop Forum)."""
 
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _FURTHEST = 2.0  # of a coordinate from 0; primaries that enclose all colours are within 1.1
@@ -24,6 +37,8 @@ _LEAST_WHITE = 0.1  # y of a white
 _LEAST_AREA = 0.01  # of the primaries' triangle, twice; Rec. 709 has 0.22
 _MOST_GAIN = 10.0  # of a channel in the result; of the widest primaries in use it is 2.5
 _SAME = 2e-3  # files round, and some write D65 with three digits
+_SAME_MATRIX = 5e-4  # of a matrix: AP1 and Rec. 2020, the most alike of those in use, differ by sixty times that
+_LEAST_SUM = 1e-6  # X + Y + Z of a primary
 _ROWS_AT_ONCE = 256
 
 
@@ -52,6 +67,35 @@ def to_rec_709(chromaticities: Sequence[float]) -> F64 | None:
     if not np.abs(matrix).max() <= _MOST_GAIN:
         raise ValueError("its primaries lie too close together")
     return np.asarray(matrix)
+
+
+def known_as(matrix: F64) -> str | None:
+    """The id of a linear space that is in use. matrix: what its red, green and blue are in Rec. 709. (3, 3), columns"""
+    for name, chromaticities in KNOWN.items():
+        theirs = to_rec_709(chromaticities)
+        if np.abs(matrix - (np.eye(3) if theirs is None else theirs)).max() <= _SAME_MATRIX:
+            return name
+    return None
+
+
+def chromaticities_of(matrix: F64) -> Chromaticities:
+    """Primaries and white by which a file's reader finds the matrix: those that it has where the white is ours.
+
+    Args:
+        matrix: what red, green and blue are in Rec. 709. (3, 3), columns
+    Raises:
+        ValueError: no primaries do that.
+    """
+    ours = _to_xyz(np.array(REC_709)) @ matrix
+    corners = np.column_stack([ours, ours.sum(axis=1)])
+    sums = corners.sum(axis=0)
+    if np.abs(sums).min() < _LEAST_SUM:
+        raise ValueError("one of its primaries is no colour")
+    values = (corners[:2] / sums).T.ravel()
+    found = to_rec_709(values)
+    if not np.allclose(np.eye(3) if found is None else found, matrix, atol=_SAME):
+        raise ValueError("its white is not ours")
+    return tuple(map(float, values))  # type: ignore[return-value]
 
 
 def convert(pixels: F32, matrix: F64) -> None:

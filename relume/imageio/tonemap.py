@@ -1,5 +1,7 @@
 """From linear radiance to what a screen shows: exposure, tone map, sRGB. The editor's shader does the same sums.
 
+A view of an OpenColorIO config may stand in the place of tone map and sRGB: what it gives is what its display is sent.
+
 `agx`: Troy Sobotka's AgX, base look, its curve as the polynomial of Benjamin Wrensch ("Minimal AgX Implementation",
 2023). `filmic`: Krzysztof Narkowicz, "ACES Filmic Tone Mapping Curve", 2015. `none`: clipped at one.
 """
@@ -13,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError, ShapeMismatchError
+from relume.imageio.ocio.current import needed
+from relume.imageio.ocio.view import OcioView
 from relume.parallel import for_ranges
 
 F32 = NDArray[np.float32]
@@ -87,23 +91,33 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
                 out[k, c] = _srgb(_filmic(rgb[c]) if kind == _FILMIC else rgb[c])
 
 
-def tone_map(image: F32, exposure: float, name: str) -> F32:
-    """Display values of linear radiance, sRGB-encoded.
+def tone_map(image: F32, exposure: float, name: str | OcioView) -> F32:
+    """Display values of linear radiance, sRGB-encoded, or as a view's display has them.
 
     Args:
         image: linear Rec. 709; negative values and NaN are black. (height, width, 3) float32
-        exposure: stops. name: one of TONE_MAPS.
+        exposure: stops. name: one of TONE_MAPS, or a view of the config in use.
     Returns:
         In [0, 1]. (height, width, 3) float32
     Raises:
         ParameterError: no tone map of that name. ShapeMismatchError: not an RGB image.
     """
-    if name not in TONE_MAPS:
-        raise ParameterError("tone_map", name, f"one of {', '.join(TONE_MAPS)}")
     if image.ndim != 3 or image.shape[2] != 3:
         raise ShapeMismatchError(f"an image has the shape (height, width, 3), not {image.shape}; reshape it")
-    pixels = np.ascontiguousarray(image, np.float32).reshape(-1, 3)
-    out = np.empty_like(pixels)
-    gain, kind = np.float32(2.0**exposure), TONE_MAPS.index(name)
+    pixels, gain = np.ascontiguousarray(image, np.float32).reshape(-1, 3), np.float32(2.0**exposure)
+    shown = _viewed(pixels, gain, name) if isinstance(name, OcioView) else _mapped(pixels, gain, name)
+    return shown.reshape(image.shape)
+
+
+def _mapped(pixels: F32, gain: np.float32, name: str) -> F32:
+    if name not in TONE_MAPS:
+        raise ParameterError("tone_map", name, f"one of {', '.join(TONE_MAPS)}")
+    out, kind = np.empty_like(pixels), TONE_MAPS.index(name)
     for_ranges(lambda start, stop: _tone_map_rows(pixels, gain, kind, out, start, stop), len(pixels), _ROWS_AT_ONCE)
-    return out.reshape(image.shape)
+    return out
+
+
+def _viewed(pixels: F32, gain: np.float32, view: OcioView) -> F32:
+    shown = np.clip(np.nan_to_num(gain * pixels, nan=0.0), 0, _BRIGHTEST)
+    needed().show(shown, view)
+    return np.asarray(np.clip(np.nan_to_num(shown, copy=False), 0, 1), np.float32)

@@ -10,6 +10,7 @@ from relume.brdf.channels import check_shared
 from relume.brdf.document import complete_term
 from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
 from relume.errors import ParameterError
+from relume.imageio.ocio.view import MAX_NAME
 from relume.look.lights import MAX_SCALE, complete_lights, default_lights
 from relume.look.model import Backdrop, Look, Show, ToneMap
 from relume.scene.model import Light, Material
@@ -162,9 +163,19 @@ def _complete_transport(given: Any, default: Mapping[str, Any]) -> dict[str, Any
 def _complete_display(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     merged = _merged(("display",), given, default)
     check_number(("display", "exposure"), merged["exposure"], *RANGES["display"]["exposure"])
-    if merged["tone_map"] not in get_args(ToneMap):
-        raise fail(("display", "tone_map"), merged["tone_map"], f"one of {names_text(get_args(ToneMap))}")
+    _check_tone_map(("display", "tone_map"), merged["tone_map"])
     return merged
+
+
+def _check_tone_map(pointer: Pointer, given: Any) -> None:
+    """Whether the server has such a view is told where it is shown: looks travel between servers."""
+    is_name = isinstance(given, str) and given in get_args(ToneMap)
+    is_view = isinstance(given, Mapping) and given.keys() == {"display", "view"}
+    if is_view:
+        is_view = all(isinstance(name, str) and 0 < len(name) <= MAX_NAME for name in given.values())
+    if not (is_name or is_view):
+        views = "or a view of an OpenColorIO config, {display, view}"
+        raise fail(pointer, given, f"one of {names_text(get_args(ToneMap))}, {views}")
 
 
 def _merged(pointer: Pointer, given: Any, default: Mapping[str, Any]) -> dict[str, Any]:

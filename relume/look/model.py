@@ -10,6 +10,8 @@ from typing import Annotated, Literal, NamedTuple, NotRequired
 from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
 
+from relume.imageio.ocio.view import OcioView
+
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
 LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
@@ -222,10 +224,10 @@ class TransportLook(_Frozen):
 
 
 class DisplayLook(_Frozen):
-    """How radiance becomes a picture: `exposure` in stops, then the tone map."""
+    """How radiance becomes a picture: `exposure` in stops, then the tone map, or a view of an OpenColorIO config."""
 
     exposure: float
-    tone_map: ToneMap
+    tone_map: ToneMap | OcioView
 
 
 class BackgroundLook(_Frozen):

@@ -40,6 +40,8 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/scenes/{scene}/finder/place": {"POST": VIEW},
     "/api/built-ins": {"GET": VIEW},
     "/api/built-ins/{name}": {"POST": EDIT},
+    "/api/color": {"GET": VIEW},
+    "/api/color/{config}/lut": {"GET": VIEW},
     "/api/models": {"GET": VIEW},
     "/api/models/in-out": {"POST": VIEW},
     "/api/models/albedo": {"POST": VIEW},

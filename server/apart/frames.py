@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from relume.exr.attributes import Origin, attributes_of
 from relume.exr.layers import layers_for
 from relume.exr.picture import Progress, export_exr
+from relume.exr.space import space_called
 from relume.imageio.files import write_image
 from relume.imageio.shrink import shrink
 from relume.picture.jobs import Cancelled
@@ -88,8 +89,9 @@ def _export(
     layers = layers_for(request.layers, look, reflects=Axis.BOUNCES in transfer.axes)
     origin = Origin(transfer.scene_id, scene_name, request.bake)
     size = request.size or (view.width, view.height)
-    attributes = attributes_of(origin, camera, size, look, layers)
-    export_exr(path, render, look, layers, attributes, request.precision, progress)
+    space = space_called(request.color_space)
+    attributes = attributes_of(origin, camera, size, look, layers, space)
+    export_exr(path, render, look, layers, attributes, request.precision, progress, space)
 
 
 def pack(

@@ -1,4 +1,5 @@
-"""A process that does steps: `python -m server.apart.main DATA BYTES THREADS NICE`, started by `server.apart.process`.
+"""A process that does steps: `python -m server.apart.main DATA BYTES THREADS NICE [CONFIG [SPACE]]`, started by
+`server.apart.process`; the last two as `relume.imageio.ocio.current` uses them.
 
 One line of JSON comes in for each step, `"stop"` for one that is not wanted any more; lines with `share`, and at last
 one with `answer`, `problem` or `cancelled` go out. It yields to everything else on the machine, and ends when nobody is
@@ -33,12 +34,13 @@ def main() -> None:
     threading.Thread(target=_listen, args=(asked, stop), daemon=True).start()
 
     # after the above, which is to hold for all threads that they start
+    from relume.imageio.ocio.current import using
     from relume.resident import give_back
     from server.apart.workshop import Workshop
     from server.library.opening import open_library
     from server.library.shelves import shelves_at
 
-    with shelves_at(data):
+    with shelves_at(data), using(*[*sys.argv[5:7], None][:2]):
         shop = Workshop(data, open_library(num_bytes, 0))
         while True:
             message = asked.get()

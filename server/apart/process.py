@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from relume.errors import CancelledError, RelumeError
+from relume.imageio.ocio.current import source
 from relume.resident import resident_bytes
 from server.apart.step import IsWanted, Step, Tell
 
@@ -40,7 +41,7 @@ class Process:
             niceness: how much it yields to others, 0…19.
         """
         numbers = map(str, (num_bytes, num_threads, niceness))
-        command = [sys.executable, *COMMAND, str(data.resolve()), *numbers]
+        command = [sys.executable, *COMMAND, str(data.resolve()), *numbers, *source()]
         # a group of its own: Ctrl-C is the server's, and what it starts itself can be killed with it
         self._process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, process_group=0,

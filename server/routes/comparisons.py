@@ -13,7 +13,7 @@ from server.access.roles import Who
 from server.errors import NotReadyError
 from server.queues.comparisons import Comparing
 from server.routes.bakes import ready_bake
-from server.routes.renders import baked_view, check_look
+from server.routes.renders import baked_view, check_display, check_look
 from server.services import Services, Shared
 from server.wire.bodies import TruthBody, TruthPlanBody, TruthRequest
 from server.wire.body import Id
@@ -42,6 +42,7 @@ async def submit_comparison(
 def _check(request: TruthRequest, transfer: Opened) -> None:
     baked_view(request.view, transfer)
     check_look(request.look, transfer, "/look")
+    check_display(request.look, "/look")
 
 
 @router.get("/{truth}")

@@ -13,6 +13,9 @@ from fastapi.responses import FileResponse
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
 from relume.exr.layers import layers_for
+from relume.exr.space import space_called
+from relume.imageio.ocio.current import needed
+from relume.imageio.ocio.view import OcioView
 from relume.picture.transfer import Axis, Eyes, Opened
 from server.access.roles import Caller, Who
 from server.apart.animation import check_animation, document_of, look_of
@@ -119,6 +122,17 @@ def check_look(partial: dict[str, Any], transfer: Opened, pointer: str) -> None:
         raise ParameterError(f"{pointer}{error.name}", error.value, error.allowed) from None
 
 
+def check_display(partial: dict[str, Any], pointer: str) -> None:
+    """Whether pictures of a checked look, at `pointer` of a body, can be shown here. Raises ParameterError."""
+    tone_map = partial.get("display", {}).get("tone_map")
+    if not isinstance(tone_map, dict):
+        return
+    try:
+        needed().check_view(OcioView(**tone_map))
+    except ParameterError as error:
+        raise ParameterError(f"{pointer}/display/tone_map", error.value, error.allowed) from None
+
+
 def _check(request: RenderRequest, transfer: Opened) -> int:
     """Raises ParameterError where something cannot be rendered.
 
@@ -128,6 +142,9 @@ def _check(request: RenderRequest, transfer: Opened) -> int:
     view = baked_view(request.view, transfer)
     if request.format != "exr" and request.layers:
         raise ParameterError("layers", True, "false for this format; only EXR files have layers")
+    if request.format != "exr" and request.color_space is not None:
+        raise ParameterError("color_space", request.color_space, "null for this format, whose looks have a tone map")
+    space_called(request.color_space)
     if request.format == "mp4":
         check_encoder()
     if transfer.eyes is Eyes.FREE:
@@ -138,6 +155,9 @@ def _check(request: RenderRequest, transfer: Opened) -> int:
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)
     _check_looks(request, transfer)
+    if request.format != "exr":
+        for index, partial in enumerate(request.looks):
+            check_display(partial, f"/looks/{index}")
     check_animation(request, request.view, transfer)
     look = look_of(request, request.view, transfer, 0)
     layers = layers_for(request.layers, look, reflects=Axis.BOUNCES in transfer.axes)

@@ -103,8 +103,8 @@ class RenderRequest(Animation):
 
     `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by
     default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light
-    path, or "light_groups", direct and reflected light of each light, together the picture; and `precision` of the
-    values.
+    path, or "light_groups", direct and reflected light of each light, together the picture; `precision` of the values;
+    and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709.
 
     Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps`
     frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner.
@@ -116,6 +116,7 @@ class RenderRequest(Animation):
     name: Name | None = None
     layers: Layering = False
     precision: Literal["half", "float"] = "half"
+    color_space: Name | None = None
     fps: Annotated[int, Field(ge=1, le=120)] = 25
     exact: bool = True
 

@@ -163,6 +163,16 @@ def test_what_a_material_sends_back_is_told(client: TestClient) -> None:
         assert client.post("/api/models/albedo", json={"terms": bad}).status_code == 422
 
 
+def test_a_server_without_a_colour_config_has_no_views(client: TestClient, baked: Baked) -> None:
+    told = client.get("/api/color").json()
+    assert not any(told.values())
+    assert client.get(f"/api/color/{'0' * 16}/lut", params={"display": "a", "view": "b"}).status_code == 404
+    look = {"display": {"tone_map": {"display": "a", "view": "b"}}}
+    refused = client.post("/api/renders", json={"bake": baked.bake, "view": "front", "looks": [look], "format": "png"})
+    assert (refused.status_code, refused.json()["parameter"]) == (422, "/looks/0/display/tone_map")
+    assert "the server has none" in refused.json()["detail"]
+
+
 def test_models_are_listed(client: TestClient) -> None:
     models = {model["model"]: model for model in client.get("/api/models").json()}
     assert "theta_h" in [curve["name"] for curve in models["cook_torrance"]["curves"]]

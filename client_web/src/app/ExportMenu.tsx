@@ -1,8 +1,9 @@
 /** Pictures to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
 import { useState } from "preact/hooks";
-import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
+import { exporting, exportExr, exportPng, exportTurntable, exrSpace, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
 import { stage } from "../picture/stage";
 import { lightLimitWords } from "../seen/limits";
+import { colorConfig } from "../state/color";
 import { drawn } from "../state/display";
 import { look } from "../state/look";
 import { moves, sideBySide, viewName } from "../state/views";
@@ -70,6 +71,25 @@ function WhatTurns() {
   );
 }
 
+/** Which colour space EXR files are in, where the server has a config. */
+function Space() {
+  return (
+    <li>
+      <label>
+        EXR in
+        <select value={exrSpace.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value || null)}>
+          <option value="">linear Rec. 709</option>
+          {colorConfig.value?.spaces.map((name) => (
+            <option key={name} value={name}>
+              {name}
+            </option>
+          ))}
+        </select>
+      </label>
+    </li>
+  );
+}
+
 export function ExportMenu() {
   const [open, setOpen] = useState(false);
   drawn.value;
@@ -118,6 +138,7 @@ export function ExportMenu() {
             </li>
           ))}
           {moves.value && <WhatTurns />}
+          {(colorConfig.value?.spaces.length ?? 0) > 0 && <Space />}
         </ul>
       )}
     </div>

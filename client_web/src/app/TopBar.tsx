@@ -5,7 +5,9 @@ import { edit } from "../edit/edit";
 import { history } from "../edit/history";
 import { markA, sideA, swapA, toggleWipe } from "../looks/compare";
 import { redo, undo } from "../looks/undo";
+import type { Look } from "../protocol";
 import { leave } from "../scene/open";
+import { colorConfig, fromKey, isHere, keyOf } from "../state/color";
 import { showBefore, wipe } from "../state/display";
 import { look } from "../state/look";
 import { mayEdit } from "../state/me";
@@ -102,19 +104,39 @@ function Display() {
         unit="EV"
         onChange={(value) => edit("Exposure", "/display/exposure", value)}
       />
-      <select
-        aria-label="Tone map"
-        title="Tone map"
-        value={display.tone_map}
-        onChange={(event) => edit("Tone map", "/display/tone_map", event.currentTarget.value)}
-      >
-        {TONE_MAPS.map(({ name, label }) => (
-          <option key={name} value={name}>
-            {label}
-          </option>
-        ))}
-      </select>
+      <ToneMapChoice chosen={display.tone_map} />
     </div>
+  );
+}
+
+/** Tone maps of our own, and the views of the server's OpenColorIO config by their displays. */
+function ToneMapChoice({ chosen }: { chosen: Look["display"]["tone_map"] }) {
+  const isMissing = typeof chosen !== "string" && colorConfig.value !== null && !isHere(chosen);
+  const words = typeof chosen === "string" ? "Tone map" : `${chosen.view}, for the display ${chosen.display}`;
+  return (
+    <select
+      class="tone-map"
+      aria-label="Tone map"
+      title={isMissing ? `${words}: this server has no such view, so AgX is shown` : words}
+      value={keyOf(chosen)}
+      onChange={(event) => edit("Tone map", "/display/tone_map", fromKey(event.currentTarget.value))}
+    >
+      {TONE_MAPS.map(({ name, label }) => (
+        <option key={name} value={name}>
+          {label}
+        </option>
+      ))}
+      {isMissing && <option value={keyOf(chosen)}>{`${chosen.view} (not here: AgX)`}</option>}
+      {colorConfig.value?.displays.map(({ name, views }) => (
+        <optgroup key={name} label={name}>
+          {views.map((view) => (
+            <option key={view} value={keyOf({ display: name, view })}>
+              {view}
+            </option>
+          ))}
+        </optgroup>
+      ))}
+    </select>
   );
 }
 

@@ -8,6 +8,7 @@ import { openScene } from "../scene/open";
 import { followPlace } from "../scene/persistence";
 import { placeFromUrl } from "../scene/url";
 import { StartPage } from "../start/StartPage";
+import { followToneMap } from "../live/displayViews";
 import { followPanels } from "../state/panels";
 import { followTimeline } from "../looks/keyframes";
 import { followRoom } from "../state/room";
@@ -60,6 +61,7 @@ function open(): void {
   followPanels();
   followTimeline();
   followRoom();
+  followToneMap();
   followThumbnails();
   // one drag is one step, however long it rests on the way; once the hand has left the control, the next is another
   window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.hold(), { capture: true });

@@ -1,11 +1,15 @@
 /** From linear Rec. 709 radiance to display values in [0, 1], sRGB-encoded; the shader's twin for probe and export. */
 import type { Rgb } from "../protocol";
+import { sampleTable, type Table } from "./table";
 
 export const TONE_MAPS = [
   { name: "agx", label: "AgX" },
   { name: "filmic", label: "Filmic" },
   { name: "none", label: "None" },
 ] as const;
+
+/** What a picture is shown by: a tone map, or the table of a view. */
+export type ShownToneMap = (typeof TONE_MAPS)[number]["name"] | Table;
 
 const clamp01 = (x: number) => Math.min(1, Math.max(0, x));
 
@@ -55,9 +59,10 @@ function filmic(x: number): number {
   return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
-/** What the screen shows for a radiance: exposure in stops, then the tone map, then the sRGB curve. */
-export function toDisplay(radiance: Rgb, exposure: number, toneMap: string): Rgb {
+/** What the screen shows for a radiance: exposure in stops, then the tone map, then the sRGB curve; or then a view. */
+export function toDisplay(radiance: Rgb, exposure: number, toneMap: ShownToneMap): Rgb {
   const exposed = radiance.map((v) => v * 2 ** exposure) as Rgb;
+  if (typeof toneMap !== "string") return sampleTable(toneMap, exposed);
   if (toneMap === "agx") return agx(exposed);
   if (toneMap === "filmic") return exposed.map((v) => srgbEncode(filmic(v))) as Rgb;
   return exposed.map(srgbEncode) as Rgb;

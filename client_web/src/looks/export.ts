@@ -91,10 +91,18 @@ export async function render(what: string, fetchFrom: string, more: Pick<RenderR
   }).finally(() => (exporting.value = null));
 }
 
+/** The colour space of the server's config that EXR files are in; null: linear Rec. 709. */
+export const exrSpace = signal<string | null>(null);
+
 /** With layers: one for each light and each kind of light path, where there are several; or both of each light. */
 export function exportExr(layers: boolean | "light_groups"): Promise<void> {
   const eye = eyeNow();
-  return render("EXR", "frames/0", { format: "exr", layers, path: eye === null ? null : { eyes: [eye] } });
+  return render("EXR", "frames/0", {
+    format: "exr",
+    layers,
+    color_space: exrSpace.value,
+    path: eye === null ? null : { eyes: [eye] },
+  });
 }
 
 export const TURNTABLE_FRAMES = 72;

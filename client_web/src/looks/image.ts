@@ -3,6 +3,7 @@ import { decodeRgb9e5 } from "../color/rgb9e5";
 import { toDisplay } from "../color/tonemap";
 import type { Pixels } from "../picture/pixels";
 import type { Look, Rgb } from "../protocol";
+import { shownBy } from "../state/color";
 
 const THUMBNAIL_WIDTH = 144;
 const TAPS = 2;
@@ -10,7 +11,7 @@ const TAPS = 2;
 type Display = Look["display"];
 
 function put(image: ImageData, index: number, radiance: Rgb, display: Display, alpha = 255): void {
-  const shown = toDisplay(radiance, display.exposure, display.tone_map);
+  const shown = toDisplay(radiance, display.exposure, shownBy(display.tone_map));
   image.data.set([...shown.map((v) => Math.round(255 * v)), alpha], 4 * index);
 }
 

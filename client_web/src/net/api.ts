@@ -4,6 +4,7 @@ import type {
   BakeBody,
   BakeRequest,
   BuiltInBody,
+  ColorBody,
   CommentBody,
   CommentRequest,
   DryRunBody,
@@ -18,6 +19,7 @@ import type {
   BtfWorkBody,
   MeasuredBody,
   ModelBody,
+  OcioView,
   Problem,
   RenderBody,
   RenderRequest,
@@ -126,6 +128,12 @@ export const measuredThumbnail = (data: string) => {
 export const listEnvironments = () => getJson<EnvironmentBody[]>("/api/environments");
 export async function deleteEnvironment(id: string): Promise<void> {
   await request(`/api/environments/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+export const getColor = () => getJson<ColorBody>("/api/color");
+/** A view of a config as a table. */
+export async function getLut(config: string, { display, view }: OcioView): Promise<ArrayBuffer> {
+  const of = new URLSearchParams({ display, view });
+  return (await request(`/api/color/${encodeURIComponent(config)}/lut?${of}`)).arrayBuffer();
 }
 export const listImages = () => getJson<ImageBody[]>("/api/images");
 export async function deleteImage(id: string): Promise<void> {

@@ -12,6 +12,15 @@ export function makeTexture(gl: Gl, filter: number): WebGLTexture {
   return texture;
 }
 
+/** A texture that is read node by node. */
+export function makeVolume(gl: Gl): WebGLTexture {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_3D, texture);
+  gl.texParameteri(gl.TEXTURE_3D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_3D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+  return texture;
+}
+
 export function allocate(gl: Gl, texture: WebGLTexture, width: number, height: number, words: Uint32Array): void {
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB9_E5, width, height, 0, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, words);

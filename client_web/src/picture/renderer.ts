@@ -1,6 +1,8 @@
 /** The WebGL2 side of the picture. Everything it shows is also held on the CPU, so a lost context is only a redraw. */
-import type { Tile } from "../protocol";
-import { allocate, makeTexture, Program } from "./gl";
+import type { Table } from "../color/table";
+import type { ShownToneMap } from "../color/tonemap";
+import { LUT_SIZE, type Tile } from "../protocol";
+import { allocate, makeTexture, makeVolume, Program } from "./gl";
 import type { Pixels } from "./pixels";
 import { fragment, VERTEX, type Features } from "./shaders";
 
@@ -13,7 +15,7 @@ export interface DrawState {
   /** Left, top, width, height of the picture in device pixels. */
   place: [number, number, number, number];
   exposure: number;
-  toneMap: string;
+  toneMap: ShownToneMap;
   falseColour: boolean;
   wipe: number;
   hover: number;
@@ -31,6 +33,9 @@ export class Renderer {
   private programs = new Map<string, Program>();
   private textures!: Record<Unit, WebGLTexture>;
   private size: [number, number] = [1, 1];
+  /** The view's table, and what of it the context holds. */
+  private tableTexture!: WebGLTexture;
+  private table: Table | null = null;
 
   constructor(readonly canvas: HTMLCanvasElement) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
@@ -56,6 +61,8 @@ export class Renderer {
     this.setReferenceAlpha(1, 1, new Uint8Array(1));
     this.setIds(1, 1, new Uint16Array([65535]));
     this.setDisplay(new ImageData(1, 1));
+    this.tableTexture = makeVolume(gl);
+    this.table = null;
   }
 
   /** Give the context back: a browser has few of them. */
@@ -70,7 +77,7 @@ export class Renderer {
       program = new Program(this.gl, VERTEX, fragment(features));
       this.programs.set(key, program);
       this.gl.useProgram(program.handle);
-      UNITS.forEach((unit, index) => this.gl.uniform1i(program?.at(unit) ?? null, index));
+      [...UNITS, "uTable"].forEach((unit, index) => this.gl.uniform1i(program?.at(unit) ?? null, index));
     } else this.gl.useProgram(program.handle);
     return program;
   }
@@ -133,7 +140,7 @@ export class Renderer {
     if (gl.isContextLost()) return;
     gl.viewport(0, 0, canvas.width, canvas.height);
     const program = this.use({
-      toneMap: state.toneMap === "agx" || state.toneMap === "filmic" ? state.toneMap : "none",
+      toneMap: typeof state.toneMap === "string" ? state.toneMap : "table",
       falseColour: state.falseColour,
       shrunk: state.place[2] < this.size[0],
       displayReferred: state.displayReferred,
@@ -145,6 +152,7 @@ export class Renderer {
       solo: state.solo >= 0,
     });
     this.bindTextures(state.place[2] / this.size[0] >= NEAREST_FROM);
+    if (typeof state.toneMap !== "string") this.bindTable(state.toneMap);
     gl.uniform2f(program.at("uCanvas"), canvas.width, canvas.height);
     gl.uniform4f(program.at("uPlace"), ...state.place);
     gl.uniform2f(program.at("uSize"), ...this.size);
@@ -154,6 +162,15 @@ export class Renderer {
     gl.uniform1i(program.at("uSolo"), state.solo);
     gl.uniform3f(program.at("uSurround"), ...state.surround);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  private bindTable(table: Table): void {
+    const { gl } = this;
+    gl.activeTexture(gl.TEXTURE0 + UNITS.length);
+    gl.bindTexture(gl.TEXTURE_3D, this.tableTexture);
+    if (table === this.table) return;
+    gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGB16F, LUT_SIZE, LUT_SIZE, LUT_SIZE, 0, gl.RGB, gl.FLOAT, table);
+    this.table = table;
   }
 
   private bindTextures(magnified: boolean): void {

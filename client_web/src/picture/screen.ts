@@ -2,10 +2,11 @@
  * view then draws that view alone, where a shared canvas would have to draw all of them again. */
 import { effect, signal } from "@preact/signals";
 import { solo } from "../seen/solo";
+import { toneMap } from "../state/color";
 import { brushed } from "../state/curveShape";
 import { drawn, falseColour, held, showBefore, wipe } from "../state/display";
 import { frameDrawn } from "../state/latency";
-import { exposure, toneMap } from "../state/look";
+import { exposure } from "../state/look";
 import { materialNames } from "../state/scene";
 import { hoveredMaterial } from "../state/selection";
 import { focusedView, sideBySide } from "../state/views";

@@ -3,9 +3,11 @@
  * What is not in use is not compiled in: a software rasteriser pays for branches that it does not take, and the plain
  * picture is three times as quick without them. */
 
+import { LUT_GAIN, LUT_SIZE } from "../protocol";
+
 /** What a variant of the shader does; the renderer compiles each when it is first needed. */
 export interface Features {
-  toneMap: "none" | "agx" | "filmic";
+  toneMap: "none" | "agx" | "filmic" | "table";
   falseColour: boolean;
   /** The picture is shown smaller than it is. */
   shrunk: boolean;
@@ -36,7 +38,9 @@ export function fragment(features: Features): string {
         ? "AGX"
         : features.toneMap === "filmic"
           ? "FILMIC"
-          : "PLAIN",
+          : features.toneMap === "table"
+            ? "TABLE"
+            : "PLAIN",
     features.shrunk && "SHRUNK",
     features.displayReferred && "DISPLAY_REFERRED",
     features.transparent && "TRANSPARENT",
@@ -47,7 +51,8 @@ export function fragment(features: Features): string {
     features.solo && "SOLO",
   ];
   const lines = defines.flatMap((name) => (name ? [`#define ${name}`] : []));
-  return ["#version 300 es", ...lines, BODY].join("\n");
+  const table = [`#define GAIN ${LUT_GAIN.toFixed(1)}`, `#define LAST ${(LUT_SIZE - 1).toFixed(1)}`];
+  return ["#version 300 es", ...lines, ...table, BODY].join("\n");
 }
 
 const BODY = `precision highp float;
@@ -92,6 +97,27 @@ vec3 filmic(vec3 x) {
   return srgb((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14));
 }
 
+#ifdef TABLE
+uniform highp sampler3D uTable;  // display values; blue is the quickest
+
+vec3 node(vec3 at) {
+  return texelFetch(uTable, ivec3(at.bgr), 0).rgb;
+}
+
+// a view's table between its nodes: the tetrahedron of the corners at 0, along the longest part, but the shortest, at 1
+vec3 table(vec3 x) {
+  const vec3 R = vec3(1.0, 0.0, 0.0), G = vec3(0.0, 1.0, 0.0), B = vec3(0.0, 0.0, 1.0);
+  vec3 place = clamp(log2(GAIN * max(x, 0.0) + 1.0) / (2.0 * log2(GAIN + 1.0)), 0.0, 1.0) * LAST;
+  vec3 at = min(floor(place), LAST - 1.0);
+  vec3 part = place - at;
+  vec3 longest = part.r >= part.g ? (part.r >= part.b ? R : B) : (part.g >= part.b ? G : B);
+  vec3 shortest = part.r < part.g ? (part.r < part.b ? R : B) : (part.g < part.b ? G : B);
+  float most = dot(part, longest), least = dot(part, shortest), between = part.r + part.g + part.b - most - least;
+  return (1.0 - most) * node(at) + (most - between) * node(at + longest)
+    + (between - least) * node(at + 1.0 - shortest) + least * node(at + 1.0);
+}
+#endif
+
 // luminance in stops about middle grey, one colour for every two stops, black and white at the ends
 vec3 falseColour(vec3 x) {
   float stops = log2(max(dot(x, vec3(0.2126, 0.7152, 0.0722)), 1e-6) / 0.18);
@@ -114,6 +140,8 @@ vec3 display(vec3 x) {
   return agx(x);
 #elif defined(FILMIC)
   return filmic(x);
+#elif defined(TABLE)
+  return table(x);
 #else
   return srgb(x);
 #endif

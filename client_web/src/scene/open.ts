@@ -2,6 +2,7 @@
 import { passing } from "../edit/edit";
 import { history } from "../edit/history";
 import { disconnect } from "../live/connections";
+import { loadColor } from "../live/displayViews";
 import { getScene, listModels } from "../net/api";
 import { stage } from "../picture/stage";
 import { aloneTransforms, besideTransforms } from "../picture/viewTransforms";
@@ -97,7 +98,7 @@ export async function openScene(
   arrived?: () => void,
 ): Promise<void> {
   await attempt(async () => {
-    const [opened, known] = await Promise.all([getScene(id), listModels()]);
+    const [opened, known] = await Promise.all([getScene(id), listModels(), loadColor()]);
     models.value = known;
     reset(opened);
     door.value = doorOf(opened.id, place);

@@ -2,9 +2,10 @@
 import { toDisplay } from "../color/tonemap";
 import { stage } from "../picture/stage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../picture/zoom";
+import { toneMap } from "../state/color";
 import { openComments } from "../state/comments";
 import { drawn, falseColour } from "../state/display";
-import { exposure, toneMap } from "../state/look";
+import { exposure } from "../state/look";
 import { histogramOpen } from "../state/panels";
 import { probe } from "../state/probe";
 import { shownPanels, togglePanel } from "../state/room";

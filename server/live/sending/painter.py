@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from numpy.typing import NDArray
 from PIL import Image
 
+from relume.errors import ParameterError
 from relume.imageio.files import to_bytes
 from relume.imageio.shrink import shrink
 from relume.imageio.tonemap import tone_map
@@ -192,7 +193,11 @@ def _payload(
 
 def jpeg_of(picture: Picture, display: DisplayLook, size: tuple[int, int], quality: int) -> bytes:
     """A picture as it is displayed, no larger than a size."""
-    shown = tone_map(shrink(picture.image(), size), display.exposure, display.tone_map)
+    image = shrink(picture.image(), size)
+    try:
+        shown = tone_map(image, display.exposure, display.tone_map)
+    except ParameterError:  # the server has no such view: the editor says so, and shows this
+        shown = tone_map(image, display.exposure, "agx")
     buffer = io.BytesIO()
     Image.fromarray(to_bytes(shown)).save(buffer, "JPEG", quality=quality)
     return buffer.getvalue()

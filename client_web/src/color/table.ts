@@ -1,0 +1,34 @@
+/** A view of the server's OpenColorIO config as a table over N³ colours: s(x) = log(G x + 1) / (2 log(G + 1)) of each
+ * channel, red slowest, and between nodes tetrahedra. The shader and the server do the same sums. */
+import { LUT_GAIN, LUT_SIZE, type Rgb } from "../protocol";
+
+/** Display values in [0, 1]; (N, N, N, 3). */
+export type Table = Float32Array;
+
+const LAST = LUT_SIZE - 1;
+const SCALE = LAST / (2 * Math.log1p(LUT_GAIN));
+/** How far apart neighbours of each channel lie. */
+const STEPS = [3 * LUT_SIZE * LUT_SIZE, 3 * LUT_SIZE, 3] as const;
+
+/** Of 16-bit numbers, little-endian, as the server sends them. */
+export function tableOf(bytes: ArrayBuffer): Table {
+  const view = new DataView(bytes);
+  return Float32Array.from({ length: bytes.byteLength / 2 }, (_, i) => view.getUint16(2 * i, true) / 65535);
+}
+
+/** What a display shows for a radiance after exposure. */
+export function sampleTable(table: Table, radiance: Rgb): Rgb {
+  const places = radiance.map((x) => Math.min(LAST, Math.max(0, SCALE * Math.log1p(LUT_GAIN * Math.max(0, x)))));
+  const nodes = places.map((place) => Math.min(LAST - 1, Math.floor(place)));
+  const steps = places.map((place, c) => ({ part: place - (nodes[c] as number), by: STEPS[c] as number }));
+  steps.sort((a, b) => b.part - a.part); // along the longest first, from the corner at 0 to that at 1
+  let at = nodes.reduce((sum, node, c) => sum + node * (STEPS[c] as number), 0);
+  const shown: Rgb = [0, 0, 0];
+  let before = 1;
+  for (const { part, by } of [...steps, { part: 0, by: 0 }]) {
+    for (let c = 0; c < 3; c++) shown[c] = (shown[c] as number) + (before - part) * (table[at + c] as number);
+    at += by;
+    before = part;
+  }
+  return shown;
+}

@@ -1,0 +1,60 @@
+"""Views as tables, for whoever has no OpenColorIO: the editor's shader.
+
+The table has N³ nodes over s(x) = log(G x + 1) / (2 log(G + 1)) of each channel, linear Rec. 709 after exposure: even
+in light near black and in stops above, with a node on 1, where many views bend. Light above s⁻¹(1) = G + 2, seven stops
+over 1, is as bright as that. Between nodes goes tetrahedral interpolation: greys come from greys alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+U16 = NDArray[np.uint16]
+
+SIZE = 65
+"""N, nodes of a channel."""
+
+GAIN = 128.0
+"""G, by which light is multiplied before its logarithm."""
+
+_CHANNELS = np.arange(3)
+
+
+def bake(show: Callable[[F32], None]) -> U16:
+    """The table of a view.
+
+    Args:
+        show: turns linear light into display values, in place. (n, 3)
+    Returns:
+        Display values, 65535 for 1; red is the slowest. (N, N, N, 3) uint16
+    """
+    light = np.expm1(2 * np.log1p(GAIN) * np.arange(SIZE) / (SIZE - 1)) / GAIN
+    nodes = np.stack(np.meshgrid(light, light, light, indexing="ij"), axis=-1).astype(np.float32)
+    show(nodes.reshape(-1, 3))
+    return np.asarray(np.clip(np.nan_to_num(nodes), 0, 1) * 65535 + 0.5, np.uint16)
+
+
+def sample(table: U16, light: F32) -> F64:
+    """Display values by a table: the twin of the editor's shader.
+
+    Args:
+        table: as `bake` makes it. (N, N, N, 3)
+        light: linear, after exposure. (n, 3)
+    """
+    place = np.clip(np.log1p(GAIN * np.maximum(light.astype(np.float64), 0)) / (2 * np.log1p(GAIN)), 0, 1) * (SIZE - 1)
+    node = np.minimum(place.astype(int), SIZE - 2)
+    part = place - node
+    order = np.argsort(-part, axis=1, kind="stable")  # from the corner at 0 along the longest part first, to that at 1
+    steps = np.take_along_axis(part, order, axis=1)
+    weights = -np.diff(steps, axis=1, prepend=1, append=0)  # of the four corners
+    shown = np.zeros(light.shape)
+    for k in range(4):
+        shown += weights[:, k, None] * table[tuple(node.T)]
+        if k < 3:
+            node += order[:, k, None] == _CHANNELS
+    return shown / 65535

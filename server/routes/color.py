@@ -1,0 +1,49 @@
+"""/api/color: displays, views and colour spaces of the server's OpenColorIO config; views as tables for shaders."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from relume.errors import NotFoundError
+from relume.imageio.ocio.current import current
+from relume.imageio.ocio.view import MAX_NAME, OcioView
+from server.files.png import FOREVER
+from server.wire.body import Id
+from server.wire.color import ColorBody, DisplayBody, ViewBody
+
+router = APIRouter(prefix="/api/color", tags=["color"])
+ViewName = Annotated[str, Query(min_length=1, max_length=MAX_NAME)]
+
+
+class LutResponse(Response):
+    """Numbers, little-endian, red slowest."""
+
+    media_type = "application/octet-stream"
+
+
+@router.get("")
+def describe_color() -> ColorBody:
+    """What looks and renders may name of the config."""
+    config = current()
+    if config is None:
+        return ColorBody(id=None, name=None, working=None, displays=[], default=None, spaces=[])
+    return ColorBody(
+        id=config.id,
+        name=config.name,
+        working=config.working,
+        displays=[DisplayBody(name=name, views=list(views)) for name, views in config.displays.items()],
+        default=ViewBody(**asdict(config.default)),
+        spaces=list(config.spaces),
+    )
+
+
+@router.get("/{config}/lut", response_class=LutResponse)
+def get_lut(config: Id, display: ViewName, view: ViewName) -> LutResponse:
+    """A view as a table of 65 x 65 x 65 x 3 numbers of 16 bits (docs/api.md)."""
+    known = current()
+    if known is None or known.id != config:
+        raise NotFoundError("the server has another colour config now; ask /api/color again")
+    return LutResponse(known.lut(OcioView(display, view)), headers=FOREVER)

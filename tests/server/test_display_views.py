@@ -1,0 +1,76 @@
+"""A server with an OpenColorIO config: what it lists, and pictures that it renders by it."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+from session_client import Baked
+from test_comparisons import is_done, wait_until
+
+from relume.imageio.files import to_bytes
+from relume.imageio.ocio.config import Config
+from relume.imageio.ocio.lut import SIZE
+from relume.imageio.ocio.view import OcioView
+from relume.imageio.primaries import KNOWN
+from server.settings import Settings
+
+CONFIG = "ocio://cg-config-latest"
+VIEW = {"display": "sRGB - Display", "view": "ACES 2.0 - SDR 100 nits (Rec.709)"}
+
+
+@pytest.fixture
+def settings(settings: Settings) -> Settings:
+    return settings.model_copy(update={"ocio": CONFIG})
+
+
+def test_its_views_are_listed_tabled_and_rendered(client: TestClient, baked: Baked, tmp_path: Path) -> None:
+    told, config = client.get("/api/color").json(), Config(CONFIG)
+    assert {each["name"]: tuple(each["views"]) for each in told["displays"]} == config.displays
+    assert (told["default"], told["working"], tuple(told["spaces"])) == (VIEW, config.working, config.spaces)
+    table = client.get(f"/api/color/{told['id']}/lut", params=VIEW)
+    assert table.content == config.lut(OcioView(**VIEW))
+    assert len(table.content) == 2 * 3 * SIZE**3
+    assert "immutable" in table.headers["cache-control"]
+    assert client.get(f"/api/color/{'0' * 16}/lut", params=VIEW).status_code == 404
+    assert client.get(f"/api/color/{told['id']}/lut", params=VIEW | {"view": "Raw?"}).status_code == 422
+
+    display = {"exposure": 1.0, "tone_map": VIEW}
+    request = {"bake": baked.bake, "view": "front", "looks": [{"display": display}], "precision": "float"}
+
+    def rendered(**more: object) -> bytes:
+        url = client.post("/api/renders", json=request | more).headers["location"]
+        assert wait_until(client, url, is_done)["state"] == "ready"
+        return client.get(f"{url}/frames/0").content
+
+    pictures = {}
+    for name in (None, "lin_ap1"):
+        (tmp_path / "a.exr").write_bytes(rendered(format="exr", color_space=name))
+        found = OpenImageIO.ImageBuf(str(tmp_path / "a.exr"))
+        pictures[name] = found.get_pixels(OpenImageIO.FLOAT)
+    assert found.spec().getattribute("chromaticities") == pytest.approx(KNOWN["lin_ap1_scene"])
+    light = np.ascontiguousarray(pictures[None]).reshape(-1, 3)
+    converted = light.copy()
+    config.convert(converted, "ACEScg")
+    np.testing.assert_allclose(pictures["lin_ap1"].reshape(-1, 3), converted, rtol=1e-5)
+    light *= 2
+    config.show(light, OcioView(**VIEW))
+    png = np.asarray(Image.open(io.BytesIO(rendered(format="png"))))
+    np.testing.assert_array_equal(png, to_bytes(light.reshape(png.shape)))
+
+
+def test_what_it_does_not_have_is_refused_before_anything_is_rendered(client: TestClient, baked: Baked) -> None:
+    other = VIEW | {"view": "Film of another house"}
+    request = {"bake": baked.bake, "view": "front", "looks": [{}, {"display": {"tone_map": other}}], "format": "png"}
+    refused = client.post("/api/renders", json=request)
+    assert (refused.status_code, refused.json()["parameter"]) == (422, "/looks/1/display/tone_map")
+    assert "Un-tone-mapped" in refused.json()["allowed"]
+    assert client.post("/api/renders", json=request | {"format": "exr"}).status_code == 202  # has no tone map
+    for more in ({"format": "exr", "color_space": "ACEScct"}, {"looks": [{}], "color_space": "ACEScg"}):
+        refused = client.post("/api/renders", json=request | more)
+        assert (refused.status_code, refused.json()["parameter"]) == (422, "color_space")
+    truth = {"bake": baked.bake, "view": "front", "look": request["looks"][1]}
+    assert client.post("/api/truths", json=truth).json()["parameter"] == "/look/display/tone_map"
