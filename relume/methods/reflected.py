@@ -10,7 +10,7 @@ from relume.methods.cells.between import Leaving, preview_between, quickly_betwe
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.reflecting import Reflecting
 from relume.methods.on_cells import LightOnCells
-from relume.picture.light import Light
+from relume.picture.light import Light, is_same_but_for_surfaces
 from relume.project.sent import Sent, evenly
 from relume.trace.cell_tree import NO_CELL
 
@@ -47,6 +47,15 @@ class Reflected:
         """What moving pictures follow while a hand moves a light."""
         return self._quickly(_between_surfaces(light), is_preview=True).sent(self._cells)
 
+    def preview_change(self, before: Light, after: Light) -> F32:
+        """How much more cells send, the same in every direction; both ends alike, so that what is wrong with both
+        cancels. Where surfaces alone have changed, highlights give light directions on its way between cells, and
+        what others see of each in the mean is what is left of them in the end. (C, 3) float32"""
+        if is_same_but_for_surfaces(before, after):
+            return self._change(before, after).seen(self._cells)
+        change = self.preview_under(after) - self.preview_under(before)
+        return change[: self.num_cells]
+
     def change(self, before: Light, after: Light) -> Sent:
         """How what cells send changes, found quickly, where the lights themselves are as before and their light on
         cells is found exactly; both ends alike, so that what is wrong with both cancels.
@@ -54,8 +63,11 @@ class Reflected:
         Args:
             before, after: of equal sources.
         """
+        return self._change(before, after).sent(self._cells)
+
+    def _change(self, before: Light, after: Light) -> Leaving:
         here, there = (self._quickly(_between_surfaces(light), is_preview=False) for light in (before, after))
-        return there.less(here).sent(self._cells)
+        return there.less(here)
 
     def _quickly(self, light: Light, *, is_preview: bool) -> Leaving:
         def found() -> Leaving:

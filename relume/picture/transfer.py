@@ -72,6 +72,10 @@ class Bounced(Protocol):
         """Radiance that they send out. (at least num_cells, 3)"""
         ...
 
+    def preview_change(self, before: Light, after: Light) -> F32:
+        """How much more they send out after than before, found quickly. (num_cells, 3)"""
+        ...
+
 
 class Local(Protocol):
     """Local lights, as far as they can be followed while they move."""

@@ -44,6 +44,10 @@ class Leaving(NamedTuple):
         frames = cells.frames[self.rows]
         return sent_by(_padded(self.even), self.rows, frames, self.vectors, to_narrow_lobes=to_narrow_lobes)
 
+    def seen(self, cells: CellLight) -> F32:
+        """What other cells see of each in the mean. (C, 3) float32"""
+        return cells.seen(self.even, self.vectors, self.rows)
+
     def less(self, other: Leaving) -> Leaving:
         """The difference to another, whose rows may be others."""
         rows = np.union1d(self.rows, other.rows)

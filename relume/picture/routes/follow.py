@@ -115,8 +115,7 @@ class Follow:
         reflected = self._reflected
         assert reflected is not None
         if self._change is None or self._change[:2] != (before, after):
-            change = reflected.preview_under(after) - reflected.preview_under(before)
-            self._change = before, after, haar(change[: reflected.num_cells]).astype(np.float32)
+            self._change = before, after, haar(reflected.preview_change(before, after)).astype(np.float32)
         return self._change[2]
 
     def _key(self, place: Place) -> tuple[Hashable, ...]:
