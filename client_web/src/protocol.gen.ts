@@ -225,7 +225,7 @@ export interface TruthRequest {
   dry_run?: boolean;
 }
 
-/** Once around an upright line, in so many frames; `start`: the first of them, by default where the view begins. `about`: a place on the line, metres; by default straight before the start, as deep as the middle of the scene. `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps that stay, too; or the `environment` alone, which needs no bake whose eye moves. */
+/** Once around an upright line, in so many frames; `start`: the first of them, by default where the view begins. `about`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows. `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps that stay, too; or the `environment` alone, which needs no bake whose eye moves. */
 export interface Turntable {
   turntable: number;
   start?: CameraFrame | null;

@@ -176,7 +176,7 @@ test("the eye goes from where one key is seen to where the other is, and rests w
   await prepared(way);
   seeKeyframeFrom(1, at(100));
   expect(pathOf("along", 9)).toMatchObject({ eyes: [{ to_world: at(0).to_world }, at(100)] });
-  expect(pathOf("around", 9)).toMatchObject({ turntable: 9, start: { to_world: at(0).to_world }, about: [0, 0, 0] });
+  expect(pathOf("around", 9)).toMatchObject({ turntable: 9, start: { to_world: at(0).to_world } });
   expect(pathOf("object", 9)).toMatchObject({ turns: "object", start: { to_world: at(0).to_world } });
   expect(pathOf("still", 9)).toBeNull();
   await vi.waitFor(() => expect(frames.value).not.toBeNull());

@@ -73,7 +73,7 @@ def _measured(transfer: MovingViews, stills: Stills, rays: tuple[int, int]) -> E
 def _eyes(transfer: MovingViews) -> Sequence[Camera]:
     """Where eyes begin, and, of the first, where a hand may turn it to."""
     views = list(transfer.views.values())[:_MOST_VIEWS]
-    around = turntable(views[0].camera, looked_at(views[0].camera, views[0].bounds), _TURN)
+    around = turntable(views[0].camera, looked_at(transfer, views[0].camera), _TURN)
     return [*(view.camera for view in views), around[1], around[-1]]
 
 

@@ -10,22 +10,35 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from relume.moving.transfer import MovingTransfer
 from relume.scene.model import Camera
+from relume.trace.cutout_filter import PAST_GLASS
+from relume.trace.primary import trace_from
 
 F64 = NDArray[np.float64]
 
 
-def looked_at(camera: Camera, bounds: tuple[F64, F64]) -> F64:
-    """What is likely in the middle of a camera's picture: straight before it, as deep as the middle of the scene is.
+def looked_at(transfer: MovingTransfer, camera: Camera) -> F64:
+    """What a camera's picture is about: a place straight before it.
 
-    The middle itself where that is behind. A scene's table or backdrop is often far larger than what it is about.
+    It is as deep as the middle of all that is of the material in the middle of the picture, which is an object's axis
+    rather than its front; a scene's table or backdrop is often far larger than what stands there. Where the middle
+    shows nothing it is as deep as the scene's; the middle itself where that is behind.
 
     Args:
-        camera: any. bounds: lowest and highest corner of the scene, metres. (3,) each.
+        transfer: of a bake. camera: any.
     Returns:
         Metres. (3,)
     """
-    middle, forward, place = (bounds[0] + bounds[1]) / 2, -camera.to_world[:3, 2], camera.to_world[:3, 3]
+    place, forward, surface = camera.to_world[:3, 3], -camera.to_world[:3, 2], transfer.surface
+    ray = place.astype(np.float32), forward[None].astype(np.float32)
+    face = int(trace_from(transfer.embree, *ray, PAST_GLASS).face[0])
+    bounds = next(iter(transfer.views.values())).bounds
+    if face >= 0:
+        is_alike = surface.face_material == surface.face_material[face]
+        corners = transfer.positions[surface.faces[is_alike].ravel()]
+        bounds = corners.min(axis=0), corners.max(axis=0)
+    middle = (bounds[0] + bounds[1]).astype(np.float64) / 2
     depth = (middle - place) @ forward
     found: F64 = place + depth * forward if depth > 0 else middle
     return found

@@ -20,6 +20,7 @@ from server.wire.renders import Animation, EyePath, Keyframes, Turntable
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from relume.moving.transfer import MovingTransfer
     from relume.moving.view import FreeView
     from relume.scene.model import Camera
 
@@ -60,7 +61,7 @@ def eyes_of(request: Animation, name: str, transfer: Opened) -> Sequence[Camera 
         start = _start_of(request.path, view)
         if request.path.turns == "environment":
             return [start] * request.num_frames
-        return turntable(start, _pivot_of(request.path, view), request.num_frames)
+        return turntable(start, _pivot_of(request.path, view, transfer), request.num_frames)
     return along([_placed(view, eye) for eye in request.path.eyes], request.num_frames)
 
 
@@ -72,10 +73,12 @@ def _start_of(path: Turntable, view: FreeView) -> Camera:
     return view.camera if path.start is None else _placed(view, path.start)
 
 
-def _pivot_of(path: Turntable, view: FreeView) -> NDArray[np.float64]:
+def _pivot_of(path: Turntable, view: FreeView, transfer: Opened) -> NDArray[np.float64]:
     from relume.moving.paths import looked_at
 
-    return looked_at(_start_of(path, view), view.bounds) if path.about is None else np.array(path.about)
+    if path.about is not None:
+        return np.array(path.about)
+    return looked_at(cast("MovingTransfer", transfer), _start_of(path, view))
 
 
 def look_of(request: Animation, view: str, transfer: Opened, index: int) -> Look:
@@ -92,7 +95,7 @@ def document_of(request: Animation, view: str | None, transfer: Opened, index: i
     degrees = 360 * index / request.num_frames
     if request.path.turns == "environment":
         return with_turned_sky(document, degrees)
-    pivot = _pivot_of(request.path, cast("FreeView", transfer.views[cast("str", view)]))
+    pivot = _pivot_of(request.path, cast("FreeView", transfer.views[cast("str", view)]), transfer)
     return with_turned_light(document, degrees, pivot.tolist())
 
 

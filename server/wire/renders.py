@@ -25,7 +25,7 @@ Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 class Turntable(Body):
     """Once around an upright line, in so many frames; `start`: the first of them, by default where the view begins.
 
-    `about`: a place on the line, metres; by default straight before the start, as deep as the middle of the scene.
+    `about`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows.
     `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps
     that stay, too; or the `environment` alone, which needs no bake whose eye moves.
     """

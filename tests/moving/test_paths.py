@@ -1,10 +1,13 @@
 """Ways of an eye: closed where they go around, through every camera where they go along."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from relume.moving.paths import along, looked_at, turntable
 from relume.scene.model import Camera
+from relume.trace.embree import EmbreeScene
 
 
 def camera(place, turn=0.0, yfov=0.7):
@@ -26,10 +29,17 @@ def test_a_turntable_sees_the_middle_alike_from_all_sides_and_closes():
     assert found[3].to_world[0, 3] > 3  # to the right first
 
 
-def test_what_a_camera_looks_at_is_before_it_as_deep_as_the_scene():
-    bounds = np.array([-1.0, 0, 2]), np.array([3.0, 2, 4])
-    np.testing.assert_allclose(looked_at(camera([2, 1.5, 9]), bounds), [2, 1.5, 3], atol=1e-12)
-    np.testing.assert_allclose(looked_at(camera([2, 1.5, -9]), bounds), [1, 1, 3], atol=1e-12)
+def test_a_picture_is_about_what_its_middle_shows_or_is_as_deep_as_the_scene():
+    near, far = ([[x, y, z] for x, y in ((1.5, 0), (3, 0), (2, 3))] for z in (3.7, 3.1))  # of one material
+    aside = [[8, 0, 0], [9, 0, 0], [8, 1, 0]]
+    positions, faces = np.array([*near, *far, *aside], np.float32), np.arange(9, dtype=np.uint32).reshape(3, 3)
+    view = SimpleNamespace(bounds=(np.array([-1.0, 0, 2]), np.array([3.0, 2, 4])))
+    surface = SimpleNamespace(faces=faces, face_material=np.array([1, 1, 0]))
+    scene = EmbreeScene.build(positions, faces)
+    transfer = SimpleNamespace(surface=surface, positions=positions, embree=scene, views={"front": view})
+    np.testing.assert_allclose(looked_at(transfer, camera([2, 1.5, 9])), [2, 1.5, 3.4], atol=1e-6)
+    np.testing.assert_allclose(looked_at(transfer, camera([0, 1.5, 9])), [0, 1.5, 3], atol=1e-12)
+    np.testing.assert_allclose(looked_at(transfer, camera([0, 1.5, -9])), [1, 1, 3], atol=1e-12)
 
 
 def test_a_way_goes_through_its_cameras_and_never_leaves_the_rotations():

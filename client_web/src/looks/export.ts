@@ -113,7 +113,6 @@ export const turns = signal<Turns>("eye");
 
 /** Once around, from where the eye is: numbered frames in a ZIP, or a video. `exact`: as where the eye rests. */
 export function exportTurntable(format: "png" | "mp4", exact: boolean): Promise<void> {
-  const about = eyeOf(viewName.peek())?.orbit.target ?? null;
-  const path = { turntable: TURNTABLE_FRAMES, turns: turns.value, start: eyeNow(), about };
+  const path = { turntable: TURNTABLE_FRAMES, turns: turns.value, start: eyeNow() };
   return render("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, exact });
 }

@@ -32,7 +32,7 @@ export function pathOf(way: EyeWay, num: number): NonNullable<RenderRequest["pat
   if (eye === null || way === "still") return null;
   const eyes = keyframes.peek().map((key): Frame => key.eye ?? eye.first);
   if (way === "along") return { eyes };
-  return { turntable: num, turns: way === "object" ? way : "eye", start: eyes[0] ?? eye.first, about: eye.orbit.target };
+  return { turntable: num, turns: way === "object" ? way : "eye", start: eyes[0] ?? eye.first };
 }
 
 function show(): void {
