@@ -20,6 +20,15 @@ def check_output(path: Path) -> None:
         raise ParameterError("--output", str(path), "a file in a folder that exists")
 
 
+def check_shown(path: Path, look: Any) -> None:
+    """Raise ParameterError before hours of work where a look has a view that no config here has."""
+    from relume.imageio.ocio.current import needed
+    from relume.imageio.ocio.view import OcioView
+
+    if path.suffix.lower() != ".exr" and isinstance(look.display.tone_map, OcioView):
+        needed().check_view(look.display.tone_map)
+
+
 def save(path: Path, image: NDArray[Any], look: Any) -> None:
     """Write linear radiance, (H, W, 3); formats for the screen are shown as the look's display says."""
     from relume.imageio.files import write_image

@@ -44,7 +44,7 @@ def render(
 ) -> None:
     """Render one exact frame of a baked scene, or a turntable."""
     from cli.data_folder import complete_look, find_bake, find_scene, open_bakes, open_settings
-    from cli.picture import check_output, save, save_exr
+    from cli.picture import check_output, check_shown, save, save_exr
     from cli.turntable import check_frames, render_turntable
     from relume.errors import ParameterError
     from relume.exr.attributes import Origin
@@ -81,6 +81,7 @@ def render(
         if isinstance(transfer, MovingViews) and quick:
             typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
         document = complete_look(partial, transfer.default_look)
+        check_shown(output, document)
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
         if turntable is not None:

@@ -24,6 +24,8 @@ from relume.brdf.sweep import moved_curves
 from relume.btf.eigen import EigenBtf
 from relume.btf.rings import rings_of
 from relume.btf.shelf import STORE, keep
+from relume.imageio.ocio import lut
+from relume.imageio.ocio.sampling import show_by
 from relume.imageio.tonemap import tone_map
 from relume.look import complete, validate
 from relume.measured.lookup import NUM_KNOTS, Part, quotients
@@ -107,6 +109,7 @@ def _edit_everything(transfer: Transfer, picture: Picture) -> None:
             picture.touch(f"/materials/{material}/terms/0/params/{parameter.name}")
             _show(picture)
     tone_map(picture.image(), 0.0, "agx")
+    show_by(np.zeros((lut.SIZE, lut.SIZE, lut.SIZE, 3), np.uint16), np.zeros((1, 3), np.float32))
 
 
 def _move_lights(transfer: Transfer, picture: Picture) -> None:

@@ -35,7 +35,7 @@ def reference(
     from rich.console import Console
     from rich.progress import Progress
 
-    from cli.picture import check_output, save
+    from cli.picture import check_output, check_shown, save
     from cli.truth.passes import find_baked, find_subject, sentences, traced
     from relume.errors import ParameterError
 
@@ -46,6 +46,7 @@ def reference(
         subject = find_baked(data, scene, look, view)
     else:
         subject = find_subject(data, scene, look, view, camera, size, method, needs_bake=paths == "method")
+    check_shown(output, subject.look)
     whose = paths if method is None else "method"
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("reference", total=1.0)

@@ -91,12 +91,13 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
                 out[k, c] = _srgb(_filmic(rgb[c]) if kind == _FILMIC else rgb[c])
 
 
-def tone_map(image: F32, exposure: float, name: str | OcioView) -> F32:
+def tone_map(image: F32, exposure: float, name: str | OcioView, *, quick: bool = False) -> F32:
     """Display values of linear radiance, sRGB-encoded, or as a view's display has them.
 
     Args:
         image: linear Rec. 709; negative values and NaN are black. (height, width, 3) float32
         exposure: stops. name: one of TONE_MAPS, or a view of the config in use.
+        quick: views as the editor's shader shows them, by tables; else as the config does.
     Returns:
         In [0, 1]. (height, width, 3) float32
     Raises:
@@ -105,7 +106,7 @@ def tone_map(image: F32, exposure: float, name: str | OcioView) -> F32:
     if image.ndim != 3 or image.shape[2] != 3:
         raise ShapeMismatchError(f"an image has the shape (height, width, 3), not {image.shape}; reshape it")
     pixels, gain = np.ascontiguousarray(image, np.float32).reshape(-1, 3), np.float32(2.0**exposure)
-    shown = _viewed(pixels, gain, name) if isinstance(name, OcioView) else _mapped(pixels, gain, name)
+    shown = _viewed(pixels, gain, name, quick) if isinstance(name, OcioView) else _mapped(pixels, gain, name)
     return shown.reshape(image.shape)
 
 
@@ -117,7 +118,7 @@ def _mapped(pixels: F32, gain: np.float32, name: str) -> F32:
     return out
 
 
-def _viewed(pixels: F32, gain: np.float32, view: OcioView) -> F32:
+def _viewed(pixels: F32, gain: np.float32, view: OcioView, quick: bool) -> F32:
     shown = np.clip(np.nan_to_num(gain * pixels, nan=0.0), 0, _BRIGHTEST)
-    needed().show(shown, view)
+    needed().show(shown, view, quick=quick)
     return np.asarray(np.clip(np.nan_to_num(shown, copy=False), 0, 1), np.float32)

@@ -46,4 +46,4 @@ def get_lut(config: Id, display: ViewName, view: ViewName) -> LutResponse:
     known = current()
     if known is None or known.id != config:
         raise NotFoundError("the server has another colour config now; ask /api/color again")
-    return LutResponse(known.lut(OcioView(display, view)), headers=FOREVER)
+    return LutResponse(known.table(OcioView(display, view)).astype("<u2").tobytes(), headers=FOREVER)

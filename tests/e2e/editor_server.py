@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -32,7 +33,8 @@ class Server:
         """Start it and wait until it answers."""
         command = [sys.executable, "-m", "cli.main", "serve", "--data", str(self.data), "--port", str(self.port)]
         with (self.data / "server.txt").open("ab") as log:
-            self.process = subprocess.Popen(command, stdout=log, stderr=log)
+            environment = os.environ | {"RELUME_OCIO": "ocio://cg-config-latest"}
+            self.process = subprocess.Popen(command, stdout=log, stderr=log, env=environment)
         deadline = time.monotonic() + START_S
         while True:
             try:

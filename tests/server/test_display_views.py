@@ -32,7 +32,7 @@ def test_its_views_are_listed_tabled_and_rendered(client: TestClient, baked: Bak
     assert {each["name"]: tuple(each["views"]) for each in told["displays"]} == config.displays
     assert (told["default"], told["working"], tuple(told["spaces"])) == (VIEW, config.working, config.spaces)
     table = client.get(f"/api/color/{told['id']}/lut", params=VIEW)
-    assert table.content == config.lut(OcioView(**VIEW))
+    assert table.content == config.table(OcioView(**VIEW)).tobytes()
     assert len(table.content) == 2 * 3 * SIZE**3
     assert "immutable" in table.headers["cache-control"]
     assert client.get(f"/api/color/{'0' * 16}/lut", params=VIEW).status_code == 404

@@ -153,6 +153,7 @@ BOUNDED = {
     "code_version.py",
     "environments/asset_store.py",
     "environments/built_in.py",
+    "imageio/ocio/config.py",
     "images/shelf.py",
     "kernel_cache.py",
     "look/library/materials.py",

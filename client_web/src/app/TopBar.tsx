@@ -126,7 +126,7 @@ function ToneMapChoice({ chosen }: { chosen: Look["display"]["tone_map"] }) {
           {label}
         </option>
       ))}
-      {isMissing && <option value={keyOf(chosen)}>{`${chosen.view} (not here: AgX)`}</option>}
+      {isMissing && <option value={keyOf(chosen)}>{`AgX, not here: ${chosen.view}`}</option>}
       {colorConfig.value?.displays.map(({ name, views }) => (
         <optgroup key={name} label={name}>
           {views.map((view) => (

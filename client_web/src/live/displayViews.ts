@@ -2,7 +2,7 @@
 import { computed, effect } from "@preact/signals";
 import { tableOf, type Table } from "../color/table";
 import { getColor, getLut } from "../net/api";
-import type { OcioView } from "../protocol";
+import type { Look, OcioView } from "../protocol";
 import { colorConfig, isHere, keyOf, tableFor, tables, toneMap } from "../state/color";
 import { look } from "../state/look";
 import { attempt } from "../ui/toasts";
@@ -23,6 +23,13 @@ async function fetchTable(config: string, view: OcioView): Promise<void> {
   await attempt(async () => (table = tableOf(await getLut(config, view))));
   asked.delete(key);
   tables.value = new Map(tables.peek()).set(key, table);
+}
+
+/** Resolves when what a look is shown by is there. */
+export function whenShown(of: Look): Promise<void> {
+  return new Promise((done) => {
+    const stop = effect(() => void (tableFor(of.display.tone_map) !== null && queueMicrotask(() => (stop(), done()))));
+  });
 }
 
 /** What was shown stays until a view's table has come. */

@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 import { eyeOf } from "../cameras/eye";
 import type { Frame } from "../cameras/orbit";
 import { eyeSize } from "../live/drawing";
+import { whenShown } from "../live/displayViews";
 import { whenExact } from "../live/exactness";
 import { deleteRender, getRender, problemText, startRender } from "../net/api";
 import { stage } from "../picture/stage";
@@ -44,6 +45,7 @@ export async function exportPng(): Promise<void> {
   if (current === null || !stage.active.isThere) return;
   await attempt(async () => {
     await whenExact();
+    await whenShown(current);
     const url = URL.createObjectURL(await pngBlob(stage.active.pixels, stage.active.alpha, current.display));
     download(url, `${fileStem()}.png`);
     window.setTimeout(() => URL.revokeObjectURL(url), 10_000);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -214,7 +215,18 @@ def test_a_lost_server_is_said_and_edits_catch_up(editor: Editor, server: Server
     assert pictures.first.get_attribute("src") != pictures.last.get_attribute("src")
 
 
-def test_export_downloads_the_picture(editor: Editor, tmp_path: Path) -> None:
+def test_views_of_a_colour_config_are_shown_and_downloaded(editor: Editor, tmp_path: Path) -> None:
+    page, tone_map = editor.page, editor.page.get_by_role("combobox", name="Tone map")
+    page.get_by_role("button", name="1:1").click()
+    tone_map.select_option("None")
+    plain, shown = editor.pixels(), {}
+    for view in ("Un-tone-mapped", "ACES 2.0 - SDR 100 nits (Rec.709)"):
+        with page.expect_response("**/lut?*"):
+            tone_map.select_option(json.dumps(["sRGB - Display", view], separators=(",", ":")))
+        shown[view] = editor.pixels()
+    first, second = shown.values()
+    assert np.abs(first - plain).max() <= 1  # both are sRGB alone
+    assert changed(second, plain) > 0.05
     with editor.page.expect_download() as download:
         editor.page.get_by_role("button", name="PNG").click()
     path = tmp_path / "picture.png"
@@ -222,4 +234,7 @@ def test_export_downloads_the_picture(editor: Editor, tmp_path: Path) -> None:
     assert download.value.suggested_filename == "still-life-front.png"
     with Image.open(path) as image:
         assert image.size == SIZE
-        assert np.asarray(image.convert("RGB")).std() > 10
+        picture = np.asarray(image.convert("RGB")).astype(np.int16)
+    (width, height), (rows, columns) = SIZE, second.shape[:2]
+    places = [((rows - height) // 2 + y, (columns - width) // 2 + x) for y in (0, 1) for x in (0, 1)]  # it is rounded
+    assert min(np.abs(second[y : y + height, x : x + width] - picture).max() for y, x in places) <= 2
