@@ -19,7 +19,7 @@ export const MAX_COMMENT = 2000;
 
 export const LUT_SIZE = 65;
 
-export const LUT_GAIN = 128;
+export const LUT_GAIN = 9;
 
 /** client → server: this frame was received and shown. */
 export interface AckMessage {

@@ -16,7 +16,7 @@ function tableFrom(of: (rgb: Rgb) => Rgb) {
   return tableOf(view.buffer);
 }
 
-const place = (x: number) => Math.min(1, Math.max(0, Math.log(LUT_GAIN * x + 1) / (2 * Math.log(LUT_GAIN + 1))));
+const place = (x: number) => Math.min(1, Math.log(1 + LUT_GAIN * Math.sqrt(x)) / (2 * Math.log(1 + LUT_GAIN)));
 
 // on each tetrahedron the order of the channels' parts stays, so that these are linear on it; on cubes they are not
 const order = (rgb: Rgb): Rgb => {

@@ -1,6 +1,7 @@
 """Environments by the command line and over HTTP, and a baked scene shown in one."""
 
 import json
+import re
 import time
 
 import numpy as np
@@ -14,6 +15,8 @@ from tiny_scenes import still_life
 from cli.main import main
 from relume.bake import Recipe
 from relume.environments.asset_store import records
+from relume.environments.reading import read_environment
+from relume.errors import SceneError
 from server.app import create_app
 from server.settings import Settings
 from worker.scenes import register_scene
@@ -75,11 +78,18 @@ def test_rest_lists_built_in_ones_first_and_shows_each(client, imported):
         (b"", "empty: 0 bytes"),
     ],
 )
-def test_hostile_files_are_refused_in_words_and_leave_nothing(client, imported, content, said):
-    response = client.post(URL, files={"environment": ("x.hdr", content)})
+def test_hostile_files_are_refused_in_words(tmp_path, content, said):
+    path = tmp_path / "x.hdr"
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match=re.escape(said)):
+        read_environment(path, "x")
+
+
+def test_a_hostile_file_that_is_sent_leaves_nothing(client, imported):
+    response = client.post(URL, files={"environment": ("x.hdr", b"#?RADIANCE\n\n-Y 4096 +X 8192\n")})
     assert response.status_code == 422
     assert response.json()["type"] == "urn:relume:problem:scene"
-    assert said in response.json()["detail"]
+    assert "claims 403 MB" in response.json()["detail"]
     assert len(client.get(URL).json()) == 5
     assert not list(client.app.state.services.settings.data.glob("upload-*"))
 

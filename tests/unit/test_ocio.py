@@ -69,10 +69,11 @@ def test_a_view_is_the_tone_map_that_the_config_has():
 @pytest.mark.parametrize(
     ("view", "mean", "most"),
     [
-        (VIEW, 0.035, 0.6),
-        (OcioView("Display P3 - Display", "ACES 2.0 - SDR 100 nits (P3 D65)"), 0.035, 0.6),
+        (VIEW, 0.04, 0.6),
+        (OcioView("Display P3 - Display", "ACES 2.0 - SDR 100 nits (P3 D65)"), 0.04, 0.6),
         (OcioView("Rec.2100-PQ - Display", HDR), 0.045, 0.3),
-        (OcioView("sRGB - Display", "Un-tone-mapped"), 0.035, 0.15),
+        (OcioView("sRGB - Display", "Un-tone-mapped"), 0.04, 0.2),
+        (OcioView("Gamma 2.6 P3-D65 - Display", "Un-tone-mapped"), 0.045, 3.0),
     ],
 )
 def test_a_table_is_the_view_but_for_less_than_a_screen_shows(view, mean, most):
@@ -133,11 +134,11 @@ def test_no_picture_is_exported_in_what_is_not_linear_light(name):
 
 
 def test_configs_that_cannot_be_used_say_why_in_one_sentence(tmp_path):
-    blind = "ocio_profile_version: 1\nroles: {default: raw}\ncolorspaces: []\n"
-    bad = {"text": "hello", "empty": "", "blind.ocio": blind}
+    blind = b"ocio_profile_version: 1\nroles: {default: raw}\ncolorspaces: []\n"
+    bad = {"text": b"hello", "empty": b"", "blind.ocio": blind, "bytes.ocio": b"\xf7" * 99, "a.ocioz": b"PK\3\4"}
     asked = r"^RELUME_OCIO is .* give (the path|a config that has displays)"
     for name, text in bad.items():
-        (tmp_path / name).write_text(text)
+        (tmp_path / name).write_bytes(text)
     for source in [str(tmp_path / name) for name in (*bad, "gone.ocio", "")] + ["ocio://palace"]:
         with pytest.raises(ParameterError, match=asked) as raised:
             Config(source)

@@ -1,4 +1,4 @@
-/** A view of the server's OpenColorIO config as a table over N³ colours: s(x) = log(G x + 1) / (2 log(G + 1)) of each
+/** A view of the server's OpenColorIO config as a table over N³ colours: s(x) = log(1 + G √x) / (2 log(1 + G)) of each
  * channel, red slowest, and between nodes tetrahedra. The shader and the server do the same sums. */
 import { LUT_GAIN, LUT_SIZE, type Rgb } from "../protocol";
 
@@ -18,7 +18,7 @@ export function tableOf(bytes: ArrayBuffer): Table {
 
 /** What a display shows for a radiance after exposure. */
 export function sampleTable(table: Table, radiance: Rgb): Rgb {
-  const places = radiance.map((x) => Math.min(LAST, Math.max(0, SCALE * Math.log1p(LUT_GAIN * Math.max(0, x)))));
+  const places = radiance.map((x) => Math.min(LAST, SCALE * Math.log1p(LUT_GAIN * Math.sqrt(Math.max(0, x)))));
   const nodes = places.map((place) => Math.min(LAST - 1, Math.floor(place)));
   const steps = places.map((place, c) => ({ part: place - (nodes[c] as number), by: STEPS[c] as number }));
   steps.sort((a, b) => b.part - a.part); // along the longest first, from the corner at 0 to that at 1

@@ -107,7 +107,7 @@ vec3 node(vec3 at) {
 // a view's table between its nodes: the tetrahedron of the corners at 0, along the longest part, but the shortest, at 1
 vec3 table(vec3 x) {
   const vec3 R = vec3(1.0, 0.0, 0.0), G = vec3(0.0, 1.0, 0.0), B = vec3(0.0, 0.0, 1.0);
-  vec3 place = clamp(log2(GAIN * max(x, 0.0) + 1.0) / (2.0 * log2(GAIN + 1.0)), 0.0, 1.0) * LAST;
+  vec3 place = min(log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN)), 1.0) * LAST;
   vec3 at = min(floor(place), LAST - 1.0);
   vec3 part = place - at;
   vec3 longest = part.r >= part.g ? (part.r >= part.b ? R : B) : (part.g >= part.b ? G : B);

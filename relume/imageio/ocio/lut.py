@@ -1,8 +1,9 @@
 """Views as tables, for whoever has no OpenColorIO: the editor's shader.
 
-The table has N³ nodes over s(x) = log(G x + 1) / (2 log(G + 1)) of each channel, linear Rec. 709 after exposure: even
-in light near black and in stops above, with a node on 1, where many views bend. Light above s⁻¹(1) = G + 2, seven stops
-over 1, is as bright as that. Between nodes goes tetrahedral interpolation: greys come from greys alone.
+The table has N³ nodes over s(x) = log(1 + G √x) / (2 log(1 + G)) of each channel, linear Rec. 709 after exposure: even
+in roots near black, where displays have powers, and in stops above, with a node on 1, where many views bend. Light
+above s⁻¹(1) = 121, seven stops over 1, is as bright as that. Between nodes goes tetrahedral interpolation: greys come
+from greys alone (docs/adr/0095-views-as-tables.md).
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ U16 = NDArray[np.uint16]
 SIZE = 65
 """N, nodes of a channel."""
 
-GAIN = 128.0
-"""G, by which light is multiplied before its logarithm."""
+GAIN = 9.0
+"""G, by which roots are multiplied before their logarithm."""
 
 _CHANNELS = np.arange(3)
 
@@ -33,7 +34,7 @@ def bake(show: Callable[[F32], None]) -> U16:
     Returns:
         Display values, 65535 for 1; red is the slowest. (N, N, N, 3) uint16
     """
-    light = np.expm1(2 * np.log1p(GAIN) * np.arange(SIZE) / (SIZE - 1)) / GAIN
+    light = (np.expm1(2 * np.log1p(GAIN) * np.arange(SIZE) / (SIZE - 1)) / GAIN) ** 2
     nodes = np.stack(np.meshgrid(light, light, light, indexing="ij"), axis=-1).astype(np.float32)
     show(nodes.reshape(-1, 3))
     return np.asarray(np.clip(np.nan_to_num(nodes), 0, 1) * 65535 + 0.5, np.uint16)
@@ -46,7 +47,8 @@ def sample(table: U16, light: F32) -> F64:
         table: as `bake` makes it. (N, N, N, 3)
         light: linear, after exposure. (n, 3)
     """
-    place = np.clip(np.log1p(GAIN * np.maximum(light.astype(np.float64), 0)) / (2 * np.log1p(GAIN)), 0, 1) * (SIZE - 1)
+    roots = np.sqrt(np.maximum(light.astype(np.float64), 0))
+    place = np.minimum(np.log1p(GAIN * roots) / (2 * np.log1p(GAIN)), 1) * (SIZE - 1)
     node = np.minimum(place.astype(int), SIZE - 2)
     part = place - node
     order = np.argsort(-part, axis=1, kind="stable")  # from the corner at 0 along the longest part first, to that at 1

@@ -23,7 +23,7 @@ def _sample_rows(pixels, table, start, stop):  # type: ignore[no-untyped-def]
     for k in range(start, stop):
         at, stride = 0, 3
         for c in (2, 1, 0):  # blue is the quickest
-            place = min(scale * np.log1p(gain * max(pixels[k, c], np.float32(0))), np.float32(last))
+            place = min(scale * np.log1p(gain * np.sqrt(max(pixels[k, c], np.float32(0)))), np.float32(last))
             node = min(int(place), last - 1)
             part[c], step[c] = place - np.float32(node), stride
             at, stride = at + node * stride, stride * SIZE
