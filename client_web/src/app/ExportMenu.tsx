@@ -1,9 +1,9 @@
 /** Pictures to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
 import { useState } from "preact/hooks";
-import { exporting, exportExr, exportPng, exportTurntable, exrSpace, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
+import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
 import { stage } from "../picture/stage";
 import { lightLimitWords } from "../seen/limits";
-import { colorConfig } from "../state/color";
+import { colorConfig, exrSpace, exrSpaceHere } from "../state/color";
 import { drawn } from "../state/display";
 import { look } from "../state/look";
 import { moves, sideBySide, viewName } from "../state/views";
@@ -77,7 +77,7 @@ function Space() {
     <li>
       <label>
         EXR in
-        <select value={exrSpace.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value || null)}>
+        <select value={exrSpaceHere.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value)}>
           <option value="">linear Rec. 709</option>
           {colorConfig.value?.spaces.map((name) => (
             <option key={name} value={name}>
@@ -111,7 +111,7 @@ export function ExportMenu() {
           PNG
         </button>
         <button
-          title={`Export the linear radiance of ${whichView()}, with a layer for each light${lightLimitWords()}`}
+          title={`Export the linear radiance of ${whichView()}${exrSpaceHere.value === null ? "" : ` in ${exrSpaceHere.value}`}, with a layer for each light${lightLimitWords()}`}
           disabled={busy}
           onClick={() => void exportExr(true)}
         >

@@ -12,6 +12,7 @@ import type { Look, RenderBody, RenderRequest, Turntable } from "../protocol";
 import { lightLimits, lightLimitWords } from "../seen/limits";
 import { seenOf } from "../seen/rendered";
 import { bake } from "../state/bakes";
+import { exrSpaceHere } from "../state/color";
 import { look } from "../state/look";
 import { scene } from "../state/scene";
 import { viewName } from "../state/views";
@@ -26,10 +27,11 @@ export const exporting = signal<{ what: string; progress: number; stop(): void }
 /** As many characters as the server leaves of a name. */
 const LONGEST_STEM = 120;
 
-/** What a picture's file is called, without what it ends with: the scene, the view, and which light is missing. */
-export function fileStem(): string {
+/** What a picture's file is called, without what it ends with: the scene, the view, which light is missing, and which
+ * colour space it is in. */
+export function fileStem(space = ""): string {
   const limits = lightLimits.value.map((limit) => limit.words);
-  const words = [scene.value?.name ?? "picture", viewName.value, ...limits].join(" ").trim();
+  const words = [scene.value?.name ?? "picture", viewName.value, ...limits, space].join(" ").trim();
   return [...words.replace(/[^\p{L}\p{N}._-]+/gu, "-")].slice(0, LONGEST_STEM).join("");
 }
 
@@ -93,16 +95,14 @@ export async function render(what: string, fetchFrom: string, more: Pick<RenderR
   }).finally(() => (exporting.value = null));
 }
 
-/** The colour space of the server's config that EXR files are in; null: linear Rec. 709. */
-export const exrSpace = signal<string | null>(null);
-
 /** With layers: one for each light and each kind of light path, where there are several; or both of each light. */
 export function exportExr(layers: boolean | "light_groups"): Promise<void> {
   const eye = eyeNow();
   return render("EXR", "frames/0", {
     format: "exr",
     layers,
-    color_space: exrSpace.value,
+    color_space: exrSpaceHere.value,
+    name: fileStem(exrSpaceHere.value ?? ""),
     path: eye === null ? null : { eyes: [eye] },
   });
 }

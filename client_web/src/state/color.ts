@@ -1,5 +1,5 @@
 /** The server's OpenColorIO config, and what pictures are shown by: tone maps, or tables of its views. */
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import type { Table } from "../color/table";
 import type { ShownToneMap } from "../color/tonemap";
 import type { ColorBody, Look, OcioView } from "../protocol";
@@ -11,6 +11,11 @@ export const colorConfig = signal<ColorBody | null>(null);
 export const tables = signal<ReadonlyMap<string, Table | null>>(new Map());
 /** What the screens show. */
 export const toneMap = signal<ShownToneMap>("agx");
+
+/** The colour space of the config that EXR files are to be in; "": linear Rec. 709. */
+export const exrSpace = signal("");
+/** The same, null where it is Rec. 709 or this server has no such space. */
+export const exrSpaceHere = computed(() => (colorConfig.value?.spaces.includes(exrSpace.value) ? exrSpace.value : null));
 
 /** A tone map as text: its name, or a view as JSON. */
 export const keyOf = (of: ToneMap): string => (typeof of === "string" ? of : JSON.stringify([of.display, of.view]));

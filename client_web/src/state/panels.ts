@@ -1,5 +1,6 @@
-/** Which panels are open and how wide they are, kept for the next visit. */
+/** Which panels are open and how wide they are, and what is chosen in them, kept for the next visit. */
 import { effect, signal, type Signal } from "@preact/signals";
+import { exrSpace } from "./color";
 
 export const outlineOpen = signal(true);
 export const inspectorOpen = signal(true);
@@ -30,6 +31,7 @@ const KEPT: Record<string, Signal<unknown>> = {
   histogramOpen,
   aimLocked,
   folded,
+  exrSpace,
 };
 const KEY = "relume.panels";
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError
-from relume.imageio.ocio.lut import bake
+from relume.imageio.ocio.lut import LAYOUT, bake
 from relume.imageio.ocio.view import OcioView
 from relume.parallel import for_ranges
 
@@ -39,7 +39,7 @@ class Config:
     """A config that has been read, and looked through.
 
     Attributes:
-        name: as the config says, or its file's. id: changes with what is in it. 16 hexadecimal digits
+        name: as the config says, or its file's. id: of what is in it and how tables are made. 16 hexadecimal digits
         working: its name of linear Rec. 709. displays: their views, both in the config's order.
         default: the view that the config shows unasked.
     """
@@ -55,7 +55,8 @@ class Config:
         self._ocio = ocio = _module()
         self._config = _read(ocio, source)
         self.name = str(self._config.getName() or os.path.basename(source))
-        self.id = hashlib.sha256(self._config.getCacheID().encode()).hexdigest()[:16]
+        made_by = f"{self._config.getCacheID()} {ocio.__version__} {LAYOUT}"
+        self.id = hashlib.sha256(made_by.encode()).hexdigest()[:16]
         self.displays: Mapping[str, tuple[str, ...]] = {
             str(display): tuple(map(str, self._config.getViews(display))) for display in self._config.getDisplays()
         }

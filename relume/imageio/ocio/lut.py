@@ -23,6 +23,9 @@ SIZE = 65
 GAIN = 9.0
 """G, by which roots are multiplied before their logarithm."""
 
+LAYOUT = f"roots {SIZE} {GAIN}"
+"""Names the scale: browsers keep tables, those of another scale are others."""
+
 _CHANNELS = np.arange(3)
 
 
