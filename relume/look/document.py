@@ -172,10 +172,14 @@ def _check_tone_map(pointer: Pointer, given: Any) -> None:
     is_name = isinstance(given, str) and given in get_args(ToneMap)
     is_view = isinstance(given, Mapping) and given.keys() == {"display", "view"}
     if is_view:
-        is_view = all(isinstance(name, str) and 0 < len(name) <= MAX_NAME for name in given.values())
+        is_view = all(isinstance(name, str) and _is_told(name) for name in given.values())
     if not (is_name or is_view):
         views = "or a view of an OpenColorIO config, {display, view}"
         raise fail(pointer, given, f"one of {names_text(get_args(ToneMap))}, {views}")
+
+
+def _is_told(name: str) -> bool:
+    return 0 < len(name) <= MAX_NAME and name.isprintable()  # half of a surrogate pair is no text that can be sent
 
 
 def _merged(pointer: Pointer, given: Any, default: Mapping[str, Any]) -> dict[str, Any]:

@@ -124,12 +124,8 @@ from relume.scene.model import Light, Material
         ("/display/tone_map", {"a": 1}, "/display/tone_map", "'agx'"),
         ("/display/tone_map", {"display": "a", "view": ""}, "/display/tone_map", "view of an OpenColorIO config"),
         ("/display/tone_map", {"display": "a", "view": "b" * 257}, "/display/tone_map", "view of an OpenColorIO"),
-        (
-            "/display/tone_map",
-            {"display": "a", "view": "b", "look": "c"},
-            "/display/tone_map",
-            "view of an OpenColorIO",
-        ),
+        ("/display/tone_map", {"display": "a", "view": "b", "c": "c"}, "/display/tone_map", "view of an OpenColorIO"),
+        ("/display/tone_map", {"display": "\ud800", "view": "b"}, "/display/tone_map", "view of an OpenColorIO"),
     ],
 )
 def test_bad_value_is_refused_with_its_pointer_and_what_is_allowed(default, path, value, pointer, allowed):

@@ -1,7 +1,9 @@
 """A server with an OpenColorIO config: what it lists, and pictures that it renders by it."""
 
 import io
+import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import OpenImageIO
@@ -13,9 +15,11 @@ from test_comparisons import is_done, wait_until
 
 from relume.imageio.files import to_bytes
 from relume.imageio.ocio.config import Config
+from relume.imageio.ocio.current import using
 from relume.imageio.ocio.lut import SIZE
 from relume.imageio.ocio.view import OcioView
 from relume.imageio.primaries import KNOWN
+from server.apart.process import Process
 from server.settings import Settings
 
 CONFIG = "ocio://cg-config-latest"
@@ -72,5 +76,23 @@ def test_what_it_does_not_have_is_refused_before_anything_is_rendered(client: Te
     for more in ({"format": "exr", "color_space": "ACEScct"}, {"looks": [{}], "color_space": "ACEScg"}):
         refused = client.post("/api/renders", json=request | more)
         assert (refused.status_code, refused.json()["parameter"]) == (422, "color_space")
+    for name in ("\0", "\ud800", "a" * 257):
+        asked = json.dumps(request | {"looks": [{}], "format": "exr", "color_space": name})
+        headers = {"Content-Type": "application/json"}
+        assert client.post("/api/renders", content=asked, headers=headers).status_code == 422
     truth = {"bake": baked.bake, "view": "front", "look": request["looks"][1]}
     assert client.post("/api/truths", json=truth).json()["parameter"] == "/look/display/tone_map"
+
+
+def test_processes_that_render_are_told_the_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[list[str]] = []
+
+    def start(command: list[str], **_: object) -> SimpleNamespace:
+        started.append(command)
+        return SimpleNamespace(stdin=io.StringIO(), stdout=io.StringIO(), pid=0, poll=lambda: 0)
+
+    monkeypatch.setattr("subprocess.Popen", start)
+    for told in ((CONFIG, "ACEScg"), (CONFIG, None), (None,)):
+        with using(*told):
+            Process(tmp_path, 1, 2, 3)
+    assert [command[-2:] for command in started] == [[CONFIG, "ACEScg"], ["3", CONFIG], ["2", "3"]]

@@ -3,7 +3,7 @@ import { useState } from "preact/hooks";
 import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
 import { stage } from "../picture/stage";
 import { lightLimitWords } from "../seen/limits";
-import { colorConfig, exrSpace, exrSpaceHere } from "../state/color";
+import { exrSpace, exrSpaceHere, spaces } from "../state/color";
 import { drawn } from "../state/display";
 import { look } from "../state/look";
 import { moves, sideBySide, viewName } from "../state/views";
@@ -79,7 +79,7 @@ function Space() {
         EXR in
         <select value={exrSpaceHere.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value)}>
           <option value="">linear Rec. 709</option>
-          {colorConfig.value?.spaces.map((name) => (
+          {spaces.value.map((name) => (
             <option key={name} value={name}>
               {name}
             </option>
@@ -138,7 +138,7 @@ export function ExportMenu() {
             </li>
           ))}
           {moves.value && <WhatTurns />}
-          {(colorConfig.value?.spaces.length ?? 0) > 0 && <Space />}
+          {spaces.value.length > 0 && <Space />}
         </ul>
       )}
     </div>

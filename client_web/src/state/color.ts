@@ -14,8 +14,10 @@ export const toneMap = signal<ShownToneMap>("agx");
 
 /** The colour space of the config that EXR files are to be in; "": linear Rec. 709. */
 export const exrSpace = signal("");
-/** The same, null where it is Rec. 709 or this server has no such space. */
-export const exrSpaceHere = computed(() => (colorConfig.value?.spaces.includes(exrSpace.value) ? exrSpace.value : null));
+/** Those of the server's config, but for linear Rec. 709 by its name there. */
+export const spaces = computed(() => colorConfig.value?.spaces.filter((name) => name !== colorConfig.value?.working) ?? []);
+/** The one that is meant, null where it is Rec. 709 or this server has none of that name. */
+export const exrSpaceHere = computed(() => (spaces.value.includes(exrSpace.value) ? exrSpace.value : null));
 
 /** A tone map as text: its name, or a view as JSON. */
 export const keyOf = (of: ToneMap): string => (typeof of === "string" ? of : JSON.stringify([of.display, of.view]));
