@@ -27,6 +27,7 @@ from relume.trace.preview_light import PreviewLight, preview_light
 F32 = NDArray[np.float32]
 
 SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a rectangle: for each view sample, for each point of a cell
+SAMPLES_OF_FEW, FEW = 256, 4  # of a mesh for each view sample, where no more materials of the scene shine
 PREVIEW_SAMPLES = 4  # for each of both while a hand moves it
 _ONES = np.ones(3, np.float32)
 
@@ -77,29 +78,35 @@ class LocalLights:
     def _off_surface(self) -> float:
         return off_surface(self.positions)
 
+    def samples_of(self, geometry: LightGeometry) -> int:
+        """How many samples a view sample has of a light, see `strata_of`: more of a mesh, of which walls hide parts."""
+        lights = self._store.attributes["look"]["lights"].values()
+        is_one_of_few = sum(light["kind"] == "mesh" for light in lights) <= FEW
+        return SAMPLES_OF_FEW if geometry.kind == "mesh" and is_one_of_few else SAMPLES
+
     def all_rays(
         self,
         light: Light,
         points: Points,
         shadows_of: Callable[[LightGeometry, Points], Shadows] | None = None,
+        *,
+        is_coarse: bool = False,
     ) -> list[LocalRays]:
         """Find the local light that comes directly to points, as rays.
 
         Args:
             light: all that arrives at the picture. points: where it arrives.
             shadows_of: where they are remembered; they are traced where there is no such place.
+            is_coarse: without it, for broad functions of where light comes from; every light has `SAMPLES`.
         """
         if not light.paths.direct:
             return []
-        find = shadows_of or self.shadows
-        return [
-            LocalRays(
-                *self._sampled(geometry, SAMPLES),
-                np.array(gain, np.float32),
-                find(shadow_geometry(geometry), points).visible,
-            )
-            for geometry, gain in light.local
-        ]
+        found = []
+        for geometry, gain in light.local:
+            num, shadow = SAMPLES if is_coarse else self.samples_of(geometry), shadow_geometry(geometry)
+            seen = self._trace(shadow, points, num) if shadows_of is None else shadows_of(shadow, points).visible
+            found.append(LocalRays(*self._sampled(geometry, num), np.array(gain, np.float32), seen))
+        return found
 
     def preview(self, geometry: LightGeometry, points: Points) -> PreviewLight:
         """Preview what points get of a light of unit emission, by few samples of it where it has an extent."""
@@ -122,7 +129,7 @@ class LocalLights:
 
     def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
         """What points see of a light."""
-        return Shadows(self._trace(geometry, points, SAMPLES))
+        return Shadows(self._trace(geometry, points, self.samples_of(geometry)))
 
     @cached_property
     def _gather_samples(self) -> Points:

@@ -181,7 +181,7 @@ class MovingViews:
 
     def _vectors(self, element: Light, beside_suns: bool) -> F32:
         points = self.surface.points
-        rays: list[Rays] = list(self.lit.local.all_rays(element, points))
+        rays: list[Rays] = list(self.lit.local.all_rays(element, points, is_coarse=True))
         sent = self.lit.reflected_in(element)
         if sent is not None:
             rays.append(GatherRays(self._links, self._pattern, sent))

@@ -25,7 +25,7 @@ from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, comple
 from relume.memory import Memory
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.harmonic_light import HarmonicLight, read_harmonic_light
-from relume.methods.local_lights import SAMPLES, LocalLights, Shadows
+from relume.methods.local_lights import LocalLights, Shadows
 from relume.methods.on_cells import LightOnCells
 from relume.methods.reflected import Reflected
 from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
@@ -175,7 +175,7 @@ class BakedViews:
 
         def remembered(geometry: LightGeometry, points: Points) -> Shadows:
             key = (self.key, view.name, material, "shadows", geometry)
-            num_bytes = len(points.position) * -(-num_samples(geometry, SAMPLES) // 8)
+            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.samples_of(geometry)) // 8)
             return memory.get(key, Shadows, num_bytes, lambda: self.local.shadows(geometry, points))
 
         return self.local.all_rays(light, view.points(material), remembered)

@@ -1,6 +1,8 @@
 """Which samples of a local light each point sees, in packets of 16 neighbouring points × one sample; and their sum.
 
-Both ends of a shadow ray lie off their surfaces, on the sides that face each other: neither shadows itself.
+Both ends of a shadow ray lie off their surfaces, on the sides that face each other: neither shadows itself. Of lights
+of very many samples, four that lie side by side are asked by 16 points together, each of which asks for one of them:
+where all agree, all see all four or none.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from relume.trace.packet import LANES, aim, ask, is_free, new_packet, set_origin
 
 F32 = NDArray[np.float32]
 
+MANY = 1024  # samples, of which four side by side are traced one by one only where neighbours do not see them alike
 _POINTS_A_RANGE = 4096
+_SIDE_BY_SIDE = 4
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -36,37 +40,71 @@ def shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface):  # type: ignore[n
     return length * dx + off_surface * nx, length * dy + off_surface * ny, length * dz + off_surface * nz, far
 
 
+@nb.njit(nogil=True, cache=True, inline="always")
+def _aim_packet(packet, light, strata, off_surface, points, first, width, sample, spread):  # type: ignore[no-untyped-def]
+    """Aim shadow rays of points [first, first + width) at one sample of a light, or at several side by side.
+
+    Args:
+        packet, light, strata, off_surface, points: as in `_trace`.
+        sample, spread: lane k's is `sample` + k mod `spread`; a power of two.
+    Returns:
+        How many of them are to be traced: those of points that this sample may light.
+    """
+    position, normal, _, seed = points
+    active = 0
+    for k in range(LANES):
+        p = first + min(k, width - 1)
+        x, y, z = position[p, 0], position[p, 1], position[p, 2]
+        shift_u, shift_v = shift_of(strata, seed[p])
+        dx, dy, dz, distance, weight, nx, ny, nz = light_sample(
+            light, strata, sample + (k & (spread - 1)), shift_u, shift_v, x, y, z
+        )
+        above = dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2] > 0
+        is_asked = k < width and above and weight > 0
+        ask(packet, k, is_asked)
+        active += 1 if is_asked else 0
+        along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface)
+        set_origin(packet, k, x, y, z)
+        aim(packet, k, along_x, along_y, along_z, far)
+    return active
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _num_free(packet, width):  # type: ignore[no-untyped-def]
+    """Count the traced rays that met nothing."""
+    found = 0
+    for k in range(width):
+        found += 1 if packet.is_asked[k] != 0 and is_free(packet, k) else 0
+    return found
+
+
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
     occluded, scene, arguments, light, strata, off_surface, points, start, stop, bits
 ):
     """Trace points [start, stop); start is a multiple of 16."""
-    position, normal, _, seed = points
-    packet = new_packet(scene, arguments)
+    packet, num = new_packet(scene, arguments), strata.uv.shape[0]
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
-        for sample in range(strata.uv.shape[0]):
-            active = 0
-            for k in range(LANES):
-                p = first + min(k, width - 1)
-                x, y, z = position[p, 0], position[p, 1], position[p, 2]
-                shift_u, shift_v = shift_of(strata, seed[p])
-                dx, dy, dz, distance, weight, nx, ny, nz = light_sample(
-                    light, strata, sample, shift_u, shift_v, x, y, z
-                )
-                above = dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2] > 0
-                is_asked = k < width and above and weight > 0
-                ask(packet, k, is_asked)
-                active += 1 if is_asked else 0
-                along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface)
-                set_origin(packet, k, x, y, z)
-                aim(packet, k, along_x, along_y, along_z, far)
-            if active == 0:
-                continue
-            trace_shadows(occluded, packet)
-            for k in range(width):
-                if packet.is_asked[k] != 0 and is_free(packet, k):
-                    bits[first + k, sample >> 3] |= np.uint8(1 << (sample & 7))
+        for group in range(0, num, _SIDE_BY_SIDE):
+            is_free_of_all = False
+            if (
+                num >= MANY
+                and _aim_packet(packet, light, strata, off_surface, points, first, width, group, _SIDE_BY_SIDE) == width
+            ):
+                trace_shadows(occluded, packet)
+                free = _num_free(packet, width)
+                if free == 0:
+                    continue
+                is_free_of_all = free == width
+            for sample in range(group, min(group + _SIDE_BY_SIDE, num)):
+                if _aim_packet(packet, light, strata, off_surface, points, first, width, sample, 1) == 0:
+                    continue
+                if not is_free_of_all:
+                    trace_shadows(occluded, packet)
+                for k in range(width):
+                    if packet.is_asked[k] != 0 and (is_free_of_all or is_free(packet, k)):
+                        bits[first + k, sample >> 3] |= np.uint8(1 << (sample & 7))
 
 
 def trace_local(
@@ -78,7 +116,7 @@ def trace_local(
         scene: the triangles that may be in the way.
         off_surface: metres by which rays end before the light's own surface.
         light: the light. strata: its samples, from `strata_of`; the points' seeds shift them.
-        points: n points that the light may reach.
+        points: n points that the light may reach; neighbours follow each other.
     Returns:
         Sample k of a point in bit k & 7 of byte k >> 3. (n, ceil(samples / 8)) uint8
     """

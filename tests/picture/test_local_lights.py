@@ -124,6 +124,7 @@ def baked(scene, folder, method="direct"):
 @pytest.mark.parametrize("is_two_sided", [True, False])
 def test_shining_surface_is_seen_and_lights_the_floor(tmp_path, is_two_sided):
     transfer = baked(room(lamp_sides=is_two_sided, lights=[SHINING]), tmp_path)
+    assert [transfer.local.samples_of(LightGeometry(kind)) for kind in ("mesh", "rectangle")] == [256, 64]
     below, above = (rendered(transfer, {}, view=view) for view in ("below", "above"))
     lamp = transfer.views["above"].material_ids() == 1
     assert np.all(np.abs(below.max(axis=(0, 1)) - [4, 2, 1]) < 0.1), "its lower side shines"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import twins
@@ -14,11 +16,14 @@ from relume.light.local import make_local, parts_of, rectangle, strata_of
 from relume.light.strata import NOT_FLAT, halvings, make_strata
 from relume.light.triangles import NO_LIGHTS
 from relume.look import LightGeometry
+from relume.methods.local_lights import SAMPLES_OF_FEW
 from relume.points import Points
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import LocalRays, Receivers
 from relume.project.shading.shader import Shader
+from relume.trace.embree import EmbreeScene
+from relume.trace.local_shadows import trace_local
 
 PANEL = LightGeometry("rectangle", (0.1, 1.4, -0.8), (0.1, -1.0, 0.3), rotation=20.0, size=(0.9, 0.5))
 MESH = LightGeometry("mesh", material="Lamp")
@@ -100,10 +105,11 @@ def test_beside_other_light_a_lamp_is_found_less_finely():
     assert 1e-6 < away.max() < 1e-3 * (2 + alone.max())
 
 
-def panel_in(columns, rows):
-    """Triangles that the panel is made of. (2 columns · rows, 3, 3)"""
+def panel_in(columns, rows, begin=0.0, end=1.0):
+    """Triangles of the panel from `begin` to `end` of its width. (2 columns · rows, 3, 3)"""
     corner, (e, f) = rectangle(PANEL)
-    e, f, triangles = e / columns, f / rows, []
+    corner = corner + begin * e
+    e, f, triangles = (end - begin) * e / columns, f / rows, []
     for a in (corner + k * e + m * f for k in range(columns) for m in range(rows)):
         triangles += [[a, a + e, a + e + f], [a, a + e + f, a + f]]
     return np.array(triangles)
@@ -121,6 +127,23 @@ def test_a_mesh_shines_as_the_panel_that_it_is(columns, rows, roughness, most):
         for lamp in (make_local(PANEL), mesh)
     )
     assert error(found, expected) < most
+
+
+def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
+    """A fifth of a panel behind an opening, against a panel as wide as that; with quarters as many samples 43 % off."""
+    term, bands = curves_of("ggx", {"roughness": 0.1})
+    wall = np.concatenate([panel_in(1, 1, -2.5, 0), panel_in(1, 1, 1, 3.3)]).reshape(-1, 3)
+    wall += 1e-3 * np.array(PANEL.direction)
+    blocks = EmbreeScene.build(wall.astype(np.float32), np.arange(12, dtype=np.uint32).reshape(4, 3))
+    open_air, behind = (make_local(MESH, shining(panel_in(1, 1, *ends), False)) for ends in ((0, 1), (-2.3, 3.1)))
+    of_panel, strata = floor_under(open_air), strata_of(behind, SAMPLES_OF_FEW)
+    seen = trace_local(blocks, 1e-5, behind, strata, of_panel.points)
+    of_lamp = replace(of_panel, rays=(LocalRays(behind, strata, np.ones(3, np.float32), seen),))
+    expected, found = (
+        Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
+        for receivers in (of_panel, of_lamp)
+    )
+    assert error(found, expected) < 0.05
 
 
 @pytest.mark.parametrize(("num_pieces", "num"), [(1, 64), (2, 256), (50, 256), (1000, 256), (3, 4), (1, 1)])

@@ -12,7 +12,7 @@ from relume.light.local import light_sample, make_local, strata_of
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import merge
-from relume.trace.local_shadows import arriving, trace_local
+from relume.trace.local_shadows import MANY, arriving, trace_local
 
 UP = np.array([0, 1, 0], np.float32)
 
@@ -69,6 +69,31 @@ def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
         wrong += np.sum(bits[:, k] != (asked & ~crosses(triangles, position.astype(float), end)))
     assert wrong <= 2e-3 * bits.size, "but for rays that graze an edge"
     assert 0.05 < bits.mean() < 0.95
+
+
+def test_very_many_samples_are_asked_in_fours_where_neighbours_agree():
+    """A floor in rows under a panel of which a card hides a third: bits are those of segments all the same."""
+    panel, card = ([[x, y, -0.5], [1, y, -0.5], [1, y, 0.5], [x, y, 0.5]] for x, y in ((-1, 1.5), (0.37, 1.3)))
+    corners = np.array(panel, np.float32)[[[0, 1, 2], [0, 2, 3]]]
+    made = make_local(LightGeometry("mesh", material="Lamp"), shining(corners, False))
+    strata = strata_of(made, MANY // 4)
+    x, z = np.meshgrid(np.linspace(-0.4, 0.4, 16), np.linspace(-0.2, 0.2, 2))
+    position = np.stack([x, 0 * x, z], axis=2).reshape(-1, 3).astype(np.float32)
+    points = points_at(position, np.tile(UP, (32, 1)))
+    hides = quad("card", card, 0)
+    bits = np.unpackbits(trace_local(embree_of(hides), 1e-5, made, strata, points), axis=1, bitorder="little")
+    place = np.array(
+        [
+            [light_sample(made, strata, k, *shift_of(strata, n), *p)[:4] for k in range(MANY)]
+            for n, p in zip(points.seed, position, strict=True)
+        ]
+    )
+    end = position[:, None] + place[..., :3] * place[..., 3:]
+    start = np.repeat(position.astype(float), MANY, axis=0)
+    free = ~crosses(hides.positions[hides.faces].astype(float), start, end.reshape(-1, 3)).reshape(32, MANY)
+    assert 0.5 < free.mean() < 0.9
+    assert (bits != free).mean() < 2e-3
+    np.testing.assert_allclose(bits.mean(axis=1), free.mean(axis=1), atol=6 / MANY)  # single cells along the edge
 
 
 def irradiance(geometry, light, position, normal, triangles=None, num_samples=64):
