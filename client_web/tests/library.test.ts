@@ -1,5 +1,5 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { importMaterial, isFound } from "../src/library/library";
+import { elsewhere, group, importMaterial, isFound, library, model, query, showAll, shown } from "../src/library/library";
 import { highlightOf, placeOf, pointOf, rangeOf } from "../src/library/map";
 
 const POINTS = [
@@ -47,6 +47,26 @@ describe("the search in the library", () => {
   it("finds by any part of the words, in any order, with a blank for a hyphen", () => {
     for (const typed of ["", "bronze", "ALUM BR", "bronze alum", "ngan", "alum-bronze "]) expect(isFound(brass, typed)).toBe(true);
     for (const typed of ["brass", "bronze 2006"]) expect(isFound(brass, typed)).toBe(false);
+  });
+});
+
+describe("what is found elsewhere", () => {
+  const fitted = (id: string, name: string, model: string, group: string) => ({ id, name, source: "", model, group, terms: [] }) as never;
+
+  it("is told where nothing that is shown is called so, and shown whole", () => {
+    library.value = [fitted("a", "Gold", "ward", "metal"), fitted("b", "Felt", "cook_torrance", "fabric")];
+    [query.value, group.value] = ["felt", "all"];
+    expect(elsewhere.value).toEqual([]);
+    for (const [typed, of, found] of [["gold", "all", "ward"], ["felt", "metal", "cook_torrance"]] as const) {
+      [query.value, group.value] = [typed, of];
+      expect(elsewhere.value).toEqual([[found, 1]]);
+      showAll(found);
+      expect([shown.value.length, elsewhere.value]).toEqual([1, []]);
+    }
+    query.value = "brass";
+    expect(elsewhere.value).toEqual([]);
+    query.value = "";
+    model.value = "cook_torrance";
   });
 });
 

@@ -101,6 +101,20 @@ class EigenBtf:
         both = np.concatenate([self.mean[:, :, None].astype(np.float32), components], axis=2)
         return np.ascontiguousarray(both.swapaxes(-1, -2))
 
+    def sum_from(self, view: int, texels: NDArray[np.int64], shares: F64) -> F64:
+        """Texels seen from one side, summed: the BRDF times cosine. (L, 3)
+
+        Args:
+            view: the side. texels: their numbers. (n,). shares: of each. (n,)
+        """
+        of, total = self.cluster[view, texels], np.zeros(self.mean.shape[2:])
+        for k in np.unique(of):
+            some, share = texels[of == k], shares[of == k]
+            weight = share @ self.weight[view, some].astype(np.float64) * self.step[view, k]
+            total += share.sum() * self.mean[view, k].astype(np.float64)
+            total += np.einsum("j,jlc->lc", weight, self.eigen[view, k].astype(np.float64))
+        return total
+
     def texel(self, number: int) -> F64:
         """The BRDF times cosine of a texel. (V, L, 3)"""
         every = np.arange(self.rings.num_directions)

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from relume.basis.arcs import log2_above_one
 from relume.brdf.terms.btf import Texels
-from relume.btf.parallax import height_seen, height_seen_numpy, slant_of, slants
-from relume.btf.rings import Rings, taps, taps_numpy
+from relume.btf.parallax import height_seen, slant_of, slants
+from relume.btf.rings import Rings, taps
+from relume.btf.sent import seen_numpy, sent_numpy
 from relume.light.triangles import TriangleLights
 from relume.project.receivers import Listed, Rays, Receivers
 
@@ -335,22 +336,10 @@ def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place
     Returns:
         (3,) float64
     """
-    found, size = texels.btf, np.array(texels.btf.size[::-1])
-    slant = wo[:2] / max(wo[2], np.hypot(wo[0], wo[1]) / np.tan(found.rings.theta[-1]))
-    light, of_light, left = taps_numpy(found.rings, directions)
-    view, of_view, _ = taps_numpy(found.rings, wo[None])
-    seen = np.zeros((found.rings.num_directions, 3))
     length = footprint / np.sqrt(wo[2])
     num = 1 if length**2 <= 3 else int(np.clip(np.ceil(length / _APART), 2, _MOST_PLACES))
     apart = np.sqrt((length**2 - 3) / (num**2 - 1)) if num > 1 else 0.0
-    for away in apart * (np.arange(num) - (num - 1) / 2):
-        one = place + away * wo[:2] / np.hypot(wo[0], wo[1]) * [1, -1]
-        height = height_seen_numpy(found.height, (one + 0.5) / size, slant)
-        for side, share in zip(view[0], of_view[0], strict=True):
-            at = one + height * (slant - slants(found.rings)[side]) * [1, -1] * size
-            first = np.floor(at).astype(int)
-            for beside in ((0, 0), (1, 0), (0, 1), (1, 1)):
-                near = share * np.abs(1 - np.array(beside) - (at - first)).prod() / num
-                column, row = (first + beside) % size
-                seen += near * found.texel(row * size[0] + column)[side]
-    return np.asarray(np.einsum("mk,m,mkc,mc->c", of_light, left, seen[light], irradiance).clip(0))
+    away = apart * (np.arange(num) - (num - 1) / 2)
+    places = place + away[:, None] * wo[:2] / np.hypot(wo[0], wo[1]) * [1, -1]
+    sent = sent_numpy(texels.btf, seen_numpy(texels.btf, places, wo), directions)
+    return np.asarray((sent * irradiance).sum(axis=0).clip(0))

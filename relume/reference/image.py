@@ -246,7 +246,7 @@ def points_of(samples: ViewSamples, textures: Mapping[str, F32]) -> Points:
     points, roughness = samples.surface.points, samples.surface.roughness
     towards = samples.eye.astype(np.float64) - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
-    return Points(points.position, points.normal, points.tangent, wo, textures, roughness)
+    return Points(points.position, points.normal, points.tangent, wo, textures, roughness, samples.surface.uv)
 
 
 def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:

@@ -21,6 +21,7 @@ from relume.brdf.channels import channel_of
 from relume.brdf.evaluate import eval_brdf
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.look import Look, Paths
+from relume.reference.covers import Cover
 from relume.reference.images import textures_of
 from relume.reference.kinds import Kinds, kinds_of
 from relume.reference.lobes import Lobe
@@ -37,6 +38,8 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _TEXTURE_ANGLE = 1e-3
+Covers = dict[tuple[int, int], Cover]  # by kinds of surfaces, and terms of these
+
 _LEAST_CHANCE = 0.05
 _LEAST_DENSITY = 1e-12
 
@@ -80,6 +83,7 @@ def reference_indirect(
     kinds, lamps = kinds_of(scene, look), lamps_of(scene, look)
     lobes = [lobes_of(of_material) for of_material in kinds.terms]
     total, squares = np.zeros((2, len(wanted), points.num_points, 3))
+    covers = _covers(kinds, points, kinds.of(np.asarray(material), points.roughness), seed)
     for path in range(num_paths):
         rng = np.random.default_rng((seed, path, points.num_points))
         here, of = points, kinds.of(np.asarray(material), points.roughness)
@@ -87,7 +91,7 @@ def reference_indirect(
         weight[_IN_MIRRORS] = 1.0
         found = np.zeros((len(wanted), points.num_points, 3))
         for bounce in range(min(MOST_BOUNCES, max(map(_longest, wanted)))):
-            directions, share, mirrored = _scattered(kinds, lobes, here, of, rng)
+            directions, share, mirrored = _scattered(kinds, lobes, here, of, covers if bounce == 0 else {}, rng)
             weight = _reflected(weight, share, mirrored, bounce)
             hits = trace_from(geometry.embree, here.position, directions)
             hit = np.nonzero(hits.face >= 0)[0]
@@ -169,11 +173,31 @@ def _places(
     return Points(*surface.points[:3], -directions[hit], textures, surface.roughness), material
 
 
+def _covers(kinds: Kinds, points: Points, kind: NDArray[np.integer], seed: int) -> Covers:
+    """What covers the points that are seen, by their kinds and the terms of these."""
+    rng, found = np.random.default_rng((seed, points.num_points)), {}
+    for index, of_material in enumerate(kinds.terms):
+        rows = points.rows(np.nonzero(kind == index)[0])
+        for k, one in enumerate(rows.covers(of_material, rng) if rows.num_points else ()):
+            if one is not None:
+                found[index, k] = one
+    return found
+
+
 def _scattered(
-    kinds: Kinds, lobes: Sequence[Sequence[Lobe]], points: Points, kind: NDArray[np.integer], rng: np.random.Generator
+    kinds: Kinds,
+    lobes: Sequence[Sequence[Lobe]],
+    points: Points,
+    kind: NDArray[np.integer],
+    covers: Covers,
+    rng: np.random.Generator,
 ) -> tuple[F32, F64, F64]:
     """Draw a direction for each point by one of its material's lobes.
 
+    Args:
+        kinds: there are. lobes: of each. points: n of them. kind: of each. (n,)
+        covers: of points that are all there are of their kind.
+        rng: draws.
     Returns:
         World space, unit (n, 3); f cos θi over the density of all lobes together (n, 3), nothing below the horizon; and
         how much of that a mirror sends on (n, 3).
@@ -191,11 +215,15 @@ def _scattered(
             wi[some] = lobe.draw(wo[some], 1, rng)[:, 0]
         density = np.mean([lobe.density_of(wi[at, None], wo[at])[:, 0] for lobe in of_lobes], axis=0)
         cosine = np.where((wi[at, 2] > 0) & (wo[at, 2] > 0), wi[at, 2], 0.0)
-        for term, mirror in zip(of_material, kinds.mirrors[index], strict=True):
+        for k, (term, mirror) in enumerate(zip(of_material, kinds.mirrors[index], strict=True)):
             channel = channel_of(term)
             texture = 1.0 if channel is None else points.textures[channel][at]
-            value = texture * eval_brdf(term, wi[at], wo[at])
-            of_term = value * (cosine / np.maximum(density, _LEAST_DENSITY))[:, None]
+            if (covered := covers.get((index, k))) is None:
+                value = eval_brdf(term, wi[at], wo[at]) * cosine[:, None]
+            else:
+                sent = [covered.sent(row, one[None])[0] for row, one in enumerate(wi[at])]
+                value = np.where(cosine[:, None] > 0, sent, 0.0) * np.asarray(term["color"])
+            of_term = texture * value / np.maximum(density, _LEAST_DENSITY)[:, None]
             share[at] += of_term
             mirrored[at] += of_term * mirror
     return np.einsum("nji,nj->ni", frames, wi).astype(np.float32), share, mirrored

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -18,6 +18,7 @@ from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.parallel import for_steps
+from relume.reference.covers import Cover, cover
 from relume.reference.kernel import add_lights, list_visible
 from relume.reference.lobes import Lobe, cosine_lobe, lobe_of
 from relume.reference.local import Arriving, LocalLamp, free_distance
@@ -45,6 +46,7 @@ class Points:
         position: off the surface already. normal, tangent: shading frame. wo: towards the viewer. (n, 3) float32
         textures: what multiplies terms of a channel, "diffuse" and "specular". (n, 3) float32 each
         roughness: see `relume.trace.surface.Surface`. (n,) float32
+        uv: see there; None where what covers surfaces counts by its mean. (n, 5) float32
     """
 
     position: F32
@@ -53,6 +55,7 @@ class Points:
     wo: F32
     textures: Mapping[str, F32]
     roughness: F32
+    uv: F32 | None = None
 
     @property
     def num_points(self) -> int:
@@ -69,7 +72,20 @@ class Points:
         """Some of the points."""
         textures = {name: values[index] for name, values in self.textures.items()}
         frame = self.normal[index], self.tangent[index], self.wo[index]
-        return Points(self.position[index], *frame, textures, self.roughness[index])
+        uv = None if self.uv is None else self.uv[index]
+        return Points(self.position[index], *frame, textures, self.roughness[index], uv)
+
+    def covers(self, terms: Sequence[Document], rng: np.random.Generator) -> list[Cover | None]:
+        """What covers them, term by term; None where it is the same everywhere. rng: draws places in it."""
+        found: list[Cover | None] = []
+        for document in terms:
+            texels = TERMS[document["model"]].settled(document).texels
+            if texels is None or self.uv is None:
+                found.append(None)
+                continue
+            wo = np.einsum("nij,nj->ni", self.frames(), self.wo.astype(np.float64))
+            found.append(cover(texels, self.uv, wo / np.linalg.norm(wo, axis=1, keepdims=True), rng))
+        return found
 
 
 @dataclass(frozen=True)
@@ -83,6 +99,7 @@ class _Tables:
     values: F64
     is_stepped: NDArray[np.bool_]
     is_gray: NDArray[np.bool_]
+    cover: Cover | None = None
 
 
 def _tabulate(document: Document) -> _Tables:
@@ -149,19 +166,33 @@ def reference_radiance(
 
     def packet(start: int, stop: int) -> None:
         some = points.rows(slice(start, stop))
+        here = _covered(tables, some, np.random.default_rng((_SEED, pass_index, start, 2)))
         if lobes:
             rng = np.random.default_rng((_SEED, pass_index, start))
-            _add_drawn(geometry, texels, spp, lobes, some, tables, rng, radiance[:, start:stop])
+            _add_drawn(geometry, texels, spp, lobes, some, here, rng, radiance[:, start:stop])
         for first in range(0, 0 if lobes else texels.num_texels, _TEXELS_AT_ONCE):
             rows = slice(first, first + _TEXELS_AT_ONCE)
-            _add_texels(geometry, texels.direction[rows], texels.power[rows], some, tables, radiance[:, start:stop])
+            _add_texels(geometry, texels.direction[rows], texels.power[rows], some, here, radiance[:, start:stop])
         rng = np.random.default_rng((_SEED, pass_index, start, 1))
         for lamp in lamps:
             arriving = lamp.arriving(geometry, some.position.astype(np.float64), spp or _MOST_OF_LAMP, rng)
-            _add_lamp(arriving, some, tables, radiance[:, start:stop])
+            _add_lamp(arriving, some, here, radiance[:, start:stop])
 
     for_steps(packet, points.num_points, _POINTS_A_PACKET, progress, cancelled, "the reference")
     return radiance
+
+
+def _covered(
+    tables: Sequence[Sequence[_Tables]], points: Points, rng: np.random.Generator
+) -> Sequence[Sequence[_Tables]]:
+    """The same of terms that cover a packet of points, with what covers it."""
+    if points.uv is None or not any(table.term.texels is not None for terms in tables for table in terms):
+        return tables
+    found = []
+    for terms in tables:
+        covers = points.covers([table.document for table in terms], rng)
+        found.append([replace(table, cover=one) for table, one in zip(terms, covers, strict=True)])
+    return found
 
 
 def _add_texels(
@@ -256,7 +287,10 @@ def _add_lights(
     x, y, z = wi[:, :num]
     for m, terms in enumerate(tables):
         for table in terms:
-            shading = table.term.quotients(x, y, z, ox, oy, oz) * z
+            if table.cover is None:
+                shading = table.term.quotients(x, y, z, ox, oy, oz) * z
+            else:
+                shading = np.ascontiguousarray(table.cover.sent(p, wi[:, :num].T).T)
             total = np.zeros(3)
             add_lights(
                 table.kinds, table.axes, table.values, table.is_stepped, table.is_gray,

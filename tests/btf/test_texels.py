@@ -17,6 +17,10 @@ from relume.methods.registry import METHODS, open_bake
 from relume.picture.light import light_of
 from relume.picture.picture import Picture
 from relume.project.texels import texel_numpy, texel_rows
+from relume.reference import Points, reference_image
+from relume.reference.indirect import _covers, _scattered
+from relume.reference.kinds import Kinds
+from relume.reference.lobes import cosine_lobe
 from relume.render.image import render_image
 from relume.scene.model import Material
 from relume.store import bake_here
@@ -197,3 +201,39 @@ def test_other_methods_show_it_too_and_follow_a_hand(small_btf, tmp_path, method
         np.testing.assert_allclose(
             live.image()[..., :3], render_image(bake, "front", look)[..., :3], rtol=1e-4, atol=1e-5
         )
+
+
+def test_brute_force_looks_up_places_within_what_pixels_cover(bake, small_btf):
+    """Its direct picture is the method's, but for what means over texels leave out."""
+    look = covered(bake, small_btf.record, (1.0, 0.8, 0.6), scale=3.0, rotation=20.0)
+    ours = render_image(bake, "front", look)[..., :3]
+    truth = np.mean([reference_image(floor(), "front", look, SIZE, 0, pass_index=k) for k in range(2)], axis=0)
+    on_floor = truth.min(axis=2) > 0.01
+    assert np.linalg.norm(ours - truth) < 0.06 * np.linalg.norm(truth)
+    assert np.linalg.norm((ours - truth)[on_floor]) < 0.3 * np.linalg.norm(
+        (truth - truth[on_floor].mean(axis=0))[on_floor]
+    )
+
+
+def test_paths_of_brute_force_begin_at_those_places(bake, small_btf):
+    """Drawn directions, each over its density, are on the average what the hemisphere makes of even light."""
+    (term,) = covered(bake, small_btf.record, (1.0, 0.8, 0.6)).materials["Floor"].terms
+    kinds, num = Kinds([[term]], [[np.zeros(3)]], [0], [()]), 400
+    rows = np.ones((num, 1), np.float32)
+    wo = np.array([0.48, 0.6, 0.64])
+    places = np.array([[0.31, 0.77, 0.0, 0.4, -1.0]])
+    points = Points(
+        0 * rows * [1, 1, 1], rows * [0, 0, 1], rows * [1, 0, 0], rows * wo, {}, rows[:, 0], (rows * places).astype("f")
+    )
+    of, rng = np.zeros(num, np.int64), np.random.default_rng(5)
+    covers = _covers(kinds, points, of, 1)
+    _, share, _ = _scattered(kinds, [[cosine_lobe()]], points, of, covers, rng)
+    z, turn = (np.arange(40) + 0.5) / 40, (np.arange(80) + 0.5) * np.pi / 40
+    flat = np.sqrt(1 - z**2)[:, None]
+    wi = np.stack([flat * np.cos(turn), flat * np.sin(turn), np.broadcast_to(z[:, None], (40, 80))], axis=-1)
+    expected = 2 * np.pi * covers[0, 0].sent(7, wi.reshape(-1, 3)).mean(axis=0) * term["color"]
+    error = share.std(axis=0) / np.sqrt(num)
+    assert (np.abs(share.mean(axis=0) - expected) < 4 * error).all()
+    assert (error < 0.04 * expected).all()
+    mean = _scattered(kinds, [[cosine_lobe()]], points, of, {}, rng)[1].mean(axis=0)
+    assert np.linalg.norm(mean - expected) > 8 * np.linalg.norm(error)  # what all texels make of it is something else

@@ -8,6 +8,7 @@ import { NavigationMap } from "./NavigationMap";
 import {
   BTFS,
   DRAG_TYPE,
+  elsewhere,
   fittedModels,
   group,
   groups,
@@ -17,11 +18,15 @@ import {
   model,
   putOnSelected,
   query,
+  showAll,
   shown,
 } from "./library";
 
+const UNFITTED: Record<string, string> = { [MEASURED]: "imported measurements", [BTFS]: "textures from all sides" };
+
+const label = (name: string) => UNFITTED[name] ?? models.value.find((info) => info.model === name)?.label ?? name;
+
 function Filters() {
-  const label = (name: string) => models.value.find((info) => info.model === name)?.label ?? name;
   return (
     <div class="library-filters">
       <select
@@ -36,13 +41,11 @@ function Filters() {
         ))}
       </select>
       <select aria-label="Model" value={model.value} onChange={(event) => (model.value = event.currentTarget.value)}>
-        {fittedModels.value.map((name) => (
+        {[...fittedModels.value, MEASURED, BTFS].map((name) => (
           <option key={name} value={name}>
             {label(name)}
           </option>
         ))}
-        <option value={MEASURED}>imported measurements</option>
-        <option value={BTFS}>textures from all sides</option>
       </select>
     </div>
   );
@@ -89,9 +92,14 @@ export function LibraryPanel() {
       <Filters />
       <Makings />
       {shown.value.length === 0 && query.value !== "" && (
-        <p class="library-help" role="status">
-          Nothing here is called “{query.value}”.
-        </p>
+        <div class="library-help library-elsewhere" role="status">
+          Nothing here is called “{query.value}”{elsewhere.value.length > 0 && ", but elsewhere"}.
+          {elsewhere.value.map(([name, num]) => (
+            <button key={name} type="button" onClick={() => showAll(name)}>
+              {label(name)}: {num}
+            </button>
+          ))}
+        </div>
       )}
       {shown.value.length === 0 && query.value === "" && model.value === MEASURED && (
         <p class="library-help">No measurements yet. A MERL file (.binary) becomes a material whose curves can be edited.</p>

@@ -74,6 +74,21 @@ export const shown = computed<Entry[]>(() => {
   return entries.value.filter((entry) => entry.model === model.value && isOfGroup(entry) && isFound(entry, query.value));
 });
 
+const MOST_ELSEWHERE = 4;
+
+/** Where nothing that is shown is called as was typed: the models that have something, and how much. */
+export const elsewhere = computed<[model: string, num: number][]>(() => {
+  if (query.value.trim() === "" || shown.value.length > 0) return [];
+  const found = new Map<string, number>();
+  for (const entry of entries.value)
+    if (isFound(entry, query.value)) found.set(entry.model, 1 + (found.get(entry.model) ?? 0));
+  return [...found].sort((one, other) => other[1] - one[1]).slice(0, MOST_ELSEWHERE);
+});
+
+export function showAll(of: string): void {
+  [model.value, group.value] = [of, "all"];
+}
+
 export function isFound({ name, about }: Pick<Entry, "name" | "about">, typed: string): boolean {
   const text = `${name} ${about}`.toLowerCase().replaceAll("-", " ");
   return typed.toLowerCase().replaceAll("-", " ").split(/\s+/).every((word) => text.includes(word));
