@@ -37,7 +37,7 @@ def below_sheen(most: float, roughness: float, *, by_light: bool) -> tuple[Kept,
     """Shares of light that what lies below a sheen keeps, by θi and by θo.
 
     Args:
-        most: the largest channel of the sheen's colour.
+        most: the largest channel of the sheen's colour. roughness: of the sheen.
         by_light: whether the first may be other than one.
     """
     theta = _middles()
