@@ -138,3 +138,23 @@ def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-un
     else:
         for k in range(ix.shape[0]):
             out[k] = scale * angle_at(THETA_O, ix[k], iy[k], iz[k], ox, oy, oz)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def alpha_and_beta_into(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ignore[no-untyped-def]
+    """γα and γβ times scales, of many directions wi and one wo, by one power: cos γα · cos γβ = cos θh.
+
+    Args:
+        scale: of each. (2,) float32. ix, iy, iz: local wi. (n,) float32
+        ox, oy, oz: local wo, scalars. alpha, beta: (n,) float32, written.
+    """
+    along, across = scale[0], scale[1]
+    for k in range(ix.shape[0]):
+        hx, hy, hz = ix[k] + ox, iy[k] + oy, iz[k] + oz
+        beside = hx * hx + hy * hy
+        inverse = _ONE / math.sqrt(beside + hz * hz + np.float32(1e-12))
+        cos_theta_h = min(max(hz * inverse, np.float32(1e-6)), _ONE)
+        cos2_phi_h = hx * hx / beside if beside > np.float32(1e-12) else np.float32(0.5)
+        cosine = power_below_one(cos_theta_h, cos2_phi_h)
+        alpha[k] = along * acos_clamped(cosine)
+        beta[k] = across * acos_clamped(min(cos_theta_h / cosine, _ONE))

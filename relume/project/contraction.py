@@ -72,6 +72,12 @@ class Contraction:
         return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
 
     @cached_property
+    def falls(self) -> F32:
+        """By how much each band is less than the one before it. (C, 3, max J + 8) float32"""
+        bands = self.bands.astype(np.float64)
+        return -np.diff(bands, axis=2, prepend=bands[:, :, :1]).astype(np.float32)
+
+    @cached_property
     def whole(self) -> WholeCurves:
         """Its curves where none is free and each has one setting."""
         steps = np.zeros((*self.bands.shape, 3), np.float32)

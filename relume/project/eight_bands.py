@@ -68,13 +68,17 @@ def _area_below(builder: Any, y: Any, low: Any, middle: Any, high: Any, rise: An
     return builder.select(builder.fcmp_ordered("<=", y, low, flags=FAST), nothing, area)
 
 
+def _areas(builder: Any, band: Any, overlap: Any) -> Any:
+    """Compute the shares of area below the beginnings of bands [band, band + 8)."""
+    first = spread(builder, builder.sitofp(band, FLOAT))
+    places = total(builder, [first, ir.Constant(VECTOR, [float(k) for k in range(NUM)])])
+    return _area_below(builder, places, *(spread(builder, value) for value in overlap))
+
+
 def _shares(builder: Any, band: Any, overlap: Any) -> Any:
     """Compute Δ of bands [band, band + 8)."""
-    of_all = [spread(builder, value) for value in overlap]
-    first = spread(builder, builder.sitofp(band, FLOAT))
-    lower = total(builder, [first, ir.Constant(VECTOR, [float(k) for k in range(NUM)])])
-    upper = total(builder, [first, ir.Constant(VECTOR, [float(k + 1) for k in range(NUM)])])
-    return difference(builder, _area_below(builder, upper, *of_all), _area_below(builder, lower, *of_all))
+    upper = _areas(builder, builder.add(band, word(1)), overlap)
+    return difference(builder, upper, _areas(builder, band, overlap))
 
 
 @kernel_part
@@ -99,20 +103,23 @@ def deposit_eight(typing_context, out, band, low, middle, high, rise, fall, red,
 
 
 @kernel_part
-def mean_of_eight(typing_context, bands, channel, band, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
-    """Compute Σ Δ_j bands[channel, j] over [band, band + 8).
+def mean_of_eight(typing_context, falls, channel, band, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
+    """Compute Σ_j A_j (c_{j-1} − c_j) over bands [band, band + 8), with A_j the share of area below band j.
+
+    Of all bands from the smallest corner's to a last one k beyond the largest's, with c_k, it is the mean Σ Δ_j c_j:
+    half of the areas, and where a curve falls nothing is a difference.
 
     Args:
-        typing_context: Numba's. bands: of a curve. (3, bands padded by 8) float32. channel: its row.
+        typing_context: Numba's. falls: c_{j-1} − c_j of a curve. (3, bands padded by 8) float32. channel: its row.
         band: the first of the eight. low, middle, high, rise, fall: the triangle's, from `overlap_of`.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array, index, first, *overlap = arguments
         eight = Array(context, builder, signature.args[0], array).eight(index, first)
-        return sum_of(builder, product(builder, _shares(builder, first, overlap), eight))
+        return sum_of(builder, product(builder, _areas(builder, first, overlap), eight))
 
-    return types.float32(bands, types.int64, types.int64, *_OVERLAP), generate
+    return types.float32(falls, types.int64, types.int64, *_OVERLAP), generate
 
 
 @kernel_part

@@ -1,4 +1,4 @@
-"""The projector's kernels: the angles of the listed lights, their division into leaves, their sharing out.
+"""The projector's kernels: the angles of the listed lights, and their division into leaves.
 
 A leaf is a triangle over which every angle is linear: a light triangle, or a part of one near an angle's pole
 (appendix A, Ben-Artzi 2006). All triangles of a level are divided together and leaves are gathered in arrays and spent
@@ -13,14 +13,12 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.brdf.angles import angles_into
-from relume.project.eight_bands import add_means_of_eight, deposit_eight, mean_of_eight, overlap_of
-from relume.vector_code import NUM as EIGHT
+from relume.brdf.angles import ALPHA, BETA, alpha_and_beta_into, angles_into
+from relume.project.leaf_kernel import spend, weigh_leaves
 
 _QUARTER = np.float32(0.25)
 _HALF = np.float32(0.5)
 _THIRD = np.float32(1 / 3)
-_BELOW_ONE = np.float32(1 - 2**-24)
 # An angle counts as linear over a triangle when it is this close to linear at the midpoints of the edges, in bands;
 # away from the pole, where curves are wider, a share of the angle more.
 _TOLERANCE_BANDS = np.float32(0.04)
@@ -87,27 +85,37 @@ def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _append(gamma, which, count, nodes, bent, origin, share, leaves, shares, of_entry, num):  # type: ignore[no-untyped-def]
+def _bows(gamma, num, bow):  # type: ignore[no-untyped-def]
+    """Sum how far each angle bends at the edges' midpoints. bow: (C, …), written."""
+    num = _padded(num)
+    for k in range(gamma.shape[0]):
+        a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
+        of_curve = bow[k]
+        for e in range(num):
+            of_curve[e] = ab[e] + bc[e] + ca[e] - (a[e] + b[e] + c[e])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _append(gamma, bow, which, count, nodes, bent, origin, share, leaves, shares, of_entry, num):  # type: ignore[no-untyped-def]
     """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves.
 
     Corners move by `bent` times as much as angles bend, which is nearly always one way (docs/method.md, "Overlap").
     """
     for k in range(gamma.shape[0]):
-        a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
+        moved = bow[k]
         for corner in range(3):
-            node = nodes[corner]
+            angle, leaf = gamma[k, nodes[corner]], leaves[k, corner]
             for n in range(count):
-                w = which[n]
-                moved = bent * (ab[w] + bc[w] + ca[w] - (a[w] + b[w] + c[w]))
-                leaves[k, corner, num + n] = max(gamma[k, node, w] + moved, np.float32(0))
+                w = np.uint64(which[n])
+                leaf[num + n] = max(angle[w] + bent * moved[w], np.float32(0))
     for n in range(count):
-        of_entry[num + n] = origin[which[n]]
+        of_entry[num + n] = origin[np.uint64(which[n])]
     shares[num : num + count] = share
     return num + count
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _sort_out(gamma, bend, num_triangles, level, fine, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
+def _sort_out(gamma, bend, bow, num_triangles, level, fine, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
     """Make leaves of the triangles over which all angles are linear, four of those that one division straightens.
 
     Args:
@@ -128,13 +136,14 @@ def _sort_out(gamma, bend, num_triangles, level, fine, origin, leaves, shares, o
         num_quartered += is_simple & (not is_whole)
         num_divided += (not is_simple) & (not is_whole)
     share = _QUARTER**level
-    num = _append(gamma, lists[0], num_whole, (0, 1, 2), _THIRD, origin, share, leaves, shares, of_entry, num)
+    _bows(gamma, num_triangles, bow)
+    num = _append(gamma, bow, lists[0], num_whole, (0, 1, 2), _THIRD, origin, share, leaves, shares, of_entry, num)
     for child in range(4):
         nodes = (_CHILDREN[child, 0], _CHILDREN[child, 1], _CHILDREN[child, 2])
         part = _QUARTER * share
         # a quarter of a triangle bends a quarter as much
         bent = _QUARTER * _THIRD
-        num = _append(gamma, lists[1], num_quartered, nodes, bent, origin, part, leaves, shares, of_entry, num)
+        num = _append(gamma, bow, lists[1], num_quartered, nodes, bent, origin, part, leaves, shares, of_entry, num)
     return num, num_divided
 
 
@@ -145,13 +154,16 @@ def _children(local, gamma, origin, which, count, child_local, child_gamma, chil
         begin = child * count
         for corner in range(3):
             node = _CHILDREN[child, corner]
-            for n in range(count):
-                for axis in range(3):
-                    child_local[axis, corner, begin + n] = local[axis, node, which[n]]
-                for k in range(gamma.shape[0]):
-                    child_gamma[k, corner, begin + n] = gamma[k, node, which[n]]
+            for axis in range(3):
+                of_parent, of_child = local[axis, node], child_local[axis, corner]
+                for n in range(count):
+                    of_child[begin + n] = of_parent[np.uint64(which[n])]
+            for k in range(gamma.shape[0]):
+                of_parent, of_child = gamma[k, node], child_gamma[k, corner]
+                for n in range(count):
+                    of_child[begin + n] = of_parent[np.uint64(which[n])]
         for n in range(count):
-            child_origin[begin + n] = origin[which[n]]
+            child_origin[begin + n] = origin[np.uint64(which[n])]
     for edge in range(3):
         following = (edge + 1) % 3
         for n in range(_padded(4 * count)):
@@ -172,140 +184,25 @@ def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no
     wo: times `Curve.axes`, one for each curve. (C, 3). gamma: (C, 6, …), written.
     """
     num = _padded(num)
+    is_pair = False  # with the curve before it
     for k in range(kinds.shape[0]):
+        if is_pair:
+            is_pair = False
+            continue
+        is_pair = k + 1 < kinds.shape[0] and kinds[k] == ALPHA and kinds[k + 1] == BETA
         for node in range(first_node, 6):
-            angles_into(
-                kinds[k], scale[k], local[0, node, :num], local[1, node, :num], local[2, node, :num],
-                wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node],
-            )  # fmt: skip
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _overlaps(corner, num_bands, num, overlap):  # type: ignore[no-untyped-def]
-    """Find `overlap_of` leaves, angles held below the last band's end. corner: (3, n), overlap: (5, n), written."""
-    end = np.float32(num_bands) * _BELOW_ONE
-    for n in range(num):
-        low, middle, high, rise, fall = overlap_of(
-            min(corner[0, n], end), min(corner[1, n], end), min(corner[2, n], end)
-        )
-        overlap[0, n], overlap[1, n], overlap[2, n] = low, middle, high
-        overlap[3, n], overlap[4, n] = rise, fall
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _multiply_means(overlap, bands, num_bands, num_rows, num, weight):  # type: ignore[no-untyped-def]
-    """Multiply the weights (3, n) of leaves by the mean of a dormant curve over each.
-
-    Args:
-        overlap: from `_overlaps`. bands: of the curve, padded. (≥ num_rows, ≥ num_bands + 8)
-        num_rows: 1 where the channels are alike, else 3.
-    """
-    last = num_bands - 1
-    for n in range(num):
-        low, middle, high, rise, fall = overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n]
-        red = green = blue = np.float32(0)
-        for band in range(min(np.int64(low), last), min(np.int64(high), last) + 1, EIGHT):
-            red += mean_of_eight(bands, 0, band, low, middle, high, rise, fall)
-            if num_rows == 3:
-                green += mean_of_eight(bands, 1, band, low, middle, high, rise, fall)
-                blue += mean_of_eight(bands, 2, band, low, middle, high, rise, fall)
-        weight[0, n] *= red
-        weight[1, n] *= green if num_rows == 3 else red
-        weight[2, n] *= blue if num_rows == 3 else red
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-def]
-    """Share leaves out to the bands of the free curve (eq. 22). weight: (3, n), out: (3, ≥ J + 8)."""
-    last = num_bands - 1
-    for n in range(num):
-        first_band, last_band = min(np.int64(overlap[0, n]), last), min(np.int64(overlap[2, n]), last)
-        for band in range(first_band, last_band + 1, EIGHT):
-            deposit_eight(
-                out, band,
-                overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n],
-                weight[0, n], weight[1, n], weight[2, n],
-            )  # fmt: skip
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _multiply_settings(overlap, settings, num_bands, num, mean, product):  # type: ignore[no-untyped-def]
-    """Multiply each leaf's product (n, rows) by the means of a dormant curve at all its settings over that leaf.
-
-    Args:
-        overlap: from `_overlaps`. settings: of the curve, padded. (≥ num_bands + 8, rows)
-        mean: scratch. (rows,)
-    """
-    last = num_bands - 1
-    for n in range(num):
-        low, middle, high, rise, fall = overlap[0, n], overlap[1, n], overlap[2, n], overlap[3, n], overlap[4, n]
-        mean[:] = 0
-        for band in range(min(np.int64(low), last), min(np.int64(high), last) + 1, EIGHT):
-            for row in range(0, mean.shape[0], EIGHT):
-                add_means_of_eight(mean, settings, row, band, low, middle, high, rise, fall)
-        for row in range(mean.shape[0]):
-            product[n, row] *= mean[row]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight, mean, product, out):  # type: ignore[no-untyped-def]
-    """Add the leaves' weights (3, n) times their curves at all settings. out: (3, N)
-
-    A handful of leaves at a time, whose products stay in a core's first-level cache.
-    """
-    num_settings = out.shape[1]
-    offset = num_settings if mean.shape[0] > num_settings else 0
-    for begin in range(0, num, product.shape[0]):
-        count = min(product.shape[0], num - begin)
-        product[:count] = 1
-        for k in range(leaves.shape[0]):
-            if setting_of[k] >= 0:
-                _overlaps(leaves[k, :, begin : begin + count], num_bands[k], count, overlap)
-                _multiply_settings(overlap, settings[setting_of[k]], num_bands[k], count, mean, product)
-        for n in range(count):
-            for channel in range(3):
-                of_channel = weight[channel, begin + n]
-                for row in range(num_settings):
-                    out[channel, row] += of_channel * product[n, offset * channel + row]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _weigh(irradiance, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
-    """Weigh the light of each leaf: irradiance · q cos θi · its share of the triangle. weight: (3, n), written."""
-    blue_row = shading.shape[0] - 1
-    for n in range(num):
-        entry = begin + of_entry[n]
-        m = np.uint64(light[entry])
-        weight[0, n] = irradiance[m, 0] * (shading[0, entry] * shares[n])
-        weight[1, n] = irradiance[m, 1] * (shading[blue_row // 2, entry] * shares[n])
-        weight[2, n] = irradiance[m, 2] * (shading[blue_row, entry] * shares[n])
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spend(  # type: ignore[no-untyped-def]
-    leaves, num, num_bands, bands, num_rows, settings, setting_of, active, overlap, weight, mean, product, out
-):  # fmt: skip
-    """Weigh the leaves by the dormant curves and share them out."""
-    for k in range(leaves.shape[0]):
-        if k != active and setting_of[k] < 0:
-            _overlaps(leaves[k], num_bands[k], num, overlap)
-            _multiply_means(overlap, bands[k], num_bands[k], num_rows[k], num, weight)
-    if active >= 0:
-        _overlaps(leaves[active], num_bands[active], num, overlap)
-        _deposit(overlap, num_bands[active], num, weight, out)
-    elif settings.shape[0] > 0:
-        _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight, mean, product, out)
-    else:
-        for channel in range(3):
-            total = np.float32(0)
-            for n in range(num):
-                total += weight[channel, n]
-            out[channel, 0] += total
+            x, y, z = local[0, node, :num], local[1, node, :num], local[2, node, :num]
+            if is_pair:
+                alpha_and_beta_into(
+                    scale[k : k + 2], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node], gamma[k + 1, node]
+                )
+            else:
+                angles_into(kinds[k], scale[k], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _divide(  # type: ignore[no-untyped-def]
-    kinds, scale, wo, support, fine, local, gamma, origin, count, parts, lists, bend, leaves, shares, of_entry, num
+    kinds, scale, wo, support, fine, local, gamma, origin, count, parts, lists, bend, bow, leaves, shares, of_entry, num
 ):  # fmt: skip
     """Divide the first `count` triangles of lists[2], and what comes of them, until every angle is linear over each.
 
@@ -320,7 +217,9 @@ def _divide(  # type: ignore[no-untyped-def]
         num_parts = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
         _angles(kinds, scale, wo, to_local, 3, num_parts, to_gamma)
         _bends(to_gamma, support, num_parts, bend)
-        num, count = _sort_out(to_gamma, bend, num_parts, level, fine, to_origin, leaves, shares, of_entry, num, lists)
+        num, count = _sort_out(
+            to_gamma, bend, bow, num_parts, level, fine, to_origin, leaves, shares, of_entry, num, lists
+        )
         local, gamma, origin = to_local, to_gamma, to_origin
     return num
 
@@ -338,7 +237,7 @@ def scratch_of(num_curves, num_lights, num_settings):  # type: ignore[no-untyped
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _scratch_of_lights(num_curves, num_lights):  # type: ignore[no-untyped-def]
-    """Make room for lights and parts: local nodes, angles, generations, which light each is of, lists, bends."""
+    """Make room for lights and parts: local nodes, angles, generations, which light each is of, lists, bends, bows."""
     room = _padded(num_lights)
     widest = max(room, _MOST_DIVIDED)
     local, gamma = np.zeros((3, 6, room), np.float32), np.empty((num_curves, 6, room), np.float32)
@@ -348,7 +247,8 @@ def _scratch_of_lights(num_curves, num_lights):  # type: ignore[no-untyped-def]
         np.empty((2, _MOST_DIVIDED), np.int64),
     )
     lists, bend = np.empty((3, widest + 1), np.int64), np.empty(widest, np.float32)
-    return local, gamma, parts, np.arange(widest), lists, bend, np.empty(num_lights, np.int64)
+    bow = np.empty((num_curves, widest), np.float32)
+    return local, gamma, parts, np.arange(widest), lists, bend, bow, np.empty(num_lights, np.int64)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -363,7 +263,7 @@ def _scratch_of_leaves(num_curves, capacity, num_settings):  # type: ignore[no-u
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, irradiance,
-    kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active, fine, start, stop, scratch,
+    kinds, axes, num_bands, bands, falls, num_rows, settings, setting_of, support, active, fine, start, stop, scratch,
     out,
 ):  # fmt: skip
     """Project the listed lights of points [start, stop).
@@ -373,7 +273,7 @@ def project_points(  # type: ignore[no-untyped-def]
         first, light, local_wo: from `list_lights`.
         shading: q · cos θi of each entry, one row for all channels, or three. (1 or 3, K) float32
         nodes: of the lights. (3 axes, 6, M) float32. irradiance: of the lights, per channel. (M, 3) float32
-        kinds, axes, num_bands, bands, num_rows, settings, setting_of, support, active: see `Contraction`.
+        kinds, axes, num_bands, bands, falls, num_rows, settings, setting_of, support, active: see `Contraction`.
         fine: how far angles may bend over a leaf, times what is tolerated of exact operators; the last level of
             division. `FINE` or `ROUGH`.
         scratch: from `scratch_of`.
@@ -384,7 +284,7 @@ def project_points(  # type: ignore[no-untyped-def]
     scale = np.empty(num_curves, np.float32)
     for k in range(num_curves):
         scale[k] = num_bands[k] / (np.pi / 2)
-    local, gamma, parts, origin, lists, bend, divided = scratch[0]
+    local, gamma, parts, origin, lists, bend, bow, divided = scratch[0]
     leaves, shares, of_entry, overlap, weight, mean, product = scratch[1]
     capacity = shares.shape[0]
     scaled_wo = np.empty((num_curves, 3), np.float32)
@@ -400,24 +300,24 @@ def project_points(  # type: ignore[no-untyped-def]
             _turn_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
         _angles(kinds, scale, scaled_wo, local, 0, num_entries, gamma)
         _bends(gamma, support, num_entries, bend)
-        num, num_divided = _sort_out(gamma, bend, num_entries, 0, fine, origin, leaves, shares, of_entry, 0, lists)
+        num, num_divided = _sort_out(gamma, bend, bow, num_entries, 0, fine, origin, leaves, shares, of_entry, 0, lists)
         divided[:num_divided] = lists[2, :num_divided]
         for batch in range(0, num_divided, _BATCH):
             if num + _MOST_LEAVES > capacity:
-                _weigh(irradiance, light, shading, begin, of_entry, shares, num, weight)
-                _spend(
-                    leaves, num, num_bands, bands, num_rows, settings, setting_of, active,
+                weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weight)
+                spend(
+                    leaves, num, num_bands, bands, falls, num_rows, settings, setting_of, active,
                     overlap, weight, mean, product, out[row],
                 )  # fmt: skip
                 num = 0
             count = min(_BATCH, num_divided - batch)
             lists[2, :count] = divided[batch : batch + count]
             num = _divide(
-                kinds, scale, scaled_wo, support, fine, local, gamma, origin, count, parts, lists, bend,
+                kinds, scale, scaled_wo, support, fine, local, gamma, origin, count, parts, lists, bend, bow,
                 leaves, shares, of_entry, num,
             )  # fmt: skip
-        _weigh(irradiance, light, shading, begin, of_entry, shares, num, weight)
-        _spend(
-            leaves, num, num_bands, bands, num_rows, settings, setting_of, active,
+        weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weight)
+        spend(
+            leaves, num, num_bands, bands, falls, num_rows, settings, setting_of, active,
             overlap, weight, mean, product, out[row],
         )  # fmt: skip

@@ -78,6 +78,6 @@ class Projector:
         r, c = self._receivers, self._contraction
         project_points(
             r.normal, r.tangent, *listed,
-            c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_of, c.support, c.active,
+            c.kinds, c.axes, c.num_bands, c.bands, c.falls, c.num_rows, c.settings, c.setting_of, c.support, c.active,
             self._fine, start, stop, self._scratch, out,
         )  # fmt: skip

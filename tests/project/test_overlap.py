@@ -21,12 +21,13 @@ def deposit_all(overlap, weight, out):
 
 
 @nb.njit
-def mean_of_all(overlap, bands, channel):
+def mean_of_all(overlap, bands, falls, channel):
     low, middle, high, rise, fall = overlap
-    mean = np.float32(0)
-    for band in range(0, NUM_BANDS, NUM):
-        mean += mean_of_eight(bands, channel, band, low, middle, high, rise, fall)
-    return mean
+    mean, top = np.float32(0), np.int64(low) - 1
+    for band in range(top + 1, np.int64(high) + 1, NUM):
+        mean += mean_of_eight(falls, channel, band, low, middle, high, rise, fall)
+        top = band + NUM - 1
+    return mean + bands[channel, top]
 
 
 def shares_of(corners, weight=(1, 1, 1)):
@@ -105,9 +106,10 @@ def test_weights_of_three_channels_and_means_are_the_shares():
     for corners in rng.uniform(0, 256, (30, 3)):
         shares = shares_of(corners)[0]
         np.testing.assert_allclose(shares_of(corners, (2, 0.5, 0)), [2 * shares, 0.5 * shares, 0 * shares], rtol=1e-6)
-        bands = rng.uniform(0, 1, (3, NUM_BANDS + NUM)).astype(np.float32)
+        bands = np.pad(rng.uniform(0, 1, (3, NUM_BANDS)), ((0, 0), (0, NUM)), mode="edge").astype(np.float32)
+        falls = -np.diff(bands, axis=1, prepend=bands[:, :1])
         for channel in range(3):
-            mean = mean_of_all(overlap_of(*np.float32(corners)), bands, channel)
+            mean = mean_of_all(overlap_of(*np.float32(corners)), bands, falls, channel)
             assert mean == pytest.approx(float(bands[channel, :NUM_BANDS] @ shares), rel=2e-6)
 
 
