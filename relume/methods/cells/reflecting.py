@@ -34,7 +34,7 @@ class Reflecting:
         reflectance: F_00, never above one. (C, 3) float32
         has_lobe: tells which materials send more one way than another; as bytes, a part of keys.
         rows: cells of these. (G,) intp
-        shares: all of F of those. (G, 3, pairs) float32
+        shares: all of F of those. (pairs, G, 3) float32
     """
 
     reflectance: F32
@@ -55,9 +55,9 @@ class Reflecting:
         whole = np.einsum("tnc,ntc->nc", plain, known[material, :, :, 0])
         has_lobe = np.abs(known[:, :, :, 1:]).max(axis=(1, 2, 3)) > 0
         rows = np.flatnonzero(has_lobe[material])
-        shares = np.einsum("tnc,ntcp->ncp", plain[:, rows], known[material[rows]])
+        shares = np.einsum("tnc,ntcp->pnc", plain[:, rows], known[material[rows]])
         held = np.clip(whole, 0, 1)
-        shares *= (held[rows] / np.maximum(whole[rows], 1e-30))[..., None]
+        shares *= held[rows] / np.maximum(whole[rows], 1e-30)
         return cls(held.astype(np.float32), has_lobe.tobytes(), rows, shares.astype(np.float32))
 
     def sent(self, arrived: Arrived) -> tuple[F32, F32]:
@@ -66,11 +66,12 @@ class Reflecting:
         Returns:
             The part that is the same everywhere, (C, 3), and L_j of `rows` beside it, (G, 3, J); float32
         """
-        vectors = arrived.vectors
+        vectors = np.ascontiguousarray(arrived.vectors.transpose(2, 0, 1))  # a function's numbers lie together
         rungs, found = ladder(SENT_DEGREE), np.zeros_like(vectors)
         for pair, (j, k) in enumerate(PAIRS[1:], 1):
             for part in (rungs.cosine, rungs.sine)[: 2 if rungs.order[j] else 1]:
-                found[..., part[j]] += self.shares[..., pair] * vectors[..., part[k]]
+                found[part[j]] += self.shares[pair] * vectors[part[k]]
                 if j != k:
-                    found[..., part[k]] += self.shares[..., pair] * vectors[..., part[j]]
-        return (self.reflectance / np.float32(np.pi) * arrived.irradiance).astype(np.float32), found
+                    found[part[k]] += self.shares[pair] * vectors[part[j]]
+        even = (self.reflectance / np.float32(np.pi) * arrived.irradiance).astype(np.float32)
+        return even, np.ascontiguousarray(found.transpose(1, 2, 0))
