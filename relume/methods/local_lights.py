@@ -27,7 +27,7 @@ from relume.trace.preview_light import PreviewLight, preview_light
 F32 = NDArray[np.float32]
 
 SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a rectangle: for each view sample, for each point of a cell
-SAMPLES_OF_FEW, FEW = 256, 4  # of a mesh for each view sample, where no more materials of the scene shine
+FINER_OF_FEW, FEW = 4, 4  # times as many of a mesh, where no more materials of the scene shine
 PREVIEW_SAMPLES = 4  # for each of both while a hand moves it
 _ONES = np.ones(3, np.float32)
 
@@ -78,11 +78,12 @@ class LocalLights:
     def _off_surface(self) -> float:
         return off_surface(self.positions)
 
-    def samples_of(self, geometry: LightGeometry) -> int:
-        """How many samples a view sample has of a light, see `strata_of`: more of a mesh, of which walls hide parts."""
+    def samples_of(self, geometry: LightGeometry, of_rectangle: int = SAMPLES) -> int:
+        """How many samples a light has where a rectangle has so many, see `strata_of`: more of a mesh, of which walls
+        hide parts, and which is near to the frame that it stands in."""
         lights = self._store.attributes["look"]["lights"].values()
         is_one_of_few = sum(light["kind"] == "mesh" for light in lights) <= FEW
-        return SAMPLES_OF_FEW if geometry.kind == "mesh" and is_one_of_few else SAMPLES
+        return of_rectangle * (FINER_OF_FEW if geometry.kind == "mesh" and is_one_of_few else 1)
 
     def all_rays(
         self,
@@ -145,13 +146,13 @@ class LocalLights:
         return self._memory.keep((self._key, "light on cells", geometry), lambda: self._irradiance(geometry))
 
     def _irradiance(self, geometry: LightGeometry) -> F32:
-        points, sampled = self._gather_samples, self._sampled(geometry, SAMPLES_OF_CELLS)
+        points, sampled = self._gather_samples, self._sampled_at_cells(geometry)
         of_points = arriving(*sampled, points, self._seen_by_cells(geometry))
         return np.asarray(of_points.reshape(-1, POINTS_A_CELL).mean(axis=1, dtype=np.float64), np.float32)
 
     def _seen_by_cells(self, geometry: LightGeometry) -> NDArray[np.uint8]:
         def traced() -> NDArray[np.uint8]:
-            return self._trace(geometry, self._gather_samples, SAMPLES_OF_CELLS)
+            return self._trace(geometry, self._gather_samples, self.samples_of(geometry, SAMPLES_OF_CELLS))
 
         return self._memory.keep((self._key, "shadows on cells", shadow_geometry(geometry)), traced)
 
@@ -163,7 +164,7 @@ class LocalLights:
         """
         seen = self._seen_by_cells(geometry)
         bits = seen.reshape(-1, POINTS_A_CELL, seen.shape[1])[rows].reshape(-1, seen.shape[1])
-        return LocalRays(*self._sampled(geometry, SAMPLES_OF_CELLS), _ONES, bits)
+        return LocalRays(*self._sampled_at_cells(geometry), _ONES, bits)
 
     def preview_irradiance(self, geometry: LightGeometry) -> F32:
         """Preview what comes to every gather cell from a light of unit emission, at one of its points. (C,) float32"""
@@ -190,6 +191,9 @@ class LocalLights:
 
     def _trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
         return trace_local(self.embree, self._off_surface, *self._sampled(geometry, num_samples), points)
+
+    def _sampled_at_cells(self, geometry: LightGeometry) -> tuple[LocalLight, Strata]:
+        return self._sampled(geometry, self.samples_of(geometry, SAMPLES_OF_CELLS))
 
     def _sampled(self, geometry: LightGeometry, of_rectangle: int) -> tuple[LocalLight, Strata]:
         """Make a light, and its samples. of_rectangle: see `strata_of`"""

@@ -12,6 +12,7 @@ from relume.bake import Recipe
 from relume.environments.model import Environment
 from relume.look import LightGeometry
 from relume.memory import Memory
+from relume.methods.local_lights import SAMPLES_OF_CELLS
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.scene.archive import make_scene
@@ -125,6 +126,7 @@ def baked(scene, folder, method="direct"):
 def test_shining_surface_is_seen_and_lights_the_floor(tmp_path, is_two_sided):
     transfer = baked(room(lamp_sides=is_two_sided, lights=[SHINING]), tmp_path)
     assert [transfer.local.samples_of(LightGeometry(kind)) for kind in ("mesh", "rectangle")] == [256, 64]
+    assert transfer.local.samples_of(LightGeometry("mesh"), SAMPLES_OF_CELLS) == 4 * SAMPLES_OF_CELLS
     below, above = (rendered(transfer, {}, view=view) for view in ("below", "above"))
     lamp = transfer.views["above"].material_ids() == 1
     assert np.all(np.abs(below.max(axis=(0, 1)) - [4, 2, 1]) < 0.1), "its lower side shines"

@@ -16,7 +16,7 @@ from relume.light.local import make_local, parts_of, rectangle, strata_of
 from relume.light.strata import NOT_FLAT, halvings, make_strata
 from relume.light.triangles import NO_LIGHTS
 from relume.look import LightGeometry
-from relume.methods.local_lights import SAMPLES_OF_FEW
+from relume.methods.local_lights import FINER_OF_FEW, SAMPLES
 from relume.points import Points
 from relume.project.contraction import contract
 from relume.project.projector import Projector
@@ -136,7 +136,7 @@ def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
     wall += 1e-3 * np.array(PANEL.direction)
     blocks = EmbreeScene.build(wall.astype(np.float32), np.arange(12, dtype=np.uint32).reshape(4, 3))
     open_air, behind = (make_local(MESH, shining(panel_in(1, 1, *ends), False)) for ends in ((0, 1), (-2.3, 3.1)))
-    of_panel, strata = floor_under(open_air), strata_of(behind, SAMPLES_OF_FEW)
+    of_panel, strata = floor_under(open_air), strata_of(behind, FINER_OF_FEW * SAMPLES)
     seen = trace_local(blocks, 1e-5, behind, strata, of_panel.points)
     of_lamp = replace(of_panel, rays=(LocalRays(behind, strata, np.ones(3, np.float32), seen),))
     expected, found = (
