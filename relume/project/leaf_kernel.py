@@ -108,7 +108,13 @@ def _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight,
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
-    """Weigh the light of each leaf: irradiance · q cos θi · its share of the triangle. weight: (3, n), written."""
+    """Weigh the light of each leaf: irradiance · q cos θi · its share of the triangle.
+
+    Args:
+        irradiance: of all lights. (m, 3). light: of each listed pair. shading: q cos θi of these. (1 or 3, pairs)
+        begin, of_entry: pair of each leaf, from `begin` on. shares: of the leaves in its triangle.
+        num: of leaves. weight: written. (3, ≥ num)
+    """
     blue_row = shading.shape[0] - 1
     for n in range(num):
         entry = np.uint64(begin + of_entry[n])
@@ -122,7 +128,15 @@ def weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weigh
 def spend(  # type: ignore[no-untyped-def]
     leaves, num, num_bands, bands, falls, num_rows, settings, setting_of, active, overlap, weight, mean, product, out
 ):  # fmt: skip
-    """Weigh the leaves by the dormant curves and share them out."""
+    """Weigh the leaves by the dormant curves and share them out.
+
+    Args:
+        leaves: where each lies along each curve. num: of them.
+        num_bands, bands, falls, num_rows: of the curves; see `_multiply_means`.
+        settings, setting_of: see `_add_settings`. active: curve that stays, −1 for none.
+        overlap, mean, product: room for what leaves share with bands, and what it comes to.
+        weight: of the leaves, changed. (3, ≥ num). out: added to.
+    """
     for k in range(leaves.shape[0]):
         if k != active and setting_of[k] < 0:
             _overlaps(leaves[k], num_bands[k], num, overlap)
