@@ -29,6 +29,7 @@ from relume.store import bake_here
 _MOVED = 0.01  # of the distance to the target, each frame
 _MEMORY = 4 << 30
 _GOLDEN = 0.618
+_UNCOUNTED = 4  # drags; what is made beside them takes some tenths of a second each time
 
 
 class Drag(NamedTuple):
@@ -160,7 +161,8 @@ class MovingScene:
 
             return self._timed(picture, frames, begin)
 
-        drag()  # not counted: of a process just begun, kernels are loaded and memory is touched first
+        for _ in range(_UNCOUNTED):  # of a process just begun, kernels are loaded and memory is touched first
+            drag()
         return drag()
 
     def share_of(self, material: str) -> float:

@@ -393,3 +393,16 @@ def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
         session.send(**eye(view, revision, 0.1 * revision), rest="stay")
         assert arrays_in(tables_of(session)) == {}
     assert kinds == ["picture", "picture", "picture", "tables"]  # how small those of colours are it learns once
+
+
+def test_tables_follow_a_picture_that_nothing_refines(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
+    session.edit(1, "/transport/show", "direct")
+    session.send(type="evaluate", by="browser")
+    until_fine(session, 1)
+    for revision in (2, 3):
+        session.edit(revision, "/environment/scale", 0.5 / revision)
+        while (first := session.frame()).header["revision"] != revision:
+            pass
+        assert first.header["kind"] == "picture"
+        assert arrays_in(tables_of(session)) == {}  # what multiplies all light is one number

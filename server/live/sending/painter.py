@@ -167,7 +167,7 @@ def _tables(
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
     lacking = [part for name, part in parts.items() if known.get(name, _NOTHING) != part.key]
-    if not lacking and request.received_s is None:
+    if not lacking and request.received_s is None and not request.is_due:
         return Painted(job, advance, None, update_ms, start_s, known=known)
     arrays = {name: array for part in lacking for name, array in part.make().items()}
     infos = [ArrayInfo(name=name, dtype=a.dtype.name, shape=a.shape) for name, a in arrays.items()]

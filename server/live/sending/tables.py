@@ -18,6 +18,7 @@ class Tables:
 
     Attributes:
         known: keys of the parts that the client's shader has.
+        is_behind: a picture was sent in their place.
     """
 
     def __init__(self) -> None:
@@ -25,7 +26,7 @@ class Tables:
         self._num_bytes: dict[str, int] = {}  # that a change took last, by what the hand was on
         self._of_all = 0
         self._kind = ""
-        self._is_behind = False  # a picture was sent in their place
+        self.is_behind = False
         self._are_slow = False
 
     def are_too_large(self, newest: Target, window: FrameWindow, is_behind: bool) -> bool:
@@ -34,7 +35,7 @@ class Tables:
         Args:
             newest: the look. window: that knows the link. is_behind: the client has no frame of that look yet.
         """
-        if not is_behind and not self._is_behind:  # the eye alone has moved
+        if not is_behind and not self.is_behind:  # the eye alone has moved
             return False
         num_bytes = self._num_bytes.get(self._kind_of(newest), self._of_all)
         self._are_slow = window.is_slow_for(num_bytes, was_slow=self._are_slow)
@@ -48,12 +49,12 @@ class Tables:
         """
         self._kind = self._kind_of(target)
         if painted.known is None:
-            self._is_behind = self._is_behind or is_behind
+            self.is_behind = self.is_behind or is_behind
             return
         if painted.message is not None and painted.known != self.known:
             self._num_bytes[self._kind] = len(painted.message)
             self._of_all = self._of_all or len(painted.message)
-        self.known, self._is_behind = painted.known, False
+        self.known, self.is_behind = painted.known, False
 
     def _kind_of(self, target: Target) -> str:
         """Of what a hand is on, the first name: materials and lights change different parts."""

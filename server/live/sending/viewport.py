@@ -103,12 +103,15 @@ class Viewport:
         received_s = eye.received_s if eye is not None and has_moved else newest.received_s
         is_moving = is_new and received_s is not None
         is_drawn_there = self._moves and self._evaluator == "browser" and pending.form != "jpeg"
-        if is_drawn_there and is_moving and self._tables.are_too_large(newest, window, self.is_behind(newest)):
+        has_just_sent = time.perf_counter() - self._sent_s < REFINE_SEND_S
+        if is_moving and is_drawn_there:
+            is_drawn_there = not self._tables.are_too_large(newest, window, self.is_behind(newest))
+        elif self._tables.is_behind and has_just_sent:  # a hand may go on
             is_drawn_there = False
         self._is_link_slow = is_slow = window.is_slow_for(self._moving_bytes, was_slow=self._is_link_slow)
         is_moving_slowly = pending.form == "auto" and is_slow and is_moving and not is_drawn_there
         form: Format = "jpeg" if pending.form == "jpeg" or is_moving_slowly else "rgb9e5"
-        is_early = is_slow or time.perf_counter() - self._sent_s < REFINE_SEND_S
+        is_early = is_slow or has_just_sent
         is_answered = self._answered is newest
         if self._moves:
             cast("MovingPicture", self.picture).draws = not is_drawn_there
@@ -136,8 +139,13 @@ class Viewport:
         return self._answered is not None and self._answered.look.display != newest.look.display
 
     def _is_owed(self, pending: PendingRequests) -> bool:
-        """Whether there are tiles in HDR to come after a JPEG, or after steps that were not sent."""
-        return bool(self._lacking) and pending.form != "jpeg"
+        """Whether something is to come at rest: tiles in HDR after a JPEG or after steps that were not sent, or what a
+        shader lacks after pictures that were sent in its place."""
+        return (bool(self._lacking) or self._lacks_tables) and pending.form != "jpeg"
+
+    @property
+    def _lacks_tables(self) -> bool:
+        return self._moves and self._evaluator == "browser" and self._tables.is_behind
 
     def painted(self, request: FrameRequest, painted: Painted, pending: PendingRequests) -> None:
         """Remember what the client has when `painted` is sent."""
@@ -166,7 +174,8 @@ class Viewport:
     def _wait(self, is_done: bool, pending: PendingRequests) -> None:
         """Nothing was sent: nothing is to be shown, or it is too early; a slow link waits for the exact picture."""
         has_more = self._has_unsent or self._is_owed(pending)
-        self.is_settled = is_done and (self._is_blank or self._is_link_slow or not has_more)
+        is_late = self._is_link_slow and not self._lacks_tables
+        self.is_settled = is_done and (self._is_blank or is_late or not has_more)
         self.not_before_s = self._sent_s + REFINE_SEND_S if is_done else 0.0
 
     def sent(self, now_s: float) -> None:
