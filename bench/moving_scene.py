@@ -90,7 +90,7 @@ class MovingScene:
         bake_here(METHODS["surface"], self._scene, self.recipe, path)
         self.bake_s = time.perf_counter() - began
         self.num_bytes = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-        self._num_drags = 0
+        self._num_drags, self._num_uncounted = 0, 1 if tiny else _UNCOUNTED
         self.opened = open_bake(path, Memory(_MEMORY))
         assert isinstance(self.opened, MovingViews)
         self.moving = self.opened
@@ -161,7 +161,7 @@ class MovingScene:
 
             return self._timed(picture, frames, begin)
 
-        for _ in range(_UNCOUNTED):  # of a process just begun, kernels are loaded and memory is touched first
+        for _ in range(self._num_uncounted):  # of a process just begun, kernels are loaded and memory is touched first
             drag()
         return drag()
 
