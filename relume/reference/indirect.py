@@ -83,10 +83,11 @@ def reference_indirect(
     kinds, lamps = kinds_of(scene, look), lamps_of(scene, look)
     lobes = [lobes_of(of_material) for of_material in kinds.terms]
     total, squares = np.zeros((2, len(wanted), points.num_points, 3))
-    covers = _covers(kinds, points, kinds.of(np.asarray(material), points.roughness), seed)
+    seen = kinds.of(np.asarray(material), points.roughness)
+    covers = _covers(kinds, points, seen, seed)
     for path in range(num_paths):
         rng = np.random.default_rng((seed, path, points.num_points))
-        here, of = points, kinds.of(np.asarray(material), points.roughness)
+        here, of = points, seen
         rows, weight = np.arange(points.num_points), np.zeros((_STATES, points.num_points, 3))
         weight[_IN_MIRRORS] = 1.0
         found = np.zeros((len(wanted), points.num_points, 3))

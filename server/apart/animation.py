@@ -15,7 +15,7 @@ from relume.look.turned import with_turned_light, with_turned_sky
 from relume.picture.transfer import Eyes, Opened
 from relume.scene.placed_camera import placed_camera
 from server.wire.cameras import CameraFrame
-from server.wire.renders import Animation, EyePath, Keyframes, Turntable
+from server.wire.renders import Animation, EyePath, Keyframes, LooksRequest, Turntable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -79,6 +79,15 @@ def _pivot_of(path: Turntable, view: FreeView, transfer: Opened) -> NDArray[np.f
     if path.about is not None:
         return np.array(path.about)
     return looked_at(cast("MovingTransfer", transfer), _start_of(path, view))
+
+
+def with_pivot(request: LooksRequest, transfer: Opened) -> LooksRequest:
+    """The same where an object turns, about a place that is found once rather than for each frame."""
+    path = request.path
+    if request.view is None or not isinstance(path, Turntable) or path.turns != "object":
+        return request
+    pivot = _pivot_of(path, cast("FreeView", transfer.views[request.view]), transfer)
+    return request.model_copy(update={"path": path.model_copy(update={"about": pivot.tolist()})})
 
 
 def look_of(request: Animation, view: str, transfer: Opened, index: int) -> Look:

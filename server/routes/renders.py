@@ -18,7 +18,7 @@ from relume.imageio.ocio.current import needed
 from relume.imageio.ocio.view import OcioView
 from relume.picture.transfer import Axis, Eyes, Opened
 from server.access.roles import Caller, Who
-from server.apart.animation import check_animation, document_of, look_of
+from server.apart.animation import check_animation, document_of, look_of, with_pivot
 from server.errors import NotReadyError
 from server.files.video import check_encoder
 from server.queues.renders import Render, planned_bytes
@@ -81,6 +81,7 @@ async def frame_looks(request: LooksRequest, services: Shared) -> LooksBody:
 def _frame_looks(request: LooksRequest, transfer: Opened) -> LooksBody:
     _check_looks(request, transfer)
     cameras = None if request.path is None else _told_way(request, transfer)
+    request = with_pivot(request, transfer)
     size, found = 0, []
     for index in range(request.num_frames):
         found.append(dict(document_of(request, request.view, transfer, index)))

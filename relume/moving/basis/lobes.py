@@ -30,7 +30,7 @@ from relume.brdf.channels import TEXTURES, group_of
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_mirrored
-from relume.moving.basis.out_factors import NUM_ROWS, OutFactors, cosines, of_white
+from relume.moving.basis.out_factors import NUM_ROWS, OutFactors, cosines, of_white, text_of_white
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -129,7 +129,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         most.append(_most_of([*compress(known, is_seen)]))
         by_group, about = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros((NUM_ROWS, 6))
         for term in compress(terms, is_seen):
-            found = _lobe_of(json.dumps({**term, "color": [1.0, 1.0, 1.0], "texture": None}, sort_keys=True))
+            found = _lobe_of(text_of_white(term))
             sent = found[:, :3] * np.asarray(term["color"], np.float64)
             by_group[:, group_of(term)] += sent
             about += sent.mean(axis=1, keepdims=True) * found[:, 3:]

@@ -93,7 +93,12 @@ def out_factors(term_document: Mapping[str, Any]) -> OutFactors:
 
 def of_white(term_document: Mapping[str, Any]) -> OutFactors:
     """Project a term, its colour and texture left out."""
-    return _of_white(json.dumps({**term_document, "color": _WHITE, "texture": None}, sort_keys=True))
+    return _of_white(text_of_white(term_document))
+
+
+def text_of_white(term_document: Mapping[str, Any]) -> str:
+    """What tells a term from others, its colour and texture left out."""
+    return json.dumps({**term_document, "color": _WHITE, "texture": None}, sort_keys=True)
 
 
 @lru_cache(maxsize=_MOST_KNOWN)

@@ -6,7 +6,7 @@ import numba as nb
 import numpy as np
 
 from relume.project.shading.boxes import CHUNK, sum_up
-from relume.project.shading.listed import evaluate_listed, least_of, room, scales_of, set_aside
+from relume.project.shading.listed import by_axes, evaluate_listed, least_of, room, scales_of, set_aside
 
 
 @nb.njit(nogil=True, cache=True)
@@ -58,25 +58,12 @@ def add_groups(  # type: ignore[no-untyped-def]
         begin, end = first[row], first[row + 1]
         if begin == end:
             continue
-        for k in range(num_curves):
-            for axis in range(3):
-                wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
+        by_axes(axes, local_wo, begin, wo)
         total[:] = 0
         evaluate_listed(
-            normal[p],
-            tangent[p],
-            (light, shading),
-            begin,
-            end,
-            lights,
-            curves,
-            scale,
-            wo,
-            local,
-            scratch,
-            chunks,
+            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local, scratch, chunks,
             total,
-        )
+        )  # fmt: skip
         least = least_of(total, out[row, :, 0])
         total[:] = 0
         for chunk in range((end - begin + CHUNK - 1) // CHUNK):

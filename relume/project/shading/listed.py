@@ -23,6 +23,18 @@ def scales_of(curves):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def by_axes(axes, local_wo, entry, out):  # type: ignore[no-untyped-def]
+    """Weigh wo by the axes of each curve.
+
+    Args:
+        axes: of the curves. (C, 3). local_wo: of all entries. (3, entries). entry: which. out: written. (C, 3)
+    """
+    for k in range(axes.shape[0]):
+        for axis in range(3):
+            out[k, axis] = axes[k, axis] * local_wo[axis, entry]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def room(num, num_rows):  # type: ignore[no-untyped-def]
     """Make room for `num` chunks of triangles: weight, radius, which are not near enough, value, error."""
     weight, radius = np.empty((num, 3, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)

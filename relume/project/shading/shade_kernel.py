@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 
 from relume.project.shading.boxes import CHUNK, evaluate, look_up, sum_up, turn
-from relume.project.shading.listed import evaluate_listed, least_of, room, scales_of, set_aside
+from relume.project.shading.listed import by_axes, evaluate_listed, least_of, room, scales_of, set_aside
 
 _ONE, _HALF, _QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
@@ -123,25 +123,12 @@ def shade_points(  # type: ignore[no-untyped-def]
         begin, end = first[p - start], first[p - start + 1]
         if begin == end:
             continue
-        for k in range(num_curves):
-            for axis in range(3):
-                wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
+        by_axes(axes, local_wo, begin, wo)
         total[:] = 0
         evaluate_listed(
-            normal[p],
-            tangent[p],
-            (light, shading),
-            begin,
-            end,
-            lights,
-            curves,
-            scale,
-            wo,
-            local[0],
-            scratch,
-            chunks,
+            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local[0], scratch, chunks,
             total,
-        )
+        )  # fmt: skip
         if num_curves == 0:
             out[p - start, :, 0] += total
             continue

@@ -102,7 +102,7 @@ class Viewport:
         size = self.size if eye is None else eye.size
         received_s = eye.received_s if eye is not None and has_moved else newest.received_s
         is_moving = is_new and received_s is not None
-        is_drawn_there = self._moves and self._evaluator == "browser" and pending.form != "jpeg"
+        is_drawn_there = self._has_shader and pending.form != "jpeg"
         has_just_sent = time.perf_counter() - self._sent_s < REFINE_SEND_S
         if is_moving and is_drawn_there:
             is_drawn_there = not self._tables.are_too_large(newest, window, self.is_behind(newest))
@@ -145,7 +145,11 @@ class Viewport:
 
     @property
     def _lacks_tables(self) -> bool:
-        return self._moves and self._evaluator == "browser" and self._tables.is_behind
+        return self._has_shader and self._tables.is_behind
+
+    @property
+    def _has_shader(self) -> bool:
+        return self._moves and self._evaluator == "browser"
 
     def painted(self, request: FrameRequest, painted: Painted, pending: PendingRequests) -> None:
         """Remember what the client has when `painted` is sent."""
