@@ -175,10 +175,13 @@ def _queues(settings: Settings, service: BakeService, batch: Batches, access: Ac
     def btf_is_made(work: str, material: str, num_bytes: int) -> None:
         access.quotas.become(("btf-work", work), ("btf", material), num_bytes)
 
+    def btf_failed(work: str) -> None:
+        access.quotas.measured("btf-work", work, 0)
+
     return _Queues(
         RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.measured, "render")),
         ComparisonQueue(sessions, settings.data, batch.run, quota),
-        BtfQueue(sessions, settings.data, batch.run, quota, btf_is_made),
+        BtfQueue(sessions, settings.data, batch.run, quota, btf_is_made, btf_failed),
     )
 
 

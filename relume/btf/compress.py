@@ -114,7 +114,7 @@ def compress(
         parts.append(_Part(**_known(begun, f"view-{view}", partial(_found, rows, images.size, chosen, view))))
     energy = float(sum(part.energy for part in parts))
     if energy <= 0:
-        raise MaterialError("the BTF is black")
+        raise MaterialError("the BTF is black; check its images")
     kept = _joined(images, parts, chosen.bits, energy)
     return kept.with_components(next((j for j, one in enumerate(kept.error) if one <= bound), chosen.components))
 

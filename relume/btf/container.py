@@ -88,7 +88,7 @@ class _Reader:
     def skip(self, count: int) -> NDArray[np.uint8]:
         """The next bytes, on the disk."""
         if count > self.left:
-            raise MaterialError(f"the .btf file is cut off: {count:,} bytes are to follow, {self.left:,} do")
+            raise damaged(f"{count:,} bytes are to follow, {self.left:,} do")
         self._at += count
         return self._bytes[self._at - count : self._at]
 
@@ -104,8 +104,16 @@ class _Reader:
         """The next number of things, bounded."""
         found = int(self.numbers("<u4", 1)[0])
         if not least <= found <= most:
-            raise MaterialError(f"the .btf file says that it has {found:,} {what}; {least} to {most:,} can be read")
+            raise MaterialError(
+                f"the .btf file says that it has {found:,} {what}; {least:,} to {most:,} can be read: choose a smaller "
+                "version of it, or download it again"
+            )
         return found
+
+
+def damaged(what: str) -> MaterialError:
+    """What is wrong with a file that is not whole."""
+    return MaterialError(f"the .btf file is cut off or damaged: {what}; download it again")
 
 
 def read_container(path: Path) -> Container:
@@ -122,7 +130,9 @@ def read_container(path: Path) -> Container:
     views, lights = _directions(file)
     width, height = (file.count(what, MOST_TEXELS) for what in ("texels a row", "rows of texels"))
     if width * height > MOST_TEXELS:
-        raise MaterialError(f"the BTF has {width}×{height} texels; at most {MOST_TEXELS:,} can be kept")
+        raise MaterialError(
+            f"the BTF has {width}×{height} texels; at most {MOST_TEXELS:,} can be kept, choose a smaller version of it"
+        )
     file.numbers("<f4", file.count("rotations", MOST_TEXELS, 0), 9)
     file.count("components", _MOST_COMPONENTS)
     model = int(file.numbers("<i4", 1)[0])
@@ -130,7 +140,7 @@ def read_container(path: Path) -> Container:
     pairs = len(views) * len(lights)
     channels = tuple(_channel(file, pairs, width * height) for _ in range(_CHANNELS))
     if file.left:
-        raise MaterialError(f"{file.left:,} bytes follow where the .btf file should end: it is damaged")
+        raise damaged(f"{file.left:,} bytes follow where it should end")
     return Container(has_cosine, views, lights, (height, width), model, channels)
 
 
@@ -159,7 +169,7 @@ def _described(file: _Reader) -> bool:
         for _ in range(_CHANNELS):
             file.skip(file.count("bytes of a channel's name", file.left, 0))
     if file.at - begin != size:
-        raise MaterialError(f"the .btf file is damaged: its description has {file.at - begin:,} bytes, not {size:,}")
+        raise damaged(f"its description has {file.at - begin:,} bytes, not {size:,}")
     return has_cosine
 
 
@@ -171,7 +181,7 @@ def _directions(file: _Reader) -> tuple[F64, F64]:
         views.append(file.numbers("<f4", 2))
         found = file.numbers("<f4", file.count("light directions", MOST_DIRECTIONS), 2)
         if lights is not None and not np.array_equal(lights, found, equal_nan=True):
-            raise MaterialError("light directions of the BTF differ from view to view")
+            raise MaterialError("light directions of the BTF differ from view to view; resample it")
         lights = found
     return np.array(views, np.float64), np.array(lights, np.float64)
 
@@ -179,14 +189,11 @@ def _directions(file: _Reader) -> tuple[F64, F64]:
 def _channel(file: _Reader, pairs: int, texels: int) -> Channel:
     kind = _FLOATS.get(int(file.numbers("u1", 1)[0]))
     if kind is None:
-        raise MaterialError("the .btf file is damaged: its numbers have neither two, four nor eight bytes")
+        raise damaged("its numbers have neither two, four nor eight bytes")
     components = file.count("components", _MOST_COMPONENTS)
     rows, columns = (int(number) for number in file.numbers("<u4", 2))
     if (rows, columns) not in ((pairs, texels), (texels, pairs)):
-        raise MaterialError(
-            f"the .btf file is damaged: {rows:,} × {columns:,} values, not {pairs:,} pairs of directions × "
-            f"{texels:,} texels"
-        )
+        raise damaged(f"{rows:,} × {columns:,} values, not {pairs:,} pairs of directions × {texels:,} texels")
     file.numbers(kind, components)  # singular values, which the second matrix contains
     left, right = file.numbers(kind, rows, components), file.numbers(kind, columns, components)
     return Channel(left, right) if rows == pairs else Channel(right, left)

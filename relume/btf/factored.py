@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.btf.container import read_container
+from relume.btf.container import damaged, read_container
 from relume.btf.found import found_rings
 from relume.btf.rings import directions
 from relume.btf.values import MOST_VALUE
@@ -35,14 +35,15 @@ class FactoredBtf:
         self._file = file = read_container(path)
         if file.model not in _MODELS:
             raise MaterialError(
-                f"the .btf file has its colours by model {file.model}; {', '.join(map(str, _MODELS))} can be read"
+                f"the .btf file has its colours by model {file.model}; {', '.join(map(str, _MODELS))} can be read: "
+                "write it with one of them, or its images into a zip"
             )
         self.size = file.size
         self.rings, self._views = found_rings(*np.degrees(file.views).T)
         lit, self._lights = found_rings(*np.degrees(file.lights).T)
         seen_from, lit_from = directions(self.rings), directions(lit)
         if lit_from.shape != seen_from.shape or np.abs(lit_from - seen_from).max() > _OFF:
-            raise MaterialError("light and view directions of the BTF are not the same")
+            raise MaterialError("light and view directions of the BTF are not the same; resample it so that they are")
         self._cosine = np.cos(file.lights[self._lights, 0]).astype(np.float32)
 
     def seen_from(self, view: int) -> F32:
@@ -58,7 +59,7 @@ class FactoredBtf:
                 out[:, :, channel] = factors.pairs[pairs].astype(np.float32) @ factors.texels.astype(np.float32).T
             out = _rgb(self._file.model, out)
         if not np.isfinite(out).all():
-            raise MaterialError("values of the .btf file are no numbers, or too large: it is damaged")
+            raise damaged("some of its values are no numbers, or too large")
         if not self._file.has_cosine:
             out *= self._cosine[:, None, None]
         return np.clip(out, 0, MOST_VALUE, out=out)

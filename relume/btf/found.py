@@ -26,13 +26,12 @@ def found_rings(theta: F64, phi: F64) -> tuple[Rings, NDArray[np.intp]]:
         MaterialError: they are not above the horizon, too many, or not evenly on rings.
     """
     if len(theta) > MOST_DIRECTIONS:
-        raise MaterialError(f"the BTF has {len(theta):,} directions; at most {MOST_DIRECTIONS} can be kept")
+        raise MaterialError(
+            f"the BTF has {len(theta):,} directions; at most {MOST_DIRECTIONS} can be kept, leave some out"
+        )
     wrong = np.flatnonzero(~((theta >= 0) & (theta < 90) & np.isfinite(phi)))
     if len(wrong):
-        raise MaterialError(
-            f"a direction of the BTF lies at θ = {theta[wrong[0]]:.4g}°, φ = {phi[wrong[0]]:.4g}°: "
-            "at or below the horizon, or nowhere"
-        )
+        raise nowhere(theta[wrong[0]], phi[wrong[0]])
     rising = np.argsort(theta, kind="stable")
     of_rings = np.split(rising, np.flatnonzero(np.diff(theta[rising]) > _APART) + 1)
     shift = [_shift(phi[ring]) for ring in of_rings]
@@ -43,8 +42,16 @@ def found_rings(theta: F64, phi: F64) -> tuple[Rings, NDArray[np.intp]]:
     order = np.concatenate([_placed(ring, phi, turned) for ring, turned in zip(of_rings, shift, strict=True)])
     away = np.abs(polar(np.radians(theta[order]), np.radians(phi[order])) - directions(rings)).max()
     if len(np.unique(order)) != len(theta) or away > np.radians(_OFF):
-        raise MaterialError("the directions of the BTF are not evenly on rings about the normal")
+        raise MaterialError("the directions of the BTF are not evenly on rings about the normal; resample it to such")
     return rings, order
+
+
+def nowhere(theta: float, phi: float) -> MaterialError:
+    """What is wrong with a direction, in degrees, that is not above the horizon."""
+    return MaterialError(
+        f"a direction of the BTF lies at θ = {theta:.4g}°, φ = {phi:.4g}°: at or below the horizon, or nowhere; leave "
+        "out what is seen or lit from there"
+    )
 
 
 def _shift(phi: F64) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -32,15 +33,17 @@ class BtfQueue(WorkQueue[BtfRequest]):
         run: RunStep,
         quota: Quota,
         kept: Callable[[str, str, int], None],
+        failed: Callable[[str], None],
     ) -> None:
         """
         Args:
             sessions: of the database. data: directory of what is made.
             run: does the steps. quota: how much may wait.
             kept: called with the id of a work that is done, that of the BTF, and how many bytes it takes.
+            failed: called with the id of a work that has failed; nothing of it takes bytes any more.
         """
         super().__init__(sessions, data / "btf-works", run, quota)
-        self._btfs, self._kept = btfs_path(data), kept
+        self._btfs, self._kept, self._failed = btfs_path(data), kept, failed
 
     def steps(self, request: BtfRequest) -> int:
         """One, which keeps what it has found when it is stopped."""
@@ -70,3 +73,8 @@ class BtfQueue(WorkQueue[BtfRequest]):
             self._kept(work.id, material, folder_bytes(self._btfs / material))
         (folder / SENT).unlink(missing_ok=True)
         return 1
+
+    def has_failed(self, work: BtfWork) -> None:
+        """Let go what was sent: nobody can go on with it."""
+        shutil.rmtree(self.folder / work.id, ignore_errors=True)
+        self._failed(work.id)

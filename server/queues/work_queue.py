@@ -133,6 +133,9 @@ class WorkQueue(ABC, Generic[Request]):
             CancelledError: it is not wanted any more.
         """
 
+    def has_failed(self, work: Work[Request]) -> None:
+        """Called before a row says that it has failed, for good: most kinds keep what they have."""
+
     def run_apart(
         self, work: Work[Request], kind: str, values: Mapping[str, Any], tell: Callable[[float], object]
     ) -> Mapping[str, Any]:
@@ -313,6 +316,7 @@ class WorkQueue(ABC, Generic[Request]):
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
                 log.exception("%s %s failed", self.noun, work.id, extra={"fields": {self.noun.lower(): work.id}})
+            self.has_failed(work)
             self._update_own(work.id, state="failed", problem=problem_of(error).detail)
         finally:
             self._update(work.id, _STATES, row.owner == self._owner, owner=None)

@@ -129,6 +129,9 @@ class TestBytes:
         while (body := client.get(url, headers=ann).json())["state"] != "ready":
             assert body["state"] != "failed", body
             time.sleep(0.02)
+        failed = client.post(works, files={"images": ("no.zip", b"none")}, headers=ann).headers["location"]
+        while client.get(failed, headers=ann).json()["state"] != "failed":
+            time.sleep(0.02)
         kept = sum(file.stat().st_size for file in (settings.data / "btfs" / body["material"]).iterdir())
         assert access.quotas.used_bytes("Ann") == kept > 0
         settings.max_bytes_each = kept

@@ -2,7 +2,10 @@
 
 import io
 import struct
+import tempfile
+import zipfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ from relume.btf.importing import import_btf
 from relume.btf.rings import rings_of
 from relume.btf.zips import ZippedBtf
 from relume.errors import MaterialError
+from relume.imageio.exr import channels_of, write_scanlines
 
 
 def test_images_come_in_the_order_of_the_rings_and_linear(tmp_path):
@@ -47,6 +51,12 @@ def of_16_bits():
     return file.getvalue()
 
 
+def of_exr(image):
+    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
+        write_scanlines(Path(file.name), channels_of(image.astype(np.float32)), {}, "float")
+        return Path(file.name).read_bytes()
+
+
 def whole(path):
     found = ZippedBtf(path)
     return [found.seen_from(view) for view in range(len(DIRECTIONS))]
@@ -55,19 +65,24 @@ def whole(path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda files: files.pop(FIRST), "is missing$"),
-        (lambda files: [files.pop(FIRST), files.pop(SECOND)], "is missing; it is the first of 2$"),
-        (lambda files: files.update({FIRST: told_as(60_000, files[FIRST])}), "cannot be read"),
-        (lambda files: files.update({FIRST: told_as(11_000, files[FIRST])}), "cannot be read|more than"),
+        (lambda files: files.pop(FIRST), r"\(40, 90\) and seen from \(40, 0\).* is missing; put it"),
+        (lambda files: [files.pop(FIRST), files.pop(SECOND)], "is missing, the first of 2;"),
+        (lambda files: [files.pop(n) for n in list(files) if "tl070" in n], "is missing, the first of 50;"),
+        (lambda files: files.update({FIRST: told_as(60_000, files[FIRST])}), "scale the images down"),
+        (lambda files: files.update({FIRST: told_as(11_000, files[FIRST])}), "scale the images down"),
         (lambda files: files.update({FIRST: of_16_bits()}), "more than a byte a channel"),
         (renamed(FIRST, FIRST.replace("tv040 pv000", "tv040 pv999")), "nowhere"),
         (lambda files: files.update({FIRST.replace("tv040/", "again/"): files[FIRST]}), "two images"),
         (lambda files: files.update({FIRST: files[FIRST][:60]}), "cannot be read"),
-        (lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], (7, 5))[0]}), "another size"),
+        (
+            lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], (7, 5))[0]}),
+            "5×7 pixels, the first",
+        ),
         (lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], kind="GIF")[0]}), "cannot be read"),
         (renamed(FIRST, FIRST.replace("tv040 pv000", "tv095 pv000")), "below the horizon"),
         (lambda files: files.clear(), "named by their directions"),
-        (lambda files: [files.pop(n) for n in list(files) if "tl070" in n], "not the same"),
+        (lambda files: files.update({"\x1b[2J\n" + FIRST.rpartition("/")[2]: b""}), r"of \?\[2J\?00000 tl040"),
+        (lambda files: files.update({FIRST: of_exr(np.full((6, 5, 3), np.nan))}), "no numbers"),
     ],
 )
 def test_bad_ones_are_refused_with_what_is_wrong(tmp_path, change, said):
@@ -86,10 +101,54 @@ def test_directions_that_are_not_evenly_on_rings_are_refused(tmp_path):
         ZippedBtf(zipped(tmp_path / "crooked.zip", crooked))
 
 
-def test_what_is_no_zip_is_refused(tmp_path):
-    (tmp_path / "no.zip").write_bytes(b"PK\x03\x04 and then nothing")
-    with pytest.raises(MaterialError, match="not a zip"):
+def test_images_of_open_exr_are_linear_and_not_negative(tmp_path):
+    def linear(files):
+        for name in [name for name in files if name.endswith(".png")]:
+            files[name.replace(".png", ".exr")] = of_exr(np.full((6, 5, 3), [7.5, 0.25, -0.5]))
+            del files[name]
+
+    seen = ZippedBtf(zipped(tmp_path / "a.zip", linear)).seen_from(3)
+    np.testing.assert_array_equal(seen, np.broadcast_to(np.float32([7.5, 0.25, 0]), seen.shape))
+
+
+def test_large_images_are_kept_as_means_of_linear_values(tmp_path, monkeypatch):
+    def larger(files):
+        for view in DIRECTIONS:
+            for light in DIRECTIONS:
+                files[name_of(view, light)] = image_of(view, light, (6, 4))[0]
+
+    monkeypatch.setattr("relume.btf.photographs.MOST_TEXELS", 10)
+    found = ZippedBtf(zipped(tmp_path / "a.zip", larger))
+    assert found.size == (3, 2)
+    means = image_of(DIRECTIONS[4], DIRECTIONS[6], (6, 4))[1].reshape(3, 2, 2, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(found.seen_from(4)[6], means.reshape(-1, 3), atol=0.006)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(b"", "not a zip"), (b"hello", "not a zip"), (b"PK\x03\x04 and nothing", "cut off"), (b"PK" * 9999, "cut off")],
+)
+def test_what_is_no_zip_is_refused(tmp_path, content, said):
+    (tmp_path / "no.zip").write_bytes(content)
+    with pytest.raises(MaterialError, match=said):
         ZippedBtf(tmp_path / "no.zip")
+
+
+def test_a_list_of_millions_of_files_is_not_read(tmp_path):
+    num_bytes = 40_000_000
+    with (tmp_path / "a.zip").open("wb") as file:
+        file.write(b"PK\1\2")
+        file.seek(num_bytes)
+        file.write(struct.pack("<4sHHHHIIH", b"PK\5\6", 0, 0, 65535, 65535, num_bytes, 0, 0))
+    with pytest.raises(MaterialError, match="more than 161,000 files"):
+        ZippedBtf(tmp_path / "a.zip")
+
+
+def test_packing_that_may_ask_for_gigabytes_is_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_LZMA) as file:
+        file.writestr(name_of(DIRECTIONS[0], DIRECTIONS[0]), b"1")
+    with pytest.raises(MaterialError, match="deflate"):
+        ZippedBtf(tmp_path / "a.zip")
 
 
 def test_the_command_line_imports_one(tmp_path, capsys):

@@ -53,7 +53,9 @@ def test_images_become_a_material_of_the_library(client: TestClient, settings: S
     assert len(client.get("/api/materials/btf").json()) == 1
 
 
-def test_a_container_becomes_a_material_whatever_it_is_called(client: TestClient, tmp_path: Path) -> None:
+def test_a_container_becomes_a_material_whatever_it_is_called(
+    client: TestClient, settings: Settings, tmp_path: Path
+) -> None:
     path, _ = container(tmp_path / "a.btf")
     body = wait_for(client, send(client, path, error=0.02), "ready", "failed")
     assert (body["state"], body["problem"]) == ("ready", None)
@@ -62,6 +64,7 @@ def test_a_container_becomes_a_material_whatever_it_is_called(client: TestClient
     path.write_bytes(path.read_bytes()[:2000])
     body = wait_for(client, send(client, path), "ready", "failed")
     assert "cut off" in body["problem"]
+    assert not (settings.data / "btf-works" / body["id"]).exists()
 
 
 @pytest.mark.slow
