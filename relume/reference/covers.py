@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.terms.btf import Texels
-from relume.btf.sent import seen_numpy, sent_numpy
+from relume.btf.sent import seen, sent
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -26,24 +26,23 @@ class Cover:
     """What some points send that are covered.
 
     Attributes:
-        texels: by which. seen: of each point, from `relume.btf.sent.seen_numpy`. (n, L, 3)
+        texels: by which. seen: of each point, from `relume.btf.sent.seen`; nothing below the horizon. (n, L, 3)
         axes: of the texture, in the points' frames. (n, 2, 2)
     """
 
     texels: Texels
-    seen: F64
+    seen: F32
     axes: F64
 
-    def sent(self, point: int, wi: F64) -> F64:
-        """BRDF times cos θi of one of the points.
+    def sent(self, of: NDArray[np.int64], wi: F64) -> F64:
+        """BRDF times cos θi of some of the points.
 
         Args:
-            point: which. wi: in its frame, z = normal, unit. (m, 3)
+            of: which, for each direction. (m,). wi: in the frames of these, z = normal, unit. (m, 3)
         Returns:
             (m, 3), not negative
         """
-        turned = np.column_stack([wi[:, :2] @ self.axes[point].T, wi[:, 2]])
-        return np.maximum(sent_numpy(self.texels.btf, self.seen[point], turned), 0)
+        return np.maximum(sent(self.texels.btf, self.seen, self.axes, of, wi), 0)
 
 
 def cover(texels: Texels, places: F32, wo: F64, rng: np.random.Generator) -> Cover:
@@ -57,13 +56,13 @@ def cover(texels: Texels, places: F32, wo: F64, rng: np.random.Generator) -> Cov
     cosine, sine = math.cos(texels.rotation), math.sin(texels.rotation)
     u, up = places[:, 0].astype(np.float64), -places[:, 1].astype(np.float64)  # up in a texture is down in its numbers
     middle = texels.scale * np.stack([cosine * u + sine * up, sine * u - cosine * up], axis=1)
-    seen = np.zeros((len(wo), texels.btf.rings.num_directions, 3))
+    towards = np.column_stack([np.einsum("nij,nj->ni", axes, wo[:, :2]), wo[:, 2]])
+    drawn = middle[:, None] + _within(texels.scale * places[:, 2].astype(np.float64), towards, rng)
+    found = np.zeros((len(wo), texels.btf.rings.num_directions, 3), np.float32)
+    above = wo[:, 2] > 0
     size = np.array(texels.btf.size[::-1])
-    for k in np.flatnonzero(wo[:, 2] > 0):
-        towards = np.append(axes[k] @ wo[k, :2], wo[k, 2])
-        drawn = middle[k] + _within(texels.scale * float(places[k, 2]), towards, rng)
-        seen[k] = seen_numpy(texels.btf, drawn * size - 0.5, towards)
-    return Cover(texels, seen, axes)
+    found[above] = seen(texels.btf, texels.tables, drawn[above] * size - 0.5, towards[above])
+    return Cover(texels, found, axes)
 
 
 def _axes_of(texels: Texels, places: F32) -> F64:
@@ -75,17 +74,18 @@ def _axes_of(texels: Texels, places: F32) -> F64:
     return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=1)
 
 
-def _within(side: float, wo: F64, rng: np.random.Generator) -> F64:
+def _within(side: F64, wo: F64, rng: np.random.Generator) -> F64:
     """Places from the middle of what a pixel covers: a rectangle, longer in the plane of the eye and the normal.
 
     Args:
-        side: of the square of its area, in repeats. wo: to the eye, in the texture's frame. (3,)
+        side: of the square of its area, in repeats. (n,). wo: to the eye, in the texture's frame. (n, 3)
     Returns:
-        One in each of its strata. (`_PLACES`², 2)
+        One in each of its strata. (n, `_PLACES`², 2)
     """
-    slanted = math.sqrt(max(wo[2], _LEAST_COSINE))
-    across = math.hypot(wo[0], wo[1])
-    along = np.array([wo[0], -wo[1]]) / across if across > 0 else np.array([1.0, 0.0])
+    slanted = np.sqrt(np.maximum(wo[:, 2], _LEAST_COSINE))[:, None, None]
+    across = np.hypot(wo[:, 0], wo[:, 1])[:, None]
+    along = np.where(across > 0, wo[:, :2] * [1, -1] / np.maximum(across, 1e-300), [1.0, 0.0])[:, None]
     corner = np.stack(np.meshgrid(*[np.arange(_PLACES)] * 2), axis=-1).reshape(-1, 2)
-    share = (corner + rng.random(corner.shape)) / _PLACES - 0.5
-    return np.asarray(side * (share[:, :1] / slanted * along + share[:, 1:] * slanted * [-along[1], along[0]]))
+    share = (corner + rng.random((len(wo), *corner.shape))) / _PLACES - 0.5
+    beside = along[..., ::-1] * [-1, 1]
+    return np.asarray(side[:, None, None] * (share[..., :1] / slanted * along + share[..., 1:] * slanted * beside))

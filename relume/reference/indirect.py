@@ -222,7 +222,7 @@ def _scattered(
             if (covered := covers.get((index, k))) is None:
                 value = eval_brdf(term, wi[at], wo[at]) * cosine[:, None]
             else:
-                sent = [covered.sent(row, one[None])[0] for row, one in enumerate(wi[at])]
+                sent = covered.sent(np.arange(len(at)), wi[at])
                 value = np.where(cosine[:, None] > 0, sent, 0.0) * np.asarray(term["color"])
             of_term = texture * value / np.maximum(density, _LEAST_DENSITY)[:, None]
             share[at] += of_term

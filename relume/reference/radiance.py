@@ -290,7 +290,7 @@ def _add_lights(
             if table.cover is None:
                 shading = table.term.quotients(x, y, z, ox, oy, oz) * z
             else:
-                shading = np.ascontiguousarray(table.cover.sent(p, wi[:, :num].T).T)
+                shading = np.ascontiguousarray(table.cover.sent(np.full(num, p), wi[:, :num].T).T)
             total = np.zeros(3)
             add_lights(
                 table.kinds, table.axes, table.values, table.is_stepped, table.is_gray,

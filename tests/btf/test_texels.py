@@ -231,7 +231,7 @@ def test_paths_of_brute_force_begin_at_those_places(bake, small_btf):
     z, turn = (np.arange(40) + 0.5) / 40, (np.arange(80) + 0.5) * np.pi / 40
     flat = np.sqrt(1 - z**2)[:, None]
     wi = np.stack([flat * np.cos(turn), flat * np.sin(turn), np.broadcast_to(z[:, None], (40, 80))], axis=-1)
-    expected = 2 * np.pi * covers[0, 0].sent(7, wi.reshape(-1, 3)).mean(axis=0) * term["color"]
+    expected = 2 * np.pi * covers[0, 0].sent(np.full(3200, 7), wi.reshape(-1, 3)).mean(axis=0) * term["color"]
     error = share.std(axis=0) / np.sqrt(num)
     assert (np.abs(share.mean(axis=0) - expected) < 4 * error).all()
     assert (error < 0.04 * expected).all()
