@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 
+ALIKE = np.zeros(1, np.float32)
+"""The chance of rays that are given none: that all of one direction pass what they meet, or none."""
+
 
 class Points(NamedTuple):
     """n points on surfaces, as the kernels want them.
@@ -18,12 +21,14 @@ class Points(NamedTuple):
         normal: unit shading normals, on the side that the points are seen from. (n, 3) float32
         tangent: unit, across the normals; n × t completes the shading frame. (n, 3) float32
         seed: number of each point in what owns it; decides how patterns of rays are shifted there. (n,) uint32
+        chance: of the rays of each at surfaces that blend: `relume.trace.cutout_filter`. (n,) float32, or (1,) of all
     """
 
     position: F32
     normal: F32
     tangent: F32
     seed: NDArray[np.uint32]
+    chance: F32 = ALIKE
 
     @property
     def num_points(self) -> int:
@@ -33,4 +38,5 @@ class Points(NamedTuple):
     def rows(self, chosen: slice | NDArray[np.integer] | NDArray[np.bool_]) -> Points:
         """Choose some of the points, which keep their seeds."""
         position, normal, tangent = (np.ascontiguousarray(array[chosen]) for array in self[:3])
-        return Points(position, normal, tangent, np.ascontiguousarray(self.seed[chosen]))
+        chance = self.chance if len(self.chance) == 1 else np.ascontiguousarray(self.chance[chosen])
+        return Points(position, normal, tangent, np.ascontiguousarray(self.seed[chosen]), chance)

@@ -17,6 +17,7 @@ from relume.eye.layers import Layer, layers_of
 from relume.eye.merged import POSITIONS, POSITIONS_A_PIXEL, Chosen, alone, joined, merged
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.eye.pixel_edges import bright_edges_of, edges_of, is_partly_there
+from relume.eye.tinted import has_tinted_glass, parted, sees_tinted_light
 from relume.eye.ways import Chain
 from relume.scene.model import Scene
 from relume.scene.roughness import level_of, levels_of
@@ -46,7 +47,8 @@ class ViewSamples:
         num_rays: how many were traced to find them.
         level: of roughness, see `relume.scene.roughness`; 0 where the material has but one. (n,) uint8
         through: what glass before a sample lets through. Samples on glass and those behind it, on mirrors and those
-            seen in them, have the same shares of a pixel. (n, 3) float32
+            seen in them, have the same shares of a pixel. Of samples of one channel it is three times that of
+            this one, and nothing of others. (n, 3) float32
         eye: where each is seen from: the camera, or the last surface that turned the way to it. (n, 3) float32
         chain: the mirrors that it is seen in, `NO_MIRROR` where it is seen in fewer.
         is_mirrored: whether its surface is a mirror, and other samples have what is seen in it. (n,)
@@ -179,7 +181,24 @@ def _sorted_samples(
     outside = ~hit[order]
     full.diffuse[outside] = lookup(scene.environment.radiance, seen.directions[outside])
     assert seen.chain is not None
-    return ViewSamples(
+    samples = ViewSamples(
         chosen.pixel[order].astype(np.uint32), chosen.weight[order], material[order], full, num_rays, level,
         seen.through, seen.eyes, seen.chain, seen.is_mirrored,
+    )  # fmt: skip
+    return _by_channel(scene, geometry, samples) if has_tinted_glass(scene.materials) else samples
+
+
+def _by_channel(scene: Scene, geometry: Geometry, samples: ViewSamples) -> ViewSamples:
+    """Make samples of one channel of those that light reaches through tinted glass."""
+    num, num_surface = len(samples.pixel), int(np.searchsorted(samples.material, BACKGROUND))
+    of_surface, is_lit = samples.surface.points.rows(slice(0, num_surface)), np.zeros(num, np.bool_)
+    is_lit[:num_surface], num_rays = sees_tinted_light(geometry, of_surface, scene.environment.radiance)
+    rows, shown = parted(is_lit)
+    level, material = samples.level[rows], samples.material[rows]
+    order = np.lexsort((shown.argmax(axis=1), level, material))  # neighbours of one channel follow each other
+    rows, shown = rows[order], shown[order]
+    return ViewSamples(
+        samples.pixel[rows], samples.weight[rows] / shown.max(axis=1), samples.material[rows],
+        samples.surface.rows(rows), samples.num_rays + num_rays, samples.level[rows], samples.through[rows] * shown,
+        samples.eye[rows], samples.chain.rows(rows), samples.is_mirrored[rows],
     )  # fmt: skip

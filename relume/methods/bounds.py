@@ -15,6 +15,7 @@ from relume.bake import Recipe
 from relume.errors import PlanError
 from relume.eye.layers import most_layers, most_shown
 from relume.eye.merged import POSITIONS_A_PIXEL
+from relume.eye.tinted import NUM_CHANNELS, has_tinted_glass
 from relume.light.gather_rays import MAX_RAYS
 from relume.scene.emission import has_images
 from relume.scene.model import Mesh, Scene, Texture
@@ -32,9 +33,11 @@ _LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power,
 
 
 def samples_of_view(scene: Scene, recipe: Recipe) -> int:
-    """View samples of one view: every position of every pixel sees something else, glass before it, more in mirrors."""
+    """View samples of one view: every position of every pixel sees something else, glass before it, more in mirrors;
+    light of every channel comes otherwise through tinted glass."""
     width, height = recipe.size
-    return POSITIONS_A_PIXEL * width * height * most_shown(scene.materials)
+    of_ray = most_shown(scene.materials) * (NUM_CHANNELS if has_tinted_glass(scene.materials) else 1)
+    return POSITIONS_A_PIXEL * width * height * of_ray
 
 
 def camera_rays(scene: Scene, recipe: Recipe) -> int:

@@ -43,6 +43,7 @@ from relume.scene.model import Camera, Scene
 from relume.scene.roughness import levels_of
 from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
+from relume.views.store_io import read_chance
 
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
@@ -192,7 +193,8 @@ class SampledViews:
         prefix = f"views/{k}"
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
-        found = trace_coherent(self.geometry_of(scene).embree, position, normal, self.sampled_of(store).targets)
+        chance, targets = read_chance(store, k, task.start, task.stop), self.sampled_of(store).targets
+        found = trace_coherent(self.geometry_of(scene).embree, position, normal, targets, chance)
         rays = np.array([found.rays.traced, found.rays.full, found.rays.checked, found.rays.wrong])
         arrays = {f"{prefix}/visibility": found.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
         return Written(arrays, found.rays.traced, found.trace_s)

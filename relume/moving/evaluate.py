@@ -30,7 +30,7 @@ F64 = NDArray[np.float64]
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _send(rungs, points, material, vectors, others, tables, eye, rows, start, stop, out, sky):  # type: ignore[no-untyped-def]
     """Evaluate the points that are [start, stop) of rows. out, sky: (points, groups, 3), written there"""
-    position, normal, tangent, _ = points
+    position, normal, tangent, _, _ = points
     num_groups, num_rungs = out.shape[1], rungs.order.shape[0]
     turned_light, sent = np.empty((3, num_rungs), np.float32), np.empty((num_groups, 3), np.float32)
     for p in rows[start:stop]:

@@ -113,7 +113,6 @@ def _chosen(view: View, material: int, step: int, receivers: Receivers, chosen: 
     def shared(few: Rays, whole: Rays) -> Rays:
         if not (isinstance(few, GatherRays) and isinstance(whole, GatherRays) and whole.sharing is not None):
             return few
-        points, tents = some.points, whole.sharing.even.times
-        return replace(few, sharing=sharing(square, width, points.position, points.normal, tents))
+        return replace(few, sharing=sharing(square, width, some.points, whole.sharing.even.times))
 
     return replace(some, rays=tuple(map(shared, some.rays, receivers.rays)))

@@ -143,7 +143,7 @@ def list_gathered(  # type: ignore[no-untyped-def]
     Returns:
         K, the number of rays.
     """
-    _, normal, tangent, seed = points
+    _, normal, tangent, seed, _ = points
     has_lobes, most = sent.table.shape[0] > 0, links.shape[1]
     rows, rays, place = np.empty(most + 1, np.int32), np.empty(most + 1, np.int64), np.empty(most, np.int64)
     local, weights = np.empty((5, most), np.float32), np.empty(most, np.float32)
@@ -182,7 +182,7 @@ def sum_gathered(points, wo, links, pattern, sent, start, stop, out):  # type: i
         points, wo, links, pattern, sent, start, stop: as there.
         out: Σ w · L, written. (points, 3) float32
     """
-    _, normal, tangent, seed = points
+    _, normal, tangent, seed, _ = points
     has_lobes, most = sent.table.shape[0] > 0, links.shape[1]
     rows, rays = np.empty(most + 1, np.int32), np.empty(most + 1, np.int64)
     local, weights = np.empty((5, most), np.float32), np.empty(most, np.float32)

@@ -214,7 +214,7 @@ def list_lamp(  # type: ignore[no-untyped-def]
     Returns:
         K, the number of entries, and M, of triangles.
     """
-    position, normal, tangent, seed = points
+    position, normal, tangent, seed, _ = points
     most = 2 * lamp[1].uv.shape[0]
     radius, reach, nearest = brings[:, 3], np.empty(most, np.float32), np.empty(most, np.float32)
     frame, scratch = np.empty((3, 3), np.float32), _scratch()

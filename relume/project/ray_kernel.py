@@ -32,7 +32,7 @@ def list_local(  # type: ignore[no-untyped-def]
     Returns:
         K, the number of rays.
     """
-    position, normal, tangent, seed = points
+    position, normal, tangent, seed, _ = points
     end = 0
     for p in range(start, stop):
         first[p - start] = end

@@ -18,6 +18,7 @@ from relume.environments.equirect import lookup, turned
 from relume.environments.model import Environment
 from relume.errors import CancelledError
 from relume.eye.mirrors import are_mirrors
+from relume.eye.tinted import chance_of
 from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
@@ -246,7 +247,8 @@ def points_of(samples: ViewSamples, textures: Mapping[str, F32]) -> Points:
     points, roughness = samples.surface.points, samples.surface.roughness
     towards = samples.eye.astype(np.float64) - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
-    return Points(points.position, points.normal, points.tangent, wo, textures, roughness, samples.surface.uv)
+    chance = chance_of(samples.through)
+    return Points(points.position, points.normal, points.tangent, wo, textures, roughness, samples.surface.uv, chance)
 
 
 def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:

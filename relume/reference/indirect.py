@@ -12,6 +12,7 @@ are a mirror's and no more than eyes follow, are none between surfaces.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,9 +95,11 @@ def reference_indirect(
         for bounce in range(min(MOST_BOUNCES, max(map(_longest, wanted)))):
             directions, share, mirrored = _scattered(kinds, lobes, here, of, covers if bounce == 0 else {}, rng)
             weight = _reflected(weight, share, mirrored, bounce)
-            hits = trace_from(geometry.embree, here.position, directions)
+            hits = trace_from(geometry.embree, here.position, directions, here.chance)
             hit = np.nonzero(hits.face >= 0)[0]
+            chance = here.chance if len(here.chance) == 1 else here.chance[hit]
             here, hit_material = _places(scene, geometry, look, hits, directions, hit)
+            here = replace(here, chance=chance)
             of = kinds.of(hit_material, here.roughness)
             rows, weight = rows[hit], weight[:, hit]
             counts = np.array([_counting(paths, bounce + 1) for paths in wanted])

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from relume.look import LightLook, Look
 from relume.look.model import DirectionalLook, MeshLook, RectangleLook, SpotLook
+from relume.points import ALIKE
 from relume.scene.model import Scene, Texture
 from relume.trace.geometry import Geometry
 from relume.trace.primary import trace_from
@@ -49,7 +50,9 @@ class LocalLamp:
     uvs: F64
     image: Texture | None
 
-    def arriving(self, geometry: Geometry, position: F64, num: int, rng: np.random.Generator) -> Arriving:
+    def arriving(
+        self, geometry: Geometry, position: F64, num: int, rng: np.random.Generator, chance: F32 = ALIKE
+    ) -> Arriving:
         """Light that arrives at points from places of the lamp's surface, or from the one place that it has.
 
         Args:
@@ -57,13 +60,15 @@ class LocalLamp:
             position: of the points, metres. (n, 3) float64
             num: places that are drawn for each point.
             rng: where they are drawn from.
+            chance: of the rays of each point, or of all; see `relume.points.Points`. (n,) or (1,)
         """
         away, factor = self._towards(position, num, rng)
         distance = np.linalg.norm(away, axis=2)
         direction = away / distance[..., None]
         flat = direction.reshape(-1, 3).astype(np.float32)
         start = np.repeat(position, direction.shape[1], axis=0).astype(np.float32)
-        free = free_distance(geometry, start, flat).reshape(distance.shape)
+        of_rays = chance if len(chance) == 1 else np.repeat(chance, direction.shape[1])
+        free = free_distance(geometry, start, flat, of_rays).reshape(distance.shape)
         is_seen = free > distance - _SLACK * geometry.epsilon - 1e-5 * distance
         return Arriving(direction, factor * is_seen[..., None] * np.array(self.look.gain))
 
@@ -114,18 +119,24 @@ def lamps_of(scene: Scene, look: Look) -> list[LocalLamp]:
     return lamps
 
 
-def free_distance(geometry: Geometry, start: F32, direction: F32) -> F32:
+def free_distance(geometry: Geometry, start: F32, direction: F32, chance: F32 = ALIKE) -> F32:
     """How far rays fly until they hit anything.
 
     Args:
         geometry: that is traced.
         start: origins, metres. (n, 3) float32
         direction: unit vectors. (n, 3) float32
+        chance: of the rays at surfaces that blend; see `relume.points.Points`. (n,) or (1,) float32
     Returns:
         Metres, infinite where nothing is hit. (n,) float32
     """
     some = (slice(k, k + _RAYS_AT_ONCE) for k in range(0, len(direction), _RAYS_AT_ONCE))
-    return np.concatenate([trace_from(geometry.embree, start[rows], direction[rows]).distance for rows in some])
+    return np.concatenate([
+        trace_from(
+            geometry.embree, start[rows], direction[rows], chance if len(chance) == 1 else chance[rows]
+        ).distance
+        for rows in some
+    ])  # fmt: skip
 
 
 def emission_of(lamps: Sequence[LocalLamp], material: str) -> F64:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -18,6 +18,7 @@ from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.parallel import for_steps
+from relume.points import ALIKE
 from relume.reference.covers import Cover, cover
 from relume.reference.kernel import add_lights, list_visible
 from relume.reference.lobes import Lobe, cosine_lobe, lobe_of
@@ -47,6 +48,7 @@ class Points:
         textures: what multiplies terms of a channel, "diffuse" and "specular". (n, 3) float32 each
         roughness: see `relume.trace.surface.Surface`. (n,) float32
         uv: see there; None where what covers surfaces counts by its mean. (n, 5) float32
+        chance: of shadow rays at surfaces that blend; see `relume.points.Points`. (n,) or (1,) float32
     """
 
     position: F32
@@ -56,6 +58,7 @@ class Points:
     textures: Mapping[str, F32]
     roughness: F32
     uv: F32 | None = None
+    chance: F32 = field(default_factory=lambda: ALIKE)
 
     @property
     def num_points(self) -> int:
@@ -73,7 +76,8 @@ class Points:
         textures = {name: values[index] for name, values in self.textures.items()}
         frame = self.normal[index], self.tangent[index], self.wo[index]
         uv = None if self.uv is None else self.uv[index]
-        return Points(self.position[index], *frame, textures, self.roughness[index], uv)
+        chance = self.chance if len(self.chance) == 1 else self.chance[index]
+        return Points(self.position[index], *frame, textures, self.roughness[index], uv, chance)
 
     def covers(self, terms: Sequence[Document], rng: np.random.Generator) -> list[Cover | None]:
         """What covers them, term by term; None where it is the same everywhere. rng: draws places in it."""
@@ -175,7 +179,8 @@ def reference_radiance(
             _add_texels(geometry, texels.direction[rows], texels.power[rows], some, here, radiance[:, start:stop])
         rng = np.random.default_rng((_SEED, pass_index, start, 1))
         for lamp in lamps:
-            arriving = lamp.arriving(geometry, some.position.astype(np.float64), spp or _MOST_OF_LAMP, rng)
+            position, num = some.position.astype(np.float64), spp or _MOST_OF_LAMP
+            arriving = lamp.arriving(geometry, position, num, rng, some.chance)
             _add_lamp(arriving, some, here, radiance[:, start:stop])
 
     for_steps(packet, points.num_points, _POINTS_A_PACKET, progress, cancelled, "the reference")
@@ -200,7 +205,7 @@ def _add_texels(
 ) -> None:
     """Add the light of some texels to a packet of points. out: (materials, points, 3)"""
     towards = np.ascontiguousarray(direction, np.float32)
-    visible = trace_visibility(geometry.embree, points.position, points.normal, towards).visible
+    visible = trace_visibility(geometry.embree, points.position, points.normal, towards, points.chance).visible
     for p in range(points.num_points):
         _add_lights(points, p, direction, power, visible[p], tables, out[:, p])
 
@@ -246,13 +251,16 @@ def _add_drawn(
     frames = points.frames()
     wo = np.einsum("nij,nj->ni", frames, points.wo.astype(np.float64))
     shared = texels.drawn(spp, rng)
-    seen = trace_visibility(geometry.embree, points.position, points.normal, shared.astype(np.float32)).visible
+    towards = shared.astype(np.float32)
+    seen = trace_visibility(geometry.embree, points.position, points.normal, towards, points.chance).visible
     is_seen = np.unpackbits(seen, axis=1, count=spp, bitorder="little").astype(bool)
     own = np.concatenate([lobe.draw(wo, num, rng) for lobe, num in lobes], axis=1)
     wi = np.concatenate([np.einsum("nij,mj->nmi", frames, shared), own], axis=1)
     own = np.einsum("nji,nmj->nmi", frames, own)
-    starts = np.repeat(points.position, own.shape[1], axis=0)
-    free = free_distance(geometry, starts, own.reshape(-1, 3).astype(np.float32)).reshape(own.shape[:2])
+    num = own.shape[1]
+    starts, chance = np.repeat(points.position, num, axis=0), points.chance
+    chance = chance if len(chance) == 1 else np.repeat(chance, num)
+    free = free_distance(geometry, starts, own.reshape(-1, 3).astype(np.float32), chance).reshape(own.shape[:2])
     is_free = np.concatenate([is_seen, np.isinf(free)], axis=1)
     direction = np.concatenate([np.broadcast_to(shared, (points.num_points, *shared.shape)), own], axis=1)
     radiance, density = texels.radiance(direction)

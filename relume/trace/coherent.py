@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from relume.color import luminance
 from relume.light.neighbours import neighbours_of
 from relume.parallel import for_ranges
+from relume.points import ALIKE
 from relume.trace.coherent_kernel import BLOCK, trace_blocks
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 
@@ -86,7 +87,7 @@ def targets_of(directions: F32, irradiance: F32) -> Targets:
     return Targets(directions, *neighbours_of(directions), luminous > _STRONG_SHARE * luminous.sum())
 
 
-def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targets) -> Coherent:
+def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targets, chance: F32 = ALIKE) -> Coherent:
     """Find what samples see, tracing where it changes and predicting where it does not.
 
     Args:
@@ -94,6 +95,7 @@ def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targ
         origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
         targets: the lights, from `targets_of`.
+        chance: of the rays of each sample, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
@@ -109,6 +111,7 @@ def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targ
             all_of_a_light.ctypes.data,
             origins,
             normals,
+            chance,
             targets,
             start,
             stop,

@@ -20,7 +20,7 @@ from numba.cpython.unsafe.numbers import trailing_zeros
 from numpy.typing import NDArray
 
 from relume.bits import WORD, into_rows
-from relume.trace.packet import FAR, LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
+from relume.trace.packet import FAR, LANES, aim, ask_first, is_free, new_packet, set_origin, take_chance, trace_shadows
 
 U64 = NDArray[np.uint64]
 
@@ -42,11 +42,13 @@ class _Block(NamedTuple):
 
     Attributes:
         facing, known, seen: above the horizon; traced; unoccluded. (num_lights,) uint64
+        chance: of the rays of each sample at surfaces that blend. (`BLOCK`,) float32
     """
 
     facing: U64
     known: U64
     seen: U64
+    chance: NDArray[np.float32]
 
 
 class _Level(NamedTuple):
@@ -105,6 +107,7 @@ def _trace(occluded, packet, block, origins, directions, lights, samples):  # ty
             wanted &= wanted - np.uint64(1)
             packet.owner[lane] = light << _BLOCK_BITS | k
             set_origin(packet, lane, origins[k, 0], origins[k, 1], origins[k, 2])
+            take_chance(packet, lane, block.chance[k])
             aim(packet, lane, x, y, z, FAR)
             rays += 1
             lane += 1
@@ -315,7 +318,7 @@ def _trace_quarter(occluded, packets, block, points, lights, span, salt, levels,
 
 @nb.njit(nogil=True, cache=True)
 def trace_blocks(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, of_alike, origins, normals, lights, start, stop, bits, counts
+    occluded, scene, arguments, of_alike, origins, normals, chance, lights, start, stop, bits, counts
 ):
     """Trace and predict samples [start, stop) block by block; `start` is a multiple of `BLOCK`.
 
@@ -323,6 +326,7 @@ def trace_blocks(  # type: ignore[no-untyped-def]
         occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
         of_alike: address of those of rays that go to one light from all samples of a quarter.
         origins: off the surface. normals: shading normals. (n, 3) float32
+        chance: of the rays of each sample, or of all, at surfaces that blend. (n,) or (1,) float32
         lights: directions, the two arrays of `relume.light.neighbours.Neighbours`, and which are always traced.
         start, stop: the samples. bits: written, light m in bit m & 7 of byte m >> 3. (n, bytes) uint8
         counts: rays traced, rays that a full trace would take, predicted bits checked, found wrong: added to. (4,)
@@ -330,13 +334,16 @@ def trace_blocks(  # type: ignore[no-untyped-def]
     directions = lights[0]
     n = directions.shape[0]
     packet, alike = new_packet(scene, arguments), new_packet(scene, of_alike)
-    block = _Block(np.zeros(n, np.uint64), np.zeros(n, np.uint64), np.zeros(n, np.uint64))
+    facing, known, seen = np.zeros(n, np.uint64), np.zeros(n, np.uint64), np.zeros(n, np.uint64)
+    block = _Block(facing, known, seen, np.full(BLOCK, chance[0]))
     nothing, whole = _new_level(n), _new_level(n)
     levels = (whole, _new_level(n), _new_level(n))
     nothing.doubted[:] = True
     for here in range(start, stop, BLOCK):
         there = min(here + BLOCK, stop)
         points, width = origins[here:there], there - here
+        if chance.shape[0] > 1:
+            block.chance[:width] = chance[here:there]
         counts[1] += _find_facing(normals[here:there], directions, block)
         region, anchors = _mask(0, width), _ends(points, 0, width)
         counts[0] += _flood(occluded, packet, block, points, lights, region, anchors, nothing, whole)

@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from relume.color import LUMINANCE
-from relume.trace.cutouts import PASSES, Cutouts
+from relume.trace.cutouts import PASSES, TINTED, Cutouts
 from relume.trace.texture import two_texels
 
 F32 = NDArray[np.float32]
@@ -31,6 +31,10 @@ _MOST = np.float32(254.5 / 255)  # a chance that texels of 255 reach, however th
 # chances of rays that are stopped by whatever is there a little, of those that only what is wholly there stops, and of
 # those that see no glass, and else what their direction makes them see
 ANYWHERE, EVERYWHERE, PAST_GLASS = np.float32(-1), np.float32(2), np.float32(-2)
+# of rays that only light of one channel takes; and of those that glass stops where it is tinted, and no other
+OF_CHANNEL, TO_TINTED = np.array([-3, -4, -5], np.float32), np.float32(-6)
+_LAST_CHANNEL = OF_CHANNEL[2]
+_TINTED = np.float32(TINTED)
 
 
 class Holes(NamedTuple):
@@ -127,6 +131,19 @@ def _schlick(cosine, f0):  # type: ignore[no-untyped-def]
     return f0 + (np.float32(1) - f0) * (np.float32(1) - min(cosine, np.float32(1))) ** 5
 
 
+@nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _passed(rule, given):  # type: ignore[no-untyped-def]
+    """What a side of glass lets pass but for what it reflects: of a channel, or of luminance. rule: of `Cutouts`"""
+    if given == 0:
+        return _RED * rule[1] + _GREEN * rule[2] + _BLUE * rule[3]
+    return rule[np.int64(-given) - 2]
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _is_tinted(rule):  # type: ignore[no-untyped-def]
+    return max(rule[1], rule[2], rule[3]) - min(rule[1], rule[2], rule[3]) > _TINTED
+
+
 @nb.cfunc("void(CPointer(int64))", cache=True, error_model="numpy")
 def _filter(arguments):  # type: ignore[no-untyped-def]
     """RTCFilterFunctionN. arguments: valid, user pointer, context, ray, hit, and how many."""
@@ -159,13 +176,12 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
             along = hits[0, lane] * x + hits[1, lane] * y + hits[2, lane] * z
             given = rays[_TIME, lane]
             least = _chance(given, face, row, x, y, z, along > 0)
-            if rules[row, 0] == PASSES and given == PAST_GLASS:
+            if rules[row, 0] == PASSES and (given == PAST_GLASS or (given == TO_TINTED and not _is_tinted(rules[row]))):
                 there = np.float32(0)
-            elif rules[row, 0] == PASSES and given == 0:
+            elif rules[row, 0] == PASSES and (given == 0 or _LAST_CHANNEL <= given < PAST_GLASS):
                 square = hits[0, lane] ** 2 + hits[1, lane] ** 2 + hits[2, lane] ** 2
                 cosine = abs(along) / np.sqrt(square * (x * x + y * y + z * z))
-                passed = _RED * rules[row, 1] + _GREEN * rules[row, 2] + _BLUE * rules[row, 3]
-                there *= np.float32(1) - passed * (np.float32(1) - _schlick(cosine, rules[row, 4]))
+                there *= np.float32(1) - _passed(rules[row], given) * (np.float32(1) - _schlick(cosine, rules[row, 4]))
         if there < least:
             valid[lane] = 0
 

@@ -19,6 +19,7 @@ from relume.scene.model import WRAPS, Glass, Material, Opacity
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
 BLENDS, PASSES = -1.0, -2.0  # instead of a bound: shares of opacity; glass
+TINTED = 0.05  # by how much the shares of channels differ at least that pass a side of glass which has a colour
 
 
 class Cutouts(NamedTuple):
@@ -56,6 +57,12 @@ def cutouts_of(materials: Sequence[Material]) -> Cutouts | None:
     if not images:
         return None
     return Cutouts(np.concatenate(texels), np.array(images, np.int64), np.array(rules, np.float32), of_material)
+
+
+def is_tinted(glass: Glass) -> bool:
+    """Tell whether glass has a colour that its shadows show."""
+    passed = _of_glass(glass)[1:4]
+    return max(passed) - min(passed) > TINTED
 
 
 def _of_glass(glass: Glass) -> tuple[float, ...]:

@@ -15,7 +15,18 @@ from relume.points import Points
 from relume.trace.cell_tree import NO_CELL_NODE, CellTree, locate
 from relume.trace.embree import intersect, packet_arguments
 from relume.trace.geometry import Geometry
-from relume.trace.packet import LANES, aim, ask, direction_of, hit_of, new_packet, place_of, set_origin, trace_hits
+from relume.trace.packet import (
+    LANES,
+    aim,
+    ask,
+    direction_of,
+    hit_of,
+    new_packet,
+    place_of,
+    set_origin,
+    take_chance,
+    trace_hits,
+)
 
 F32 = NDArray[np.float32]
 
@@ -42,12 +53,13 @@ def _enter(points, wo, pattern, first, width, packet, frame, towards, shifts):  
 
     wo: (n, 3). frame: tangent, bitangent, normal. (3, 3, `LANES`) shifts: (2 sets, 4, `LANES`)
     """
-    position, normal, tangent, seed = points
+    position, normal, tangent, seed, chance = points
     for k in range(LANES):
         p = first + min(k, width - 1)
         n, t, o = normal[p], tangent[p], wo[p]
         b = (n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0])
         set_origin(packet, k, position[p, 0], position[p, 1], position[p, 2])
+        take_chance(packet, k, chance[min(p, chance.shape[0] - 1)])
         for axis in range(3):
             frame[0, axis, k], frame[1, axis, k], frame[2, axis, k] = t[axis], b[axis], n[axis]
         for row in range(3):

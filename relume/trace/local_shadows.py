@@ -17,7 +17,7 @@ from relume.light.strata import Strata
 from relume.parallel import for_ranges
 from relume.points import Points
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
-from relume.trace.packet import LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
+from relume.trace.packet import LANES, aim, ask, is_free, new_packet, set_origin, take_chance, trace_shadows
 
 F32 = NDArray[np.float32]
 
@@ -50,7 +50,7 @@ def _aim_packet(packet, light, strata, off_surface, points, first, width, sample
     Returns:
         How many of them are to be traced: those of points that this sample may light.
     """
-    position, normal, _, seed = points
+    position, normal, _, seed, chance = points
     active = 0
     for k in range(LANES):
         p = first + min(k, width - 1)
@@ -65,6 +65,7 @@ def _aim_packet(packet, light, strata, off_surface, points, first, width, sample
         active += 1 if is_asked else 0
         along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, off_surface)
         set_origin(packet, k, x, y, z)
+        take_chance(packet, k, chance[min(p, chance.shape[0] - 1)])
         aim(packet, k, along_x, along_y, along_z, far)
     return active
 
@@ -134,7 +135,7 @@ def trace_local(
 @nb.njit(nogil=True, cache=True)
 def _arriving(light, strata, points, visible, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum what points [start, stop) see of a light into `out`. (n,)"""
-    position, normal, _, seed = points
+    position, normal, _, seed, _ = points
     for p in range(start, stop):
         x, y, z = position[p, 0], position[p, 1], position[p, 2]
         shift_u, shift_v = shift_of(strata, seed[p])

@@ -21,7 +21,7 @@ from relume.parallel import for_shares
 from relume.points import Points
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 from relume.trace.local_shadows import shadow_ray
-from relume.trace.packet import LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
+from relume.trace.packet import LANES, aim, ask_first, is_free, new_packet, set_origin, take_chance, trace_shadows
 
 F32 = NDArray[np.float32]
 
@@ -60,7 +60,7 @@ def _flush(occluded, packet, waiting, seen):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _ask(occluded, packet, position, first, width, rays, given, are_probes, seen):  # type: ignore[no-untyped-def]
+def _ask(occluded, packet, position, chance, first, width, rays, given, are_probes, seen):  # type: ignore[no-untyped-def]
     """Trace the rays that would bring light to the probes of a block, or to its other points.
 
     Returns:
@@ -74,6 +74,7 @@ def _ask(occluded, packet, position, first, width, rays, given, are_probes, seen
         lane, p = asked & (LANES - 1), first + k
         packet.owner[lane] = r
         set_origin(packet, lane, position[p, 0], position[p, 1], position[p, 2])
+        take_chance(packet, lane, chance[min(p, chance.shape[0] - 1)])
         aim(packet, lane, rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3])
         asked += 1
         if lane == LANES - 1:
@@ -86,7 +87,7 @@ def _ask(occluded, packet, position, first, width, rays, given, are_probes, seen
 @nb.njit(nogil=True, cache=True)
 def _aim(light, strata, off_surface, points, first, width, rays, given):  # type: ignore[no-untyped-def]
     """Aim the rays of a block's points, sample after sample of `BLOCK` each: direction and end, and w · cos θi."""
-    position, normal, _, seed = points
+    position, normal, _, seed, _ = points
     for k in range(width):
         p = first + k
         x, y, z = position[p, 0], position[p, 1], position[p, 2]
@@ -113,12 +114,12 @@ def _light(  # type: ignore[no-untyped-def]
     for first in range(start, stop, BLOCK):
         width = min(BLOCK, stop - first)
         _aim(light, strata, off_surface, points, first, width, rays, given)
-        asked, num_seen = _ask(occluded, packet, points.position, first, width, rays, given, True, seen)
+        asked, num_seen = _ask(occluded, packet, points.position, points.chance, first, width, rays, given, True, seen)
         if asked > 0 and num_seen == 0:
             continue
         is_open = asked > 0 and num_seen == asked
         if not is_open:
-            _ask(occluded, packet, points.position, first, width, rays, given, False, seen)
+            _ask(occluded, packet, points.position, points.chance, first, width, rays, given, False, seen)
         for sample in range(strata.uv.shape[0]):
             byte, bit = sample >> 3, np.uint8(1 << (sample & 7))
             for k in range(width):

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_ranges, for_shares
+from relume.points import ALIKE
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
-from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
+from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, take_chance, trace_shadows
 
 F32 = NDArray[np.float32]
 
@@ -19,7 +20,9 @@ _POINTS_A_RANGE = 512
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(occluded, scene, arguments, origins, normals, directions, start, stop, bits):  # type: ignore[no-untyped-def]
+def _trace(  # type: ignore[no-untyped-def]
+    occluded, scene, arguments, origins, normals, chance, directions, start, stop, bits
+):
     """Trace points [start, stop) against all lights; returns the number of rays. start is a multiple of 16."""
     packet = new_packet(scene, arguments)
     facing = np.empty(LANES, np.bool_)
@@ -30,6 +33,7 @@ def _trace(occluded, scene, arguments, origins, normals, directions, start, stop
         for k in range(LANES):
             p = first + min(k, width - 1)
             set_origin(packet, k, origins[p, 0], origins[p, 1], origins[p, 2])
+            take_chance(packet, k, chance[min(p, chance.shape[0] - 1)])
         for light in range(num_lights):
             x, y, z = directions[light, 0], directions[light, 1], directions[light, 2]
             active = 0
@@ -66,7 +70,7 @@ class Traced:
     trace_s: float
 
 
-def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions: F32) -> Traced:
+def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions: F32, chance: F32 = ALIKE) -> Traced:
     """Trace every point against every light above its horizon.
 
     Args:
@@ -74,6 +78,7 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
         origins: off the surface already. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
         directions: unit, towards the lights. (m, 3) float32
+        chance: of the rays of each point, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
     Cost: O(n · m · log triangles) time.
     """
     bits = np.zeros((len(origins), (len(directions) + 7) // 8), np.uint8)
@@ -82,7 +87,9 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
 
     def kernel(start: int, stop: int) -> None:
         counts.append(
-            _trace(occluded, scene.handle, arguments.ctypes.data, origins, normals, directions, start, stop, bits)
+            _trace(
+                occluded, scene.handle, arguments.ctypes.data, origins, normals, chance, directions, start, stop, bits
+            )
         )
 
     began = time.perf_counter()

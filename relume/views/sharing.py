@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from relume.points import Points
 from relume.sharing import Sharing, Weights
 
 F32 = NDArray[np.float32]
@@ -38,17 +39,20 @@ def _most_neighbours(first, pixel, width):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _weigh(order, first, pixel, width, position, normal, min_cos_turn, starts, among, weights):  # type: ignore[no-untyped-def]
+def _weigh(  # type: ignore[no-untyped-def]
+    order, first, pixel, width, position, normal, chance, min_cos_turn, starts, among, weights
+):
     """Weigh samples for each other.
 
     Args:
         order, first: samples of pixel p are order[first[p] : first[p + 1]]. pixel: of each sample. (n,) int64
-        position, normal: of each. (n, 3) float32. min_cos_turn: of the normals of neighbours.
+        position, normal: of each. (n, 3) float32. chance: of the rays of each, or of all; those of one share.
+        min_cos_turn: of the normals of neighbours.
         starts, among, weights: written, compressed rows. (n + 1,), (≥ entries,) each
     Returns:
         How many entries there are.
     """
-    height, count = (first.shape[0] - 1) // width, 0
+    height, count, num_chances = (first.shape[0] - 1) // width, 0, chance.shape[0]
     for a in range(pixel.shape[0]):
         starts[a], total = count, 0.0
         x, y = pixel[a] % width, pixel[a] // width
@@ -62,7 +66,8 @@ def _weigh(order, first, pixel, width, position, normal, min_cos_turn, starts, a
                         turn += np.float64(normal[a, axis]) * np.float64(normal[b, axis])
                         rise += np.float64(normal[a, axis]) * away
                         squared += away * away
-                    if a == b or (turn > min_cos_turn and rise * rise <= _MAX_RISE * _MAX_RISE * squared):
+                    is_smooth = turn > min_cos_turn and rise * rise <= _MAX_RISE * _MAX_RISE * squared
+                    if a == b or (is_smooth and chance[a % num_chances] == chance[b % num_chances]):
                         # a tent; samples of one pixel count as one
                         weight = (2 - abs(row - y)) * (2 - abs(column - x)) / (end - begin)
                         among[count], weights[count] = b, weight
@@ -74,24 +79,24 @@ def _weigh(order, first, pixel, width, position, normal, min_cos_turn, starts, a
     return count
 
 
-def sharing(pixel: NDArray[np.uint32], width: int, position: F32, normal: F32, tents: int = 1) -> Sharing:
+def sharing(pixel: NDArray[np.uint32], width: int, points: Points, tents: int = 1) -> Sharing:
     """Weigh a material's samples for each other; rows sum to one.
 
     Args:
         pixel: y · width + x of each. (n,) uint32. width: of the picture, pixels.
-        position, normal: of each. (n, 3) float32
+        points: where each is.
         tents: how often what is scattered evenly is shared, one tent after another.
     Cost: O(n) time.
     """
     own, num_pixels = pixel.astype(np.int64), (int(pixel.max(initial=0)) // width + 1) * width
     order = np.argsort(own, kind="stable").astype(np.int32)
     first = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=num_pixels))])
-    most = _most_neighbours(first, own, width)
+    most, of_points = _most_neighbours(first, own, width), (points.position, points.normal, points.chance)
 
     def weights(min_cos_turn: float) -> csr_array:
         starts, among = np.empty(len(own) + 1, np.int32), np.empty(most, np.int32)
         found = np.empty(most, np.float32)
-        num = _weigh(order, first, own, width, position, normal, min_cos_turn, starts, among, found)
+        num = _weigh(order, first, own, width, *of_points, min_cos_turn, starts, among, found)
         return csr_array((found[:num].copy(), among[:num].copy(), starts), shape=(len(own), len(own)))
 
     return Sharing(Weights(weights(_MIN_COS_TURN), tents), Weights(weights(_MIN_COS_TURN_OF_HIGHLIGHTS), 1))

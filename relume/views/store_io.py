@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.errors import SceneError, StoreError
+from relume.eye.tinted import chance_of
 from relume.light.gather_rays import Pattern, make_pattern
-from relume.points import Points
+from relume.points import ALIKE, Points
 from relume.project.receivers import GatherRays
 from relume.project.sent import Sent
 from relume.scene.checks import check_camera
@@ -68,7 +69,18 @@ def read_points(store: StoreReader, k: int, start: int, stop: int, seed: NDArray
     """
     names = "position", "normal", "tangent"
     position, normal, tangent = (store.read(f"views/{k}/{name}", start, stop) for name in names)
-    return Points(position, normal, tangent, seed)
+    return Points(position, normal, tangent, seed, read_chance(store, k, start, stop))
+
+
+def read_chance(store: StoreReader, k: int, start: int, stop: int) -> F32:
+    """Read the chance of the rays of samples at surfaces that blend; see `Points`.
+
+    Args:
+        store: an open store. k: number of the view. start, stop: rows of its arrays.
+    """
+    if not store.attributes.get("has_layers"):
+        return ALIKE
+    return chance_of(store.read(f"views/{k}/through", start, stop))
 
 
 def read_eyes(store: StoreReader, k: int, start: int, stop: int) -> F32:

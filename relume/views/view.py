@@ -180,8 +180,8 @@ class View:
 
     def _sharing(self, material: int) -> Sharing:
         def found() -> Sharing:
-            points, tents = self.points(material), int(self.store.attributes.get("gather_tents", 1))
-            return sharing(self.pixel[self.rows(material)], self.width, points.position, points.normal, tents)
+            tents = int(self.store.attributes.get("gather_tents", 1))
+            return sharing(self.pixel[self.rows(material)], self.width, self.points(material), tents)
 
         return self.memory.keep((self.key, "sharing", self.name, material), found)
 

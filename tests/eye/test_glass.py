@@ -169,8 +169,8 @@ def tinted():
     return scene_of(back, ball, pane, camera=camera, environment=studio(), materials=materials)
 
 
-def opened(scene, method, folder):
-    recipe = Recipe(method, ("front",), SIZE, 600, num_points=2000)
+def opened(scene, method, folder, size=SIZE, num_lights=600):
+    recipe = Recipe(method, ("front",), size, num_lights, num_points=2000)
     return open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
 
 
@@ -191,6 +191,22 @@ def test_pictures_agree_with_brute_force_and_the_background_shines_through(tinte
     alpha = Coverage(alone, lambda material: np.ones(0, np.float32)).pixels([])
     assert alpha[24, 46] == pytest.approx(1 - 0.96 * 0.4, abs=0.01)
     assert alpha[2, 2] == 0
+
+
+def test_shadows_of_a_pane_have_its_colour(tmp_path):
+    """A floor that sees the sky through a pane alone, by a bake and by brute force."""
+    tint, size = np.array([0.9, 0.6, 0.2]), (16, 16)
+    pane = quad("pane", [[-60, 4, 60], [60, 4, 60], [60, 4, -60], [-60, 4, -60]], 1)
+    floor = quad("floor", [[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]], 0)
+    camera, sky = looking("front", (0, 2, 2), (0, 0, 0), 0.6), np.ones((32, 64, 3), np.float32)
+    scene = scene_of(floor, pane, camera=camera, environment=sky, materials=[WHITE, glass(tint=tuple(tint))])
+    found = opened(scene, "direct", tmp_path, size, 2000)
+    for picture in (
+        render_image(found, "front", look_of(found)),
+        reference_image(scene, "front", look_of(found), size, 0),
+    ):
+        seen = picture.mean(axis=(0, 1))
+        np.testing.assert_allclose(seen / seen[0], tint / tint[0], atol=0.03)
 
 
 def test_a_moving_eye_sees_panes_as_one_at_rest(tinted, tmp_path):

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 from relume.brdf.registry import TERMS
 from relume.light.gather_rays import make_pattern
 from relume.light.triangles import subdivide
+from relume.points import ALIKE, Points
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays
@@ -31,6 +32,11 @@ def grid(keep=None):
     return pixel, position, np.tile(np.array([0, 1, 0], np.float32), (len(pixel), 1))
 
 
+def shared_by(pixel, position, normal, chance=ALIKE, **options):
+    points = Points(position, normal, np.zeros_like(normal), pixel, chance)
+    return sharing(pixel, WIDTH, points, **options)
+
+
 def by_hand(pixel, is_same):
     """Every pair of samples, one after another."""
     weights = np.zeros((len(pixel), len(pixel)))
@@ -44,14 +50,14 @@ def by_hand(pixel, is_same):
 
 def test_pixels_around_share_by_a_tent_and_edges_of_the_picture_by_what_is_there():
     pixel, position, normal = grid()
-    found = sharing(pixel, WIDTH, position, normal).even.matrix
+    found = shared_by(pixel, position, normal).even.matrix
     np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
     np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_samples_of_one_pixel_count_as_one():
     pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
-    found = sharing(pixel, WIDTH, position, normal).even.matrix
+    found = shared_by(pixel, position, normal).even.matrix
     np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
 
 
@@ -61,12 +67,20 @@ def test_other_pieces_of_a_surface_take_no_part():
     x, y = pixel % WIDTH, pixel // WIDTH
     normal[x > 4] = [1, 0, 0]
     position[(x <= 4) & (y > 3), 1] += 0.5
-    found = sharing(pixel, WIDTH, position, normal).even.matrix.toarray()
+    found = shared_by(pixel, position, normal).even.matrix.toarray()
     piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
     flat = piece != 2  # on the wall, depth as the floor has it is a rise
     assert not found[piece[:, None] != piece[None, :]].any()
     expected = by_hand(pixel, lambda a, b: piece[a] == piece[b])
     np.testing.assert_allclose(found[np.ix_(flat, flat)], expected[np.ix_(flat, flat)], rtol=1e-6)
+
+
+def test_samples_of_different_channels_share_nothing():
+    pixel, position, normal = (np.concatenate([a, a]) for a in grid())
+    chance = np.repeat(np.array([-3, -4], np.float32), len(pixel) // 2)
+    found = shared_by(pixel, position, normal, chance).even.matrix.toarray()
+    assert not found[chance[:, None] != chance].any()
+    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_highlights_are_shared_by_what_is_turned_alike():
@@ -77,7 +91,7 @@ def test_highlights_are_shared_by_what_is_turned_alike():
     def both(degrees):
         angle = np.radians(degrees) * is_turned
         normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
-        found = sharing(pixel, WIDTH, position, normal)
+        found = shared_by(pixel, position, normal)
         return found.even.matrix.toarray(), found.highlights.matrix.toarray()
 
     all_alike = by_hand(pixel, lambda a, b: True)
@@ -88,7 +102,7 @@ def test_highlights_are_shared_by_what_is_turned_alike():
 
 def test_tents_follow_each_other_and_highlights_have_one():
     pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
-    found = sharing(pixel, WIDTH, position, normal, tents=3)
+    found = shared_by(pixel, position, normal, tents=3)
     assert (found.even.times, found.highlights.times) == (3, 1)
     rings, among = found.even.rings(4, 11)
     values = np.random.default_rng(9).random((len(pixel), 3))

@@ -29,7 +29,7 @@ F32 = NDArray[np.float32]
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _add(points, material, lobes, light, eye, glances, is_fine, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
     """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
-    position, normal, _, _ = points
+    position, normal, _, _, _ = points
     shown, both = np.empty(3, np.float32), np.empty(3, np.float32)
     for p in rows[start:stop]:
         lobe = lobes.of[material[p]]

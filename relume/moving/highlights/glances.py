@@ -36,7 +36,7 @@ def _middle(one, other, first, sigma):  # type: ignore[no-untyped-def]
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _glance(points, material, visible, listed, lobes, eye, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Look along lobes from the points that are [start, stop) of rows."""
-    position, normal, _, _ = points
+    position, normal, _, _, _ = points
     for p in rows[start:stop]:
         lobe = lobes.of[material[p]]
         out[p] = 0
