@@ -27,6 +27,7 @@ F64 = NDArray[np.float64]
 
 MOST_CLUSTERS, MOST_COMPONENTS = 64, 16
 MOST_TEXELS = 512 * 512
+_MOST_SEEN = 1 << 25  # texels times directions: values of one side take 400 MB, and are there up to four times
 _CLUSTERS = (1, 2, 4, 8, 16, 32, 64)  # among which the number is chosen
 _SEED = 0  # of the first clusters
 _SPAN = 64  # R: numbers that a texel's row is brought to
@@ -79,6 +80,11 @@ class _Part(NamedTuple):
     missed: F64
 
 
+def most_texels(directions: int) -> int:
+    """How many can be kept of a BTF of so many directions."""
+    return min(MOST_TEXELS, _MOST_SEEN // directions)
+
+
 def compress(
     images: Images,
     bound: float,
@@ -95,10 +101,12 @@ def compress(
     Raises:
         MaterialError: values are not finite, or negative, or the BTF is black. CancelledError: `cancelled` said so.
     """
-    height, width = images.size
-    if not 0 < height * width <= MOST_TEXELS:
-        raise MaterialError(f"the BTF has {width}×{height} texels; at most {MOST_TEXELS:,} can be kept")
-    views = images.rings.num_directions
+    (height, width), views = images.size, images.rings.num_directions
+    if not 0 < height * width <= most_texels(views):
+        raise MaterialError(
+            f"the BTF has {width}×{height} texels; in {views} directions at most {most_texels(views):,} can be kept, "
+            "scale it down"
+        )
 
     def rows_of(view: int, share: float) -> F32:
         if cancelled():

@@ -39,14 +39,14 @@ def read_photograph(data: bytes, name: str) -> F32:
     return _linear(data, name) if data.startswith(EXR_MAGIC) else _srgb(data, name)
 
 
-def reduced(image: F32) -> F32:
-    """The image of at most `MOST_TEXELS`, each the mean of as many pixels along both sides as a whole number says.
+def reduced(image: F32, most: int) -> F32:
+    """The image of at most so many texels, each the mean of as many pixels along both sides as a whole number says.
 
     Args:
-        image: linear. (height, width, 3)
+        image: linear. (height, width, 3). most: see `relume.btf.compress.most_texels`.
     """
     height, width = image.shape[:2]
-    times = math.ceil(math.sqrt(height * width / MOST_TEXELS))
+    times = math.ceil(math.sqrt(height * width / most))
     return shrink(image, (max(width // times, 1), max(height // times, 1)))
 
 

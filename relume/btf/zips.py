@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.btf.compress import most_texels
 from relume.btf.found import found_rings, nowhere
 from relume.btf.photographs import SUFFIXES, read_photograph, reduced
 from relume.btf.rings import MOST_DIRECTIONS
@@ -53,7 +54,8 @@ class ZippedBtf:
         self._order = [given[number] for number in order]
         self._check_complete()
         first = self._photograph(self._order[0], self._order[0])
-        self._pixels, self.size = first.shape, reduced(first).shape[:2]
+        self._most = most_texels(len(given))
+        self._pixels, self.size = first.shape, reduced(first, self._most).shape[:2]
 
     def _check_complete(self) -> None:
         pairs = ((view, light) for view in self._order for light in self._order)
@@ -77,7 +79,7 @@ class ZippedBtf:
             sizes = (f"{shape[1]}×{shape[0]}" for shape in (image.shape, self._pixels))
             named = _shown(self._by_pair[view, light].filename)
             raise MaterialError("{} has {} pixels, the first image {}; scale all alike".format(named, *sizes))
-        return reduced(image)
+        return reduced(image, self._most)
 
     def _photograph(self, view: Direction, light: Direction) -> F32:
         entry = self._by_pair[view, light]

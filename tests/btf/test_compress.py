@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from relume.btf.begun import Begun
-from relume.btf.compress import MOST_COMPONENTS, compress
-from relume.btf.rings import directions, ubo_rings
+from relume.btf.compress import MOST_COMPONENTS, compress, most_texels
+from relume.btf.rings import directions, rings_of, ubo_rings
 from relume.errors import CancelledError, MaterialError
 
 RINGS = ubo_rings()
@@ -148,3 +148,12 @@ def test_a_black_btf_and_one_that_is_too_large_are_refused():
     images.size = (1 << 20, 1 << 20)
     with pytest.raises(MaterialError, match="texels"):
         kept(images)
+
+
+def test_more_texels_than_memory_is_meant_for_are_refused_before_any_is_read():
+    class Large:
+        rings, size = rings_of([(0.0, 1), (40.0, 199), (70.0, 200)]), (300, 300)  # 81 directions may have as many
+
+    assert most_texels(81) > 300 * 300
+    with pytest.raises(MaterialError, match="in 400 directions at most 83,886 can be kept, scale it down"):
+        kept(Large())

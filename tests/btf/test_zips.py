@@ -117,7 +117,7 @@ def test_large_images_are_kept_as_means_of_linear_values(tmp_path, monkeypatch):
             for light in DIRECTIONS:
                 files[name_of(view, light)] = image_of(view, light, (6, 4))[0]
 
-    monkeypatch.setattr("relume.btf.photographs.MOST_TEXELS", 10)
+    monkeypatch.setattr("relume.btf.compress.MOST_TEXELS", 10)
     found = ZippedBtf(zipped(tmp_path / "a.zip", larger))
     assert found.size == (3, 2)
     means = image_of(DIRECTIONS[4], DIRECTIONS[6], (6, 4))[1].reshape(3, 2, 2, 2, 3).mean(axis=(1, 3))
