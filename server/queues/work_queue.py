@@ -213,6 +213,13 @@ class WorkQueue(ABC, Generic[Request]):
         with self._sessions() as session:
             return [self._work(row) for row in session.scalars(select(self.row).order_by(self.row.created))]
 
+    def naming(self, text: str) -> list[str]:
+        """Ids of work that waits or goes on whose request holds a text, oldest first."""
+        row = self.row
+        asked = select(row.id).where(row.state.in_(_ACTIVE), row.request.contains(text, autoescape=True))
+        with self._sessions() as session:
+            return list(session.scalars(asked.order_by(row.created)))
+
     def delete(self, identity: str) -> None:
         """Stop the work and forget its files. Raises NotFoundError."""
         self.get(identity)

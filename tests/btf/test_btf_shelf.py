@@ -21,7 +21,10 @@ from relume.synthetic.make import Made, make_btf
 from server.app import create_app
 from server.live.state.look_state import LookState
 from server.live.state.shown_views import ShownViews
+from server.records.tables import RenderRow
 from server.settings import Settings
+from server.wire.renders import RenderRequest
+from worker.lease import new_owner
 
 
 def test_what_is_kept_is_found_by_its_name(small_btf):
@@ -175,6 +178,15 @@ def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
         assert f"a session of bake {bake}" in refused.json()["detail"]
         resumes.close(token, time.monotonic())
         assert resumes.take(token, bake, time.monotonic()) is not None
+        looks = [{"materials": {"Ball": json.loads(terms)}}]
+        request = RenderRequest(bake=bake, view="front", looks=looks, format="png").model_dump_json()
+        of_another = {"owner": new_owner(), "heartbeat": time.time()}  # server, which is at work on it
+        row = {"id": "f" * 16, "request": request, "state": "running", "done": 0, "created": 0.0, "client": ""}
+        with client.app.state.services.bakes.ledger.sessions.begin() as rows:
+            rows.add(RenderRow(**row, is_first=False, **of_another))
+        refused = client.delete(f"/api/materials/btf/{found['id']}")
+        assert (refused.status_code, "by render ffff" in refused.json()["detail"]) == (409, True)
+        client.delete(f"/api/renders/{row['id']}")
         assert client.delete(f"/api/materials/btf/{found['id']}").status_code == 204
         assert client.get(f"/api/materials/btf/{found['id']}").status_code == 404
         assert client.get("/api/materials/btf").json() == []

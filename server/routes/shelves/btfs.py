@@ -39,7 +39,7 @@ async def get_btf_thumbnail(material: Id, services: Shared) -> PngResponse:
 
 @router.delete("/{material}", status_code=204)
 async def delete_btf(material: Id, services: Shared) -> Response:
-    """Delete a BTF that no saved look, no link and no session of this server names."""
+    """Delete a BTF that no saved look, link, session of this server or work under way names."""
     await remove_unused(STORE, btfs_path(services.settings.data), material, "btf", services)
     return Response(status_code=204)
 

@@ -55,7 +55,7 @@ def get_image_thumbnail(image: Id, services: Shared) -> PngResponse:
 
 @router.delete("/{image}", status_code=204)
 async def delete_image(image: Id, services: Shared) -> Response:
-    """Delete an image that no saved look, no link and no session of this server names."""
+    """Delete an image that no saved look, link, session of this server or work under way names."""
     folder = images_path(services.settings.data)
     record = await run_in_threadpool(get_record, folder, image)
     await remove_unused(IMAGES, folder, image, "image", services, called=f"image {record.name!r}")

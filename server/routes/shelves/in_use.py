@@ -18,7 +18,7 @@ _MOST_NAMED = 3  # of what uses it, in a message
 async def remove_unused(
     store: AssetStore, folder: Path, identity: str, kind: Kind, services: Services, called: str | None = None
 ) -> None:
-    """Remove a thing that no saved look, no link and no session of this server names, and whose it is.
+    """Remove a thing, whose it is too, that no saved look, link, session of this server or work under way names.
 
     Args:
         store, folder, identity: which thing, and where it is kept. kind: of it, in quotas. services: the server's.
@@ -42,6 +42,8 @@ def _check_unused(what: str, said: str, services: Services, sessions: list[str])
     users = [f"look {name!r}" for name in services.looks.naming(said)]
     users += [f"link {identity}" for identity in services.shares.naming(said)]
     users += [f"a session of bake {bake}" for bake in sessions]
+    for queue in (services.renders, services.comparisons):
+        users += [f"{queue.noun} {work}" for work in queue.naming(said)]
     if users:
         more = f" and {len(users) - _MOST_NAMED} more" if len(users) > _MOST_NAMED else ""
         raise InUseError(f"{what} is shown by {', '.join(users[:_MOST_NAMED])}{more}; change or delete these first")

@@ -78,7 +78,7 @@ def thumbnail_of(record: MaterialRecord | BtfRecord) -> bytes:
 
 @router.delete("/{material}", status_code=204)
 async def delete_measured(material: Id, services: Shared) -> Response:
-    """Delete a measured material that no saved look, no link and no session of this server names."""
+    """Delete a measured material that no saved look, link, session of this server or work under way names."""
     await remove_unused(STORE, materials_path(services.settings.data), material, "material", services)
     return Response(status_code=204)
 
