@@ -30,7 +30,7 @@ def read_photograph(data: bytes, name: str) -> F32:
     """Decode a JPEG or PNG, which are sRGB of a byte a channel, or an OpenEXR file, which is linear.
 
     Args:
-        data: of the file. name: of it, in messages.
+        data: of the file. name: what it is, in messages.
     Returns:
         (height, width, 3) float32, finite, from 0 to `relume.btf.values.MOST_VALUE`.
     Raises:

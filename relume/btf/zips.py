@@ -78,7 +78,7 @@ class ZippedBtf:
         if image.shape != self._pixels:
             sizes = (f"{shape[1]}×{shape[0]}" for shape in (image.shape, self._pixels))
             named = _shown(self._by_pair[view, light].filename)
-            raise MaterialError("{} has {} pixels, the first image {}; scale all alike".format(named, *sizes))
+            raise MaterialError("the image {} has {} pixels, the first one {}; scale all alike".format(named, *sizes))
         return reduced(image, self._most)
 
     def _photograph(self, view: Direction, light: Direction) -> F32:
@@ -86,8 +86,8 @@ class ZippedBtf:
         try:
             data = self._zip.read(entry)
         except Exception as error:  # zipfile and zlib raise many kinds for damaged data
-            raise MaterialError(f"{_shown(entry.filename)} is damaged in the zip; pack it again") from error
-        return read_photograph(data, _shown(entry.filename))
+            raise MaterialError(f"the image {_shown(entry.filename)} is damaged in the zip; pack it again") from error
+        return read_photograph(data, f"the image {_shown(entry.filename)}")
 
 
 class _Bounded(io.FileIO):
@@ -136,7 +136,7 @@ def _named(entries: list[zipfile.ZipInfo]) -> dict[tuple[Direction, Direction], 
 def _check_packed(entry: zipfile.ZipInfo) -> None:
     if entry.file_size > _MOST_IMAGE_BYTES:
         most = _MOST_IMAGE_BYTES >> 20
-        raise MaterialError(f"{_shown(entry.filename)} is larger than {most} MB; scale the images down")
+        raise MaterialError(f"the image {_shown(entry.filename)} is larger than {most} MB; scale the images down")
     if entry.flag_bits & 1:
         raise MaterialError("the zip is encrypted; pack it without a password")
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):

@@ -76,7 +76,7 @@ def whole(path):
         (lambda files: files.update({FIRST: files[FIRST][:60]}), "cannot be read"),
         (
             lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], (7, 5))[0]}),
-            "5×7 pixels, the first",
+            "^the image tv040.* has 5×7 pixels, the first",
         ),
         (lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], kind="GIF")[0]}), "cannot be read"),
         (renamed(FIRST, FIRST.replace("tv040 pv000", "tv095 pv000")), "below the horizon"),

@@ -10,7 +10,7 @@ const MESH_FILES = ".glb,.obj,.ply,.zip";
 function Making({ work }: { work: BtfWorkBody }) {
   const { id, name, progress, state } = work;
   return (
-    <li class="library-making">
+    <li class={`library-making ${state === "failed" ? "has-failed" : ""}`}>
       <span class="library-making-name">{name}</span>
       {isGoingOn(work) && <progress max={1} value={progress} aria-label={`Making of ${name}`} />}
       <span role="status">{makingWords(work)}</span>
