@@ -39,6 +39,7 @@ from relume.parallel import num_threads
 from relume.picture.picture import Picture
 from relume.picture.transfer import Transfer
 from relume.reference import Points, reference_radiance, texels_of
+from relume.reference.covers import cover
 from relume.scene.archive import load_scene, save_scene
 from relume.scene.demo import demo_scene
 from relume.scene.model import Scene
@@ -153,12 +154,20 @@ def _cover(transfer: Any, picture: Picture | MovingPicture, folder: Path) -> Non
     )  # fmt: skip
     with STORE.at(folder / "btfs"):
         terms = keep(folder / "btfs", source, "Grey", None, lambda: grey).terms()
+        _look_at_places(complete_term(("warm",), terms[0], None))
         partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
         picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
         if isinstance(picture, Picture):
             _show(picture)
         else:
             picture.advance(None)
+
+
+def _look_at_places(term: dict[str, Any]) -> None:
+    """Find what places of a BTF send, as brute force does."""
+    texels, up = TERMS[term["model"]].settled(term).texels, np.array([[0.0, 0.0, 1.0]])
+    assert texels is not None
+    cover(texels, np.ones((1, 5), np.float32), up, np.random.default_rng(0)).sent(np.zeros(1, np.int64), up)
 
 
 def _compare(scene: Scene) -> None:
