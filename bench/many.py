@@ -1,9 +1,10 @@
 """load.aggregate_ratio: frames a second summed over 1 … 64 sessions that all drag, lowest ÷ best.
+load.frame_cost_ratio: the server's processor time for a frame, least ÷ most of the same numbers of sessions.
 
 A real server in its own process; this one has the hands of all sessions (`bench.hands`). All sessions are on one bake:
 with one slider in everybody's hand, so that all read one operator, and with four sliders in turn. Numbers of sessions
-are taken in turn, round after round; the ratio is of medians. What the server spends on a frame, which does not depend
-on what else the machine does, is in the row.
+are taken in turn, round after round; the ratios are of medians. What a frame costs hardly depends on what else the
+machine does, and tells whether sessions are in each other's way; how many there are a second does.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from websockets.asyncio.client import connect
 
 from bench.figure import Figure
@@ -25,7 +27,7 @@ from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume.bake import Recipe
 from relume.environments.studio import studio
 
-_NAME = "load.aggregate_ratio"
+_NAMES = ("load.aggregate_ratio", "load.frame_cost_ratio")
 _SLIDERS = tuple(
     (f"/materials/{material}/terms/1/params/{name}", span)
     for name, span in (("sigma", (0.1, 0.4)), ("ior", (1.3, 2.5)))
@@ -36,7 +38,7 @@ _WARM_S = 1.0
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, drag with more and more hands."""
-    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((640, 480), 1000, 3, 2.0)
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((640, 480), 1000, 5, 2.0)
     numbers = (1, 2) if tiny else (1, 2, 4, 8, 16, 32, 64)
     shining = (LAMBERT, cook_torrance(0.2))
     scene = teapot_on_table(studio(), shining, shining)
@@ -53,15 +55,17 @@ def measure(tiny: bool) -> list[Figure]:
                 for number in some:
                     rates = asyncio.run(_dragged(server, house, sliders, number, seconds))
                     found.setdefault((kind, number), []).append(rates)
-    ratios: list[float] = []
+    ratios: list[NDArray[np.float64]] = []
     context: dict[str, object] = {}
     for kind, (_, some) in kinds.items():
         medians = np.array([np.median(found[kind, number], axis=0) for number in some]).reshape(-1, 2)
         if len(medians):
-            ratios.append(float(medians[:, 0].min() / medians[:, 0].max()))
+            ratios.append(medians.min(axis=0) / medians.max(axis=0))
         context |= {f"{kind}_fps": medians[:, 0].tolist(), f"{kind}_ms_a_frame": medians[:, 1].tolist()}
     context |= {"sessions": list(numbers), "rounds": rounds, "seconds": seconds, "size": list(size)}
-    return [Figure(_NAME, min(ratios), "ratio", context)]
+    return [
+        Figure(name, float(ratio), "ratio", context) for name, ratio in zip(_NAMES, np.min(ratios, axis=0), strict=True)
+    ]
 
 
 async def _made(server: Server, house: House) -> None:

@@ -35,8 +35,8 @@ ONE_THREAD = dict.fromkeys(
     ("RELUME_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 
-# Our ledger decides about retries; results are a few numbers, so nothing is ever spilled to disk. Dask's profile of each
-# task, a hundred samples a second that nobody looks at, took a fiftieth of a core from each worker that traces.
+# Our ledger decides about retries; results are a few numbers, so nothing is ever spilled to disk. Dask's profile of
+# tasks, a hundred samples a second that nobody looks at, took a fiftieth of a core from each worker that traces.
 DASK_CONFIG: dict[str, Any] = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.worker.profile.enabled": False,

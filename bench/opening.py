@@ -1,0 +1,144 @@
+"""opening.*: what somebody waits for who opens a bake of fixed views, or changes its light.
+
+The still life, 1,000 lights, each bake opened for the first time, from the call that opens its store: `opening.first_s`
+ends with the first picture that is encoded, `opening.exact_s` and `opening.exact_gather_s` with the exact one, of
+640×480 pixels, of straight light and of all of it. `opening.relit_s`, `opening.relit_gather_s`: from a look whose light
+is turned, or is another map's, to its exact picture, the longer of the two.
+
+`opening.large_…`: the same of straight light at 1920×1080 pixels; `opening.large_edit_ms`: look → encoded bytes while
+the teapot's highlight is in hand, the median. In their rows also 3840×2160 pixels; `opening.larger_ratio`: the largest
+ratio of both sizes' figures ÷ that of their pixels.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bench.figure import Figure
+from bench.timing import seconds
+from relume.bake import BakeMethod, Recipe
+from relume.look import Look, validate
+from relume.memory import Memory
+from relume.methods.direct import DirectMethod
+from relume.methods.gather import GatherMethod
+from relume.methods.registry import open_transfer
+from relume.parallel import num_threads
+from relume.picture.picture import Picture
+from relume.picture.transfer import Transfer
+from relume.scene.demo import demo_scene
+from relume.store import bake_here
+
+_MEMORY = 6 << 30  # the most that a server takes unless it is told
+_HAND = "/materials/Teapot/terms/1/params/nu"
+_EDITS = 30
+_TURNED, _EXCHANGED = {"rotation": 50.0}, {"map": "clear_sky"}
+
+
+class _Waits(NamedTuple):
+    """Seconds until the first and the exact picture, and exact ones of two other lights; milliseconds of a frame."""
+
+    first_s: float
+    exact_s: float
+    turned_s: float
+    exchanged_s: float
+    edit_ms: float
+
+    @property
+    def relit_s(self) -> float:
+        """The longer one of both lights."""
+        return max(self.turned_s, self.exchanged_s)
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, open and change the light in all sizes, after tiny ones that compile."""
+    small, large, larger = ((48, 36), (64, 36), (96, 54)) if tiny else ((640, 480), (1920, 1080), (3840, 2160))
+    num_lights = 60 if tiny else 1000
+    direct, gather = DirectMethod(), GatherMethod()
+    for method in (direct, gather):
+        _waits(method, (48, 36), 60)
+    one, all_light = (_waits(method, small, num_lights) for method in (direct, gather))
+    hd, uhd = (_waits(direct, size, num_lights) for size in (large, larger))
+    common = {"lights": num_lights, "threads": num_threads()}
+    of_small = {"size": list(small), **common, "direct": one._asdict(), "gather": all_light._asdict()}
+    of_large = {**common, _name(large): hd._asdict(), _name(larger): uhd._asdict()}
+    pixels = larger[0] * larger[1] / (large[0] * large[1])
+    return [
+        Figure("opening.first_s", max(one.first_s, all_light.first_s), "s", of_small),
+        Figure("opening.exact_s", one.exact_s, "s", of_small),
+        Figure("opening.exact_gather_s", all_light.exact_s, "s", of_small),
+        Figure("opening.relit_s", one.relit_s, "s", of_small),
+        Figure("opening.relit_gather_s", all_light.relit_s, "s", of_small),
+        Figure("opening.large_first_s", hd.first_s, "s", of_large),
+        Figure("opening.large_exact_s", hd.exact_s, "s", of_large),
+        Figure("opening.large_edit_ms", hd.edit_ms, "ms", of_large),
+        Figure("opening.larger_ratio", float(np.max(np.divide(uhd, hd)) / pixels), "ratio", of_large),
+    ]
+
+
+def _name(size: tuple[int, int]) -> str:
+    return f"{size[0]}×{size[1]}"
+
+
+def _waits(method: BakeMethod, size: tuple[int, int], num_lights: int) -> _Waits:
+    scene = demo_scene()
+    view = scene.cameras[0].name
+    with tempfile.TemporaryDirectory() as folder:
+        recipe = Recipe(method.name, (view,), size, num_lights)
+        path = bake_here(method, scene, recipe, Path(folder) / "opened.zarr")
+        began = time.perf_counter()
+        transfer = open_transfer(path, Memory(_MEMORY))
+        picture = Picture(transfer, view, Memory(_MEMORY), is_watched=True)
+        while not picture.advance(None).complete:
+            _make(picture)
+        picture.encode(picture.all_tiles(), "rgb9e5")
+        first_s = time.perf_counter() - began
+        _settle(picture)
+        exact_s = time.perf_counter() - began
+        turned_s, exchanged_s = (_relit_s(transfer, picture, light) for light in (_TURNED, _EXCHANGED))
+        _relit_s(transfer, picture, {})
+        return _Waits(first_s, exact_s, turned_s, exchanged_s, _edit_ms(transfer, picture))
+
+
+def _make(picture: Picture) -> None:
+    picture.freeze(lambda share: None, lambda: False)
+
+
+def _settle(picture: Picture) -> None:
+    """Make all that is lacking, and the bytes of the exact picture."""
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        _make(picture)
+    picture.encode(picture.all_tiles(), "rgb9e5")
+
+
+def _relit_s(transfer: Transfer, picture: Picture, light: dict[str, Any]) -> float:
+    """Seconds until the picture shows the scene's own look in another light exactly."""
+    document = copy.deepcopy(transfer.default_look)
+    document["environment"] |= light
+    picture.set_look(validate(document, transfer.default_look))
+    return seconds(lambda: _settle(picture))
+
+
+def _edit_ms(transfer: Transfer, picture: Picture) -> float:
+    """The median frame of a drag, what the hand needs made before."""
+    picture.touch(_HAND)
+    _settle(picture)
+    taken = []
+    for exponent in np.geomspace(20, 200, _EDITS):
+        look = _sharpened(transfer, float(exponent))
+        began = time.perf_counter()
+        picture.set_look(look, hand=_HAND)
+        picture.encode(picture.advance(None).tiles, "rgb9e5")
+        taken.append(time.perf_counter() - began)
+    return 1e3 * float(np.median(taken))
+
+
+def _sharpened(transfer: Transfer, exponent: float) -> Look:
+    document = copy.deepcopy(transfer.default_look)
+    document["materials"]["Teapot"]["terms"][1]["params"]["nu"] = exponent
+    return validate(document, transfer.default_look)
