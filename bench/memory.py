@@ -1,6 +1,8 @@
 """memory.*: resident memory of a real server and its worker processes, before ten scenes, after them, and at rest.
 
 Each scene is baked, opened in a session, one of its curves taken in hand, its light turned and exchanged, and left.
+`memory.server_growth`: by how much the server at rest is larger after forty scenes more, of small pictures: all kernels
+are loaded after ten, and what grows from then on is kept for nobody.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from worker.ledger import Ledger
 from worker.scenes import register_scene
 
 _REST_S, _MORE_S = 60, 30  # what the server waits before it lets go, and time to do it
-_NUM_SCENES = 10
+_NUM_SCENES, _NUM_MORE = 10, 40
 
 
 @dataclass(frozen=True)
@@ -40,28 +42,33 @@ class Resident:
 def measure(tiny: bool) -> list[Figure]:
     """Let one server bake and show scene after scene, then leave it alone."""
     size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
-    scenes = list(_scenes(2 if tiny else _NUM_SCENES))
+    num_scenes, num_more = (2, 1) if tiny else (_NUM_SCENES, _NUM_MORE)
+    scenes = list(_scenes(num_scenes + num_more))
     with baked_house(scenes[0], Recipe("direct", (scenes[0].cameras[0].name,), (64, 48), 60)) as house:
         _register(house, scenes[1:])
         with serving(house) as server:
             before = _resident(server.pid)
-            for number, scene in enumerate(scenes):
-                _visit(server, scene, size, num_lights, "gather" if number % 2 else "direct")
+            _visit_all(server, scenes[:num_scenes], size, num_lights)
             after = _resident(server.pid)
-            time.sleep(0 if tiny else _REST_S + _MORE_S)
-            rest = _resident(server.pid)
+            rest = _rested(server, tiny)
+            _visit_all(server, scenes[num_scenes:], (size[0] // 2, size[1] // 2), num_lights // 2)
+            more = _rested(server, tiny)
     context = {
-        "scenes": len(scenes),
+        "scenes": num_scenes,
         "size": list(size),
         "lights": num_lights,
         "rest_s": _REST_S + _MORE_S,
         "server_at_start": before.server / 1e6,
     }
     found = {"after": after, "rest": rest}
+    of_growth = {**context, "more_scenes": num_more, "floor_mb": rest.server / 1e6, "rest_mb": more.server / 1e6}
     return [
-        Figure(f"memory.{of}_{when}_mb", getattr(resident, of) / 1e6, "MB", context)
-        for when, resident in found.items()
-        for of in ("server", "workers")
+        *(
+            Figure(f"memory.{of}_{when}_mb", getattr(resident, of) / 1e6, "MB", context)
+            for when, resident in found.items()
+            for of in ("server", "workers")
+        ),
+        Figure("memory.server_growth", max(0.0, more.server / rest.server - 1), "share", of_growth),
     ]
 
 
@@ -69,7 +76,19 @@ def _scenes(count: int) -> Iterator[Scene]:
     """Scenes of several sizes made by code, each another."""
     yield from [each.make() for each in BUILT_IN.values()][:count]
     for number in range(count - len(BUILT_IN)):
-        yield teapot_on_table(studio(), (LAMBERT, cook_torrance(0.1 + 0.05 * number)), (LAMBERT,))
+        yield teapot_on_table(studio(), (LAMBERT, cook_torrance(0.1 + 0.01 * number)), (LAMBERT,))
+
+
+def _visit_all(server: Server, scenes: list[Scene], size: tuple[int, int], num_lights: int) -> None:
+    """One after another, every second with light between surfaces."""
+    for number, scene in enumerate(scenes):
+        _visit(server, scene, size, num_lights, "gather" if number % 2 else "direct")
+
+
+def _rested(server: Server, tiny: bool) -> Resident:
+    """What is held when nobody has been there for a while."""
+    time.sleep(0 if tiny else _REST_S + _MORE_S)
+    return _resident(server.pid)
 
 
 def _register(house: House, scenes: list[Scene]) -> None:

@@ -173,7 +173,13 @@ GROUPS = (
     ),
     Group(
         "bench.memory",
-        ("memory.server_after_mb", "memory.workers_after_mb", "memory.server_rest_mb", "memory.workers_rest_mb"),
+        (
+            "memory.server_after_mb",
+            "memory.workers_after_mb",
+            "memory.server_rest_mb",
+            "memory.workers_rest_mb",
+            "memory.server_growth",
+        ),
     ),
     Group("bench.peer_mitsuba", ("peer.mitsuba_time_ratio",)),
     Group("bench.peer_gather", ("peer.mitsuba_gather_time_ratio", "peer.cycles_time_ratio")),

@@ -97,6 +97,7 @@ TARGETS = {
     "opening.large_exact_s": "≤ 5 s",
     "opening.large_edit_ms": "≤ 33 ms",
     "opening.larger_ratio": "≤ 1",
+    "memory.server_growth": "≤ 0.1",
     "demo.bake_s": "≤ 30 s",
     "demo.first_picture_s": "≤ 10 s",
 }
