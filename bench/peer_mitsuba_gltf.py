@@ -73,8 +73,8 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
             along = mi.Vector3f(self.textures["tangent"].eval_3(si, active)) * 2 - 1
             hand = self.textures["hand"].eval_1(si, active) * 2 - 1
         else:
-            along = si.dp_du
-            hand = dr.sign(dr.dot(dr.cross(si.sh_frame.n, si.dp_du), -si.dp_dv))
+            along, down = self._towards_texels(si)
+            hand = dr.sign(dr.dot(dr.cross(si.sh_frame.n, along), -down))
         along = si.to_local(along)
         up = mi.Vector3f(0, 0, 1)
         along = dr.normalize(mi.Vector3f(along.x, along.y, 0) + mi.Vector3f(1e-9, 0, 0))
@@ -87,6 +87,14 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         s = along * dr.cos(turn) + beside * dr.sin(turn)
         s = dr.normalize(s - normal * dr.dot(normal, s))
         return mi.Frame3f(s, dr.cross(normal, s), normal)
+
+    def _towards_texels(self, si: Any) -> tuple[Any, Any]:
+        """Where the places of the normal map go along its u, and along its v, which runs down."""
+        if "normal_00" not in self.numbers:
+            return si.dp_du, si.dp_dv
+        (a, b), (c, d) = ([self.numbers[f"normal_{row}{column}"] for column in range(2)] for row in range(2))
+        of_area = a * d - b * c
+        return (d * si.dp_du - c * si.dp_dv) / of_area, (a * si.dp_dv - b * si.dp_du) / of_area
 
     def _value(self, t: Texel, wi: Any, wo: Any) -> Any:
         """BRDF times the cosine; directions in the bent frame."""
