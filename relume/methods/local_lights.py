@@ -72,7 +72,7 @@ class LocalLights:
     @cached_property
     def embree(self) -> EmbreeScene:
         """Their search tree."""
-        return EmbreeScene.build(self.positions, self.faces, read_holes(self._store, self.faces))
+        return EmbreeScene.build(self.positions, self.faces, read_holes(self._store, self.positions, self.faces))
 
     @cached_property
     def _off_surface(self) -> float:

@@ -88,11 +88,12 @@ def has_holes(store: StoreReader) -> bool:
     return bool(store.attributes.get("has_holes"))
 
 
-def read_holes(store: StoreReader, faces: NDArray[np.uint32]) -> Holes | None:
+def read_holes(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) -> Holes | None:
     """Where triangles of a store have holes; None where all are whole.
 
     Args:
-        store: an open one. faces: its triangles. (num_faces, 3) uint32
+        store: an open one. positions: its vertices. (num_vertices, 3) float32. faces: its triangles.
+            (num_faces, 3) uint32
     Raises:
         ChunkDamagedError: what says so does not fit the triangles.
     """
@@ -102,9 +103,13 @@ def read_holes(store: StoreReader, faces: NDArray[np.uint32]) -> Holes | None:
     cutouts = check_cutouts({name: store.read(f"cutouts/{name}") for name in Cutouts._fields}, len(names))
     uvs, material = store.read("scene/uvs"), store.read("scene/face_material")
     corner, last = int(faces.max(initial=0)), int(material.max(initial=0))
-    if corner >= len(uvs) or len(material) != len(faces) or not 0 <= material.min(initial=0) <= last < len(names):
+    if (
+        corner >= min(len(uvs), len(positions))
+        or len(material) != len(faces)
+        or not 0 <= material.min(initial=0) <= last < len(names)
+    ):
         raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that the scene has not")
-    return Holes.of(faces, uvs, material, cutouts)
+    return Holes.of(faces, positions, uvs, material, cutouts)
 
 
 def read_moving_error(store: StoreReader) -> Estimated | None:

@@ -16,6 +16,8 @@ import numpy as np
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from relume.color import LUMINANCE
 from relume.trace.cutouts import PASSES, TINTED, Cutouts
@@ -41,14 +43,16 @@ class Holes(NamedTuple):
     """What the filter reads, kept for as long as the scene that it belongs to.
 
     Attributes:
-        addresses: of the arrays below and of those of the cut-outs. (6,) int64
+        addresses: of the arrays below and of those of the cut-outs. (7,) int64
         image: row of `Cutouts.images` of each triangle, −1 where it has no holes. (faces,) int32
+        sheet: those of one number are passed by one chance: all of an image, but each piece of glass. (faces,) int32
         faces: corners. (faces, 3) uint32. uvs: places of corners in textures. (corners, 2) float32
         cutouts: the images.
     """
 
     addresses: NDArray[np.int64]
     image: NDArray[np.int32]
+    sheet: NDArray[np.int32]
     faces: U32
     uvs: F32
     cutouts: Cutouts
@@ -61,17 +65,38 @@ class Holes(NamedTuple):
         return any(self.cutouts.texels[a : a + h * w].min() < 255 for a, h, w in zip(first, height, width, strict=True))
 
     @classmethod
-    def of(cls, faces: U32, uvs: F32, face_material: NDArray[np.int32], cutouts: Cutouts) -> Holes:
+    def of(cls, faces: U32, positions: F32, uvs: F32, face_material: NDArray[np.int32], cutouts: Cutouts) -> Holes:
         """Gather what the filter reads.
 
         Args:
-            faces: (num_faces, 3) uint32 into `uvs`. uvs: (num_vertices, 2) float32
+            faces: (num_faces, 3) uint32 into the next two.
+            positions: (num_vertices, 3) float32. uvs: (num_vertices, 2) float32
             face_material: (num_faces,) int32 into `cutouts.of_material`. cutouts: the images.
         """
         image = np.ascontiguousarray(cutouts.of_material[face_material], np.int32)
         faces, uvs = np.ascontiguousarray(faces, np.uint32), np.ascontiguousarray(uvs, np.float32)
-        read = (image, faces, uvs, cutouts.texels, cutouts.images, cutouts.rules)
-        return cls(np.array([array.ctypes.data for array in read], np.int64), image, faces, uvs, cutouts)
+        sheet = _sheets(positions, faces, image, cutouts)
+        read = (image, faces, uvs, cutouts.texels, cutouts.images, cutouts.rules, sheet)
+        return cls(np.array([array.ctypes.data for array in read], np.int64), image, sheet, faces, uvs, cutouts)
+
+
+def _sheets(positions: F32, faces: U32, image: NDArray[np.int32], cutouts: Cutouts) -> NDArray[np.int32]:
+    """The image of each triangle; of pieces of glass that do not touch its first, numbers of their own. (faces,)
+
+    Panes one behind the other absorb as two.
+    """
+    sheet, (first, num) = image.copy(), (len(cutouts.rules), 0)
+    for row in np.flatnonzero(cutouts.rules[:, 0] == PASSES):
+        of_row = np.flatnonzero(image == row)
+        _, corner = np.unique(positions[faces[of_row]].reshape(-1, 3), axis=0, return_inverse=True)
+        a, b, c = corner.reshape(-1, 3).T
+        ends = np.concatenate([a, b]), np.concatenate([b, c])
+        num_corners = int(corner.max(initial=-1)) + 1
+        graph = coo_array((np.ones(len(ends[0]), np.bool_), ends), (num_corners, num_corners))
+        pieces, piece = connected_components(graph, directed=False)
+        sheet[of_row] = np.where(piece[a] == 0, row, first + num + piece[a])
+        num += pieces
+    return sheet
 
 
 def _cast(typing_context, address):  # type: ignore[no-untyped-def]
@@ -107,11 +132,11 @@ def _hashed(word):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _chance(given, face, row, x, y, z, is_behind):  # type: ignore[no-untyped-def]
+def _chance(given, face, sheet, x, y, z, is_behind):  # type: ignore[no-untyped-def]
     """A number in (0, 1) for a ray that meets a surface that blends: the given one, or one of its direction (x, y, z).
 
     A given one moves with the face: what a ray met before says nothing about what it meets behind that. All rays to
-    one light have one direction and so one chance, at fronts and at backs of each image: shadows of panes are even.
+    one light have one direction and so one chance, at fronts and at backs of each sheet: shadows of panes are even.
     """
     if given == ANYWHERE:
         return np.float32(1 / 512)
@@ -120,7 +145,7 @@ def _chance(given, face, row, x, y, z, is_behind):  # type: ignore[no-untyped-de
     if given > 0:
         moved = given + np.float32(_hashed(np.uint32(face)) >> np.uint32(8)) * np.float32(2**-24)
         return min(moved - np.float32(1) if moved > 1 else moved, _MOST)
-    word = np.uint32(2 * row + is_behind)
+    word = np.uint32(2 * sheet + is_behind)
     for component in (x, y, z):
         word = _hashed(np.uint32(word ^ np.float32(component).view(np.uint32)))
     return min((np.float32(word >> np.uint32(8)) + np.float32(1)) * np.float32(2**-24), _MOST)
@@ -153,10 +178,11 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
     rays = _array(_at(words[3]), (9, width), np.float32)
     hits = _array(_at(words[4]), (6, width), np.float32)
     primitives = _array(_at(words[4]), (6, width), np.uint32)
-    read = _array(_at(words[1]), (6,), np.int64)
+    read = _array(_at(words[1]), (7,), np.int64)
     of_face = _array(_at(read[0]), (1 << 40,), np.int32)
     faces = _array(_at(read[1]), (1 << 40, 3), np.uint32)
     uvs = _array(_at(read[2]), (1 << 40, 2), np.float32)
+    sheets = _array(_at(read[6]), (1 << 40,), np.int32)
     texels = _array(_at(read[3]), (1 << 40,), np.uint8)
     images = _array(_at(read[4]), (1 << 30, 5), np.int64)
     rules = _array(_at(read[5]), (1 << 30, 6), np.float32)
@@ -175,7 +201,7 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
             x, y, z = rays[_DIRECTION, lane], rays[_DIRECTION + 1, lane], rays[_DIRECTION + 2, lane]
             along = hits[0, lane] * x + hits[1, lane] * y + hits[2, lane] * z
             given = rays[_TIME, lane]
-            least = _chance(given, face, row, x, y, z, along > 0)
+            least = _chance(given, face, sheets[face], x, y, z, along > 0)
             if rules[row, 0] == PASSES and (given == PAST_GLASS or (given == TO_TINTED and not _is_tinted(rules[row]))):
                 there = np.float32(0)
             elif rules[row, 0] == PASSES and (given == 0 or _LAST_CHANNEL <= given < PAST_GLASS):

@@ -88,7 +88,7 @@ def merge(scene: Scene) -> Geometry:
     counts = [len(mesh.faces) for mesh in scene.meshes]
     face_material = np.repeat([mesh.material for mesh in scene.meshes], counts).astype(np.int32)
     cutouts = cutouts_of(scene.materials)
-    holes = None if cutouts is None else Holes.of(whole.faces, whole.uvs, face_material, cutouts)
+    holes = None if cutouts is None else Holes.of(whole.faces, whole.positions, whole.uvs, face_material, cutouts)
     return Geometry(
         positions=whole.positions,
         normals=whole.normals,
