@@ -91,6 +91,11 @@ def parse_document(json_bytes: bytes) -> Document:
     except ValidationError as problem:
         fault = problem.errors(include_url=False, include_input=False)[0]
         place = UNREADABLE.sub("", "/".join(str(step)[:40] for step in fault["loc"])) or "the document"
+        if fault["type"] == "too_long":
+            most = fault["ctx"]["max_length"]
+            raise SceneError(
+                f"the scene has more than the {most:,} {place} that are read; join some or split it"
+            ) from None
         raise SceneError(
             f"the scene's JSON is not valid glTF 2.0 at {place}: {fault['msg']}; export it again"
         ) from None
