@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relume.color import luminance
 from relume.light.triangles import subdivide
+from relume.parallel import for_ranges
 from relume.points import ALIKE, Points
 from relume.scene.model import Material
 from relume.trace.coherent import targets_of, trace_coherent
@@ -25,6 +26,8 @@ F32 = NDArray[np.float32]
 
 NUM_CHANNELS = 3
 _LIGHTS = 200  # that are asked for
+RAYS_TO_TINTED = 2 * _LIGHTS  # of each sample, at most
+_POINTS_A_RANGE = 16_384
 _LEAST_SHARE = 0.01  # of the light that is above a sample's horizon; less through tinted glass is grey
 
 
@@ -45,14 +48,21 @@ def sees_tinted_light(geometry: Geometry, points: Points, radiance: F32) -> tupl
     anywhere = float(radiance.mean(dtype=np.float64)) or 1.0  # as lamps and surfaces may be in any direction
     lights = subdivide(radiance + np.float32(anywhere), _LIGHTS)
     targets = targets_of(lights.direction, lights.irradiance)
-    weight, share, num_rays = luminance(lights.irradiance), np.zeros((2, points.num_points), np.float32), 0
-    for seen, chance in zip(share, (PAST_GLASS, TO_TINTED), strict=True):
-        found = trace_coherent(geometry.embree, points.position, points.normal, targets, np.full(1, chance))
-        num_rays += found.rays.traced
-        bits = np.unpackbits(found.visible, axis=1, count=len(weight), bitorder="little")
-        seen[:] = bits @ weight
-    above = np.maximum(points.normal @ lights.direction.T, 0) > 0
-    return share[0] - share[1] > _LEAST_SHARE * (above @ weight), num_rays
+    weight = luminance(lights.irradiance)
+    past, to_tinted = (
+        trace_coherent(geometry.embree, points.position, points.normal, targets, np.full(1, chance))
+        for chance in (PAST_GLASS, TO_TINTED)
+    )
+    found = np.zeros(points.num_points, np.bool_)
+
+    def judge(start: int, stop: int) -> None:
+        passed = past.visible[start:stop] & ~to_tinted.visible[start:stop]
+        share = np.unpackbits(passed, axis=1, count=len(weight), bitorder="little") @ weight
+        above = (points.normal[start:stop] @ lights.direction.T > 0) @ weight
+        found[start:stop] = share > _LEAST_SHARE * above
+
+    for_ranges(judge, points.num_points, _POINTS_A_RANGE)
+    return found, past.rays.traced + to_tinted.rays.traced
 
 
 def parted(is_lit: NDArray[np.bool_]) -> tuple[NDArray[np.intp], F32]:

@@ -7,19 +7,20 @@ of them: a silhouette has eight levels of coverage for a few samples, and thin c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.equirect import lookup
-from relume.eye.layers import Layer, layers_of
+from relume.eye.layers import Layer, layers_of, most_shown
 from relume.eye.merged import POSITIONS, POSITIONS_A_PIXEL, Chosen, alone, joined, merged
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.eye.pixel_edges import bright_edges_of, edges_of, is_partly_there
-from relume.eye.tinted import has_tinted_glass, parted, sees_tinted_light
+from relume.eye.tinted import NUM_CHANNELS, has_tinted_glass, parted, sees_tinted_light
 from relume.eye.ways import Chain
-from relume.scene.model import Scene
+from relume.scene.model import Material, Scene
 from relume.scene.roughness import level_of, levels_of
 from relume.trace.cutout_filter import EVERYWHERE
 from relume.trace.geometry import Geometry
@@ -144,7 +145,19 @@ def sample_view(
     parts = [alone(layer, is_edge) for layer in coarse], [merged(geometry, layer, edge_pixel) for layer in fine]
     chosen = joined([part for of_rays in parts for part in of_rays], MOST_MIRRORS)
     num_rays = sum(len(layer.ray) for layer in (*coarse, *fine))
-    return _sorted_samples(scene, geometry, chosen, width, pixel_angle, num_rays)
+    samples = _sorted_samples(scene, geometry, chosen, width, pixel_angle, num_rays)
+    if not has_tinted_glass(scene.materials):
+        return samples
+    return _by_channel(scene, geometry, samples, most_samples(scene.materials, width * height))
+
+
+def most_samples(materials: Sequence[Material], num_pixels: int) -> int:
+    """Bound the samples of a view: each position of a pixel sees something else, glass before it, more in mirrors.
+
+    Args:
+        materials: of the scene. num_pixels: of the picture.
+    """
+    return POSITIONS_A_PIXEL * num_pixels * most_shown(materials)
 
 
 def _edges(
@@ -181,18 +194,22 @@ def _sorted_samples(
     outside = ~hit[order]
     full.diffuse[outside] = lookup(scene.environment.radiance, seen.directions[outside])
     assert seen.chain is not None
-    samples = ViewSamples(
+    return ViewSamples(
         chosen.pixel[order].astype(np.uint32), chosen.weight[order], material[order], full, num_rays, level,
         seen.through, seen.eyes, seen.chain, seen.is_mirrored,
     )  # fmt: skip
-    return _by_channel(scene, geometry, samples) if has_tinted_glass(scene.materials) else samples
 
 
-def _by_channel(scene: Scene, geometry: Geometry, samples: ViewSamples) -> ViewSamples:
-    """Make samples of one channel of those that light reaches through tinted glass."""
+def _by_channel(scene: Scene, geometry: Geometry, samples: ViewSamples, most: int) -> ViewSamples:
+    """Make samples of one channel of those that light reaches through tinted glass; none where that were too many.
+
+    most: samples that a plan has room for.
+    """
     num, num_surface = len(samples.pixel), int(np.searchsorted(samples.material, BACKGROUND))
     of_surface, is_lit = samples.surface.points.rows(slice(0, num_surface)), np.zeros(num, np.bool_)
     is_lit[:num_surface], num_rays = sees_tinted_light(geometry, of_surface, scene.environment.radiance)
+    if num + (NUM_CHANNELS - 1) * np.count_nonzero(is_lit) > most:
+        return replace(samples, num_rays=samples.num_rays + num_rays)
     rows, shown = parted(is_lit)
     level, material = samples.level[rows], samples.material[rows]
     order = np.lexsort((shown.argmax(axis=1), level, material))  # neighbours of one channel follow each other

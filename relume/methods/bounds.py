@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from relume.bake import Recipe
 from relume.errors import PlanError
-from relume.eye.layers import most_layers, most_shown
+from relume.eye.layers import most_layers
 from relume.eye.merged import POSITIONS_A_PIXEL
-from relume.eye.tinted import NUM_CHANNELS, has_tinted_glass
+from relume.eye.tinted import RAYS_TO_TINTED, has_tinted_glass
+from relume.eye.view_samples import most_samples
 from relume.light.gather_rays import MAX_RAYS
 from relume.scene.emission import has_images
 from relume.scene.model import Mesh, Scene, Texture
@@ -33,17 +34,20 @@ _LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power,
 
 
 def samples_of_view(scene: Scene, recipe: Recipe) -> int:
-    """View samples of one view: every position of every pixel sees something else, glass before it, more in mirrors;
-    light of every channel comes otherwise through tinted glass."""
+    """View samples of one view."""
     width, height = recipe.size
-    of_ray = most_shown(scene.materials) * (NUM_CHANNELS if has_tinted_glass(scene.materials) else 1)
-    return POSITIONS_A_PIXEL * width * height * of_ray
+    return most_samples(scene.materials, width * height)
 
 
 def camera_rays(scene: Scene, recipe: Recipe) -> int:
     """Rays that find the samples of all views: one through each pixel, then all positions of each, and all layers."""
     width, height = recipe.size
     return (1 + POSITIONS_A_PIXEL) * width * height * len(recipe.views) * most_layers(scene.materials)
+
+
+def tinted_rays(scene: Scene, num_samples: int) -> int:
+    """Rays that find which of some samples see light through tinted glass."""
+    return num_samples * RAYS_TO_TINTED if has_tinted_glass(scene.materials) else 0
 
 
 def lights_bytes(scene: Scene, recipe: Recipe) -> int:

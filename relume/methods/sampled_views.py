@@ -101,7 +101,7 @@ class SampledViews:
         surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_images(scene) else 0)
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
         in_store = samples * (bits + surface_bytes) + bounds.lights_bytes(scene, recipe)
-        num_rays = samples * recipe.num_lights + bounds.camera_rays(scene, recipe)
+        num_rays = samples * recipe.num_lights + bounds.camera_rays(scene, recipe) + bounds.tinted_rays(scene, samples)
         return Plan(
             num_view_samples=samples,
             num_rays=num_rays,
