@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from relume.basis.local_pca import Clusters, cluster, distances, missed, strongest
 from relume.btf.begun import Arrays, Begun
 from relume.btf.eigen import LARGEST, EigenBtf
-from relume.btf.packing import largest
+from relume.btf.packing import cluster_bits, largest
 from relume.btf.rings import Rings
 from relume.errors import CancelledError, MaterialError
 
@@ -194,7 +194,7 @@ def _choose(some: list[_Span], bound: float) -> _Chosen:
 
 def _size(num_clusters: int, bits: NDArray[np.uint8], texels: int, values: int) -> float:
     """Bytes of a view, nearly."""
-    return num_clusters * (2 + len(bits)) * values + texels * (1 + float(bits.sum()) / 8)
+    return num_clusters * (2 + len(bits)) * values + texels * (cluster_bits(num_clusters) + float(bits.sum())) / 8
 
 
 def _rounding(z: F32, found: Clusters) -> F64:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.btf.packing import packed_bytes
+from relume.btf.packing import cluster_bits, packed_bytes
 from relume.btf.rings import Rings
 
 F32 = NDArray[np.float32]
@@ -73,7 +73,8 @@ class EigenBtf:
     @property
     def num_bytes(self) -> int:
         """What is kept, the coarser levels left out, which files of measurements do not have either."""
-        of_texels = packed_bytes(self.size[0] * self.size[1], np.append(self.bits, np.uint8(8)))  # their clusters, too
+        bits = np.append(self.bits, np.uint8(cluster_bits(self.mean.shape[1])))
+        of_texels = packed_bytes(self.size[0] * self.size[1], bits)
         tables = self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
         return self.rings.num_directions * of_texels + tables + self.height.nbytes
 

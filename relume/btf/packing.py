@@ -1,4 +1,4 @@
-"""Whole numbers of a few bits each, without gaps: the weights of a BTF on the disk.
+"""Whole numbers of a few bits each, without gaps: clusters and weights of a BTF on the disk.
 
 A row is C numbers of b_j bits, sign included: n is written as n + 2^(b_j − 1) − 1, its highest bit first.
 """
@@ -20,11 +20,16 @@ def largest(bits: NDArray[np.integer]) -> NDArray[np.int64]:
     return np.asarray(2 ** (bits.astype(np.int64) - 1) - 1)
 
 
+def cluster_bits(num: int) -> int:
+    """That tell which of so many clusters a texel is in."""
+    return max(1, (num - 1).bit_length())
+
+
 def packed(rows: I8, bits: U8) -> U8:
     """Pack rows.
 
     Args:
-        rows: (n, C), none farther from zero than `largest` of its bits. bits: of each column, 2 to 8. (C,)
+        rows: (n, C), none below −`largest` of its bits, none above that + 1. bits: of each column, 1 to 8. (C,)
     Returns:
         (bytes,) of `packed_bytes`
     """

@@ -1,7 +1,7 @@
 """BTFs that were imported or made; `relume.asset_store` keeps them.
 
-    <folder>/<id>/cluster.npy, mean.npy, …      arrays of `relume.btf.eigen.EigenBtf`
-                  packed.npy                    its weights, in as few bits as they need (`relume.btf.packing`)
+    <folder>/<id>/mean.npy, eigen.npy, …        arrays of `relume.btf.eigen.EigenBtf`
+                  packed.npy                    clusters and weights, in as few bits as they need (`relume.btf.packing`)
                   btf.json                      name, what it is, how well it is kept
 
 Look documents name one as "btf:<id>".
@@ -16,18 +16,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relume.asset_store import AssetStore
 from relume.btf.compress import MOST_CLUSTERS, MOST_COMPONENTS, MOST_TEXELS
 from relume.btf.eigen import I8, MOST_HEIGHT, U8, EigenBtf
-from relume.btf.packing import packed, packed_bytes, unpacked
+from relume.btf.packing import cluster_bits, largest, packed, packed_bytes, unpacked
 from relume.btf.rings import rings_of
 from relume.errors import MaterialError
 
 STORE = AssetStore("BTF", "btf:", "btf.json", MaterialError, max_entries=100)
 _PACKED = "packed.npy"
 _ARRAYS = {
-    "levels": np.int32, "cluster": np.uint8, "mean": np.float16, "eigen": np.int8,
+    "levels": np.int32, "mean": np.float16, "eigen": np.int8,
     "step": np.float32, "average": np.float32,
     "height": np.float32,
 }  # fmt: skip
@@ -81,7 +82,9 @@ def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Cal
         found = make()
         for array in _ARRAYS:
             np.save(made / f"{array}.npy", getattr(found, array))
-        np.save(made / _PACKED, np.stack([packed(weight, found.bits) for weight in found.weight]))
+        of_clusters = np.array([cluster_bits(found.mean.shape[1])], np.uint8)
+        rows = np.concatenate([(found.cluster - largest(of_clusters)).astype(np.int8)[..., None], found.weight], axis=2)
+        np.save(made / _PACKED, np.stack([packed(row, np.append(of_clusters, found.bits)) for row in rows]))
         return {
             "synthetic": synthetic,
             "rings": [
@@ -90,6 +93,7 @@ def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Cal
             ],
             "shift": found.rings.shift.tolist(),
             "bits": found.bits.tolist(),
+            "cluster_bits": int(of_clusters[0]),
             "error": list(found.error),
             "ratio": found.measured_bytes / found.num_bytes,
         }
@@ -133,31 +137,53 @@ def _load(path: Path) -> EigenBtf:
         error = tuple(float(one) for one in document["error"])
         arrays = {name: _array(path, name) for name in _ARRAYS if name != "height" or (path / "height.npy").exists()}
         arrays.setdefault("height", np.zeros((1, 1), np.float32))  # before there was one
-        bits, weight = _weights(path, document)
+        bits, cluster, weight = _texels(path, document, arrays["levels"])
     except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
         raise STORE.damaged(path) from problem
     if not all(arrays[name].dtype == dtype for name, dtype in _ARRAYS.items()):
         raise STORE.damaged(path)
-    found = EigenBtf(rings=rings, error=error, bits=bits, weight=weight, **arrays)
+    found = EigenBtf(rings=rings, error=error, bits=bits, cluster=cluster, weight=weight, **arrays)
     if not _is_sound(found):
         raise STORE.damaged(path)
     return found
 
 
-def _weights(path: Path, document: Mapping[str, Any]) -> tuple[U8, I8]:
-    """Bits and weights. Raises ValueError, KeyError, TypeError, OSError, EOFError where they do not fit."""
+def _texels(path: Path, document: Mapping[str, Any], levels: NDArray[np.int32]) -> tuple[U8, U8, I8]:
+    """Bits, clusters and weights. Raises ValueError, KeyError, TypeError, OSError, EOFError where they do not fit."""
     if "bits" not in document:  # each had a byte before they were packed
         weight = _array(path, "weight")
         if weight.dtype != np.int8 or weight.ndim != 3:
             raise ValueError("weights")
-        return np.full(weight.shape[2], 8, np.uint8), weight
+        return np.full(weight.shape[2], 8, np.uint8), _clusters(path), weight
     bits = np.array([int(one) for one in document["bits"]])
     if len(bits) > MOST_COMPONENTS or not ((bits >= 2) & (bits <= 8)).all():
         raise ValueError("bits")
-    of_bits, num, rows = bits.astype(np.uint8), _array(path, "cluster").shape[1], _array(path, "packed")
-    if rows.dtype != np.uint8 or rows.ndim != 2 or rows.shape[1] != packed_bytes(num, of_bits):
+    of_bits = bits.astype(np.uint8)
+    if "cluster_bits" not in document:  # so had clusters
+        cluster = _clusters(path)
+        return of_bits, cluster, _unpacked(path, of_bits, cluster.shape[1])
+    width = int(document["cluster_bits"])
+    if not 1 <= width <= cluster_bits(MOST_CLUSTERS) or levels.ndim != 2 or levels.shape[1:] != (3,):
+        raise ValueError("clusters")
+    of_clusters = np.array([width], np.uint8)
+    num = int(levels[:, 1:].astype(np.int64).prod(axis=1).sum())
+    rows = _unpacked(path, np.append(of_clusters, of_bits), num)
+    return of_bits, (rows[..., 0] + largest(of_clusters)).astype(np.uint8), np.ascontiguousarray(rows[..., 1:])
+
+
+def _clusters(path: Path) -> U8:
+    found = _array(path, "cluster")
+    if found.dtype != np.uint8 or found.ndim != 2:
+        raise ValueError("clusters")
+    return found
+
+
+def _unpacked(path: Path, bits: U8, num: int) -> I8:
+    """Rows of so many texels from each side. (V, num, columns)"""
+    rows = _array(path, "packed")
+    if rows.dtype != np.uint8 or rows.ndim != 2 or rows.shape[1] != packed_bytes(num, bits):
         raise ValueError("packed")
-    return of_bits, np.stack([unpacked(row, of_bits, num) for row in rows])
+    return np.stack([unpacked(row, bits, num) for row in rows])
 
 
 def _array(path: Path, name: str) -> np.ndarray[Any, Any]:

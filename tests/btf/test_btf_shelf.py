@@ -4,6 +4,7 @@ import io
 import json
 import shutil
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from PIL import Image
 from cli.main import main
 from relume.brdf.document import complete_term
 from relume.btf import shelf
+from relume.btf.packing import packed
 from relume.btf.rings import ubo_rings
-from relume.btf.shelf import STORE, btf, get_record, records
+from relume.btf.shelf import STORE, btf, get_record, keep, records
 from relume.btf.values import Values
 from relume.errors import CancelledError, MaterialError, NotFoundError, ParameterError
 from relume.synthetic.make import Made, make_btf
@@ -46,7 +48,7 @@ def test_a_look_that_names_another_is_refused(small_btf, data):
         complete_term(("terms", 0), {"model": "measured_btf", "data": data}, None)
 
 
-@pytest.mark.parametrize("array", ["cluster", "packed", "mean", "eigen", "step", "average", "levels", "height"])
+@pytest.mark.parametrize("array", ["packed", "mean", "eigen", "step", "average", "levels", "height"])
 @pytest.mark.parametrize("how", ["gone", "cut", "shape", "numbers"])
 def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
     shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / small_btf.record.id)
@@ -62,7 +64,7 @@ def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
     elif how == "shape":
         np.save(path, values[:-1])
     else:
-        np.save(path, np.full_like(values, 250 if array == "cluster" else -1 if array == "levels" else 0) * (
+        np.save(path, np.full_like(values, -1 if array == "levels" else 0) * (
             np.nan if values.dtype.kind == "f" else 1))  # fmt: skip
         if array in ("eigen", "packed"):
             pytest.skip("any steps are sound")
@@ -75,24 +77,46 @@ def changed(path, **changes):
     path.write_text(json.dumps({key: value for key, value in document.items() if value is not None}))
 
 
-def test_weights_that_have_a_byte_each_are_read_as_before(small_btf, tmp_path):
+@pytest.mark.parametrize("are_packed", [False, True])
+def test_clusters_and_weights_that_have_a_byte_each_are_read_as_before(small_btf, tmp_path, are_packed):
     at = tmp_path / small_btf.record.id
     shutil.copytree(small_btf.folder / small_btf.record.id, at)
     expected = btf(small_btf.record.data)
-    np.save(at / "weight.npy", expected.weight)
-    (at / "packed.npy").unlink()
-    changed(at / "btf.json", bits=None)
+    np.save(at / "cluster.npy", expected.cluster)
+    if are_packed:  # weights alone
+        np.save(at / "packed.npy", np.stack([packed(weight, expected.bits) for weight in expected.weight]))
+    else:
+        np.save(at / "weight.npy", expected.weight)
+        (at / "packed.npy").unlink()
+        changed(at / "btf.json", bits=None)
+    changed(at / "btf.json", cluster_bits=None)
     assert get_record(tmp_path, small_btf.record.id).components == expected.num_components
     found = shelf._load(at)
     np.testing.assert_array_equal(found.weight, expected.weight)
-    assert found.bits.tolist() == [8] * expected.num_components
+    np.testing.assert_array_equal(found.cluster, expected.cluster)
+    assert found.bits.tolist() == (expected.bits.tolist() if are_packed else [8] * expected.num_components)
 
 
-@pytest.mark.parametrize("bits", [[], [8] * 17, [9], [1], ["x"], [3], 7])
-def test_bits_that_do_not_fit_are_damage(small_btf, tmp_path, bits):
+def test_what_is_told_of_its_bytes_is_what_lies_on_the_disk(small_btf):
+    """But for the coarser levels, headers of 128 bytes, and the average, which lists read."""
+    found, folder = btf(small_btf.record.data), small_btf.folder / small_btf.record.id
+    texels, all_texels = found.size[0] * found.size[1], found.cluster.shape[1]
+    on_disk = {path.stem: path.stat().st_size - 128 for path in folder.glob("*.npy")}
+    assert on_disk["packed"] == pytest.approx(
+        (found.num_bytes - sum(on_disk[name] for name in ("mean", "eigen", "step", "height"))) * all_texels / texels,
+        abs=2 * len(found.cluster),
+    )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [*({"bits": bits} for bits in ([], [8] * 17, [9], [1], ["x"], [3], 7)),
+     *({"cluster_bits": bits} for bits in (0, 3, 7, 300, "x"))],
+)  # fmt: skip
+def test_bits_that_do_not_fit_are_damage(small_btf, tmp_path, changes):
     at = tmp_path / small_btf.record.id
     shutil.copytree(small_btf.folder / small_btf.record.id, at)
-    changed(at / "btf.json", bits=bits)
+    changed(at / "btf.json", **changes)
     with pytest.raises(MaterialError, match="damaged"):
         get_record(tmp_path, small_btf.record.id)
 
@@ -192,3 +216,13 @@ def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
         assert client.get("/api/materials/btf").json() == []
     with pytest.raises(NotFoundError):
         STORE.found(name)
+
+
+def test_clusters_are_kept_whatever_their_number(small_btf, tmp_path):
+    (source := tmp_path / "five").write_text("5")
+    few = btf(small_btf.record.data).with_components(2)
+    five = replace(few, **{name: np.repeat(getattr(few, name)[:, :1], 5, axis=1) for name in ("mean", "eigen", "step")},
+                   cluster=np.random.default_rng(0).integers(0, 5, few.cluster.shape).astype(np.uint8))  # fmt: skip
+    kept = shelf._load(tmp_path / keep(tmp_path, source, "Five", None, lambda: five).id)
+    np.testing.assert_array_equal(kept.cluster, five.cluster)
+    np.testing.assert_array_equal(kept.weight, five.weight)

@@ -6,7 +6,7 @@ import pytest
 from relume.btf.packing import largest, packed, packed_bytes, unpacked
 
 
-@pytest.mark.parametrize("bits", [[8], [3], [2, 3, 4, 5, 6, 7, 8], [5, 5, 4, 3, 3], []])
+@pytest.mark.parametrize("bits", [[8], [3], [2, 3, 4, 5, 6, 7, 8], [5, 5, 4, 3, 3], [1, 6], []])
 @pytest.mark.parametrize("num", [1, 37])
 def test_what_is_packed_comes_back(bits, num):
     of = np.array(bits, np.uint8)
