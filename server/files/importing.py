@@ -7,13 +7,14 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import shutil
 import signal
 import sys
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -108,7 +109,10 @@ def main() -> int:
 
 
 def _load() -> None:
-    """Load what imports need, while nobody waits for it."""
+    """Load what imports need, readers of scenes as well, while nobody waits for it."""
+    import relume.environments.reading
+    import relume.scene.companions
+    import relume.scene.importer  # noqa: F401
     import worker.database
     import worker.ledger
     import worker.scenes  # noqa: F401
@@ -171,7 +175,8 @@ def _import_scene(request: ImportRequest) -> str:
     from worker.ledger import Ledger
     from worker.scenes import register_scene
 
-    return register_scene(Path(request.data), Ledger(open_database(request.database)), scene)
+    with closing(Ledger(open_database(request.database))) as ledger:
+        return register_scene(Path(request.data), ledger, scene)
 
 
 def _built_in(name: str) -> Scene:
@@ -188,7 +193,8 @@ def _put_on_ground(request: ImportRequest) -> str:
     from worker.scenes import register_scene
 
     scene = with_ground(load_scene(request.file), request.name)
-    return register_scene(Path(request.data), Ledger(open_database(request.database)), scene)
+    with closing(Ledger(open_database(request.database))) as ledger:
+        return register_scene(Path(request.data), ledger, scene)
 
 
 def _read_scene(request: ImportRequest) -> Scene:
@@ -203,4 +209,6 @@ def _read_scene(request: ImportRequest) -> Scene:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    code = main()
+    sys.stdout.flush()
+    os._exit(code)  # who asked waits for the end, and to take all modules apart takes a second on a busy machine
