@@ -19,7 +19,7 @@ from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
 from relume.estimated import Estimated
 from relume.light.tiles import Tiles, choose_tiles
-from relume.light.triangles import TriangleLights, weigh
+from relume.light.triangles import TriangleLights, Unturned, weigh
 from relume.operators.shade import shade
 from relume.reference import reference_radiance, texels_of
 from relume.trace.visibility import trace_visibility
@@ -50,7 +50,7 @@ def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
     """
     tiles = choose_tiles(environment.radiance, num_lights, relightable)
     centroids = tiles.centroids.astype(np.float32)
-    return Bake(tiles, centroids if relightable else weigh(tiles, environment.radiance).direction)
+    return Bake(tiles, centroids if relightable else weigh(tiles, Unturned.of(environment.radiance)).direction)
 
 
 def compare(
@@ -71,7 +71,7 @@ def compare(
     truth = reference_radiance(lit.geometry, texels_of(light), lit.points, documents, spp)
     errors = {}
     for kind, baked in bakes.items():
-        lights = weigh(baked.tiles, light.radiance)
+        lights = weigh(baked.tiles, Unturned.of(light.radiance))
         for (name, document), right in zip(terms.items(), truth, strict=True):
             errors[name, kind] = over_points(_radiance(lit, baked, lights, document), right)
     return errors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,19 +190,22 @@ def _moments(texels: Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) ->
     Args:
         total: luminous light of all tiles. (M,) mean: its directions. (M, 3) fitted: the tiles in question. (F,)
     """
-    is_fitted = np.isin(texels.tile, fitted)
-    chosen = Texels(*(values[is_fitted] for values in vars(texels).values()))
-    place = np.searchsorted(fitted, chosen.tile)
-    frames, weight = _tangent_frames(mean[fitted]), chosen.luminous / total[chosen.tile]
+    place_of = np.full(len(total), -1, np.int32)
+    place_of[fitted] = np.arange(len(fitted))
+    place = place_of[texels.tile]
+    if len(fitted) < len(total):
+        is_fitted = place >= 0
+        texels, place = Texels(*(values[is_fitted] for values in vars(texels).values())), place[is_fitted]
+    frames, weight = _tangent_frames(mean[fitted]), texels.luminous / total[texels.tile]
 
     def summed(values: F64) -> F64:
         return _sums(place, weight * values, len(fitted))
 
-    position = _on_tangent_plane(chosen.directions, mean[chosen.tile], frames[place])
+    position = _on_tangent_plane(texels.directions, mean[texels.tile], frames[place])
     centre = np.stack([summed(position[:, i]) for i in range(2)], axis=1)
     position -= centre[place]
     # a texel is no point: its own extent counts, as that of a square of its solid angle
-    extent = summed(chosen.solid_angles) / 12
+    extent = summed(texels.solid_angles) / 12
     xx, xy, yy = (summed(position[:, i] * position[:, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
     return centre, np.stack([xx + extent, xy, xy, yy + extent], axis=1).reshape(-1, 2, 2)
 
@@ -250,26 +253,47 @@ def nodes_of(corners: F64) -> F32:
     return np.ascontiguousarray(nodes.transpose(2, 1, 0), np.float32)
 
 
-def weigh(tiles: Tiles, radiance: F32, rotation: float = 0.0) -> TriangleLights:
+@dataclass(frozen=True)
+class Unturned:
+    """The texels of an environment before anybody turns it: what stays while a hand does.
+
+    Attributes:
+        light: radiance × solid angle. (n, 3) luminous: its luminance. (n,) directions: unit. (n, 3)
+        solid_angles: (n,)
+    """
+
+    light: F64
+    luminous: F64
+    directions: F64
+    solid_angles: F64
+
+    @classmethod
+    def of(cls, radiance: F32) -> Self:
+        """Those of an equirectangular map, top row first. (height, width, 3) float32"""
+        height, width, _ = radiance.shape
+        directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64)
+        texel_angles = np.repeat(texel_solid_angles(height, width), width)
+        light = radiance.reshape(-1, 3).astype(np.float64) * texel_angles[:, None]
+        luminous = luminance(light.astype(np.float32)).astype(np.float64)
+        return cls(light, luminous, directions, texel_angles)
+
+
+def weigh(tiles: Tiles, environment: Unturned, rotation: float = 0.0) -> TriangleLights:
     """Weigh the light of an environment in each tile; it need not be the one that the tiles were chosen for.
 
     Args:
         tiles: M tiles of the sphere.
-        radiance: equirectangular, top row first. (height, width, 3) float32
+        environment: its texels.
         rotation: of the environment about +Y, degrees, counter-clockwise seen from above.
     Cost: O(texels · depth) time.
     """
-    height, width, _ = radiance.shape
-    directions = turned(texel_directions(height, width).reshape(-1, 3).astype(np.float64), rotation)
-    solid_angles = np.repeat(texel_solid_angles(height, width), width)
-    light = radiance.reshape(-1, 3).astype(np.float64) * solid_angles[:, None]
-    luminous = luminance(light.astype(np.float32)).astype(np.float64)
-    texels = Texels(tiles.locate(directions), luminous, directions, solid_angles)
-    irradiance = np.stack([texels.sums(light[:, c], len(tiles.codes)) for c in range(3)], axis=1)
+    directions = turned(environment.directions, rotation)
+    texels = Texels(tiles.locate(directions), environment.luminous, directions, environment.solid_angles)
+    irradiance = np.stack([texels.sums(light, len(tiles.codes)) for light in environment.light.T], axis=1)
     corners, mean = matched(tiles.corners, texels)
     return TriangleLights(nodes_of(corners), mean.astype(np.float32), irradiance.astype(np.float32), codes=tiles.codes)
 
 
 def subdivide(radiance: F32, num_lights: int) -> TriangleLights:
     """Divide an environment into about `num_lights` triangles. Raises as `choose_tiles` does."""
-    return weigh(choose_tiles(radiance, num_lights), radiance)
+    return weigh(choose_tiles(radiance, num_lights), Unturned.of(radiance))

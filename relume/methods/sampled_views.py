@@ -33,7 +33,7 @@ from relume.eye.layers import has_layers
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
-from relume.light.triangles import weigh
+from relume.light.triangles import Unturned, weigh
 from relume.look import default_look
 from relume.methods import bounds
 from relume.methods.last_read import LastRead
@@ -221,7 +221,7 @@ def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
     """The light triangles of a scene's environment, as arrays of a store."""
     radiance = scene.environment.radiance
     tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
-    lights = weigh(tiles, radiance)
+    lights = weigh(tiles, Unturned.of(radiance))
     return {
         "lights/nodes": lights.nodes,
         "lights/direction": lights.direction,

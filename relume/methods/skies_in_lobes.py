@@ -12,7 +12,6 @@ from relume.environments.equirect import turned
 from relume.light.blur import blurred, reduced
 from relume.light.suns import LAMPS, Divided, without_suns
 from relume.look import EnvironmentKey
-from relume.methods.store_io import read_traced_directions
 from relume.methods.transfer import BakedViews
 from relume.moving.highlights.lobe_lights import LobeLights, lobe_lights
 from relume.moving.sky import Sky, sky_of
@@ -61,7 +60,6 @@ class SkiesInLobes:
                 tile = self.lit.tiles.locate(turned(sun.towards.reshape(-1, 3), environment.rotation))
                 share += np.bincount(tile, minlength=len(luminous)) / np.float32(len(tile))
             beside = np.maximum(luminous - luminance(self.lamps(environment)[:, 3:6]) @ of_lamps, 0)
-            directions = read_traced_directions(self.lit.store)
-            return lobe_lights(directions, self.lit.lights.radius, beside, of_lamps, widths)
+            return lobe_lights(self.lit.traced_directions, self.lit.lights.radius, beside, of_lamps, widths)
 
         return self.lit.memory.passing.keep((self.lit.key, "lights of lobes", environment, widths), listed)

@@ -9,7 +9,7 @@ import numpy as np
 
 from relume.environments.equirect import shrunk
 from relume.light.suns import Divided, without_suns
-from relume.light.triangles import TriangleLights, weigh
+from relume.light.triangles import TriangleLights, Unturned, weigh
 from relume.look import EnvironmentKey
 from relume.methods.transfer import PREVIEW_WIDTH, BakedViews, shown_of
 from relume.moving.beams.beam import Beam, light_of_sun, targets_of_sun
@@ -37,22 +37,25 @@ class SunsOfSkies:
         if not self.are_in(light):
             return self.lit.lights_of(light)
         key = self.lit.key, "lights beside suns", light.environment
-        return shown_of(self.lit.memory.keep(key, lambda: self._weighed(light.environment, None)), light)
+        return shown_of(self.lit.memory.keep(key, lambda: self._weighed(light.environment)), light)
 
     def preview_lights_beside(self, light: Light) -> TriangleLights:
         """The same, found quickly."""
         if not self.are_in(light):
             return self.lit.preview_lights_of(light)
         key = self.lit.key, "preview lights beside suns", light.environment
-        return shown_of(
-            self.lit.memory.passing.keep(key, lambda: self._weighed(light.environment, PREVIEW_WIDTH)), light
-        )
+        return shown_of(self.lit.memory.passing.keep(key, lambda: self._weighed_quickly(light.environment)), light)
 
-    def _weighed(self, environment: EnvironmentKey, width: int | None) -> TriangleLights:
-        beside = self._divided(environment.map).beside
-        if width is not None:
-            beside = shrunk(beside, width)
-        return weigh(self.lit.tiles, beside, environment.rotation)
+    def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
+        of = Unturned.of(self._divided(environment.map).beside)
+        return weigh(self.lit.tiles, of, environment.rotation)
+
+    def _weighed_quickly(self, environment: EnvironmentKey) -> TriangleLights:
+        def small() -> Unturned:
+            return Unturned.of(shrunk(self._divided(environment.map).beside, PREVIEW_WIDTH))
+
+        key = self.lit.owner_of(environment.map), "small environment beside suns", environment.map
+        return weigh(self.lit.tiles, self.lit.memory.keep(key, small), environment.rotation)
 
     def beams(self, light: Light, points: Points) -> Iterator[Beam]:
         """Suns whose light comes straight, and what they bring to points if nothing hides them."""

@@ -20,7 +20,7 @@ from relume.light.blur import blurred, reduced
 from relume.light.local import num_samples
 from relume.light.merged import merge, num_merged
 from relume.light.tiles import Tiles
-from relume.light.triangles import TriangleLights, weigh
+from relume.light.triangles import TriangleLights, Unturned, weigh
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.memory import Memory
 from relume.methods.cells.cell_light import CellLight
@@ -128,25 +128,29 @@ class BakedViews:
 
     def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
         def weighed() -> TriangleLights:
-            return weigh(self.tiles, self.radiance_of(environment.map), environment.rotation)
+            return weigh(self.tiles, Unturned.of(self.radiance_of(environment.map)), environment.rotation)
 
         return self.memory.keep((self.key, "lights", environment), weighed)
 
     def preview_lights_in(self, environment: EnvironmentKey) -> TriangleLights:
         """The triangles of an environment from a map of at most 256 texels' width: a large one takes seconds."""
 
+        key = self.owner_of(environment.map), "small environment", environment.map
+
         def weighed() -> TriangleLights:
-            radiance = self.radiance_of(environment.map)
-            if radiance.shape[1] > PREVIEW_WIDTH:
-                key = self.owner_of(environment.map), "small environment", environment.map
-                radiance = self.memory.keep(key, lambda: shrunk(radiance, PREVIEW_WIDTH))
-            return weigh(self.tiles, radiance, environment.rotation)
+            of = self.memory.keep(key, lambda: Unturned.of(shrunk(self.radiance_of(environment.map), PREVIEW_WIDTH)))
+            return weigh(self.tiles, of, environment.rotation)
 
         return self.memory.passing.keep((self.key, "preview lights", environment), weighed)
 
     def owner_of(self, name: str | None) -> str:
         """Whose entries in the memory those made of an environment are: the bake's where it is its own."""
         return self.key if name is None else "environments"
+
+    @cached_property
+    def traced_directions(self) -> F32:
+        """Where shadow rays went. (M, 3) float32"""
+        return read_traced_directions(self.store)
 
     @cached_property
     def tiles(self) -> Tiles:
@@ -188,7 +192,7 @@ class BakedViews:
     def open_sky(self, light: Light, points: Points, *, is_preview: bool) -> Arriving:
         """What the environment brings to points, seen along their normals, if nothing hides it. See `Transfer`."""
         straight = light._replace(paths=light.paths._replace(direct=True).without_reflections())
-        above = points.normal @ read_traced_directions(self.store).T > 0
+        above = points.normal @ self.traced_directions.T > 0
         seen = np.packbits(above, axis=1, bitorder="little")
         lights = self.preview_lights_of(straight) if is_preview else self.lights_of(straight)
         return lights, Receivers(points, points.normal, seen)

@@ -10,7 +10,7 @@ from relume.color import luminance
 from relume.environments.equirect import shrunk, texel_directions, texel_solid_angles
 from relume.errors import PlanError
 from relume.light.tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
-from relume.light.triangles import subdivide, weigh
+from relume.light.triangles import Unturned, subdivide, weigh
 
 
 def solid_angles(corners):
@@ -217,8 +217,8 @@ def test_absurd_counts_are_refused(asked):
 def test_a_turned_environment_weighs_as_its_turned_image(columns):
     radiance = studio()  # 64 texels wide
     tiles = choose_tiles(radiance, 200)
-    turned = weigh(tiles, radiance, 360 * columns / 64)
-    rolled = weigh(tiles, np.roll(radiance, -columns, axis=1))
+    turned = weigh(tiles, Unturned.of(radiance), 360 * columns / 64)
+    rolled = weigh(tiles, Unturned.of(np.roll(radiance, -columns, axis=1)))
     # a texel's centre that rounding puts on the other side of an edge changes two tiles; most tiles have none there
     same = np.isclose(turned.irradiance, rolled.irradiance, rtol=1e-5, atol=1e-9).all(axis=1)
     assert same.mean() > 0.9
@@ -231,7 +231,7 @@ def test_a_turned_environment_weighs_as_its_turned_image(columns):
 def test_another_environment_keeps_all_its_light_in_the_tiles_it_lies_in():
     tiles = choose_tiles(studio(), 300)
     other = np.random.default_rng(4).random((38, 76, 3), np.float32)
-    lights = weigh(tiles, other)
+    lights = weigh(tiles, Unturned.of(other))
     np.testing.assert_allclose(lights.irradiance.sum(axis=0, dtype=float), texel_power(other).sum(axis=0), rtol=1e-6)
     depth = np.diagonal(depth_inside(tiles.corners, lights.direction.astype(float)))
     assert (depth > -1e-6).all()
@@ -286,4 +286,5 @@ def test_a_shrunk_map_weighs_as_much():
     np.testing.assert_allclose(small, studio(), rtol=1e-6)
     assert shrunk(small[:, :-1], 4).shape == small[:, :-1].shape  # an odd side cannot be halved
     tiles = choose_tiles(studio(), 60)
-    np.testing.assert_allclose(weigh(tiles, small).irradiance.sum(0), weigh(tiles, whole).irradiance.sum(0), rtol=1e-2)
+    few, all_texels = (weigh(tiles, Unturned.of(texels)).irradiance.sum(0) for texels in (small, whole))
+    np.testing.assert_allclose(few, all_texels, rtol=1e-2)

@@ -13,7 +13,7 @@ from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.light.gather_rays import make_pattern
 from relume.light.smooth import divide
 from relume.light.tiles import choose_tiles
-from relume.light.triangles import weigh
+from relume.light.triangles import Unturned, weigh
 from relume.points import Points
 from relume.project.alike_rays import alike_ray_vectors, weighed_functions
 from relume.project.harmonic_transfer import ClusteredTransfer, transfer_matrices, transfer_matrices_numpy
@@ -34,7 +34,7 @@ BROUGHT = harmonics(TILES.centroids) * TILES.solid_angles[:, None]
 
 def lights_of(radiance):
     """Triangles that shadows were asked for in the middles of."""
-    return replace(weigh(TILES, radiance), direction=TILES.centroids.astype(np.float32))
+    return replace(weigh(TILES, Unturned.of(radiance)), direction=TILES.centroids.astype(np.float32))
 
 
 def points_on_a_ball(num, seed=3):
