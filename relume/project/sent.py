@@ -8,8 +8,8 @@ place (x, y) / (1 + z), so that the horizon is as fine as the normal. Rays sprea
 together hardly knows the difference.
 
 What few functions make of a small bright light has rings about it, in part below nothing. Who gathers widely sees none
-of them; a narrow lobe would see one alone. For those there is a second table, of L_j times a factor of its degree, with
-which no light becomes negative (docs/adr/0047-cells-send-by-direction.md).
+of them; a narrow lobe sees one alone. For those there is a second table, of L_j times a factor of its degree, which
+takes a part of them away (docs/adr/0047-cells-send-by-direction.md).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREES, SENT_DEGREE, in_basis, num_functions
+from relume.basis.zernike import SENT_DEGREE, WINDOW, in_basis, num_functions
 from relume.parallel import for_ranges
 from relume.trace.cell_tree import NO_CELL
 
@@ -47,7 +47,7 @@ class Sent(NamedTuple):
         frame: tangents and bitangents. (G, 2, 3) float32
         scale: what a step of the table is worth. (G, 3) float32
         table: of each square, x outermost. (G, SIDE², 3) int16
-        smooth: the same, without rings. (G, SIDE², 3) int16
+        smooth: the same, with fewer rings. (G, SIDE², 3) int16
     """
 
     even: F32
@@ -76,7 +76,7 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, *, to_n
     lobe = np.full(NO_CELL + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
     scale = np.empty((len(rows), 3), np.float32)
-    means = np.stack([grid_means(), no_rings()[:, None] * grid_means()][: 1 + to_narrow_lobes])
+    means = np.stack([grid_means(), WINDOW[:NUM_SENT, None] * grid_means()][: 1 + to_narrow_lobes])
     tables = np.empty((len(means), len(rows), SIDE * SIDE, 3), np.int16)
 
     def fill(start: int, stop: int) -> None:
@@ -89,23 +89,6 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, *, to_n
 
     for_ranges(fill, len(rows), _ROWS_A_RANGE)
     return Sent(even, lobe, frame, scale, tables[0], tables[-1])
-
-
-@lru_cache(maxsize=1)
-def no_rings() -> F32:
-    """The factors w_n of all functions, with which a mirror's lobe is nowhere negative. (J,) float32
-
-    The kernel Σ_m h_nm(ω) h_nm(ω') of a degree is a mean, over an angle, of Gegenbauer's C_n^(3/2) (Xu 1999), so that
-    w are the coefficients of a function of one variable that is not negative: of those of degree N the narrowest, the
-    square of C_r^(3/2)(t) / (t − z), r = N / 2 + 1, with z the largest zero. C_n^(3/2) is the derivative of Legendre's
-    P_(n+1).
-    """
-    t, weight = np.polynomial.legendre.leggauss(SENT_DEGREE + 4)
-    polynomials = [np.polynomial.legendre.Legendre.basis(n + 1).deriv() for n in range(SENT_DEGREE + 1)]
-    last = polynomials[SENT_DEGREE // 2 + 1]
-    bump = weight * (1 - t * t) * (last(t) / (t - last.roots().max())) ** 2
-    of_degree = np.array([(bump * p(t)).sum() / p(1.0) for p in polynomials]) / bump.sum()
-    return np.asarray(of_degree[DEGREES[:NUM_SENT]], np.float32)
 
 
 @lru_cache(maxsize=1)

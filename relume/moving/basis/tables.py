@@ -12,14 +12,12 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import DEGREES, NUM_FUNCTIONS, ladder
+from relume.basis.zernike import NUM_FUNCTIONS, WINDOW, ladder
 from relume.brdf.channels import group_of
 from relume.moving.basis.lobes import NUM_GROUPS, are_lobes, is_narrow
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS, out_factors
 
 F32 = NDArray[np.float32]
-
-_WINDOWS = np.exp(-DEGREES * (DEGREES + 2) / (2 * 8.0**2)).astype(np.float32)  # w: e^(−n (n + 2) / 2 d²), d = 8
 
 
 class Tables(NamedTuple):
@@ -64,7 +62,7 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
             shared = [(one.table, is_lobe, is_narrow(one)) for of_group, one, is_lobe in every if of_group == group]
             plain = [table for table, is_lobe, _ in shared if not is_lobe]
             told = [table for table, is_lobe, narrow in shared if is_lobe and not narrow]
-            others = [table * _WINDOWS for table, is_lobe, _ in shared if is_lobe]
+            others = [table * WINDOW for table, is_lobe, _ in shared if is_lobe]
             for first, found in ((0, plain), (2, told), (4, others)):
                 for kind, kept, tables in (
                     (0, even, [t[:, 0][..., rungs.cosine] for t in found if t.shape[1] == 1]),
