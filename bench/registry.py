@@ -107,7 +107,9 @@ GROUPS = (
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
     Group(
         "bench.surface_truth",
-        ("surface.rmse_diffuse", "surface.rmse_hard_sun", "surface.rmse_glossy_0.5", "surface.rmse_glossy_0.3"),
+        tuple(
+            f"surface.rmse_{kind}" for kind in ("diffuse", "hard_sun", "glossy_0.5", "glossy_0.3", "ggx_0.5", "ggx_0.3")
+        ),
     ),
     Group("bench.resting", ("surface.rest_s", "surface.rest_first_s")),
     Group("bench.canvas_moving", ("surface.canvas_fps",)),

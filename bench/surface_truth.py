@@ -2,11 +2,12 @@
 
 The scenes of bench/surface.py, all surfaces of one material: diffuse in the Cornell box under its sky, or under one as
 bright whose sun is an eighth as wide, 0.5° from its middle to its edge (`hard_sun`); nothing but a Blinn–Phong
-highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2).
+highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2); or metal of
+GGX itself, whose highlights have skirts, of these roughnesses, F0 of 0.9 (`ggx_…`; Mitsuba's `principled`).
 Mitsuba follows every path, highlights that light other surfaces among them, ours by few functions. Edges and
 background belong to the pictures. The picture is a fine frame, as where the eye has just come to rest and as renders
-are; `while_it_moves` is the same of a frame under a moving eye, in percent. Mitsuba's own noise is taken off:
-`bench.standard_error.over_passes`.
+are; `while_it_moves` is the same of a frame under a moving eye, `at_rest` of the fixed view that replaces it, in
+percent. Mitsuba's own noise is taken off: `bench.standard_error.over_passes`.
 """
 
 from __future__ import annotations
@@ -29,12 +30,13 @@ from relume.look import Look, complete, validate
 from relume.look.document import MAX_BOUNCES
 from relume.memory import Memory
 from relume.methods.moving_views import MovingViews
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS, open_bake, open_transfer
 from relume.moving.fine_job import FineJob
 from relume.moving.picture import MovingPicture
 from relume.render.image import render_image
 from relume.scene.built_in import built_in
 from relume.scene.cornell import sunny_sky
+from relume.scene.model import Scene
 from relume.store import bake_here
 
 _GREY = {"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}
@@ -43,9 +45,13 @@ _KINDS = {
     "hard_sun": ("cornell_box", (400, 400)),
     "glossy_0.5": ("still_life", (640, 480)),
     "glossy_0.3": ("still_life", (640, 480)),
+    "ggx_0.5": ("still_life", (640, 480)),
+    "ggx_0.3": ("still_life", (640, 480)),
 }
+_F0 = 0.9  # of the metal
 _GAIN = 0.23  # a highlight reflects up to four times its colour
-_SPP = {"glossy_0.3": 128}  # of each pass; 32 of others. The error of fewer is not known: its tails are heavy
+# of each pass; 32 of others. The error of fewer is not known: its tails are heavy
+_SPP = {"glossy_0.3": 128, "ggx_0.3": 64}
 _HARD = np.radians(0.5), 512  # radius of a hard sun, rows of its map
 _UNIT = "%"
 
@@ -60,8 +66,23 @@ def measure(tiny: bool) -> list[Figure]:
 def _terms_of(kind: str) -> list[dict[str, Any]]:
     if kind in ("diffuse", "hard_sun"):
         return [_GREY]
-    exponent = 2 / float(kind.partition("_")[2]) ** 4 - 2
+    if kind.startswith("ggx"):
+        params = {"roughness": _number(kind), "f0": _F0}
+        return [{"model": "ggx", "color": [1.0] * 3, "params": params, "texture": None}]
+    exponent = 2 / _number(kind) ** 4 - 2
     return [{"model": "blinn_phong", "color": [_GAIN] * 3, "params": {"exponent": exponent}, "texture": None}]
+
+
+def _number(kind: str) -> float:
+    return float(kind.partition("_")[2])
+
+
+def _theirs(kind: str) -> dict[str, Any]:
+    """The material as Mitsuba has it."""
+    if kind.startswith("ggx"):
+        color = {"type": "rgb", "value": [_F0] * 3}
+        return {"type": "principled", "base_color": color, "metallic": 1.0, "roughness": _number(kind)}
+    return bsdf(_terms_of(kind))
 
 
 def _while_it_moves(opened: MovingViews, view: str, look: Look) -> NDArray[np.float32]:
@@ -73,6 +94,12 @@ def _while_it_moves(opened: MovingViews, view: str, look: Look) -> NDArray[np.fl
         picture.install(job, job.make(lambda share: None, lambda: False))
         picture.advance(None)
     return picture.image()
+
+
+def _at_rest(scene: Scene, recipe: Recipe, folder: Path, look: Look) -> NDArray[np.float32]:
+    """What replaces it: a fixed view from the same place."""
+    path = bake_here(METHODS["gather"], scene, recipe, folder / "gather.zarr")
+    return render_image(open_transfer(path, Memory(4 << 30)), recipe.views[0], look)[..., :3]
 
 
 def _figure(kind: str, tiny: bool) -> Figure:
@@ -91,12 +118,18 @@ def _figure(kind: str, tiny: bool) -> Figure:
         ours = render_image(opened, recipe.views[0], look)
         assert isinstance(opened, MovingViews)
         plain = _while_it_moves(opened, recipe.views[0], look)
+        at_rest = _at_rest(scene, replace(recipe, method="gather"), Path(folder), look)
         integrator = {"type": "path", "max_depth": MAX_BOUNCES + 2, "rr_depth": 6}
-        job = {"spp": [spp], "passes": PASSES, "bsdfs": [bsdf(terms)] * len(scene.meshes), "integrator": integrator}
+        job = {"spp": [spp], "passes": PASSES, "bsdfs": [_theirs(kind)] * len(scene.meshes), "integrator": integrator}
         render(scene, size, job, Path(folder))
         theirs = passes_of(Path(folder))
     found = over_passes(ours.astype(np.float64), theirs)
-    moving = {"while_it_moves": 100 * over_passes(plain.astype(np.float64), theirs).error.value}
+    rested = over_passes(at_rest.astype(np.float64), theirs)
+    moving = {
+        "while_it_moves": 100 * over_passes(plain.astype(np.float64), theirs).error.value,
+        "at_rest": 100 * rested.error.value,
+        "at_rest_bias": rested.context["bias"],
+    }
     context = {
         **found.context,
         **moving,

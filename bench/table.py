@@ -60,6 +60,8 @@ TARGETS = {
     "surface.rmse_hard_sun": "≤ 8 %",
     "surface.rmse_glossy_0.5": "≤ 6 %",
     "surface.rmse_glossy_0.3": "≤ 12 %",
+    "surface.rmse_ggx_0.5": "≤ 6 %",
+    "surface.rmse_ggx_0.3": "≤ 12 %",
     "surface.points_rmse": "≤ 1 %",
     "surface.all_vs_sun": "≥ 5",
     "surface.first_touch_s": "≤ 1 s",
