@@ -31,7 +31,7 @@ class Mirrored(NamedTuple):
     Attributes:
         lobes: of all materials. sky: that they show where points see it.
         glances: of vertices along their lobes, from `relume.moving.highlights.glances`. (vertices, 3) float32
-        is_fine: two lobes stand for a highlight, as at points, not one.
+        is_fine: two lobes stand for each highlight, as at points, not for those alone that ask for it.
     """
 
     lobes: Lobes
@@ -84,13 +84,14 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
     hidden, facing = _beyond(per * away), _beyond(per * abs(along))
     above = min((np.float32(1) + facing) / (np.float32(1) + hidden), np.float32(1))
     light[0] = light[1] = light[2] = 0
-    one, other, first = ray, ray, np.float32(1)
-    if mirrored.is_fine:
-        row, share, one, other, first, sigma = along_both(mirrored.lobes, lobe, n, direction)
+    one, other, first, sigma_2 = ray, ray, np.float32(1), sigma
+    if mirrored.is_fine or mirrored.lobes.is_two[lobe]:
+        row, share, one, other, first, sigma, sigma_2 = along_both(mirrored.lobes, lobe, n, direction)
     for k in range(2):
         part = first if k == 0 else np.float32(1) - first
         if part > 0:
-            add_sky_in_lobe(mirrored.sky, seen, one if k == 0 else other, sigma, above * part, light)
+            towards, width = (one, sigma) if k == 0 else (other, sigma_2)
+            add_sky_in_lobe(mirrored.sky, seen, towards, width, above * part, light)
     for channel in range(3):
         light[channel] *= mirrored.sky.gain[channel]
     return row, share

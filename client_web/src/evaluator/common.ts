@@ -84,7 +84,7 @@ uniform int uNumSkyLevels, uNumLamps;
 uniform vec3 uSkyGain;
 uniform vec4 uLampDirections[${LAMPS}];
 uniform vec3 uLampLights[${LAMPS}];
-struct Lobes { vec3 one, other; float first, sigma; };
+struct Lobes { vec3 one, other; float first, sigma, sigma2; };
 float levelOf(float sigma) { return max(2.0 * log2(max(sigma * 180.0 / PI / 2.0, 1e-3)) + 1.0, 0.0); }
 vec3 skyAbout(vec3 direction, float sigma) {
   float place = min(levelOf(sigma), float(uNumSkyLevels - 1));
@@ -111,17 +111,18 @@ vec3 asideOf(vec3 n, vec3 d) {
 }
 vec3 leanTo(float cosine, vec3 aside, vec3 n) { return sqrt(max(1.0 - cosine * cosine, 0.0)) * aside + cosine * n; }
 vec4 lobeRow(int texel, float share) { return mix(texelFetch(uLobes, at(texel), 0), texelFetch(uLobes, at(texel + ${GROUPS + 1}), 0), share); }
-vec3 alongLobe(int of, float share, vec3 n, vec3 d, out float wide) {
-  wide = lobeRow(of - 1, share).a;
-  return leanTo(lobeRow(of - 2, share).a, asideOf(n, d), n);
-}
 Lobes alongBoth(int of, float share, vec3 n, vec3 d) {
   vec4 shape = lobeRow(of, share);
   vec3 aside = asideOf(n, d);
-  return Lobes(leanTo(shape.x, aside, n), leanTo(shape.y, aside, n), shape.z, shape.w);
+  return Lobes(leanTo(shape.x, aside, n), leanTo(shape.y, aside, n), shape.z, shape.w, lobeRow(of - 2, share).a);
+}
+float wideOf(int of, float share) { return lobeRow(of - 1, share).a; }
+vec3 middleOf(Lobes lobes) {
+  vec2 length = 1.0 - vec2(lobes.sigma * lobes.sigma, lobes.sigma2 * lobes.sigma2);
+  return normalize(lobes.first * length.x * lobes.one + (1.0 - lobes.first) * length.y * lobes.other);
 }
 vec3 skyInBoth(Lobes lobes, vec3 seen) {
-  return mix(skyInLobe(lobes.other, lobes.sigma, seen), skyInLobe(lobes.one, lobes.sigma, seen), lobes.first);
+  return mix(skyInLobe(lobes.other, lobes.sigma2, seen), skyInLobe(lobes.one, lobes.sigma, seen), lobes.first);
 }
 `;
 /** The albedo of a lobe in a group of terms, whose texel of a table is `of`. */

@@ -31,7 +31,8 @@ float lampSeen(int lamp, int p) {
 }
 vec3 glanceAlong(Lobes lobes, int p) {
   vec3 middle = mix(lobes.other, lobes.one, lobes.first);
-  float size = length(middle), variance = lobes.sigma * lobes.sigma + max(1.0 - size, 0.0);
+  float size = length(middle), own = mix(lobes.sigma2 * lobes.sigma2, lobes.sigma * lobes.sigma, lobes.first);
+  float variance = own + max(1.0 - size, 0.0);
   middle /= size;
   int width = clamp(int(floor(2.0 * log2(max(sqrt(variance), 1e-6) / ${narrowest}) + 0.5)), 0, ${widths - 1});
   int list = texelFetch(uLobeFirsts, at(width), 0).x + squareOf(middle);

@@ -178,11 +178,12 @@ const mirrored = (rows: number) => `
 float shareAbove(float x) { return 1.0 / (1.0 + exp(-1.702 * max(x, -20.0))); }
 vec3 mirrored(int lobe, vec3 n, vec3 d, vec3 outward, vec4 glance, out int row, out float share) {
   row = rowOf(clamp(-dot(n, d), 0.01, 1.0), share);
-  float wide, along = dot(d, outward);
-  vec3 ray = alongLobe((lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS}, share, n, d, wide);
+  int of = (lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS};
+  Lobes lobes = alongBoth(of, share, n, d);
+  vec3 ray = middleOf(lobes);
+  float along = dot(d, outward), wide = wideOf(of, share);
   float away = dot(ray, outward) * (along > 0.0 ? -1.0 : 1.0);
   float above = min(shareAbove(away / wide) / shareAbove(abs(along) / wide), 1.0);
-  Lobes lobes = alongBoth((lobe * ${rows} + row) * ${GROUPS + 1} + ${GROUPS}, share, n, d);
   return above * skyInBoth(lobes, glance.xyz);
 }
 `;

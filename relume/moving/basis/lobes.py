@@ -3,16 +3,16 @@
     L(ωo) = a(θo) · L̄(ωm, √(1 − R)),   a = ∫ ρ cos θi dωi,   R ωm = ∫ ωi ρ cos θi dωi / a
 
 L̄ is the sky about a direction, blurred by a width; it is found for each pixel, where Σ_k p_k t_k is found for points.
-Points find more: seen from aslant a highlight is longer in the plane of the eye and the normal than across it, and
-leans. Two round lobes of its lesser width σ, whose mean, variance and third moment in that plane are the highlight's,
-stand for it there (docs/adr/0063-highlights.md),
+Points find more: most highlights have a core and a wide skirt, and seen from aslant they are longer in the plane of the
+eye and the normal than across it, and lean. Two round lobes stand for one there (`relume.moving.basis.two_lobes`,
+docs/adr/0098-core-and-skirt.md),
 
-    L_2(ωo) = a(θo) · Σ_n s_n L̄(ω_n, σ),   s_1 + s_2 = 1 .
+    L_2(ωo) = a(θo) · Σ_n s_n L̄(ω_n, σ_n),   s_1 + s_2 = 1 ,
 
-What is narrower than the in-basis can tell sends of the sky L_2 alone. L is what changes fastest from point to point,
-and what is sent less L is interpolated: B(pixel) = L(pixel) + Σ_points w (B − L)
-(docs/adr/0048-highlights-between-points.md). All stand in tables over θo, as out-factors do; of terms that depend on φo
-as well, the mean over it, and one lobe.
+and for each pixel, too, where both are not alike. What is narrower than the in-basis can tell sends of the sky L_2
+alone. L is what changes fastest from point to point, and what is sent less L is interpolated:
+B(pixel) = L(pixel) + Σ_points w (B − L) (docs/adr/0048-highlights-between-points.md). All stand in tables over θo, as
+out-factors do; of terms that depend on φo as well, the mean over it, and one lobe.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_mirrored
 from relume.moving.basis.out_factors import NUM_ROWS, OutFactors, cosines, of_white, text_of_white
+from relume.moving.basis.two_lobes import NUM_NUMBERS, fit_two
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -44,9 +45,9 @@ _INNERMOST = 3e-4  # radians
 _EYES = 8  # φo over which a term that is not isotropic is averaged
 _MOST_KNOWN = 256
 _LEAST_MISSED = 1e-3
-_POWERS = (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)
-_LEAST_WIDE = np.radians(3)
-_MOST_APART = 1.8  # of 2 (1 − R), all of which two lobes without a width would have
+_POWERS = (0, 0), (1, 0), (0, 1)
+_NUM_SHAPE = NUM_NUMBERS + 2
+_ALIKE = 1.5  # times as wide as the other is a lobe, at most, where one stands for both
 
 
 class Lobes(NamedTuple):
@@ -56,10 +57,11 @@ class Lobes(NamedTuple):
         albedo: a, by groups of terms as in `relume.moving.evaluate`. (lobes, `NUM_ROWS`, groups, 3) float32
         cosine: cos θ of ω_1 and ω_2, on the side that the mirror direction is. (lobes, `NUM_ROWS`, 2) float32
         first: s_1. (lobes, `NUM_ROWS`) float32
-        sigma: of both, radians. (lobes, `NUM_ROWS`) float32
+        sigma: of both, radians. (lobes, `NUM_ROWS`, 2) float32
         mean: cos θm. (lobes, `NUM_ROWS`) float32. wide: √(1 − R), σ of one lobe for both. (lobes, `NUM_ROWS`) float32
         most: what the in-basis says of the sky is believed up to so many times of what the lobe says, and down to that
             part of it; 1: it is not believed, since it cannot tell the terms. (lobes,) float32
+        is_two: whether one lobe for both would stand for it badly. (lobes,) bool
         of: lobe of each material, −1 for none. (materials,) int32
     """
 
@@ -70,6 +72,7 @@ class Lobes(NamedTuple):
     mean: F32
     wide: F32
     most: F32
+    is_two: NDArray[np.bool_]
     of: NDArray[np.int32]
 
     @classmethod
@@ -127,7 +130,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
             continue
         of[index] = len(albedo)
         most.append(_most_of([*compress(known, is_seen)]))
-        by_group, about = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros((NUM_ROWS, 6))
+        by_group, about = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros((NUM_ROWS, _NUM_SHAPE))
         for term in compress(terms, is_seen):
             found = _lobe_of(text_of_white(term))
             sent = found[:, :3] * np.asarray(term["color"], np.float64)
@@ -136,11 +139,13 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         total = by_group.sum(axis=1).mean(axis=1)[:, None]
         albedo.append(by_group)
         shape.append(np.where(total > 0, about / np.maximum(total, 1e-30), 1))
-    shapes = np.reshape(np.array(shape, np.float32), (len(shape), NUM_ROWS, 6))
-    first, sigma, mean, wide = (np.ascontiguousarray(shapes[..., k]) for k in range(2, 6))
+    shapes = np.reshape(np.array(shape, np.float32), (len(shape), NUM_ROWS, _NUM_SHAPE))
+    cosine, sigma = (np.ascontiguousarray(shapes[..., k : k + 2]) for k in (0, 3))
+    first, mean, wide = (np.ascontiguousarray(shapes[..., k]) for k in (2, 5, 6))
+    is_two = (sigma.max(axis=2) > _ALIKE * sigma.min(axis=2)).any(axis=1)
     return Lobes(
         np.reshape(np.array(albedo, np.float32), (len(albedo), NUM_ROWS, NUM_GROUPS, 3)),
-        np.ascontiguousarray(shapes[..., :2]), first, sigma, mean, wide, np.array(most, np.float32), of,
+        cosine, first, sigma, mean, wide, np.array(most, np.float32), is_two, of,
     )  # fmt: skip
 
 
@@ -159,11 +164,26 @@ def _about_mirror(num_spokes: int) -> tuple[F64, F64]:
     return away.reshape(-1, 3), area
 
 
+class _Even(NamedTuple):
+    """Where isotropic terms are evaluated.
+
+    Attributes:
+        quadrature: for φo = 0. moments: about it, see `_about_lobe`.
+        x, z: of ωi there. (rows, n) float32. area: solid angles. (n,) float32
+    """
+
+    quadrature: Quadrature
+    moments: F64
+    x: F32
+    z: F32
+    area: F32
+
+
 @lru_cache(maxsize=1)
-def _even_quadrature() -> tuple[Quadrature, F64]:
-    """Where isotropic terms are evaluated, and the moments about it."""
+def _even() -> _Even:
     wi, wo, moments = _about_lobe(0.0, _SPOKES // 2)
-    return Quadrature(wi, wo), moments
+    x, z = (np.ascontiguousarray(part, np.float32) for part in (-wi[..., 0], wi[..., 2]))
+    return _Even(Quadrature(wi, wo), moments, x, z, _about_mirror(_SPOKES // 2)[1].astype(np.float32))
 
 
 def _about_lobe(phi: float, num_spokes: int) -> tuple[F64, F64, F64]:
@@ -188,9 +208,6 @@ def _about_lobe(phi: float, num_spokes: int) -> tuple[F64, F64, F64]:
 
 def _moments_of(document: Mapping[str, Any]) -> F64:
     """∫ ρ x^a z^b cos θi dωi over `_POWERS`, the mean over φo. (channels, rows, powers)"""
-    if of_white(document).is_isotropic:
-        quadrature, moments = _even_quadrature()
-        return np.asarray((quadrature.values(document)[..., None, :] @ moments)[..., 0, :])
     eyes, times = np.arange(_EYES) * (2 * np.pi / _EYES), np.ones(_EYES)  # how many eyes each stands for
     if is_mirrored(document):
         eyes, times = eyes[: _EYES // 4 + 1], np.array([2.0, *[4.0] * (_EYES // 4 - 1), 2.0])
@@ -203,39 +220,22 @@ def _moments_of(document: Mapping[str, Any]) -> F64:
 
 @lru_cache(maxsize=_MOST_KNOWN)
 def _lobe_of(term_text: str) -> F64:
-    """a of each channel, then as in `_shape_of`, in each row. (`NUM_ROWS`, 9)"""
+    """a of each channel; cos θ of both lobes, s_1, σ of both; cos θm, √(1 − R). (`NUM_ROWS`, 10)"""
     document = json.loads(term_text)
-    moments = _moments_of(document)
-    sent = np.broadcast_to(moments[..., 0], (3, NUM_ROWS)).T
-    shape = _shape_of(moments.mean(axis=0), is_split=of_white(document).is_isotropic)
-    return np.column_stack([sent, shape])
+    if not of_white(document).is_isotropic:
+        moments = _moments_of(document)
+        mean, wide = _one_of(moments)
+        return np.column_stack([moments[..., 0].T, mean, mean, np.full(NUM_ROWS, 0.5), wide, wide, mean, wide])
+    even = _even()
+    value = even.quadrature.values(document)
+    moments = (value[..., None, :] @ even.moments)[..., 0, :]
+    sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
+    albedo = np.broadcast_to(moments[..., 0], (3, NUM_ROWS)).T
+    return np.column_stack([albedo, fit_two(even.x, even.z, even.area, sent), *_one_of(moments)])
 
 
-def _shape_of(moments: F64, *, is_split: bool) -> F64:
-    """Fit one lobe or two to moments of `_POWERS`.
-
-    With t the angle of ωm from the normal, u = x cos t − z sin t is what directions lie off it in the plane of the eye.
-    A lobe of κ is R / κ wide across, E[y²]; what E[u²] is more than that, two lobes apart make up, at the two points
-    that have the same second and third moment: those of a Gaussian quadrature of what a round blur leaves.
-
-    Args:
-        moments: (rows, powers). is_split: two lobes, where they fit better than one.
-    Returns:
-        cos θ of both, s_1, σ; cos θm and √(1 − R) of one. (rows, 6)
-    """
-    mean = moments[:, 1:] / np.maximum(moments[:, :1], 1e-30)
-    x, z, xx, xz, zz, xxx, xxz, xzz, zzz = mean.T
+def _one_of(moments: F64) -> tuple[F64, F64]:
+    """Find cos θm and √(1 − R) from moments of `_POWERS`, (channels, rows, powers). (rows,) each"""
+    sent, x, z = moments.mean(axis=0).T
     length = np.hypot(x, z)
-    sine, cosine = (part / np.maximum(length, 1e-30) for part in (x, z))
-    angle, width = np.arctan2(np.abs(sine), cosine), np.maximum(1 - length, 1e-8)
-    along = cosine**2 * xx - 2 * sine * cosine * xz + sine**2 * zz
-    third = cosine**3 * xxx - 3 * cosine**2 * sine * xxz + 3 * cosine * sine**2 * xzz - sine**3 * zzz
-    apart = np.clip((along - (1 - xx - zz)) / np.maximum(length, 1e-30), 0, _MOST_APART * width)
-    apart *= np.clip(np.sqrt(width) / _LEAST_WIDE - 1, 0, 1) * is_split  # points see nothing of what is narrower
-    half = np.sqrt(np.maximum(apart, 1e-12))
-    lean = np.clip(third / np.maximum(length, 1e-30) / (2 * half**2), -half, half)
-    reach = np.sqrt(lean**2 + half**2)
-    off = np.stack([lean - reach, lean + reach]) * (apart > 0)
-    cosines_of = np.cos(np.clip(angle + np.arcsin(np.clip(off, -1, 1)), 0, np.pi / 2))
-    sigma = np.sqrt(np.maximum(width - apart / 2, 1e-8))
-    return np.column_stack([*cosines_of, (reach + lean) / (2 * reach), sigma, cosine, np.sqrt(width)])
+    return z / np.maximum(length, 1e-30), np.sqrt(np.maximum(1 - length / np.maximum(sent, 1e-30), 1e-8))

@@ -2,11 +2,11 @@
 
     B(pixel) = L(pixel) + Σ_points w (B − L),   L(ωo) = a(θo) (V L̄(ωm, σ) + Σ_lamps V_j L̄_j(ωm, σ))
 
-L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate; in fine frames
-L_2, the sky in two lobes that stand for the highlight better. It is what turns fastest where surfaces are curved, twice
-as fast as their normals. B = Σ_k p_k t_k of the sky is what the in-basis says. Beside what is bright it rings, and says
-what cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple, down to
-L_2 itself.
+L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate; in fine frames,
+and where one lobe would stand for the highlight badly, L_2, the sky in two. It is what turns fastest where surfaces are
+curved, twice as fast as their normals. B = Σ_k p_k t_k of the sky is what the in-basis says. Beside what is bright it
+rings, and says what cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the
+multiple, down to L_2 itself.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ def _add(points, material, lobes, light, eye, glances, is_fine, rows, start, sto
         seen = glances[p, 0], glances[p, 1], glances[p, 2]
         for channel in range(3):
             shown[channel] = both[channel] = 0
-        row, share, one, other, first, sigma = along_both(lobes, lobe, n, d)
+        row, share, one, other, first, sigma, sigma_2 = along_both(lobes, lobe, n, d)
         add_sky_in_lobe(light, seen, one, sigma, first, both)
-        add_sky_in_lobe(light, seen, other, sigma, np.float32(1) - first, both)
-        if is_fine:
+        add_sky_in_lobe(light, seen, other, sigma_2, np.float32(1) - first, both)
+        if is_fine or lobes.is_two[lobe]:
             shown[0], shown[1], shown[2] = both[0], both[1], both[2]
         else:
             _, _, ray, wide = along_lobe(lobes, lobe, n, d)

@@ -23,14 +23,15 @@ F64 = NDArray[np.float64]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _middle(one, other, first, sigma):  # type: ignore[no-untyped-def]
+def _middle(one, other, first, sigma, sigma_2):  # type: ignore[no-untyped-def]
     """Find the mean direction of two lobes, three numbers, and how wide both are together, σ²."""
     x = first * one[0] + (np.float32(1) - first) * other[0]
     y = first * one[1] + (np.float32(1) - first) * other[1]
     z = first * one[2] + (np.float32(1) - first) * other[2]
     length = math.sqrt(x * x + y * y + z * z)
     per = np.float32(1) / length
-    return per * x, per * y, per * z, sigma * sigma + max(np.float32(1) - length, np.float32(0))
+    own = first * sigma * sigma + (np.float32(1) - first) * sigma_2 * sigma_2
+    return per * x, per * y, per * z, own + max(np.float32(1) - length, np.float32(0))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -45,8 +46,8 @@ def _glance(points, material, visible, listed, lobes, eye, rows, start, stop, ou
         n = normal[p, 0], normal[p, 1], normal[p, 2]
         x, y, z = position[p, 0] - eye[0], position[p, 1] - eye[1], position[p, 2] - eye[2]
         scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
-        _, _, one, other, first, sigma = along_both(lobes, lobe, n, (scale * x, scale * y, scale * z))
-        x, y, z, variance = _middle(one, other, first, sigma)
+        _, _, one, other, first, sigma, sigma_2 = along_both(lobes, lobe, n, (scale * x, scale * y, scale * z))
+        x, y, z, variance = _middle(one, other, first, sigma, sigma_2)
         place = listed.first[width_of(math.sqrt(variance))] + square_of(x, y, z)
         seen, total = np.float32(0), np.float32(1e-30)
         for k in range(listed.lists.shape[1]):

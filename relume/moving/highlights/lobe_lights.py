@@ -208,7 +208,8 @@ def widths_of(lobes: Lobes) -> tuple[int, ...]:
     if not len(lobes.sigma):
         return ()
     angle = np.arccos(np.clip(lobes.cosine.astype(np.float64), -1, 1))
-    middle = lobes.first * np.exp(1j * angle[..., 0]) + (1 - lobes.first) * np.exp(1j * angle[..., 1])
-    sigma = np.sqrt(lobes.sigma**2 + 1 - np.abs(middle))
+    share = np.stack([lobes.first, 1 - lobes.first], axis=-1)
+    middle = (share * np.exp(1j * angle)).sum(axis=-1)
+    sigma = np.sqrt((share * lobes.sigma**2).sum(axis=-1) + 1 - np.abs(middle))
     low, high = (int(width_of(np.float32(end))) for end in (sigma.min(), sigma.max()))
     return tuple(range(low, high + 1))

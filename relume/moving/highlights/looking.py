@@ -55,14 +55,16 @@ def along_both(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     Args:
         lobes, lobe, n, d: as of `along_lobe`.
     Returns:
-        A row of the table and the share of the next; both directions, tuples; the share of the first, s_1; σ.
+        A row of the table and the share of the next; both directions, tuples; the share of the first, s_1; σ of the
+        first and of the other.
     """
     row, share, aside = _aside(n, d)
     first = lobes.first[lobe, row] + share * (lobes.first[lobe, row + 1] - lobes.first[lobe, row])
-    sigma = lobes.sigma[lobe, row] + share * (lobes.sigma[lobe, row + 1] - lobes.sigma[lobe, row])
+    sigma = lobes.sigma[lobe, row, 0] + share * (lobes.sigma[lobe, row + 1, 0] - lobes.sigma[lobe, row, 0])
+    sigma_2 = lobes.sigma[lobe, row, 1] + share * (lobes.sigma[lobe, row + 1, 1] - lobes.sigma[lobe, row, 1])
     one = lobes.cosine[lobe, row, 0] + share * (lobes.cosine[lobe, row + 1, 0] - lobes.cosine[lobe, row, 0])
     other = lobes.cosine[lobe, row, 1] + share * (lobes.cosine[lobe, row + 1, 1] - lobes.cosine[lobe, row, 1])
-    return row, share, _leaning(one, aside, n), _leaning(other, aside, n), first, sigma
+    return row, share, _leaning(one, aside, n), _leaning(other, aside, n), first, sigma, sigma_2
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")

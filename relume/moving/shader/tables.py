@@ -128,13 +128,13 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
 
 
 def _lobes(lobes: Lobes) -> F32:
-    """Of each row of each lobe the albedos by groups, with `most`, cos θm, √(1 − R); then both cosines, s_1 and σ.
+    """Of each row of each lobe the albedos by groups, with `most`, σ_2, √(1 − R); then both cosines, s_1 and σ_1.
     (lobes · rows · (groups + 1), 4)"""
-    num, rows = lobes.sigma.shape
+    num, rows = lobes.first.shape
     out = np.zeros((num, rows, NUM_GROUPS + 1, 4), np.float32)
     out[:, :, :NUM_GROUPS, :3] = lobes.albedo
-    out[:, :, 0, 3], out[:, :, 1, 3], out[:, :, 2, 3] = lobes.most[:, None], lobes.mean, lobes.wide
-    out[:, :, NUM_GROUPS] = np.concatenate([lobes.cosine, lobes.first[..., None], lobes.sigma[..., None]], axis=-1)
+    out[:, :, 0, 3], out[:, :, 1, 3], out[:, :, 2, 3] = lobes.most[:, None], lobes.sigma[..., 1], lobes.wide
+    out[:, :, NUM_GROUPS] = np.concatenate([lobes.cosine, lobes.first[..., None], lobes.sigma[..., :1]], axis=-1)
     return out.reshape(-1, 4)
 
 
