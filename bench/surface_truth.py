@@ -51,7 +51,7 @@ _KINDS = {
 _F0 = 0.9  # of the metal
 _GAIN = 0.23  # a highlight reflects up to four times its colour
 # of each pass; 32 of others. The error of fewer is not known: its tails are heavy
-_SPP = {"glossy_0.3": 128, "ggx_0.3": 64}
+_SPP = {"glossy_0.3": 128}
 _HARD = np.radians(0.5), 512  # radius of a hard sun, rows of its map
 _UNIT = "%"
 
