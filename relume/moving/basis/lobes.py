@@ -48,6 +48,7 @@ _LEAST_MISSED = 1e-3
 _POWERS = (0, 0), (1, 0), (0, 1)
 _NUM_SHAPE = NUM_NUMBERS + 2
 _ALIKE = 1.5  # times as wide as the other is a lobe, at most, where one stands for both
+_LEAST_COSINE = 0.3  # of θo, where that counts: farther aslant all lobes are unlike
 
 
 class Lobes(NamedTuple):
@@ -142,7 +143,8 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
     shapes = np.reshape(np.array(shape, np.float32), (len(shape), NUM_ROWS, _NUM_SHAPE))
     cosine, sigma = (np.ascontiguousarray(shapes[..., k : k + 2]) for k in (0, 3))
     first, mean, wide = (np.ascontiguousarray(shapes[..., k]) for k in (2, 5, 6))
-    is_two = (sigma.max(axis=2) > _ALIKE * sigma.min(axis=2)).any(axis=1)
+    is_unlike = sigma.max(axis=2) > _ALIKE * sigma.min(axis=2)
+    is_two = is_unlike[:, cosines() > _LEAST_COSINE].any(axis=1)
     return Lobes(
         np.reshape(np.array(albedo, np.float32), (len(albedo), NUM_ROWS, NUM_GROUPS, 3)),
         cosine, first, sigma, mean, wide, np.array(most, np.float32), is_two, of,
