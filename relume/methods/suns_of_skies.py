@@ -6,15 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from relume.environments.equirect import shrunk
 from relume.light.suns import Divided, without_suns
 from relume.light.triangles import TriangleLights, Unturned, weigh
 from relume.look import EnvironmentKey
-from relume.methods.transfer import PREVIEW_WIDTH, BakedViews, shown_of
+from relume.methods.transfer import BakedViews, shown_of
 from relume.moving.beams.beam import Beam, light_of_sun, targets_of_sun
 from relume.picture.light import Light
 from relume.points import Points
+
+F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -43,19 +45,13 @@ class SunsOfSkies:
         """The same, found quickly."""
         if not self.are_in(light):
             return self.lit.preview_lights_of(light)
-        key = self.lit.key, "preview lights beside suns", light.environment
-        return shown_of(self.lit.memory.passing.keep(key, lambda: self._weighed_quickly(light.environment)), light)
+        return shown_of(self.lit.weighed_quickly("lights beside suns", light.environment, self._beside), light)
 
     def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
-        of = Unturned.of(self._divided(environment.map).beside)
-        return weigh(self.lit.tiles, of, environment.rotation)
+        return weigh(self.lit.tiles, Unturned.of(self._beside(environment.map)), environment.rotation)
 
-    def _weighed_quickly(self, environment: EnvironmentKey) -> TriangleLights:
-        def small() -> Unturned:
-            return Unturned.of(shrunk(self._divided(environment.map).beside, PREVIEW_WIDTH))
-
-        key = self.lit.owner_of(environment.map), "small environment beside suns", environment.map
-        return weigh(self.lit.tiles, self.lit.memory.keep(key, small), environment.rotation)
+    def _beside(self, name: str | None) -> F32:
+        return self._divided(name).beside
 
     def beams(self, light: Light, points: Points) -> Iterator[Beam]:
         """Suns whose light comes straight, and what they bring to points if nothing hides them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -134,14 +134,23 @@ class BakedViews:
 
     def preview_lights_in(self, environment: EnvironmentKey) -> TriangleLights:
         """The triangles of an environment from a map of at most 256 texels' width: a large one takes seconds."""
+        return self.weighed_quickly("lights", environment, self.radiance_of)
 
-        key = self.owner_of(environment.map), "small environment", environment.map
+    def weighed_quickly(
+        self, what: str, environment: EnvironmentKey, radiance_of: Callable[[str | None], F32]
+    ) -> TriangleLights:
+        """The same of a part of an environment; what stays while it is turned is kept.
+
+        Args:
+            what: of it, in words. environment: whose. radiance_of: finds the part by the environment's name.
+        """
+        key = self.owner_of(environment.map), f"texels of preview {what}", environment.map
 
         def weighed() -> TriangleLights:
-            of = self.memory.keep(key, lambda: Unturned.of(shrunk(self.radiance_of(environment.map), PREVIEW_WIDTH)))
+            of = self.memory.keep(key, lambda: Unturned.of(shrunk(radiance_of(environment.map), PREVIEW_WIDTH)))
             return weigh(self.tiles, of, environment.rotation)
 
-        return self.memory.passing.keep((self.key, "preview lights", environment), weighed)
+        return self.memory.passing.keep((self.key, f"preview {what}", environment), weighed)
 
     def owner_of(self, name: str | None) -> str:
         """Whose entries in the memory those made of an environment are: the bake's where it is its own."""

@@ -171,12 +171,7 @@ def _import_scene(request: ImportRequest) -> str:
         from relume.scene.ground import with_ground
 
         scene = with_ground(scene)
-    from worker.database import open_database
-    from worker.ledger import Ledger
-    from worker.scenes import register_scene
-
-    with closing(Ledger(open_database(request.database))) as ledger:
-        return register_scene(Path(request.data), ledger, scene)
+    return _registered(request, scene)
 
 
 def _built_in(name: str) -> Scene:
@@ -188,11 +183,15 @@ def _built_in(name: str) -> Scene:
 def _put_on_ground(request: ImportRequest) -> str:
     from relume.scene.archive import load_scene
     from relume.scene.ground import with_ground
+
+    return _registered(request, with_ground(load_scene(request.file), request.name))
+
+
+def _registered(request: ImportRequest, scene: Scene) -> str:
     from worker.database import open_database
     from worker.ledger import Ledger
     from worker.scenes import register_scene
 
-    scene = with_ground(load_scene(request.file), request.name)
     with closing(Ledger(open_database(request.database))) as ledger:
         return register_scene(Path(request.data), ledger, scene)
 

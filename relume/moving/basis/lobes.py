@@ -45,10 +45,9 @@ _INNERMOST = 3e-4  # radians
 _EYES = 8  # φo over which a term that is not isotropic is averaged
 _MOST_KNOWN = 256
 _LEAST_MISSED = 1e-3
-_POWERS = (0, 0), (1, 0), (0, 1)
 _NUM_SHAPE = NUM_NUMBERS + 2
 _ALIKE = 1.5  # times as wide as the other is a lobe, at most, where one stands for both
-_LEAST_COSINE = 0.3  # of θo, where that counts: farther aslant all lobes are unlike
+_ASLANT = 0.3  # cos θo above which that counts: farther aslant all lobes are unlike
 
 
 class Lobes(NamedTuple):
@@ -144,7 +143,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
     cosine, sigma = (np.ascontiguousarray(shapes[..., k : k + 2]) for k in (0, 3))
     first, mean, wide = (np.ascontiguousarray(shapes[..., k]) for k in (2, 5, 6))
     is_unlike = sigma.max(axis=2) > _ALIKE * sigma.min(axis=2)
-    is_two = is_unlike[:, cosines() > _LEAST_COSINE].any(axis=1)
+    is_two = is_unlike[:, cosines() > _ASLANT].any(axis=1)
     return Lobes(
         np.reshape(np.array(albedo, np.float32), (len(albedo), NUM_ROWS, NUM_GROUPS, 3)),
         cosine, first, sigma, mean, wide, np.array(most, np.float32), is_two, of,
@@ -194,8 +193,8 @@ def _about_lobe(phi: float, num_spokes: int) -> tuple[F64, F64, F64]:
     Args:
         phi: φo of the eyes. num_spokes: of the directions about each.
     Returns:
-        ωi (rows, n, 3); ωo (rows, 1, 3); weights of cos θi dωi times x^a z^b, `_POWERS`, with x what ωi goes away from
-        the eye along the surface, and z = cos θi (rows, n, powers).
+        ωi (rows, n, 3); ωo (rows, 1, 3); weights of cos θi dωi, and times x and z, with x what ωi goes away from the
+        eye along the surface, and z = cos θi (rows, n, 3).
     """
     away, area = _about_mirror(num_spokes)
     cosine, aside = cosines()[:, None], np.array([np.cos(phi), np.sin(phi), 0.0])
@@ -205,15 +204,15 @@ def _about_lobe(phi: float, num_spokes: int) -> tuple[F64, F64, F64]:
     wi = away @ np.stack([cosine * aside + sine * [0, 0, 1], across, cosine * [0, 0, 1] - sine * aside], axis=1)
     x, z = -(wi @ aside), wi[..., 2]
     weight = np.maximum(z, 0) * area
-    return wi, wo[:, None], np.stack([weight * x**a * z**b for a, b in _POWERS], axis=-1)
+    return wi, wo[:, None], np.stack([weight, weight * x, weight * z], axis=-1)
 
 
 def _moments_of(document: Mapping[str, Any]) -> F64:
-    """∫ ρ x^a z^b cos θi dωi over `_POWERS`, the mean over φo. (channels, rows, powers)"""
+    """∫ ρ (1, x, z) cos θi dωi, the mean over φo. (channels, rows, 3)"""
     eyes, times = np.arange(_EYES) * (2 * np.pi / _EYES), np.ones(_EYES)  # how many eyes each stands for
     if is_mirrored(document):
         eyes, times = eyes[: _EYES // 4 + 1], np.array([2.0, *[4.0] * (_EYES // 4 - 1), 2.0])
-    total = np.zeros((3, NUM_ROWS, len(_POWERS)))
+    total = np.zeros((3, NUM_ROWS, 3))
     for phi, share in zip(eyes, times / times.sum(), strict=True):
         wi, wo, moments = _about_lobe(phi, _SPOKES)
         total += share * np.einsum("rnc,rnk->crk", eval_brdf(document, wi, wo), moments, optimize=True)
@@ -237,7 +236,7 @@ def _lobe_of(term_text: str) -> F64:
 
 
 def _one_of(moments: F64) -> tuple[F64, F64]:
-    """Find cos θm and √(1 − R) from moments of `_POWERS`, (channels, rows, powers). (rows,) each"""
+    """Find cos θm and √(1 − R) from moments, (channels, rows, 3). (rows,) each"""
     sent, x, z = moments.mean(axis=0).T
     length = np.hypot(x, z)
     return z / np.maximum(length, 1e-30), np.sqrt(np.maximum(1 - length / np.maximum(sent, 1e-30), 1e-8))
