@@ -107,6 +107,25 @@ def test_anisotropy_stretches_along_the_turned_tangent() -> None:
     assert any("Ashikhmin" in warning for warning in scene.warnings)
 
 
+@pytest.mark.parametrize(
+    ("is_bumpy", "has_own", "words"),
+    [
+        (False, True, "smooth, as what it covers; its own normal texture is not used"),
+        (True, True, "as bumpy as what it covers; its own normal texture is not used"),
+        (True, False, "as bumpy as what it covers; in the file it is smooth"),
+        (False, False, None),
+    ],
+)
+def test_it_is_told_where_a_coat_has_other_bumps_than_what_it_covers(is_bumpy, has_own, words) -> None:
+    glb = Glb()
+    bumps = {"index": glb.texture([[[200, 150, 220]]])}
+    coat = {"clearcoatFactor": 1} | ({"clearcoatNormalTexture": bumps} if has_own else {})
+    scene = imported({"clearcoat": coat}, glb, **({"normalTexture": bumps} if is_bumpy else {}))
+    told = [str(warning) for warning in scene.warnings if "coat" in str(warning)]
+    assert len(told) == (words is not None)
+    assert all(words in warning for warning in told)
+
+
 def test_a_turned_normal_map_means_the_same_directions() -> None:
     glb = Glb()
     info = {"index": glb.texture([[[200, 150, 220]]])}

@@ -21,7 +21,7 @@ from relume.scene.gltf.blend import Blend, mix
 from relume.scene.gltf.document import Material as GltfMaterial
 from relume.scene.gltf.document import TextureInfo
 from relume.scene.gltf.images import ImageReader
-from relume.scene.gltf.layers import Layers, read_layers
+from relume.scene.gltf.layers import Clearcoat, Layers, read_layers
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import Raster
 from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
@@ -101,10 +101,8 @@ class MaterialReader:
         over = self._over(layers, strength, what)
         normal_map = self._normal_map(material.normalTexture, turn, what)
         shining = self._shining(material, what)
-        if over.coat > 0 and normal_map is not None:
-            self._warnings.append(
-                simplified(f"the coat of {what} is as bumpy as what it covers; it has no normals of its own")
-            )
+        if over.coat > 0:
+            self._doubt_coat(layers.clearcoat, what, is_bumpy=normal_map is not None)
         made = Material(
             name,
             make_terms(replace(surface, has_normal_map=normal_map is not None), over),
@@ -138,6 +136,14 @@ class MaterialReader:
         red, green, blue = np.clip(tint, 0, 1).tolist()
         r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
         return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b))
+
+    def _doubt_coat(self, coat: Clearcoat, what: str, *, is_bumpy: bool) -> None:
+        """Tell of bumps that a coat has not in common with what it covers; a sample has one normal for both."""
+        has_own = coat.clearcoatNormalTexture is not None
+        if is_bumpy or has_own:
+            shown = "as bumpy as what it covers" if is_bumpy else "smooth, as what it covers"
+            said = "its own normal texture is not used" if has_own else "in the file it is smooth"
+            self._warnings.append(simplified(f"the coat of {what} is shown {shown}; {said}"))
 
     def _doubt(self, layers: Layers, what: str) -> None:
         """Tell of an index of refraction that no opaque matter has; what stands for a mirror is tinted or weak."""
@@ -221,8 +227,6 @@ class MaterialReader:
 
     def _over(self, layers: Layers, anisotropy: float, what: str) -> Over:
         coat, sheen = layers.clearcoat, layers.sheen
-        if coat.clearcoatNormalTexture is not None:
-            self._warnings.append(simplified(f"the normal texture of the coat of {what} is not used"))
         weight = coat.clearcoatFactor * self._mean(coat.clearcoatTexture, 0, f"coat texture of {what}")
         coat_roughness = coat.clearcoatRoughnessFactor
         if coat.clearcoatRoughnessTexture is not None:
