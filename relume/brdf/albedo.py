@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from relume.basis.zernike import SENT_DEGREE, in_basis, ladder
 from relume.brdf.channels import TEXTURES, Images, group_of, images_of
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.mirror import mirrored_share
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.registry import TERMS
 from relume.brdf.symmetry import about_normal, is_isotropic
@@ -51,13 +52,13 @@ def is_diffuse(term_document: Mapping[str, Any]) -> bool:
 
 
 def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
-    """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`; and the
-    images that its look names in their place.
+    """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`; the
+    images that its look names in their place; and its mirrors.
 
     Args:
         terms: of a complete look.
     Returns:
-        What `shares_in` and `images_in` read.
+        What `shares_in`, `images_in` and `mirrors_in` read.
     """
     return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True))
 
@@ -72,7 +73,14 @@ def _reflectances(terms_text: str) -> bytes:
             found = np.round(found * _STEPS) / _STEPS
         total[group_of(term)] += found
     named = [name or "" for name in images_of(terms)]
-    return total.astype(np.float32).tobytes() + " ".join(named).encode()
+    mirrors = [_in_steps(term) for term in terms if mirrored_share(term).any()]
+    beside = [*named, json.dumps(mirrors, sort_keys=True)] if mirrors else named
+    return total.astype(np.float32).tobytes() + " ".join(beside).encode()
+
+
+def _in_steps(term: Mapping[str, Any]) -> dict[str, Any]:
+    """A mirror whose colour has the steps that highlights have."""
+    return {**term, "color": (np.round(np.asarray(term["color"]) * _STEPS) / _STEPS).tolist()}
 
 
 def shares_in(of_material: bytes) -> F32:
@@ -82,8 +90,15 @@ def shares_in(of_material: bytes) -> F32:
 
 def images_in(of_material: bytes) -> Images:
     """What a look names in the place of each of a material's `TEXTURES`. of_material: from `reflectances_of`"""
-    diffuse, specular = of_material[_SHARE_BYTES:].decode().split(" ")
+    diffuse, specular, *_ = of_material[_SHARE_BYTES:].decode().split(" ", 2)
     return diffuse or None, specular or None
+
+
+def mirrors_in(of_material: bytes) -> list[dict[str, Any]]:
+    """The terms of a material that are mirrors, in part at least. of_material: from `reflectances_of`"""
+    _, _, *mirrors = of_material[_SHARE_BYTES:].decode().split(" ", 2)
+    found: list[dict[str, Any]] = json.loads(mirrors[0]) if mirrors else []
+    return found
 
 
 def reflectance(term_document: Mapping[str, Any]) -> F64:

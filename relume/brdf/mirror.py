@@ -69,3 +69,9 @@ def mirrored(documents: Sequence[Mapping[str, Any]], cos_theta_i: NDArray[np.flo
             values = np.prod([curve_values(document, curve, theta) for curve in curves], axis=0).T
             total += share * np.asarray(document["color"]) * values * (1 if document.get("texture") is None else tint)
     return total
+
+
+def mirrored_part(document: Mapping[str, Any]) -> dict[str, Any]:
+    """A term as far as it is a mirror: what is left of it is its lobe. document: a term of a complete look"""
+    color = mirrored_share(document) * np.asarray(document["color"], np.float64)
+    return {**document, "color": color.tolist()}

@@ -76,6 +76,12 @@ class Tiles:
         return _corners(self.codes)
 
     @cached_property
+    def along(self) -> NDArray[np.uint64]:
+        """Numbers that rise along a way through all tiles, which leaves no node before it was in all of it. (M,)"""
+        levels = np.array([(code.bit_length() - 4) // 2 for code in map(int, self.codes)], np.uint64)
+        return self.codes << (2 * (MAX_DEPTH - levels)).astype(np.uint64)
+
+    @cached_property
     def solid_angles(self) -> F64:
         """Of each tile, sr. (M,)"""
         return solid_angles(self.corners)

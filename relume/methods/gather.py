@@ -10,6 +10,8 @@ from a seed. Stages after those of the views: "gather cells", then "gather rays"
     cells/links                                 cells that the rays of its points hit
     views/<k>/links                             cells that the rays of a view sample hit
     views/<k>/number                            of a view sample: seeds its rays
+    thrown/…                                    relume.methods.thrown.Thrown: bright lights, planes of flat mirrors
+    views/<k>/thrown                            which of those lights a view sample sees in flat mirrors
 """
 
 from __future__ import annotations
@@ -22,12 +24,14 @@ from numpy.typing import NDArray
 
 from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.brdf.albedo import is_diffuse
+from relume.eye.flat_mirrors import MOST_PLANES, flat_mirrors, has_flat_mirrors, lights_in_mirrors
 from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
 from relume.methods import bounds
 from relume.methods.last_read import LastRead
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
-from relume.methods.store_io import SHARD_ROWS, read_cells, read_gather_samples, read_tree
+from relume.methods.store_io import SHARD_ROWS, read_cells, read_gather_samples, read_lights, read_tiles, read_tree
+from relume.methods.thrown import MOST_GROUPS, Thrown, read_thrown
 from relume.methods.transfer import BouncedViews, described
 from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS
@@ -73,26 +77,28 @@ class GatherMethod:
 
     def open(self, store: StoreReader, key: str, memory: Memory) -> BouncedViews:
         """Views lit by the environment, by local lights, and by surfaces. See `TransferMethod`."""
-        return BouncedViews(**described(store, key, memory), cells=read_cells(store))
+        return BouncedViews(**described(store, key, memory), cells=read_cells(store), thrown=read_thrown(store))
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
         bounds.check_gathering(recipe, MAX_CELLS)
         direct, cells, (rays, _) = self._views.plan(scene, recipe), _num_cells(recipe), self._rays_of(recipe)
         points, bits = POINTS_A_CELL * cells, (recipe.num_lights + 7) // 8
-        num_rays = direct.num_rays + direct.num_view_samples * rays + points * (RAYS_A_POINT + recipe.num_lights)
+        seen = MOST_PLANES * min(MOST_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
+        num_rays = direct.num_rays + direct.num_view_samples * (rays + 2 * seen)
+        num_rays += points * (RAYS_A_POINT + recipe.num_lights)
         return Plan(
             num_view_samples=direct.num_view_samples,
             num_rays=num_rays,
             work_s=bounds.work_s(scene, num_rays, _RAY_NS, _TRIANGLE_US),
             store_bytes=direct.store_bytes
-            + direct.num_view_samples * (2 * rays + 4)
+            + direct.num_view_samples * (2 * rays + 4 + -(-seen // 8))
             + cells * _BYTES_A_CELL
             + points * bits,
             peak_bytes=direct.peak_bytes
             + cells * _MAKING_BYTES_A_CELL
             + bounds.num_triangles(scene) * _NORMAL_BYTES
-            + SHARD_ROWS * (3 * 2 * rays + _SHARD_ROW_BYTES),
+            + SHARD_ROWS * (3 * 2 * rays + _SHARD_ROW_BYTES + 2 * seen),
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
@@ -124,17 +130,20 @@ class GatherMethod:
         """As the views; what cells see, and all links. See `BakeMethod`."""
         if stage < _RAYS:
             return self._views.arrays(stage, scene, recipe, store) if stage < _CELLS else []
-        num_cells = store.shape("cells/material")[0]
+        num_cells, thrown = store.shape("cells/material")[0], read_thrown(store)
         bits = POINTS_A_CELL * ((store.shape("lights/power")[0] + 7) // 8)
         widths = [("cells/visibility", bits, "uint8"), ("cells/links", POINTS_A_CELL * RAYS_A_POINT, "uint16")]
         of_cells = [
             ArraySpec(path, (num_cells, width), dtype, (CHUNK_ROWS, width), (CELLS_A_SHARD, width))
             for path, width, dtype in widths
         ]
+        of_samples = [("links", (self._rays_of(recipe)[0],), "uint16"), ("number", (), "uint32")]
+        if thrown is not None:
+            of_samples.append(("thrown", (-(-thrown.num_seen // 8),), "uint8"))
         of_views = [
             ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
             for k, rows in enumerate(self._views.sampled_of(store).num_surface_samples)
-            for name, width, dtype in (("links", (self._rays_of(recipe)[0],), "uint16"), ("number", (), "uint32"))
+            for name, width, dtype in of_samples
         ]
         return [*of_cells, *of_views]
 
@@ -143,7 +152,7 @@ class GatherMethod:
         if task.stage < _CELLS:
             return self._views.compute(scene, recipe, task, store)
         if task.stage == _CELLS:
-            return self._cells(scene, recipe)
+            return self._cells(scene, recipe, store)
         return self._of_view(scene, recipe, task, store) if task.view else self._of_cells(scene, task, store)
 
     def _rays_of(self, recipe: Recipe) -> tuple[int, int]:
@@ -151,11 +160,23 @@ class GatherMethod:
         rays = recipe.gather_rays or self._rays
         return rays, round(rays * self._glossy / self._rays)
 
-    def _cells(self, scene: Scene, recipe: Recipe) -> Written:
-        cells = choose_cells(scene, self._views.geometry_of(scene), recipe.views, recipe.size, _num_cells(recipe))
+    def _cells(self, scene: Scene, recipe: Recipe, store: StoreReader) -> Written:
+        geometry = self._views.geometry_of(scene)
+        cells = choose_cells(scene, geometry, recipe.views, recipe.size, _num_cells(recipe))
         fields: dict[str, NDArray[Any]] = {**vars(cells), **cells.tree._asdict()}
         del fields["tree"]
-        return Written({f"cells/{name}": array for name, array in fields.items()}, 0, 0.0)
+        thrown = self._thrown(scene, store, cells.position)
+        return Written({f"cells/{name}": array for name, array in fields.items()} | thrown, 0, 0.0)
+
+    def _thrown(self, scene: Scene, store: StoreReader, cells: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+        """What is traced over flat mirrors. cells: where their points are. (C, points, 3)"""
+        if not has_flat_mirrors(scene):
+            return {}
+        geometry = self._views.geometry_of(scene)
+        mirrors = flat_mirrors(scene, geometry)
+        plane = mirrors.holding(cells, geometry.epsilon)
+        found = Thrown.of(read_lights(store), read_tiles(store), mirrors, plane)
+        return {f"thrown/{name}": array for name, array in vars(found).items()} if found.num_seen else {}
 
     def _of_cells(self, scene: Scene, task: Task, store: StoreReader) -> Written:
         points, geometry = read_gather_samples(store, task.start, task.stop), self._views.geometry_of(scene)
@@ -181,7 +202,11 @@ class GatherMethod:
             pattern = pattern_of_material(store, k, int(index))
             parts.append(trace_links(geometry, tree, points.rows(slice(first, stop)), wo[first:stop], pattern))
         arrays = {f"views/{k}/links": np.concatenate([part.cell for part in parts]), f"views/{k}/number": seed}
-        return Written(arrays, sum(part.num_rays for part in parts), sum(part.trace_s for part in parts))
+        num_rays = sum(part.num_rays for part in parts)
+        if (thrown := read_thrown(store)) is not None:
+            seen = lights_in_mirrors(geometry, flat_mirrors(scene, geometry), points, thrown.direction)
+            arrays[f"views/{k}/thrown"], num_rays = seen.visible, num_rays + seen.num_rays
+        return Written(arrays, num_rays, sum(part.trace_s for part in parts))
 
 
 def _num_cells(recipe: Recipe) -> int:

@@ -73,7 +73,7 @@ class MovingViews:
         Raises:
             StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
         """
-        lit = BouncedViews(**described_light(store, key, memory), cells=read_cells(store))
+        lit = BouncedViews(**described_light(store, key, memory), cells=read_cells(store), thrown=None)
         width, height = store.attributes["size"]
         cameras = (read_camera(store, k) for k in range(len(store.attributes["views"])))
         surface = read_surface(store)

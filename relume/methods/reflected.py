@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +37,15 @@ class Reflected:
         """What exact pictures show."""
         between = _between_surfaces(light)
         return self._memory.keep((self._key, "reflected light", between), lambda: self._sent(between))
+
+    def beside(self, light: Light, taken: Callable[[Light], Leaving]) -> Sent:
+        """The same without what `taken` finds of it: what is shown of that is found otherwise."""
+        between = _between_surfaces(light)
+
+        def found() -> Sent:
+            return self._leaving(between).less(taken(between)).sent(self._cells)
+
+        return self._memory.keep((self._key, "reflected light beside what is thrown", between), found)
 
     def preview_under(self, light: Light) -> F32:
         """What pictures follow while a hand moves, the same in every direction; waits for nobody who wants something
@@ -81,10 +92,12 @@ class Reflected:
     def _sent(self, light: Light) -> Sent:
         if not light.paths.reflect:
             return evenly(np.zeros((NO_CELL + 1, 3), np.float32))
+        return self._leaving(light).sent(self._cells)
+
+    def _leaving(self, light: Light) -> Leaving:
         reflecting = self._reflecting(light, self._memory)
         arrived = self._on_cells.arrived(light, reflecting, is_preview=False)
-        found = sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
-        return found.sent(self._cells)
+        return sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
 
     def _preview(self, light: Light) -> F32:
         if not light.paths.reflect:

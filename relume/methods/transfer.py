@@ -30,6 +30,7 @@ from relume.methods.on_cells import LightOnCells
 from relume.methods.reflected import Reflected
 from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
 from relume.methods.thinned import ThinnedStore
+from relume.methods.thrown import Thrown, ThrownLight
 from relume.operators.image_files import ImageFiles
 from relume.picture.light import Light
 from relume.picture.transfer import Arriving, Axis, Eyes
@@ -41,6 +42,7 @@ from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
+_NOTHING = evenly(np.zeros((NO_CELL + 1, 3), np.float32))
 
 F32 = NDArray[np.float32]
 
@@ -175,6 +177,18 @@ class BakedViews:
         """What the gather cells send; None where nothing of it comes to the picture."""
         return self.reflected.under(light) if self.reflected is not None and light.paths.reflect else None
 
+    def between_surfaces(
+        self, light: Light, gathered: GatherRays, thrown: NDArray[np.uint8] | None
+    ) -> tuple[Rays, ...]:
+        """The rays of samples that bring what surfaces send.
+
+        Args:
+            light: all that shines.
+            gathered: their gather rays, of which `sent` does not count. thrown: what they see in flat mirrors.
+        """
+        sent = self.reflected_in(light)
+        return () if sent is None else (replace(gathered, sent=sent),)
+
     def arriving(self, view: View, material: int, light: Light, memory: Memory) -> Arriving:
         """What arrives at a material's samples in a light; shadows that the memory lacks are traced. See `Transfer`."""
         lights = self.lights_of(light)
@@ -250,11 +264,13 @@ class FewSamples:
     Attributes:
         receivers: without any rays.
         gathered: their gather rays, where those were baked; they bring nothing yet.
+        thrown: the lights that they see in flat mirrors, where those were baked. (n, bytes) uint8
     """
 
     transfer: BakedViews
     receivers: Receivers
     gathered: GatherRays | None = None
+    thrown: NDArray[np.uint8] | None = None
 
     @property
     def num_bytes(self) -> int:
@@ -264,11 +280,11 @@ class FewSamples:
 
     def arriving(self, light: Light) -> Arriving:
         """What arrives at them in a light; the environment from a small map, local lights exactly."""
-        transfer = self.transfer
-        sent = transfer.reflected_in(light) if self.gathered is not None else None
-        gathered = () if self.gathered is None or sent is None else (replace(self.gathered, sent=sent),)
+        transfer, reflected = self.transfer, tuple[Rays, ...]()
+        if self.gathered is not None:
+            reflected = transfer.between_surfaces(light, self.gathered, self.thrown)
         local = transfer.local.all_rays(light, self.receivers.points)
-        return transfer.preview_lights_of(light), replace(self.receivers, rays=(*gathered, *local))
+        return transfer.preview_lights_of(light), replace(self.receivers, rays=(*reflected, *local))
 
 
 @dataclass(frozen=True)
@@ -277,9 +293,11 @@ class BouncedViews(BakedViews):
 
     Attributes:
         cells: gather cells, which send it.
+        thrown: what flat mirrors send exactly; None where there are none.
     """
 
     cells: CellLight
+    thrown: Thrown | None
 
     axes = BakedViews.axes | {Axis.BOUNCES}
 
@@ -292,19 +310,45 @@ class BouncedViews(BakedViews):
         return Reflected(self.cells, on_cells, self.memory, self.key)
 
     @cached_property
+    def thrown_light(self) -> ThrownLight | None:
+        """The same in any look."""
+        if self.thrown is None:
+            return None
+        return ThrownLight(self.thrown, self.cells, self.lights_in, self.memory, self.key)
+
+    @cached_property
     def harmonic(self) -> HarmonicLight | None:
         """How smooth light comes to points and cells, where that was baked."""
         return read_harmonic_light(self.store, self.cells)
 
     def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
         """The rays among what arrives: those of gather cells, and of local lights."""
-        local, sent = super()._rays(view, material, light, memory), self.reflected_in(light)
-        return local if sent is None else (view.gather_rays(material, sent), *local)
+        local = super()._rays(view, material, light, memory)
+        if not light.paths.reflect:
+            return local
+        rays, seen = view.gather_rays(material, _NOTHING), self._thrown_to(view, material)
+        return (*self.between_surfaces(light, rays, seen), *local)
+
+    def between_surfaces(
+        self, light: Light, gathered: GatherRays, thrown: NDArray[np.uint8] | None
+    ) -> tuple[Rays, ...]:
+        """The rays of samples that bring what surfaces send. See `BakedViews`."""
+        by_mirrors = self.thrown_light
+        if thrown is None or by_mirrors is None or not by_mirrors.is_in(light):
+            return super().between_surfaces(light, gathered, thrown)
+        beside = self.reflected.beside(light, by_mirrors.taken)
+        return replace(gathered, sent=beside), by_mirrors.rays(light, thrown)
+
+    def _thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
+        """The lights that a material's samples see in flat mirrors. (n, bytes) uint8"""
+        rows = view.rows(material)
+        return None if self.thrown is None else self.store.read(f"views/{view.index}/thrown", rows.start, rows.stop)
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
-        few, nothing = super().some(view, material, chosen), evenly(np.zeros((NO_CELL + 1, 3), np.float32))
-        return replace(few, gathered=view.gather_rays(material, nothing).alone(chosen))
+        few, seen = super().some(view, material, chosen), self._thrown_to(view, material)
+        thrown = None if seen is None else seen[chosen]
+        return replace(few, gathered=view.gather_rays(material, _NOTHING).alone(chosen), thrown=thrown)
 
 
 def shown_of(lights: TriangleLights, light: Light) -> TriangleLights:

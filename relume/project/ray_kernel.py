@@ -59,6 +59,40 @@ def list_local(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def list_thrown(  # type: ignore[no-untyped-def]
+    points, wo, direction, across, visible, start, stop, first, wi, out, irradiance
+):
+    """List the lights that points [start, stop) see in flat mirrors.
+
+    Args:
+        points, wo, start, stop: as of `list_local`. direction, across, visible: as in `ThrownRays`.
+        first, wi, out, irradiance: written, as there; the irradiance of a ray is cos θi · `across`.
+    Returns:
+        K, the number of rays.
+    """
+    _, normal, tangent, _, _ = points
+    end = 0
+    for p in range(start, stop):
+        first[p - start] = end
+        n, t = normal[p], tangent[p]
+        (bx, by, bz), (ox, oy, oz) = in_frame(n, t, wo[p])
+        for k in range(direction.shape[0]):
+            if not (visible[p, k >> 3] >> (k & 7)) & 1:
+                continue
+            dx, dy, dz = direction[k, 0], direction[k, 1], direction[k, 2]
+            z = n[0] * dx + n[1] * dy + n[2] * dz
+            if z <= 0:
+                continue
+            wi[0, end], wi[1, end], wi[2, end] = t[0] * dx + t[1] * dy + t[2] * dz, bx * dx + by * dy + bz * dz, z
+            out[0, end], out[1, end], out[2, end] = ox, oy, oz
+            for channel in range(3):
+                irradiance[channel, end] = z * across[k, channel]
+            end += 1
+    first[stop - start] = end
+    return end
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
     """Multiply the weights of rays by a dormant curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
     for channel in range(3):

@@ -15,7 +15,7 @@ from relume.light.local import SURFACE, LocalLight, parts_of
 from relume.light.strata import LampParts, Strata
 from relume.points import Points
 from relume.project.gathered_kernel import list_gathered, sum_gathered
-from relume.project.ray_kernel import list_local
+from relume.project.ray_kernel import list_local, list_thrown
 from relume.project.sent import Sent
 from relume.sharing import Sharing
 
@@ -122,6 +122,35 @@ class LocalRays:
         """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
         arriving = self.light, self.strata, self.gain, self.visible
         return int(list_local(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+
+
+@dataclass(frozen=True)
+class ThrownRays:
+    """Rays that bring what flat mirrors throw: one from each light that is seen in them.
+
+    Attributes:
+        direction: in which each is seen, unit. (K, 3) float32
+        across: what each brings to a surface across its way. (K, 3) float32
+        visible: light k of a point in bit k & 7 of byte k >> 3. (n, bytes) uint8
+    """
+
+    direction: F32
+    across: F32
+    visible: NDArray[np.uint8]
+
+    @property
+    def rays_a_point(self) -> int:
+        """The most rays that any point has."""
+        return len(self.direction)
+
+    def alone(self, chosen: NDArray[np.integer]) -> ThrownRays:
+        """Choose those of some points; see `Rays`."""
+        return replace(self, visible=self.visible[chosen])
+
+    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
+        arriving = self.direction, self.across, self.visible
+        return int(list_thrown(receivers.points, receivers.wo, *arriving, start, stop, *listed))
 
 
 def is_lamp(rays: Rays, num_curves: int) -> TypeGuard[LocalRays]:

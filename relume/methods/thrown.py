@@ -1,0 +1,180 @@
+"""Light that flat mirrors throw: of the lights whose way over a plane was traced to view samples, exact and sharp.
+
+A gather cell on a mirror sends what comes to it as few functions have it, some 30° wide, a small sun as all else. Of
+lights that were traced it sends nothing to samples that know which of them they see: these get
+
+    E m c F(θ)   in the direction v = d − 2 (d · n) n,   cos θ = |d · n|,
+
+with the irradiance E of lights that lie together in direction d, and what the mirror sends on in the look
+(`relume.brdf.mirror`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.bake import StoreReader
+from relume.basis.zernike import SENT_DEGREE
+from relume.brdf.albedo import Reflectances, mirrors_in, reflectances_of
+from relume.brdf.mirror import mirrored, mirrored_part
+from relume.color import luminance
+from relume.errors import ChunkDamagedError, StoreError
+from relume.eye.flat_mirrors import FlatMirrors, seen_in
+from relume.light.tiles import Tiles
+from relume.light.triangles import TriangleLights
+from relume.look import EnvironmentKey
+from relume.memory import Memory
+from relume.methods.cells.between import Leaving
+from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.reflecting import Arrived
+from relume.picture.light import Light
+from relume.project.receivers import ThrownRays
+
+F32 = NDArray[np.float32]
+
+NO_PLANE = 255  # of cells
+MOST_GROUPS = 128
+_BRIGHT = 8.0  # times the mean radiance of the sky: gather rays find what is dimmer
+
+
+@dataclass(frozen=True)
+class Thrown:
+    """What was traced: bright lights, those that lie together as one.
+
+    Attributes:
+        lights: which of the bake's. (T,) int32. group: that each is in. (T,) int32
+        direction: to the groups. (G, 3) float32
+        normal: of the planes. (P, 3) float32. material: of their mirrors. (P,) uint16
+        plane: that each gather cell lies in, `NO_PLANE` where in none. (C,) uint8
+    """
+
+    lights: NDArray[np.int32]
+    group: NDArray[np.int32]
+    direction: F32
+    normal: F32
+    material: NDArray[np.uint16]
+    plane: NDArray[np.uint8]
+
+    @property
+    def num_planes(self) -> int:
+        """P."""
+        return len(self.normal)
+
+    @property
+    def num_seen(self) -> int:
+        """Groups in all planes together, P G."""
+        return self.num_planes * len(self.direction)
+
+    @classmethod
+    def of(cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: NDArray[np.uint8]) -> Thrown:
+        """Choose the lights that are too bright for few functions.
+
+        Args:
+            lights: of a bake. tiles: that they lie in. mirrors: of its scene. plane: of its cells.
+        """
+        light = luminance(lights.irradiance).astype(np.float64)
+        bright = np.flatnonzero(light > _BRIGHT * light.sum() / (4 * np.pi) * tiles.solid_angles)
+        bright = bright[np.argsort(tiles.along[bright], kind="stable")]  # neighbours beside each other
+        num_groups = min(len(bright), MOST_GROUPS)
+        group = np.arange(len(bright)) * num_groups // max(1, len(bright))
+        towards = np.zeros((num_groups, 3))
+        np.add.at(towards, group, light[bright, None] * lights.direction[bright])
+        direction = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
+        chosen = bright.astype(np.int32), group.astype(np.int32), direction
+        return cls(*chosen, mirrors.normal, mirrors.material, plane)
+
+
+def read_thrown(store: StoreReader) -> Thrown | None:
+    """What a store knows of flat mirrors; None where there is none, or no bright light."""
+    try:
+        store.shape("thrown/lights")
+    except StoreError:
+        return None
+    found = Thrown(**{of.name: store.read(f"thrown/{of.name}") for of in fields(Thrown)})
+    limits: list[tuple[NDArray[Any], int]] = [
+        (found.lights, store.shape("lights/power")[0]),
+        (found.group, len(found.direction)),
+        (found.material, len(store.attributes["materials"])),
+    ]
+    are_known = all(len(numbers) == 0 or 0 <= numbers.min() <= numbers.max() < limit for numbers, limit in limits)
+    if not are_known or found.plane.shape != store.shape("cells/material"):
+        raise ChunkDamagedError("thrown", "it does not fit the lights, materials and cells of the bake")
+    return found
+
+
+class ThrownLight:
+    """Of one bake, in any look; safe to use from several threads.
+
+    Args:
+        thrown: what was traced. cells: that have sent it. lights_in: finds the triangles of an environment.
+        memory: of all that is made from the bake. key: of the bake in it.
+    """
+
+    def __init__(
+        self,
+        thrown: Thrown,
+        cells: CellLight,
+        lights_in: Callable[[EnvironmentKey], TriangleLights],
+        memory: Memory,
+        key: str,
+    ) -> None:
+        self._thrown, self._cells, self._lights_in = thrown, cells, lights_in
+        self._memory, self._key = memory, key
+        self._directions = seen_in(thrown.normal, thrown.direction).reshape(-1, 3)
+
+    @staticmethod
+    def is_in(light: Light) -> bool:
+        """Whether anything of it may be in a light: it is reflected once before it comes."""
+        return light.paths.reflect and light.paths.first == 1 and light.is_environment_lit
+
+    def rays(self, light: Light, visible: NDArray[np.uint8]) -> ThrownRays:
+        """What comes to samples.
+
+        Args:
+            light: that `is_in` says has any. visible: see `relume.eye.flat_mirrors.Seen`. (n, bytes) uint8
+        """
+        thrown, gain = self._thrown, np.array(light.environment_gain)
+        arriving = np.zeros((len(thrown.direction), 3))
+        np.add.at(arriving, thrown.group, gain * self._lights_in(light.environment).irradiance[thrown.lights])
+        cosine, tints = np.abs(thrown.normal @ thrown.direction.T), self._cells.textures[1]
+        sent = np.zeros((*cosine.shape, 3))
+        for p, material in enumerate(thrown.material):
+            on_plane = thrown.plane == p
+            tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
+            terms = mirrors_in(light.reflectances[material])
+            sent[p] = mirrored(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
+        return ThrownRays(self._directions, (sent * arriving).reshape(-1, 3).astype(np.float32), visible)
+
+    def taken(self, light: Light) -> Leaving:
+        """What cells in the planes send of the same lights, as functions have it."""
+        cells, lobes = self._cells, self._cells.reflecting(_mirrors_alone(light.reflectances))
+        is_among = self._thrown.plane[lobes.rows] != NO_PLANE
+        rows = lobes.rows[is_among]
+        arrived, gain = self._arrived(light.environment, rows), np.array(light.environment_gain, np.float32)
+        some = replace(
+            lobes,
+            reflectance=lobes.reflectance * (self._thrown.plane != NO_PLANE)[:, None],
+            rows=rows,
+            shares=lobes.shares[:, is_among],
+        )
+        even, vectors = some.sent(Arrived(gain * arrived.irradiance, gain[:, None] * arrived.vectors))
+        return Leaving(even[: cells.num_cells], rows, vectors)
+
+    def _arrived(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> Arrived:
+        def found() -> Arrived:
+            among, cells = self._thrown.lights.astype(np.intp), self._cells
+            whole = self._lights_in(environment)
+            some = whole.some(among, whole.irradiance[among])
+            return Arrived(cells.irradiance(some, among), cells.vectors(rows, some, SENT_DEGREE, among))
+
+        return self._memory.keep((self._key, "thrown light on cells", environment, rows.tobytes()), found)
+
+
+def _mirrors_alone(reflectances: Reflectances) -> Reflectances:
+    """Of materials as far as they are mirrors."""
+    return tuple(reflectances_of(list(map(mirrored_part, mirrors_in(one)))) for one in reflectances)
