@@ -44,6 +44,7 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.ViewMessage,
     protocol.ViewsMessage,
     protocol.FocusMessage,
+    protocol.RegionMessage,
     protocol.AckMessage,
     protocol.StreamMessage,
     protocol.ProbeMessage,

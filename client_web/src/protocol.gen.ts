@@ -151,6 +151,13 @@ export interface ProbeMessage {
   y: number;
 }
 
+/** client → server: of a view whose eye is "baked" this region is on the screen: x, y, width, height in pixels of its picture. It is exact before the rest, frames of what is on its way bring its tiles alone, and `fidelity` is that of what is in it. null: all of the picture, as it is before anything is said. */
+export interface RegionMessage {
+  type: "region";
+  view: string;
+  rect: [number, number, number, number] | null;
+}
+
 /** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709. Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
 export interface RenderRequest {
   bake: string;
@@ -887,6 +894,7 @@ export type ClientMessage =
   | ViewMessage
   | ViewsMessage
   | FocusMessage
+  | RegionMessage
   | AckMessage
   | StreamMessage
   | ProbeMessage

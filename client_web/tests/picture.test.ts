@@ -2,7 +2,7 @@ import { crc32, deflateSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
 import { srgbDecode, srgbEncode, toDisplay, type ShownToneMap } from "../src/color/tonemap";
 import { decodeIds } from "../src/picture/png16";
-import { FIT, fitWidth, pan, shownWidth, toPicture, toScreen, zoomAt } from "../src/picture/transform";
+import { FIT, fitWidth, pan, regionOf, shownWidth, toPicture, toScreen, zoomAt } from "../src/picture/transform";
 import type { Rgb } from "../src/protocol";
 
 describe("tone maps", () => {
@@ -48,6 +48,19 @@ describe("transform", () => {
     const [u, v] = toPicture(zoomed, canvas, 333, 222);
     const [x, y] = toScreen(pan(zoomed, canvas, 10, -5), canvas, u, v);
     expect([x, y].map(Math.round)).toEqual([343, 217]);
+  });
+
+  test("what is on the screen is told in pixels, and all of it by saying nothing", () => {
+    expect(regionOf(FIT, canvas, 1920, 1440)).toBe(null);
+    const zoomed = zoomAt(FIT, canvas, 4, 400, 300);
+    const [x, y, width, height] = regionOf(zoomed, canvas, 1920, 1440) as number[] as [number, number, number, number];
+    expect(Math.abs(2 * x + width - 1920)).toBeLessThanOrEqual(1);
+    expect(width / 1920).toBeCloseTo(800 / shownWidth(zoomed, canvas), 2);
+    expect(Math.abs(2 * y + height - 1440)).toBeLessThanOrEqual(1);
+    const corner = { ...zoomed, centre: [0, 1] as [number, number] };
+    const [left, top, across, down] = regionOf(corner, canvas, 1920, 1440) as [number, number, number, number];
+    expect([left, top + down]).toEqual([0, 1440]);
+    expect(Math.abs(across - width / 2) + Math.abs(down - height / 2)).toBeLessThan(2);
   });
 
   test("the picture cannot be lost", () => {

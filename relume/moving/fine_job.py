@@ -47,6 +47,7 @@ class FineJob:
     what = "finer highlights"
     state: ClassVar[Literal["shading"]] = "shading"
     refines = True
+    goes_on = False
 
     def make(self, progress: Progress, cancelled: Cancelled) -> Frame:
         """Find it: as long as a few frames take."""

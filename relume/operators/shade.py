@@ -8,8 +8,9 @@ or two.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -81,6 +82,68 @@ def shaded_rows(
     return project_levels(term, contractions, lights, receivers, start, stop, shader)[:, 0]
 
 
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """An image of one term of which some is shaded: whoever is stopped goes on from there, and some of it may go first.
+
+    Attributes:
+        rows: one for each sample, nothing where it is not shaded yet. (n, 3) float32
+        done: which steps of `grain` samples are. (steps,)
+        lock: held while it is shaded.
+    """
+
+    rows: F32
+    done: NDArray[np.bool_]
+    grain: int
+    lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    @classmethod
+    def of(cls, num_samples: int) -> Begun:
+        """Nothing of it."""
+        grain = min(max(num_samples // _STEPS, _FEWEST_A_STEP), _MOST_A_STEP)
+        return cls(np.zeros((num_samples, 3), np.float32), np.zeros(-(-num_samples // grain), np.bool_), grain)
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        return self.rows.nbytes + self.done.nbytes
+
+    def shade(
+        self,
+        term: Term,
+        bands: Mapping[str, NDArray[np.float64]],
+        lights: TriangleLights,
+        receivers: Receivers,
+        progress: Callable[[float], None],
+        cancelled: Callable[[], bool],
+        wanted: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Shade what is lacking of it.
+
+        Args:
+            term: it is of. bands: of its curves, as of `shade`. lights, receivers: what arrives, and where.
+            progress: called with the share done. cancelled: asked now and then.
+            wanted: samples that are shaded, with those beside them; None: all. (n,)
+        Raises:
+            CancelledError: `cancelled` said so; what was shaded stays.
+        """
+        contractions = contract_levels(term, bands, None)
+        with self.lock:
+            lacking = np.flatnonzero(~self.done if wanted is None else self._steps_of(wanted) & ~self.done)
+
+            def step(start: int, stop: int) -> None:
+                for k in lacking[start:stop]:
+                    rows = slice(int(k) * self.grain, min((int(k) + 1) * self.grain, len(self.rows)))
+                    self.rows[rows] = shaded_rows(term, contractions, lights, receivers, rows.start, rows.stop)
+                    self.done[k] = True
+
+            for_steps(step, len(lacking), 1, progress, cancelled, "shading")
+
+    def _steps_of(self, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which steps have any of some samples."""
+        return np.logical_or.reduceat(wanted, np.arange(0, len(wanted), self.grain))
+
+
 def shade(
     term: Term,
     bands: Mapping[str, NDArray[np.float64]],
@@ -98,13 +161,6 @@ def shade(
     Raises:
         CancelledError: `cancelled` said so.
     """
-    num_samples = len(receivers.normal)
-    rows = np.zeros((num_samples, 3), np.float32)
-    contractions = contract_levels(term, bands, None)
-
-    def step(start: int, stop: int) -> None:
-        rows[start:stop] = shaded_rows(term, contractions, lights, receivers, start, stop)
-
-    grain = min(max(num_samples // _STEPS, _FEWEST_A_STEP), _MOST_A_STEP)
-    for_steps(step, num_samples, grain, progress, cancelled, "shading")
-    return Shaded.of(rows)
+    begun = Begun.of(len(receivers.normal))
+    begun.shade(term, bands, lights, receivers, progress, cancelled)
+    return Shaded.of(begun.rows)

@@ -20,7 +20,7 @@ from relume.operators.edit_basis import EditBasis
 from relume.operators.frozen import Frozen, Rough
 from relume.operators.operator import Operator
 from relume.operators.packed import Packed
-from relume.operators.shade import Shaded, shade, shaded_bytes
+from relume.operators.shade import Begun, Shaded, shaded_bytes
 from relume.picture.fidelity import Fidelity
 from relume.picture.light import Light, parts_of
 from relume.picture.live_term import LiveTerm
@@ -32,6 +32,7 @@ from relume.project.receivers import Receivers
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+_BEGUN = "begun"  # ends the names of images of which some is shaded
 Progress = Callable[[float], None]
 Cancelled = Callable[[], bool]
 
@@ -43,6 +44,7 @@ class Job(Protocol):
         what: in words. key: equal keys are the same job.
         state: what making it is called; what follows a hand takes a few frames, and nobody is told of it.
         refines: the picture is near its look without it, so that it can wait until the hand rests.
+        goes_on: what is made of it is kept where it is cancelled.
     """
 
     @property
@@ -53,6 +55,8 @@ class Job(Protocol):
     def key(self) -> tuple[Hashable, ...]: ...
     @property
     def refines(self) -> bool: ...
+    @property
+    def goes_on(self) -> bool: ...
     def make(self, progress: Progress, cancelled: Cancelled) -> Any:
         """Make it, unless the memory has it; a `NotMadeError` where what is shown can stay. Raises CancelledError where
         `cancelled`, asked now and then, said so."""
@@ -106,6 +110,7 @@ class Freeze:
     form: Form
     refines: bool
     state: Literal["freezing", "shading"] = "freezing"
+    goes_on = False
 
     @classmethod
     def of(cls, place: Place, basis: EditBasis, form: Form) -> Freeze:
@@ -206,6 +211,7 @@ class Shade:
     is_default: bool
     refines: bool
     state: Literal["freezing", "shading"] = "shading"
+    goes_on = True
 
     @classmethod
     def of(cls, place: Place, light: Light, *, refines: bool | None = None) -> Shade:
@@ -240,21 +246,55 @@ class Shade:
 
     def _summed(self, progress: Progress, cancelled: Cancelled) -> Shaded:
         """Shade the parts of the light that no other image has had, and sum all."""
-        images, material, live = self.place
-
-        def shaded(light: Light, done: int) -> Shaded:
-            def tell(share: float) -> None:
-                progress((done + share) / max(1, len(self.parts)))
-
-            return shade(self.term, self.bands, *images.arriving(material, light), tell, cancelled)
-
+        cache, live = self.place.images.cache, self.place.live
         if len(self.parts) < 2:
-            return shaded(self.light, 0)
+            return self._finished(self.key, self.light, progress, cancelled)
         found: list[tuple[F32, Rgb]] = []
         for done, (key, light, gain) in enumerate(self.parts):
-            part = images.cache.get(key, Shaded, self.num_bytes, partial(shaded, light, done))
-            found.append((part.image, gain))
+            make = partial(self._finished, key, light, partial(self._tell, progress, done), cancelled)
+            found.append((cache.get(key, Shaded, self.num_bytes, make).image, gain))
         return Shaded(weighted_sum(np.zeros_like(live.ready.image), found))
+
+    def _finished(self, key: tuple[Hashable, ...], light: Light, progress: Progress, cancelled: Cancelled) -> Shaded:
+        """The image in a light, from what was begun of it."""
+        shaded = Shaded.of(self._begun(key, light, progress, cancelled, None))
+        self.place.images.cache.forget((*key, _BEGUN))
+        return shaded
+
+    def _begun(
+        self,
+        key: tuple[Hashable, ...],
+        light: Light,
+        progress: Progress,
+        cancelled: Cancelled,
+        wanted: NDArray[np.bool_] | None,
+    ) -> F32:
+        """Rows of the image in a light, those of wanted samples shaded; None: all. (n, 3)"""
+        images, material, _ = self.place
+        num, passing = material.num_samples, images.cache.passing
+        begun = passing.get((*key, _BEGUN), Begun, self.num_bytes, lambda: Begun.of(num))
+        begun.shade(self.term, self.bands, *images.arriving(material, light), progress, cancelled, wanted)
+        return begun.rows
+
+    def _tell(self, progress: Progress, done: int, share: float) -> None:
+        """How much of all parts of the light is done with a share of one."""
+        progress((done + share) / max(1, len(self.parts)))
+
+    def some(self, wanted: NDArray[np.bool_], progress: Progress, cancelled: Cancelled) -> F32:
+        """Rows of the same image of which only wanted samples are made; others may be anything. (n, 3)
+
+        Args:
+            wanted: samples of the material. (n,) progress, cancelled: as of `make`; what is made is kept.
+        """
+        if len(self.parts) < 2:
+            return self._begun(self.key, self.light, progress, cancelled, wanted)
+        total, num = np.zeros((len(wanted), 3), np.float32), len(wanted)
+        for done, (key, light, gain) in enumerate(self.parts):
+            known = self.place.images.cache.find(key, Shaded)
+            tell = partial(self._tell, progress, done)
+            rows = self._begun(key, light, tell, cancelled, wanted) if known is None else known.rows(num)
+            total += np.array(gain, np.float32) * rows
+        return total
 
     def install(self, made: Shaded) -> None:
         """See `Job`; an image of older curves is shown where there is none: a hand may not rest for long."""
@@ -284,6 +324,7 @@ class Settle:
     rounding: float = 0.0
     refines: bool = True
     state: Literal["freezing", "shading"] = "shading"
+    goes_on = False
 
     @property
     def what(self) -> str:

@@ -14,7 +14,7 @@ from relume.picture.light import Light
 from relume.picture.live_term import LiveTerm
 from relume.views.compose import add_term
 from relume.views.squares import num_squares
-from relume.views.view import View
+from relume.views.view import Tile, View
 
 F32 = NDArray[np.float32]
 
@@ -47,12 +47,20 @@ class MaterialImage:
         self._is_current = False
         self.num_composed = 0
         self._num_squares: dict[int, int] = {}
+        self._in_region: tuple[Tile, NDArray[np.bool_]] | None = None
 
     def num_squares(self, step: int) -> int:
         """How many squares of step × step pixels it is seen in."""
         if step not in self._num_squares:
             self._num_squares[step] = num_squares(self._view, self.index, step)
         return self._num_squares[step]
+
+    def lies_in(self, region: Tile) -> NDArray[np.bool_]:
+        """Which of its samples are seen in a region of the picture, see `View.lies_in`; the last answer is kept."""
+        known = self._in_region
+        if known is None or known[0] != region:
+            self._in_region = known = region, self._view.lies_in(self.index, region)
+        return known[1]
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
         """New targets; terms that stay as they are keep their images."""

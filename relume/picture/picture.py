@@ -21,6 +21,7 @@ from relume.picture.jobs import Freeze, Job, Place
 from relume.picture.light import Solo
 from relume.picture.pointer import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
 from relume.picture.probe import brush, probe
+from relume.picture.region import word_in
 from relume.picture.transfer import Transfer
 from relume.picture.transition import Transition
 from relume.picture.view_images import ViewImages, documents_of
@@ -36,7 +37,7 @@ class Advance:
 
     Attributes:
         tiles: x, y, width, height of the picture's tiles that are new. exact: the picture shows its look exactly.
-        fidelity: how nearly it shows it. complete: something of every term is shown.
+        fidelity: how nearly it shows it, in what is seen of it. complete: something of every term is shown.
         was_off: how far the picture that an exact one replaces was from it, relative RMS, where its eye moved.
     """
 
@@ -100,6 +101,10 @@ class Picture:
             self._touched = None  # the hand has moved on to a light
         self._look = look
 
+    def look_at(self, region: Tile | None) -> None:
+        """What is seen of the picture, and is to be exact first: x, y, width, height in pixels; None: all."""
+        self._images.region = region
+
     def touch(self, pointer: str) -> None:
         """Prepare what a hand takes hold of ahead of its first edit.
 
@@ -158,10 +163,11 @@ class Picture:
         if is_new_behind or not np.array_equal(self._gain, gain):
             self._gain = gain
             tiles.update(self._view.all_tiles)
-        fidelity = worst(live.word for _, live in images.terms())
+        exact = all(live.word == "exact" for _, live in images.terms())
+        fidelity = worst(word_in(Place(images, *of), images.region) for of in images.terms())
         complete = not any(live.is_blank for _, live in images.terms())
         in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
-        return Advance(in_order, fidelity == "exact", fidelity, complete)
+        return Advance(in_order, exact, fidelity, complete)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture."""

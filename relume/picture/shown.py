@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from relume.operators.edit_basis import EditBasis
 from relume.operators.operator import Operator
 from relume.picture.fidelity import Fidelity
 from relume.picture.light import Light
+from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -38,6 +39,8 @@ class Shown:
         basis: what the operator in use leaves free. coefficients: c of it in `image`. (3, columns) float64
         rounding: length of the errors to be expected in `image` of float32 sums, since it was shaded.
         anchor: the last image of which every coefficient was summed, where that was in another light.
+        exact_in: of what image, see `LiveTerm.key_of_image`, and in which region of the picture, it is the exact one.
+        detail: of a preview, how often it was made of more samples.
     """
 
     image: F32
@@ -48,6 +51,8 @@ class Shown:
     coefficients: F64 | None = None
     rounding: float = 0.0
     anchor: Shown | None = None
+    exact_in: tuple[Hashable, Tile] | None = None
+    detail: int = 0
 
     @property
     def is_firm(self) -> bool:

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+import numpy as np
+
 from relume.look import Look
 from relume.look.model import Rgb
 from relume.operators.edit_basis import CurveBasis, EditBasis
@@ -21,11 +23,12 @@ from relume.picture.fidelity import Fidelity
 from relume.picture.hand import Hand
 from relume.picture.jobs import Freeze, Job, Place, Shade, goes_on_from
 from relume.picture.light import Light, of_source, vector_of
+from relume.picture.region import is_exact_in, is_seen, region_first
 from relume.picture.routes import operator
 from relume.picture.routes.base import LightRoute
 from relume.picture.routes.follow import Follow
 from relume.picture.routes.mix import Mix
-from relume.picture.routes.preview import Preview, can_preview, helps_to_open, is_prepared
+from relume.picture.routes.preview import Preview, can_preview, helps_to_open, is_prepared, is_worth_finer
 from relume.picture.routes.recall import Recall
 from relume.picture.thinning import EXACT, ROUGH, Form, comes_roughly, form_for
 from relume.picture.view_images import ViewImages
@@ -157,17 +160,41 @@ class Transition:
         return _first_lacking(self._mix, unlit, self._images.light)
 
     def _lacking(self, hand: Hand) -> Job | None:
-        """One job for each term whose image is not what is wanted and follows no operator towards it; cheap ones first,
-        those of the touched material before all others."""
-        candidates = list(self._bases_lacking(hand))
+        """One job for each term whose image is not what is wanted and follows no operator towards it; those first of
+        which something is to be seen that is not exact; of them those of the touched material, and cheap ones."""
+        candidates, region = list(self._bases_lacking(hand)), self._images.region
         if not candidates:
             return None
-        place, basis = min(candidates, key=lambda item: _cost(item[0], item[1], hand))
+
+        def rank(item: tuple[Place, EditBasis | None]) -> tuple[int, ...]:
+            place, basis = item
+            return not is_seen(place, region) or is_exact_in(place, region), *_cost(place, basis, hand)
+
+        place, basis = min(candidates, key=rank)
         form = None if basis is None else self._form(place, basis)
         if basis is not None and form is not None:
             return self._freeze(place, basis, form)
         # where no operator fits, an image that shows older curves stands until the hand rests
-        return Shade.of(place, self._images.light, refines=place.live.is_firm or place.live.is_seen())
+        whole = Shade.of(place, self._images.light, refines=place.live.is_firm or place.live.is_seen())
+        return self._sooner(whole, [other for other, basis in candidates if basis is None]) or whole
+
+    def _sooner(self, whole: Shade, lacking: Sequence[Place]) -> Job | None:
+        """What is seen sooner than the whole image of a term, where many samples are to be shaded: what of it is in
+        sight, or all that is lacking in more detail. lacking: terms that are to be shaded, this one among them."""
+        part = region_first(whole, lacking, self._images.region)
+        of_place = whole.place
+        detail = of_place.live.ready.detail
+        if of_place.live.ready.fidelity != Fidelity.PREVIEW or of_place.live.ready.light != whole.light:
+            return part
+        dear = [place for place in lacking if _needs_angles(place) and place.live.ready.detail == detail]
+        if of_place not in dear:
+            return part
+        left = sum(place.material.num_samples for place in dear)
+        if part is not None:
+            left = sum(np.count_nonzero(p.material.lies_in(part.region)) for p in dear)
+        if not is_worth_finer(left, detail):
+            return part
+        return Preview.of(self._images, dear, "a preview").finer(detail + 1, refines=whole.refines)
 
     def _bases_lacking(self, hand: Hand) -> Iterator[tuple[Place, EditBasis | None]]:
         for place in self._places():
@@ -305,7 +332,11 @@ def _first_lacking(route: LightRoute, places: Iterable[Place], light: Light) -> 
 
 def _cost(place: Place, basis: EditBasis | None, hand: Hand) -> tuple[bool, bool, int]:
     """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
-    live, touched = place.live, hand.touched
-    is_flat = basis is None and not any(c.kinds.size for c in contract_levels(live.term, live.target, None))
+    touched = hand.touched
     is_other = touched is None or touched.place.material is not place.material
-    return is_other, not is_flat, place.material.num_samples
+    return is_other, basis is not None or _needs_angles(place), place.material.num_samples
+
+
+def _needs_angles(place: Place) -> bool:
+    """Whether any curve of a term is not flat."""
+    return any(c.kinds.size for c in contract_levels(place.live.term, place.live.target, None))

@@ -24,6 +24,7 @@ from relume.picture.mirrors import Mirrors
 from relume.picture.pointer import CurvePointer, ParameterPointer
 from relume.picture.transfer import Axis, Transfer
 from relume.project.receivers import Receivers
+from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -47,6 +48,7 @@ class ViewImages:
         default: the scene's own look. by_name: the materials in the scene's order.
         light: what arrives at them. default_light: what does under the scene's own look.
         gain: what multiplies the finished picture. mirrors: what they send on of it.
+        region: pixels that are seen of the picture: x, y, width, height; None: all.
     """
 
     def __init__(self, transfer: Transfer, view_name: str, cache: Memory) -> None:
@@ -60,6 +62,7 @@ class ViewImages:
         }
         self.gain = gain_of(self.default)
         self.mirrors = Mirrors(self.view)
+        self.region: Tile | None = None
 
     def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
         """All that this view sees anything of."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -147,9 +148,10 @@ def open_store(path: Path) -> Reader:
         file = path / name
         if not file.is_file() or file.stat().st_size != size:
             raise ChunkDamagedError(name, "missing or cut since it was published")
+    num_present = Counter(name.partition("/c/")[0] for name in sizes if "/c/" in name)
     for name in sizes:
         if name.endswith("/zarr.json"):
-            _check_array(path, name, sizes)
+            _check_array(path, name, num_present)
     return reader
 
 
@@ -164,13 +166,14 @@ def _manifest_sizes(path: Path) -> dict[str, int]:
     return sizes
 
 
-def _check_array(path: Path, document: str, sizes: Mapping[str, int]) -> None:
+def _check_array(path: Path, document: str, num_present: Mapping[str, int]) -> None:
+    """Raises ChunkDamagedError where an array has not all its shards. num_present: shards by the path of an array."""
     metadata = read_json(path / document)
     if metadata.get("node_type") == "group":
         return
     array_path = document.removesuffix("/zarr.json")
     spec = spec_from_metadata(check_path(array_path), metadata)
-    present = sum(name.startswith(f"{array_path}/c/") for name in sizes)
+    present = num_present.get(array_path, 0)
     if present != num_shards(spec):
         raise ChunkDamagedError(array_path, f"{present} shards of {num_shards(spec)}")
 

@@ -98,6 +98,12 @@ class View:
         """Find the samples of a material."""
         return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
 
+    def lies_in(self, material: int, region: Tile) -> NDArray[np.bool_]:
+        """Find which of a material's samples are seen in pixels of a region: x, y, width, height. (n,)"""
+        row, column = np.divmod(self.pixel[self.rows(material)].astype(np.int64), self.width)
+        x, y, width, height = region
+        return (column >= x) & (column < x + width) & (row >= y) & (row < y + height)
+
     def levels(self, material: int) -> Levels:
         """Find how rough a material's samples are."""
         return Levels(self.ratios[material], self.level[self.rows(material)])
@@ -161,16 +167,22 @@ class View:
             is_lit: whether light comes from the environment itself; else no bits are read.
         """
         rows = self.rows(material)
-        if is_lit:
-            visible = self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
-        else:
-            visible = np.empty((rows.stop - rows.start, 0), np.uint8)
+        visible = self._visible(material) if is_lit else np.empty((rows.stop - rows.start, 0), np.uint8)
         points = self.points(material)
         gathered = () if reflected is None else (self.gather_rays(material, reflected),)
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
         level = self.level[rows] if self.ratios[material] else None
         wo = towards(self.eyes(rows), points.position)
         return Receivers(points, wo, visible, (*gathered, *local), uv, level)
+
+    def _visible(self, material: int) -> NDArray[np.uint8]:
+        """Read the bits of a material's samples, kept for a while: unpacking them takes longer than many a use."""
+        rows = self.rows(material)
+
+        def read() -> NDArray[np.uint8]:
+            return self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
+
+        return self.memory.passing.keep((self.key, "visibility", self.name, material), read)
 
     def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
         """Read from the store the rays of a material's samples that bring what gather cells send."""

@@ -98,6 +98,7 @@ MESSAGES: Mapping[str, Role] = {
     "view": VIEW,
     "views": VIEW,
     "focus": VIEW,
+    "region": VIEW,
     "eye": VIEW,
     "evaluate": VIEW,
     "stream": VIEW,

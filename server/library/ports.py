@@ -32,7 +32,10 @@ class Advance(Protocol):
     @property
     def exact(self) -> bool: ...
     @property
-    def fidelity(self) -> Word: ...
+    def fidelity(self) -> Word:
+        """How near what is seen of it is to its look."""
+        ...
+
     @property
     def complete(self) -> bool:
         """Whether something of every term is shown."""
@@ -61,6 +64,14 @@ class Picture(Protocol):
     def image(self) -> F32: ...
     def probe(self, x: int, y: int) -> Mapping[str, Any]: ...
     def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
+
+
+class FixedPicture(Picture, Protocol):
+    """One from where it was baked."""
+
+    def look_at(self, region: Tile | None) -> None:
+        """What is seen of it, and is to be exact first."""
+        ...
 
 
 class MovingPicture(Picture, Protocol):

@@ -81,6 +81,8 @@ class Reception:
                 self._show(message.names, None)
             case protocol.FocusMessage():
                 self._shown.work_in(message.view)
+            case protocol.RegionMessage():
+                self._look_at(message)
             case protocol.StreamMessage():
                 self._pending.form, self._pending.quality = message.format, message.quality
             case protocol.ProbeMessage():
@@ -137,6 +139,19 @@ class Reception:
             self._pending.eyes[message.view] = Eye(
                 message.eye, camera, message.size, received_s, message.rest == "exact"
             )
+
+    def _look_at(self, message: protocol.RegionMessage) -> None:
+        """Take note of what is on the screen of a view."""
+        self._check_view(message.view)
+        if self._transfer.eyes is Eyes.FREE:
+            raise ParameterError("view", message.view, "a view whose eye is baked")
+        if message.rect is None:
+            self._pending.regions.pop(message.view, None)
+            return
+        (x, y, _, _), view = message.rect, self._transfer.views[message.view]
+        if not (x < view.width and y < view.height):
+            raise ParameterError("rect", list(message.rect), f"some of the picture's {view.width}×{view.height} pixels")
+        self._pending.regions[message.view] = message.rect
 
     def _check_view(self, name: str) -> None:
         if name not in self._transfer.views:

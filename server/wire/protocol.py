@@ -34,6 +34,7 @@ SURFACE_LAYOUT = 3
 Sources = Annotated[list[Name], Field(min_length=1, max_length=MAX_LIGHTS + 1)]
 Degrees = Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)]
 Pixel = Annotated[int, Field(ge=0, le=65535)]
+Extent = Annotated[int, Field(ge=1, le=65535)]
 Coordinate = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
 
 
@@ -82,6 +83,16 @@ class FocusMessage(Message):
 
     type: Literal["focus"]
     view: Name
+
+
+class RegionMessage(Message):
+    """client → server: of a view whose eye is "baked" this region is on the screen: x, y, width, height in pixels of
+    its picture. It is exact before the rest, frames of what is on its way bring its tiles alone, and `fidelity` is that
+    of what is in it. null: all of the picture, as it is before anything is said."""
+
+    type: Literal["region"]
+    view: Name
+    rect: tuple[Pixel, Pixel, Extent, Extent] | None
 
 
 class AckMessage(Message):
@@ -165,6 +176,7 @@ ClientMessage = Annotated[
     | ViewMessage
     | ViewsMessage
     | FocusMessage
+    | RegionMessage
     | AckMessage
     | StreamMessage
     | ProbeMessage

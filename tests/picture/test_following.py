@@ -8,7 +8,7 @@ from oracle import exact_image
 from sessions import BUDGET, bake_corner, look_of, make_next, relative_rmse, settle
 
 from relume.memory import Memory
-from relume.operators.shade import shade
+from relume.operators.shade import Begun
 from relume.picture.jobs import Shade
 from relume.picture.picture import Picture
 from relume.picture.routes.follow import FreezeRows
@@ -246,12 +246,13 @@ def test_only_the_part_of_light_that_an_edit_changes_is_shaded(gathered, monkeyp
         settle(picture)
         return {(lights.num_lights > 0, *(type(r).__name__ for r in receivers.rays)) for lights, receivers in calls}
 
-    def recorded(term, bands, lights, receivers, progress, cancelled):
-        calls.append((lights, receivers))
-        return shade(term, bands, lights, receivers, progress, cancelled)
+    class Recorded(Begun):
+        def shade(self, term, bands, lights, receivers, *watched):
+            calls.append((lights, receivers))
+            super().shade(term, bands, lights, receivers, *watched)
 
     calls = []
-    monkeypatch.setattr("relume.picture.jobs.shade", recorded)
+    monkeypatch.setattr("relume.picture.jobs.Begun", Recorded)
     picture = Picture(gathered, "front", Memory(BUDGET))
     environment, local, reflected = (True,), (False, "LocalRays"), (False, "GatherRays")
     assert shaded(shown()) == {environment, local, reflected}

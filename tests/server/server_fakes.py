@@ -118,6 +118,7 @@ class FakeJob:
     key: str
     state: str = "freezing"
     refines: bool = False
+    goes_on: bool = False
 
     @property
     def what(self) -> str:
@@ -166,6 +167,9 @@ class FakePicture:
         self.control.hands.append(hand)
         self.control.solos.append(solo)
 
+    def look_at(self, region: tuple[int, int, int, int] | None) -> None:
+        self.control.regions.append(region)
+
     def check(self, look: Any) -> None:
         if self.view.name in self.control.short_of_memory and ior_of(look) != self.ior:
             raise MemoryBudgetError("the curve", 2, 1, "close it")
@@ -196,7 +200,7 @@ class FakePicture:
         self.spent = min(NUM_COEFFICIENTS, self.spent + budget)
         target = colour_and_sigma(self.look) + (self.ior - 1.5)
         self.pixels += (target - self.pixels) * np.float32(self.spent / NUM_COEFFICIENTS)
-        return advance_of(self.all_tiles()[:1], exact and self.spent == NUM_COEFFICIENTS)
+        return advance_of(self.all_tiles()[: self.control.tiles_a_step], exact and self.spent == NUM_COEFFICIENTS)
 
     def all_tiles(self) -> list[tuple[int, int, int, int]]:
         width, height = self.view.width, self.view.height
@@ -245,6 +249,8 @@ class Control:
     max_step: int = NUM_COEFFICIENTS
     refines: bool = False
     num_looks: int = 0
+    tiles_a_step: int = 1
+    regions: list[tuple[int, int, int, int] | None] = field(default_factory=list)
     hands: list[str | None] = field(default_factory=list)
     solos: list[frozenset[str] | None] = field(default_factory=list)
     num_cancelled: int = 0

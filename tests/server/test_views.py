@@ -155,3 +155,25 @@ def test_views_that_cannot_be_shown_are_refused(client: TestClient, baked: Baked
         assert session.text("problem")["problem"]["status"] in (400, 422)
         session.edit(1, SIGMA, 0.3)
         assert session.exact(1).header["view"] == "front"
+
+
+def test_what_is_on_the_screen_comes_first_and_the_rest_when_the_hand_rests(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    control.tiles_a_step = 100
+    with open_session(client, baked.bake) as session:
+        header = session.exact(0).header
+        width, height = header["width"], header["height"]
+        session.send(type="region", view="front", rect=[0, 0, 3, 2])
+        session.edit(1, SIGMA, 0.5)
+        first, rest = session.frame().header, session.exact(1).header
+        assert (first["revision"], first["tiles"][0][:2], first["exact"]) == (1, [0, 0], False)
+        assert control.regions == [(0, 0, 3, 2)]
+        whole = {(x, y) for x, y, _, _ in [*first["tiles"], *rest["tiles"]]}
+        assert len(first["tiles"]) == 1 < len(whole) == len(rest["tiles"]) + 1
+        session.send(type="region", view="front", rect=None)
+        session.edit(2, SIGMA, 0.6)
+        assert len(session.exact(2).header["tiles"]) == len(whole)
+        for rect in ([width, 0, 1, 1], [0, height, 9, 9]):
+            session.send(type="region", view="front", rect=rect)
+            assert "some of the picture's" in session.text("problem")["problem"]["detail"]

@@ -246,15 +246,15 @@ def test_nothing_is_overwritten(data: Path, ledger_url: str, shelf: Shelf, tmp_p
 
 
 @pytest.mark.parametrize("ledger_url", ["sqlite"], indirect=True)
-@pytest.mark.parametrize("path", ["../out", "/etc/out", "scenes/../../out", "a//b", "", "a\0b"])
 def test_a_snapshot_that_names_places_outside_is_refused(
-    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path, path: str
+    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path
 ) -> None:
     name = take(data, ledger_url, shelf)
     file = shelf.folder / "snapshots" / f"{name}.json"
     document = json.loads(file.read_text())
-    document["files"][0]["path"] = path
-    file.write_text(json.dumps(document))
-    with pytest.raises(BackupError, match="not a snapshot of relume"):
-        restore(shelf, None, tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'new.db'}")
-    assert not (tmp_path / "elsewhere").exists()
+    for path in ("../out", "/etc/out", "scenes/../../out", "a//b", "", "a\0b"):
+        document["files"][0]["path"] = path
+        file.write_text(json.dumps(document))
+        with pytest.raises(BackupError, match="not a snapshot of relume"):
+            restore(shelf, None, tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'new.db'}")
+        assert not (tmp_path / "elsewhere").exists(), path

@@ -28,6 +28,8 @@ export class BakeConnection {
   arrivals = new Arrivals();
   /** The views that the server was asked to show, as text. */
   toldViews: string | null = null;
+  /** The part of each view that the server was told is on the screen, as text. */
+  toldRegions = new Map<string, string>();
   /** The server was told that this browser draws moving views. */
   toldEvaluator = false;
 
@@ -43,6 +45,7 @@ export class BakeConnection {
     this.hello = hello;
     this.arrivals = new Arrivals();
     this.toldViews = null;
+    this.toldRegions.clear();
     this.toldEvaluator = false;
   }
 }

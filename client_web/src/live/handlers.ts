@@ -22,6 +22,7 @@ import { connections, type BakeConnection } from "./connections";
 import { take } from "./drawing";
 import { answered } from "./probing";
 import { showBake } from "./swap";
+import { tellRegions } from "./tellRegions";
 import { shownOf, tellEyes, tellViews } from "./tellViews";
 import { comeIn, followShared } from "./together";
 import { want } from "./want";
@@ -55,6 +56,7 @@ function welcome(of: BakeConnection, hello: HelloMessage): void {
   if (!comeIn(of, hello)) want(of, takeUp(hello.look as unknown as Look), performance.now());
   tellViews(of, shownOf(hello), focusedView.peek());
   tellEyes(of, hello);
+  tellRegions(of);
   if (of === connections.shown) {
     freezing.value = null;
     showBake(of);

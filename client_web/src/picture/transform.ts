@@ -45,6 +45,21 @@ export function toScreen(transform: Transform, canvas: Canvas, u: number, v: num
   return [canvas.width / 2 + (u - cu) * width, canvas.height / 2 + ((v - cv) * width) / canvas.aspect];
 }
 
+/** The pixels of a picture that are on the canvas: x, y, width, height; null where that is all of them, or none. */
+export function regionOf(
+  transform: Transform,
+  canvas: Canvas,
+  width: number,
+  height: number,
+): [x: number, y: number, width: number, height: number] | null {
+  const [left, top] = toPicture(transform, canvas, 0, 0);
+  const [right, bottom] = toPicture(transform, canvas, canvas.width, canvas.height);
+  const [x, y] = [Math.max(0, Math.floor(left * width)), Math.max(0, Math.floor(top * height))];
+  const [across, down] = [Math.min(width, Math.ceil(right * width)) - x, Math.min(height, Math.ceil(bottom * height)) - y];
+  const isAll = across === width && down === height;
+  return isAll || across < 1 || down < 1 ? null : [x, y, across, down];
+}
+
 /** Zoom by `factor`, keeping what is under (x, y) where it is. */
 export function zoomAt(transform: Transform, canvas: Canvas, factor: number, x: number, y: number): Transform {
   const before = shownWidth(transform, canvas);

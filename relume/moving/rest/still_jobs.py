@@ -102,6 +102,7 @@ class SparseJob:
     what = "a first exact look from here"
     state: ClassVar[Literal["shading"]] = "shading"
     refines = True
+    goes_on = False
 
     @staticmethod
     def is_worth(wanted: ExactView) -> bool:
@@ -154,6 +155,7 @@ class StillJob:
     what = "the exact picture from here"
     state: ClassVar[Literal["shading"]] = "shading"
     refines = True
+    goes_on = False
 
     def make(self, progress: Progress, cancelled: Cancelled) -> Picture | NotMadeError:
         """Trace and shade it, or why not. Raises CancelledError where `cancelled`, asked now and then, said so."""

@@ -30,6 +30,7 @@ class LightJob:
     what = "light on the points"
     state: ClassVar[Literal["shading"]] = "shading"
     refines = True
+    goes_on = False
 
     @property
     def key(self) -> tuple[Hashable, ...]:
@@ -71,6 +72,7 @@ class FollowJob:
     what = "light between surfaces"
     state: ClassVar[Literal["following"]] = "following"
     refines = False
+    goes_on = False
 
     @property
     def key(self) -> tuple[Hashable, ...]:

@@ -46,7 +46,7 @@ class FreezeRows:
     num_bytes: int
 
     state: Literal["freezing", "shading"] = "freezing"
-    refines = False
+    refines = goes_on = False
 
     def make(self, progress: Progress, cancelled: Cancelled) -> IndirectOperator:
         """See `Job`."""

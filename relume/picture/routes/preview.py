@@ -3,7 +3,8 @@
 When the environment is turned or exchanged, or surfaces reflect other light onto each other, every image of a picture
 counts for nothing at once, and shading all samples takes seconds; so it does where a view is opened for the first time.
 A preview costs a few thousand samples whatever the picture's size, holds no operator, and lets the hand see where the
-light goes; colours and textures multiply it at full size. It is never called exact: at rest all is shaded.
+light goes; colours and textures multiply it at full size. It is never called exact: at rest all is shaded. Where that
+takes long, as of a large picture, finer previews come before, each of eight times as many samples.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from relume.operators.shade import Shaded, shade
 from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Cancelled, Place, Progress
 from relume.picture.light import Light
+from relume.picture.region import with_rows
+from relume.picture.shown import Shown
 from relume.picture.transfer import Few, Transfer
 from relume.picture.view_images import ViewImages
 from relume.views.squares import nearest, one_of_each_square
@@ -31,6 +34,8 @@ F32 = NDArray[np.float32]
 
 _MOST_SHADED = 6000  # samples of a view, about
 _FEW_TO_SHADE = 8 * _MOST_SHADED  # samples of terms of a view; they take about as long as choosing some of them
+_FINER = 8  # times as many samples
+_LONG = 16  # times as many as a finer preview shades; where fewer are left, all are shaded
 _NUM_NEIGHBOURS = 3
 _SOFT = 0.5  # pixels²; a sample's own neighbours share it where they are as near as this
 
@@ -53,33 +58,40 @@ class Sparse:
         return int(self.few.num_bytes + weights.data.nbytes + weights.indices.nbytes + weights.indptr.nbytes)
 
 
-def choose_sparse(transfer: Transfer, view: View, material: int) -> Sparse:
+def choose_sparse(transfer: Transfer, view: View, material: int, detail: int = 0) -> Sparse:
     """One sample of each square of pixels that a material is seen in; reads the store.
 
     Those between take the mean of the nearest, by place in the picture and by normal.
 
     Args:
         transfer: an opened bake. view: one of its views. material: index of the material.
+        detail: how often the samples are made more.
     """
-    step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _MOST_SHADED))))
+    step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _num_shaded(detail)))))
     chosen = one_of_each_square(view, material, step)
     near, weight = nearest(view, material, chosen, step, _NUM_NEIGHBOURS, _SOFT)
     first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(chosen))
     weights = csr_array((weight.ravel(), near.ravel(), first), shape=shape)
+    weights.eliminate_zeros()
     return Sparse(transfer.some(view, material, chosen), weights)
 
 
-def _sparse(images: ViewImages, material: int) -> Sparse:
-    """Of a material of a view, kept in the cache with the operators."""
+def _num_shaded(detail: int) -> int:
+    return _MOST_SHADED * int(_FINER**detail)
+
+
+def _sparse(images: ViewImages, material: int, detail: int) -> Sparse:
+    """Of a material of a view, kept in the cache with the operators; of finer previews for a while."""
 
     def choose() -> Sparse:
-        return choose_sparse(images.transfer, images.view, material)
+        return choose_sparse(images.transfer, images.view, material, detail)
 
-    return images.cache.get(_key(images, material), Sparse, _bytes_of(images, material), choose)
+    cache = images.cache.passing if detail else images.cache
+    return cache.get(_key(images, material, detail), Sparse, _bytes_of(images, material), choose)
 
 
-def _key(images: ViewImages, material: int) -> tuple[Hashable, ...]:
-    return images.transfer.key, images.view.name, material, "sparse"
+def _key(images: ViewImages, material: int, detail: int = 0) -> tuple[Hashable, ...]:
+    return images.transfer.key, images.view.name, material, "sparse", detail
 
 
 def _bytes_of(images: ViewImages, material: int) -> int:
@@ -97,6 +109,11 @@ def helps_to_open(images: ViewImages) -> bool:
     """Whether a picture that shows nothing yet is seen much sooner so than by making the images that it lacks."""
     lacking = sum(m.num_samples for m, image in images.terms() if not images.is_at_hand(m, image))
     return lacking > _FEW_TO_SHADE and can_preview(images)
+
+
+def is_worth_finer(num_samples: int, detail: int) -> bool:
+    """Whether shading so many samples takes so long that a preview of one more detail than this is worth its while."""
+    return num_samples > _LONG * _num_shaded(detail + 1)
 
 
 def is_prepared(images: ViewImages) -> bool:
@@ -120,6 +137,7 @@ class Preview:
 
     Attributes:
         gain: what multiplies the finished picture in that light.
+        detail: how often it is made finer.
     """
 
     key: tuple[Hashable, ...]
@@ -128,9 +146,11 @@ class Preview:
     gain: Rgb
     parts: Sequence[_Part]
     what: str = "the light"
+    detail: int = 0
+    refines: bool = False
 
     state: Literal["freezing", "shading"] = "shading"
-    refines = False
+    goes_on = False
 
     @classmethod
     def of(cls, images: ViewImages, places: Iterable[Place], what: str) -> Preview:
@@ -139,11 +159,15 @@ class Preview:
         key = images.transfer.key, images.view.name, images.light
         return cls(key, images, images.light, images.gain, parts, what)
 
+    def finer(self, detail: int, *, refines: bool) -> Preview:
+        """The same of more samples. refines: it can wait for hands."""
+        return replace(self, key=(*self.key, detail), detail=detail, refines=refines)
+
     def make(self, progress: Progress, cancelled: Cancelled) -> list[F32]:
         """See `Job`. Returns images of all parts, (tiles, 3, samples) float32 each."""
         found = []
         for k, part in enumerate(self.parts):
-            sparse = _sparse(self.images, part.place.material.index)
+            sparse = _sparse(self.images, part.place.material.index, self.detail)
             shaded = shade(part.term, part.bands, *sparse.few.arriving(self.light), lambda share: None, cancelled)
             found.append(_spread(shaded, sparse.weights))
             progress((k + 1) / len(self.parts))
@@ -155,8 +179,17 @@ class Preview:
             live = part.place.live
             is_followed = live.ready.fidelity == Fidelity.FOLLOWED and live.ready.light == live.light
             if not (live.is_firm or is_followed) and part.place.is_there():
-                rough = replace(live.ready, image=image, fidelity=Fidelity.PREVIEW, bands=part.bands, light=self.light)
-                live.put(rough)
+                live.put(self._over(part, image))
+
+    def _over(self, part: _Part, image: F32) -> Shown:
+        """The image in the place of what is ready; a part of that which is exact already stays."""
+        ready, material = part.place.live.ready, part.place.material
+        rough = replace(ready, image=image, fidelity=Fidelity.PREVIEW, bands=part.bands, light=self.light)
+        if ready.exact_in is None or ready.light != self.light:
+            return replace(rough, exact_in=None, detail=self.detail)
+        which = material.lies_in(ready.exact_in[1])
+        kept = with_rows(image, Shaded(ready.image).rows(len(which)), which)
+        return replace(rough, image=kept, detail=self.detail)
 
 
 def _spread(shaded: Shaded, weights: Any) -> F32:

@@ -114,7 +114,8 @@ class FrameLoop:
     def _due_s(self, viewport: Viewport) -> float:
         """When a view is to be painted: at once with a new look, refined when the hand rests."""
         pending = self._pending
-        if viewport.is_behind(pending.target) or viewport.has_to_move(pending) or viewport.has_other_evaluator(pending):
+        is_asked = viewport.has_to_move(pending) or viewport.has_other_evaluator(pending)
+        if viewport.is_behind(pending.target) or is_asked or viewport.has_other_region(pending):
             return 0.0
         return float("inf") if viewport.is_settled else max(self._rest_until_s, viewport.not_before_s)
 
@@ -207,6 +208,14 @@ class FrameLoop:
                 self._freezer.start(viewport, viewport.job)
                 return
 
+    def _make_way(self, viewport: Viewport) -> None:
+        """Something else of a view is seen: what is made of the rest of it goes on later from where it was."""
+        running = self._freezer.running
+        if running is None or running[0] is not viewport or not running[1].goes_on:
+            return
+        if viewport.job is not None and viewport.job.key != running[1].key:
+            self._freezer.cancel()
+
     def _is_stale(self, viewport: Viewport, job: Job) -> bool:
         """Whether the user has moved on; an image of an older look is still worth showing where there is none."""
         if viewport not in self._viewports.values():
@@ -253,6 +262,8 @@ class FrameLoop:
             self._rest_until_s = time.perf_counter() + REST_S
             self._settle_at_s = time.perf_counter() + SETTLE_S
         viewport.painted(request, painted, self._pending)
+        if request.is_turned:
+            self._make_way(viewport)
         if painted.message is not None:
             await self._hand_over(viewport, painted.message, "picture", request.form, told=(request, painted))
         await self._answers.send_curve(target)

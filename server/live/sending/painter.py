@@ -17,7 +17,7 @@ from relume.imageio.files import to_bytes
 from relume.imageio.shrink import shrink
 from relume.imageio.tonemap import tone_map
 from relume.look.model import DisplayLook
-from server.library.ports import Advance, MovingPicture, Picture, Tile
+from server.library.ports import Advance, FixedPicture, MovingPicture, Picture, Tile
 from server.live.state.target import Eye, Target
 from server.wire.protocol import ArrayInfo, FrameHeader, FrameTimes, TablesInfo
 
@@ -37,7 +37,10 @@ class FrameRequest:
         target: the look that the frame will show.
         accepting: pictures that have not got that look yet; all take it, or none.
         lacking: tiles that the client has not got in HDR, besides those that this step changes.
-        only_exact: send nothing unless the step makes the picture exact.
+        only_exact: send nothing unless the step makes the picture exact, or first what is seen of it.
+        region: what is on the client's screen of it; None: all. is_turned: it has not been told to the picture.
+        is_moving: a hand waits for it: tiles out of sight come when it rests.
+        is_seen_exact: the client knows that what it sees is exact.
         is_due: there is something to send even where this step changes nothing.
         is_told: the client knows that what it has is exact.
         size: of the picture. jpeg_size: of a JPEG of it, no larger.
@@ -54,6 +57,10 @@ class FrameRequest:
     form: Format
     quality: int
     only_exact: bool
+    region: Tile | None
+    is_turned: bool
+    is_moving: bool
+    is_seen_exact: bool
     is_due: bool
     is_told: bool
     received_s: float | None
@@ -76,6 +83,7 @@ class Painted:
         message: the packed frame, or None where none is to be sent.
         started_s: when the thread began, seconds of `time.perf_counter`.
         known: keys of the parts that the client's shader has when it has got the message.
+        held_back: tiles that it lacks then.
     """
 
     job: Job | None
@@ -85,6 +93,12 @@ class Painted:
     started_s: float
     encode_ms: float = 0.0
     known: Mapping[str, Hashable] | None = None
+    held_back: frozenset[Tile] = frozenset()
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether all that the client has is exact when it has got the message."""
+        return self.advance.exact and not self.held_back
 
 
 def accept(pictures: Iterable[Picture], target: Target) -> None:
@@ -117,6 +131,8 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     if request.eye is not None:
         eye = request.eye
         cast("MovingPicture", picture).set_eye(eye.camera, eye.size, rests=eye.rests)
+    if request.is_turned:
+        cast("FixedPicture", picture).look_at(request.region)
     advance = picture.advance(request.max_coefficients)
     job = picture.next_job()
     updated_s = time.perf_counter()
@@ -124,14 +140,34 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     if request.known is not None and (found := cast("MovingPicture", picture).parts()) is not None:
         return _tables(request, advance, job, found, start_s)
     has_news = bool(advance.tiles) or request.is_due
-    is_sent = (has_news or not request.is_told) if advance.exact else (has_news and not request.only_exact)
+    is_held = request.only_exact and (advance.fidelity != "exact" or request.is_seen_exact)
+    is_sent = (has_news or not request.is_told) if advance.exact else (has_news and not is_held)
     if not is_sent:
         return Painted(job, advance, None, update_ms, start_s)
-    tiles, payload, alpha = _payload(picture, request, advance.tiles)
+    lacking = request.lacking.union(advance.tiles)
+    held_back = _out_of_sight(lacking, request, advance)
+    tiles, payload, alpha = _payload(picture, request, lacking - held_back)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    of_picture = {"tiles": tiles, "format": request.form, "kind": "picture", "alpha": alpha is not None}
+    of_picture = {
+        "tiles": tiles, "format": request.form, "kind": "picture", "alpha": alpha is not None,
+        "exact": advance.exact and not held_back,
+    }  # fmt: skip
     header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_picture)
-    return Painted(job, advance, pack(header, payload + (alpha or b"")), update_ms, start_s, encode_ms)
+    message = pack(header, payload + (alpha or b""))
+    return Painted(job, advance, message, update_ms, start_s, encode_ms, held_back=held_back)
+
+
+def _out_of_sight(lacking: frozenset[Tile], request: FrameRequest, advance: Advance) -> frozenset[Tile]:
+    """Tiles that a frame can do without: those that a step has changed, of a picture that is on its way."""
+    is_on_its_way = request.is_moving or (bool(advance.tiles) and not advance.exact)
+    if request.region is None or request.form == "jpeg" or not is_on_its_way:
+        return frozenset()
+    left, top, across, down = request.region
+    return frozenset(
+        (x, y, width, height)
+        for x, y, width, height in lacking
+        if x + width <= left or left + across <= x or y + height <= top or top + down <= y
+    )
 
 
 def _waited_ms(request: FrameRequest, start_s: float) -> float:
@@ -147,7 +183,6 @@ def _header(request: FrameRequest, advance: Advance, ms: FrameTimes, rest: Mappi
         view=request.view,
         width=request.size[0],
         height=request.size[1],
-        exact=advance.exact,
         fidelity=advance.fidelity,
         complete=advance.complete,
         eye=request.shown_eye,
@@ -174,20 +209,20 @@ def _tables(
     tables = TablesInfo(**numbers._asdict(), arrays=infos)
     payload = b"".join(array.tobytes() for array in arrays.values())
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    of_tables = {"tiles": [], "format": "arrays", "kind": "tables", "tables": tables}
+    of_tables = {"tiles": [], "format": "arrays", "kind": "tables", "tables": tables, "exact": advance.exact}
     header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_tables)
     now_known = {**known, **{name: part.key for name, part in parts.items()}}
     return Painted(job, advance, pack(header, payload), update_ms, start_s, encode_ms, now_known)
 
 
 def _payload(
-    picture: Picture, request: FrameRequest, changed: Sequence[Tile]
+    picture: Picture, request: FrameRequest, wanted: frozenset[Tile]
 ) -> tuple[list[Tile], bytes, bytes | None]:
     """The tiles of a frame, their pixels, and their coverage where they are not opaque."""
     if request.form == "jpeg":
         shown = jpeg_of(picture, request.target.look.display, request.jpeg_size, request.quality)
         return [(0, 0, *request.size)], shown, None
-    tiles = sorted(request.lacking.union(changed), key=lambda tile: (tile[1], tile[0]))
+    tiles = sorted(wanted, key=lambda tile: (tile[1], tile[0]))
     return tiles, picture.encode(tiles, "rgb9e5"), picture.encode_alpha(tiles)
 
 

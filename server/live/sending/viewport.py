@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
-from server.library.ports import Advance, MovingPicture, Picture
+from server.library.ports import Advance, MovingPicture, Picture, Tile
 from server.live.sending.coefficient_budget import CoefficientBudget
 from server.live.sending.painter import Format, FrameRequest, Painted
 from server.live.sending.tables import Tables
@@ -63,6 +63,8 @@ class Viewport:
         self._is_blank = not moves  # nothing of it has been shaded: a frame would be black
         self._has_unsent = self._is_link_slow = False
         self._answered: Target | None = None
+        self._seen_exact: Target | None = None
+        self._region: Tile | None = None
         self._moving_bytes = 0
         self._sent_s = 0.0
         self._budget = CoefficientBudget()
@@ -74,6 +76,10 @@ class Viewport:
     def has_other_evaluator(self, pending: PendingRequests) -> bool:
         """Whether its pixels are to be found elsewhere than they were."""
         return self._moves and pending.evaluator != self._evaluator
+
+    def has_other_region(self, pending: PendingRequests) -> bool:
+        """Whether something else of it is on the client's screen than was."""
+        return not self._moves and pending.regions.get(self.name) != self._region
 
     def is_behind(self, newest: Target) -> bool:
         """Whether it has not been painted with this look."""
@@ -123,6 +129,10 @@ class Viewport:
             form=form,
             quality=pending.quality,
             only_exact=self._is_blank or (not is_new and is_early),
+            region=None if self._moves else pending.regions.get(self.name),
+            is_turned=self.has_other_region(pending),
+            is_moving=is_moving,
+            is_seen_exact=self._seen_exact is newest,
             is_due=self._has_unsent or (self._has_other_display(newest) if is_new else self._is_owed(pending)),
             is_told=self.is_exact and is_answered,
             received_s=None if is_answered and not has_moved else received_s,
@@ -153,7 +163,9 @@ class Viewport:
 
     def painted(self, request: FrameRequest, painted: Painted, pending: PendingRequests) -> None:
         """Remember what the client has when `painted` is sent."""
-        tiles, exact = painted.advance.tiles, painted.advance.exact
+        tiles, exact = painted.advance.tiles, painted.is_exact
+        if request.is_turned:
+            self._region, self._seen_exact = request.region, None
         if request.eye is not None:
             self.eye, self.size = request.eye, request.size
             self._lacking, self._all_tiles = frozenset(), frozenset(self.picture.all_tiles())
@@ -169,8 +181,9 @@ class Viewport:
             self._has_unsent = self._has_unsent or bool(tiles)
             self._wait(is_done, pending)
             return
-        self._lacking = self._all_tiles if request.form == "jpeg" else frozenset()
+        self._lacking = self._all_tiles if request.form == "jpeg" else painted.held_back
         self._has_unsent, self._answered, self.is_exact = False, request.target, exact
+        self._seen_exact = request.target if painted.advance.fidelity == "exact" else None
         self._is_blank = self._is_blank and not exact
         self.is_settled = is_done and not self._is_owed(pending)
         self.not_before_s = 0.0

@@ -18,12 +18,14 @@ class PendingRequests:
         target: the newest look; it stays, each view is painted with it once.
         space: width and height that the client has for the view that it shows alone; None: as much as it is large.
         eyes: newest eye of each view that has been given one; it stays.
+        regions: what is on the client's screen of each view, where it has said so: x, y, width, height in pixels.
         evaluator: who finds the pixels of views whose eye moves.
         touch, hold: pointers of a curve that was opened, of a parameter whose slider is in hand.
     """
 
     target: Target
     eyes: dict[str, Eye] = field(default_factory=dict)
+    regions: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
     touch: str | None = None
     hold: str | None = None
     probe: ProbeMessage | None = None

@@ -1,0 +1,112 @@
+"""What is seen of a picture is exact first; what was made of the rest is kept, and the whole is what it ever was."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import numpy as np
+import pytest
+import twins
+from sessions import BUDGET, look_of, make_next, settle
+
+from relume.errors import CancelledError
+from relume.memory import Memory
+from relume.operators.shade import shaded_rows
+from relume.picture.jobs import Shade
+from relume.picture.picture import Picture
+from relume.picture.region import ShadeRegion
+from relume.picture.routes.preview import Preview
+
+REGION = (4, 6, 16, 12)
+
+
+@pytest.fixture(autouse=True)
+def large(monkeypatch):
+    """Small pictures are treated as large ones are; steps are as small as what is seen of them."""
+    for name, value in {
+        "region._WORTH": 0,
+        "routes.preview._FEW_TO_SHADE": 0,
+        "routes.preview._MOST_SHADED": 40,
+    }.items():
+        monkeypatch.setattr(f"relume.picture.{name}", value)
+    monkeypatch.setattr("relume.operators.shade._FEWEST_A_STEP", 16)
+
+
+def seen(image):
+    x, y, width, height = REGION
+    return image[y : y + height, x : x + width]
+
+
+TURNS = count(1)
+
+
+def opened(transfer, region=REGION):
+    """A picture of a look of which no image is kept, its first preview shown."""
+    picture = Picture(transfer, "front", Memory(BUDGET), is_watched=True)
+    degrees = float(next(TURNS))
+    picture.set_look(look_of(transfer, lambda document: document["environment"].update(rotation=degrees)))
+    picture.look_at(region)
+    picture.advance(None)
+    assert isinstance(make_next(picture), Preview)
+    return picture
+
+
+def until_seen(picture):
+    """Make what is wanted until what is seen is exact; what was made."""
+    made = []
+    while picture.advance(None).fidelity != "exact":
+        made.append(make_next(picture))
+    return made
+
+
+@pytest.mark.parametrize("method", ["transfer", "gathered"])
+def test_what_is_seen_is_exact_before_the_rest(request, method):
+    transfer = request.getfixturevalue(method)
+    picture = opened(transfer)
+    made = until_seen(picture)
+    assert any(isinstance(job, ShadeRegion) for job in made)
+    assert not picture.advance(None).exact
+    early = picture.image()
+    whole = settle(picture).image()
+    np.testing.assert_array_equal(seen(early), seen(whole))
+    assert np.abs(early - whole).max() > 1e-3
+    np.testing.assert_allclose(whole, twins.full_evaluation(transfer, "front", picture._look), rtol=1e-3, atol=1e-5)
+
+
+def test_somewhere_else_is_exact_when_that_is_looked_at(transfer):
+    picture = opened(transfer)
+    until_seen(picture)
+    picture.look_at((5, 7, 4, 4))
+    assert picture.advance(None).fidelity == "exact"
+    picture.look_at((20, 10, 16, 12))
+    assert picture.advance(None).fidelity != "exact"
+    picture.look_at(None)
+    assert picture.advance(None).fidelity == "preview"
+
+
+def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
+    picture = opened(transfer, None)
+    while isinstance(job := picture.next_job(), Preview) or job.place.material.num_samples < 100:
+        make_next(picture)
+    shaded, asked = [], []
+    monkeypatch.setattr("relume.operators.shade.shaded_rows", lambda *of: shaded.append(of[4:6]) or shaded_rows(*of))
+    with pytest.raises(CancelledError):
+        job.make(lambda share: None, lambda: asked.append(1) or len(asked) > 2)
+    assert isinstance(job, Shade)
+    assert shaded
+    job.make(lambda share: None, lambda: False)
+    assert sorted(shaded) == sorted(set(shaded))
+    assert sum(stop - start for start, stop in shaded) == job.place.material.num_samples
+
+
+def test_a_large_picture_is_seen_finer_and_finer(transfer, monkeypatch):
+    monkeypatch.setattr("relume.picture.routes.preview._MOST_SHADED", 4)
+    monkeypatch.setattr("relume.picture.routes.preview._LONG", 1)
+    picture, images = opened(transfer, None), []
+    while not picture.advance(None).exact:
+        if isinstance(make_next(picture), Preview):
+            picture.advance(None)
+            images.append(picture.image())
+    errors = [float(np.sqrt(np.mean((image - picture.image()) ** 2))) for image in images]
+    assert len(errors) > 1
+    assert errors == sorted(errors, reverse=True)

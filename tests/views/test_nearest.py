@@ -1,0 +1,34 @@
+"""What samples between chosen ones take of them: the nearest, by place and normal, in the squares about their own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relume.views.squares import nearest, one_of_each_square
+
+STEP, NUM, SOFT = 4, 3, 0.5
+
+
+def squared_distances(view, material, chosen):
+    """From every sample to every chosen one; infinite beyond the squares that are looked in. (n, chosen)"""
+    rows = view.rows(material)
+    y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
+    normal = view.points(material).normal.astype(np.float64)
+    squared = (10 * STEP) ** 2 * ((normal[:, None] - normal[chosen]) ** 2).sum(axis=2)
+    for place in (x, y):
+        squared += (place[:, None] - place[chosen]) ** 2
+        squared[abs(place[:, None] // STEP - place[chosen] // STEP) > 2] = np.inf
+    return squared
+
+
+def test_samples_take_the_nearest_about_them(transfer):
+    view = transfer.views["front"]
+    for material in range(len(transfer.material_names)):
+        chosen = one_of_each_square(view, material, STEP)
+        near, weight = nearest(view, material, chosen, STEP, NUM, SOFT)
+        squared = squared_distances(view, material, chosen)
+        expected = 1 / (np.sort(squared, axis=1)[:, : near.shape[1]] + SOFT)
+        expected /= expected.sum(axis=1, keepdims=True)
+        np.testing.assert_allclose(weight, expected, rtol=1e-3, atol=1e-6)
+        taken = np.where(weight > 0, np.take_along_axis(squared, near, axis=1), np.inf)
+        np.testing.assert_allclose(taken, np.sort(squared, axis=1)[:, : near.shape[1]], rtol=1e-3, atol=1e-2)
