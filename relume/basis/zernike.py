@@ -28,7 +28,8 @@ QUICK_DEGREE = 4  # of those in which light is followed while a hand moves it
 NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
 DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
 """Degree of each function. (K,)"""
-WINDOW = np.exp(-DEGREES * (DEGREES + 2) / (2 * 8.0**2)).astype(np.float32)
+FALL = 1 / (2 * 8.0**2)
+WINDOW = np.exp(-FALL * DEGREES * (DEGREES + 2)).astype(np.float32)
 """w of each function: e^(−n (n + 2) / 2 d²), d = 8. Functions cut off at a degree ring beside what is bright; w takes
 a part of that away for a little blur (docs/adr/0063-highlights.md, docs/adr/0047-cells-send-by-direction.md)."""
 AT_ONCE = 128  # rays that `add_light` takes; all columns of them stay in the first cache

@@ -163,7 +163,7 @@ class ThrownLight:
             shares=lobes.shares[:, is_among],
         )
         even, vectors = some.sent(Arrived(gain * arrived.irradiance, gain[:, None] * arrived.vectors))
-        return Leaving(even[: cells.num_cells], rows, vectors)
+        return Leaving(even[: cells.num_cells], rows, vectors, some.widening)
 
     def _arrived(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> Arrived:
         def found() -> Arrived:

@@ -22,7 +22,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import SENT_DEGREE, WINDOW, in_basis, num_functions
+from relume.basis.zernike import DEGREES, FALL, SENT_DEGREE, in_basis, num_functions
 from relume.parallel import for_ranges
 from relume.trace.cell_tree import NO_CELL
 
@@ -34,6 +34,7 @@ NUM_SENT = num_functions(SENT_DEGREE)
 SIDE = 16  # squares across the disc of all places
 _FINER = 8
 _RIM, _LITTLE = 0.999, 1e-9
+_NARROWEST = 1 / (2 * 4.9**2)  # of a highlight and the window together: a metal's of roughness 0.3
 _STEPS = 32_767  # of 16-bit radiance
 _ROWS_A_RANGE = 256  # their values stay in the cache
 
@@ -65,22 +66,25 @@ def evenly(radiance: F32) -> Sent:
     )
 
 
-def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, *, to_narrow_lobes: bool = True) -> Sent:
+def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, falls: F32 | None = None) -> Sent:
     """Put together what cells send.
 
     Args:
         even: as in `Sent`. rows: the cells that send more one way than another. (G,)
         frame: their tangents and bitangents. (G, 2, 3) float32. vectors: L_j of each. (G, 3, J) float32
-        to_narrow_lobes: False where only cells look it up, which see widely: `smooth` is `table` then.
+        falls: how fast what narrow lobes see of each falls with the degree, see `falls_of`. (G,) float32; None where
+            only cells look it up, which see widely: `smooth` is `table` then.
     """
     lobe = np.full(NO_CELL + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
     scale = np.empty((len(rows), 3), np.float32)
-    means = np.stack([grid_means(), WINDOW[:NUM_SENT, None] * grid_means()][: 1 + to_narrow_lobes])
-    tables = np.empty((len(means), len(rows), SIDE * SIDE, 3), np.int16)
+    means, degrees = grid_means(), DEGREES[:NUM_SENT] * (DEGREES[:NUM_SENT] + 2)
+    tables = np.empty((1 if falls is None else 2, len(rows), SIDE * SIDE, 3), np.int16)
 
     def fill(start: int, stop: int) -> None:
-        values = vectors[start:stop] @ means[:, None]  # (tables, cells, 3, squares)
+        some = vectors[start:stop]
+        several = [some] if falls is None else [some, some * np.exp(-np.outer(falls[start:stop], degrees))[:, None]]
+        values = np.stack(several).astype(np.float32) @ means  # (tables, cells, 3, squares)
         largest = np.maximum(values.max(axis=(0, 3)), -values.min(axis=(0, 3)))
         scale[start:stop] = np.maximum(largest, np.float32(1e-30)) / np.float32(_STEPS)
         values /= scale[start:stop, :, None]
@@ -89,6 +93,17 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, *, to_n
 
     for_ranges(fill, len(rows), _ROWS_A_RANGE)
     return Sent(even, lobe, frame, scale, tables[0], tables[-1])
+
+
+def falls_of(widening: F32) -> F32:
+    """How fast what narrow lobes see of cells is to fall with the degree n, as e^(−n (n + 2) f). (G,) float32
+
+    Sharp highlights ring most, and no cell tells how sharp they are: they are seen as wide as those of rough metal.
+
+    Args:
+        widening: f by which the cells' highlights let light fall themselves. (G,)
+    """
+    return np.asarray(np.maximum(FALL, _NARROWEST - widening), np.float32)
 
 
 @lru_cache(maxsize=1)

@@ -59,7 +59,7 @@ def test_squares_are_those_of_the_rays(cells):
 def test_what_arrives_quickly_is_what_arrives_in_squares(cells, arrived):
     reflecting = cells.reflecting((MATT, SHINY))
     even, vectors = reflecting.sent(arrived)
-    now = Leaving(even, reflecting.rows, vectors).sent(cells)
+    now = Leaving(even, reflecting.rows, vectors, reflecting.widening).sent(cells)
     exact, quick = cells.arriving(now, reflecting.rows), arriving_quickly(cells, now, reflecting.rows)
     np.testing.assert_allclose(quick.irradiance, exact.irradiance, rtol=1e-4)
     assert relative_rmse(quick.vectors[..., :6], exact.vectors[..., :6]) < 0.05
@@ -84,8 +84,10 @@ def test_what_is_sent_quickly_is_about_what_is_sent(cells, arrived, wall, first,
 def test_a_difference_knows_the_rows_of_both():
     rng = np.random.default_rng(1)
     even, vectors = rng.random((2, 5, 3)).astype(np.float32), rng.random((2, 2, 3, NUM_SENT)).astype(np.float32)
-    one, other = (Leaving(even[k], np.array(rows), vectors[k]) for k, rows in enumerate(([0, 3], [3, 4])))
+    falls = np.array([[0.1, 0.2], [0.3, 0.4]], np.float32)
+    one, other = (Leaving(even[k], np.array(rows), vectors[k], falls[k]) for k, rows in enumerate(([0, 3], [3, 4])))
     found = one.less(other)
     np.testing.assert_array_equal(found.even, even[0] - even[1])
     np.testing.assert_array_equal(found.rows, [0, 3, 4])
+    np.testing.assert_array_equal(found.widening, [falls[0, 0], falls[0, 1], falls[1, 1]])
     np.testing.assert_array_equal(found.vectors, [vectors[0, 0], vectors[0, 1] - vectors[1, 0], -vectors[1, 1]])

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import twins
 
-from relume.basis.zernike import SENT_DEGREE, WINDOW, in_basis, ladder
-from relume.brdf.albedo import PAIRS, shares
+from relume.basis.zernike import FALL, SENT_DEGREE, WINDOW, in_basis, ladder
+from relume.brdf.albedo import PAIRS, reflectances_of, shares
 from relume.brdf.evaluate import eval_brdf
-from relume.project.sent import NUM_SENT, evenly, grid_means, sent_by
+from relume.methods.cells.reflecting import Arrived, Reflecting
+from relume.project.sent import NUM_SENT, evenly, falls_of, grid_means, sent_by
 from relume.trace.cell_tree import NO_CELL
 
 NUM_PAIRS = 200_000
@@ -75,14 +76,32 @@ def test_a_table_holds_what_its_functions_send():
     np.testing.assert_array_equal(twins.sent_towards(sent, 1, wo[0]), even[1])
 
 
-def test_narrow_lobes_see_fewer_rings_about_what_a_mirror_sends():
-    """One bright direction from anywhere, mirrored: less below nothing, and as much in all."""
+def sent_of_one_direction(roughness):
+    """What metal sends of light from one direction, 50 of them, and how fast that falls."""
+    metal = {**PLAIN, "model": "ggx", "color": [1, 1, 1], "params": {"roughness": roughness, "f0": 0.9}}
+    plain = np.ones((2, 50, 3), np.float32)
+    made = Reflecting.of((reflectances_of([metal]),), np.zeros(50, np.uint16), plain)
     vectors = np.repeat(in_basis(over_hemisphere(50, 6))[:, None, :NUM_SENT], 3, axis=1).astype(np.float32)
+    of_cells, leaving = made.sent(Arrived(plain[0], vectors))
     even = np.zeros((NO_CELL + 1, 3), np.float32)
-    sent = sent_by(even, np.arange(50), np.tile(np.eye(3, dtype=np.float32)[:2], (50, 1, 1)), vectors)
-    ring, fewer = sent.table.min(axis=(1, 2)), sent.smooth.min(axis=(1, 2))
-    assert np.all(ring < -0.08 * sent.table.max(axis=(1, 2)))
-    assert np.all(fewer > 0.82 * ring)
+    even[:50] = of_cells
+    frame, falls = np.tile(np.eye(3, dtype=np.float32)[:2], (50, 1, 1)), falls_of(made.widening)
+    return sent_by(even, np.arange(50), frame, leaving, falls), falls
+
+
+def test_narrow_lobes_see_fewer_rings_about_what_metals_send_and_no_sharper_ones():
+    def lowest(sent, table):
+        light = sent.even[:50, None, 0] + sent.scale[:, :1] * table[..., 0]
+        return light.min(axis=1) / light.max(axis=1)
+
+    known = {roughness: sent_of_one_direction(roughness) for roughness in (0.01, 0.1, 0.3, 0.6)}
+    for sent, _ in known.values():
+        assert np.all(lowest(sent, sent.smooth) > lowest(sent, sent.table))
+    sharp, rough = known[0.01][0], known[0.3][0]
+    assert np.median(lowest(sharp, sharp.table)) < np.median(lowest(rough, rough.table)) - 0.1
+    assert np.median(lowest(sharp, sharp.smooth)) > np.median(lowest(rough, rough.smooth)) - 0.02
+    np.testing.assert_allclose(known[0.3][1], FALL, rtol=0.04)  # from there on all is as the highlight has it
+    np.testing.assert_allclose(known[0.6][1], FALL, rtol=1e-6)
     assert WINDOW[0] == 1
     assert np.all(np.diff(WINDOW) <= 0)
 

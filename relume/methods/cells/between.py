@@ -19,7 +19,7 @@ from relume.methods.cells.bounces import bounce, bounced, preview_bounced
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.quick import arriving_quickly
 from relume.methods.cells.reflecting import Arrived, Reflecting
-from relume.project.sent import Sent, sent_by
+from relume.project.sent import Sent, falls_of, sent_by
 from relume.trace.cell_tree import NO_CELL
 
 F32 = NDArray[np.float32]
@@ -33,16 +33,18 @@ class Leaving(NamedTuple):
     Attributes:
         even: the part that is the same everywhere. (C, 3) float32
         rows: the cells that send more one way than another. (G,) intp. vectors: L_j of each. (G, 3, J) float32
+        widening: by their highlights, see `Reflecting`. (G,) float32
     """
 
     even: F32
     rows: NDArray[np.intp]
     vectors: F32
+    widening: F32
 
     def sent(self, cells: CellLight, *, to_narrow_lobes: bool = True) -> Sent:
         """As rays look it up. to_narrow_lobes: whether rays of pictures do"""
-        frames = cells.frames[self.rows]
-        return sent_by(_padded(self.even), self.rows, frames, self.vectors, to_narrow_lobes=to_narrow_lobes)
+        falls = falls_of(self.widening) if to_narrow_lobes else None
+        return sent_by(_padded(self.even), self.rows, cells.frames[self.rows], self.vectors, falls)
 
     def seen(self, cells: CellLight) -> F32:
         """What other cells see of each in the mean. (C, 3) float32"""
@@ -54,7 +56,10 @@ class Leaving(NamedTuple):
         vectors = np.zeros((len(rows), *self.vectors.shape[1:]), np.float32)
         vectors[np.searchsorted(rows, self.rows)] += self.vectors
         vectors[np.searchsorted(rows, other.rows)] -= other.vectors
-        return Leaving(self.even - other.even, rows, vectors)
+        widening = np.zeros(len(rows), np.float32)
+        for one in (other, self):
+            widening[np.searchsorted(rows, one.rows)] = one.widening
+        return Leaving(self.even - other.even, rows, vectors, widening)
 
 
 def sent_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> Leaving:
@@ -103,7 +108,10 @@ def _between(
     number, directed = 1, min(last, _DIRECTED) if len(rows) else 1
     total, total_vectors = (float(first == 1) * array.astype(np.float64) for array in (even, vectors))
     while number < directed:
-        (even, vectors), number = reflecting.sent(arriving(Leaving(even, rows, vectors))), number + 1
+        (even, vectors), number = (
+            reflecting.sent(arriving(Leaving(even, rows, vectors, reflecting.widening))),
+            number + 1,
+        )
         if number >= first:
             total, total_vectors = total + even, total_vectors + vectors
     if number < last:
@@ -112,7 +120,7 @@ def _between(
         for _ in range(start - number):
             even = bounce(cells.links, reflecting.reflectance, even)
         total += summed(even, last - start)
-    return Leaving(total.astype(np.float32), rows, total_vectors.astype(np.float32))
+    return Leaving(total.astype(np.float32), rows, total_vectors.astype(np.float32), reflecting.widening)
 
 
 def preview_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> F32:

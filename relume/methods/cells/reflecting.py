@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ from relume.basis.zernike import SENT_DEGREE, ladder
 from relume.brdf.albedo import PAIRS, Reflectances, shares_in
 
 F32 = NDArray[np.float32]
+
+
+_OF_DEGREE = {2 * rung: PAIRS.index((rung, rung)) for rung in range(1 + SENT_DEGREE // 2)}  # those of order 0
 
 
 class Arrived(NamedTuple):
@@ -41,6 +45,13 @@ class Reflecting:
     has_lobe: bytes
     rows: NDArray[np.intp]
     shares: F32
+
+    @cached_property
+    def widening(self) -> F32:
+        """How fast the highlights of `rows` let light fall with the degree n, as e^(−n (n + 2) f). f: (G,) float32"""
+        low, high = (np.abs(self.shares[_OF_DEGREE[n]]).mean(axis=1) for n in (2, SENT_DEGREE))
+        falls = np.log(np.maximum(low, 1e-30) / np.maximum(high, 1e-30)) / (SENT_DEGREE * (SENT_DEGREE + 2) - 2 * 4)
+        return np.asarray(np.clip(falls, 0, 1), np.float32)
 
     @classmethod
     def of(cls, reflectances: Reflectances, material: NDArray[np.uint16], textures: F32) -> Reflecting:
