@@ -18,7 +18,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 
 from relume import errors as relume_errors
-from relume.errors import ProtocolError, RelumeError
+from relume.errors import ProtocolError, RelumeError, is_no_room
 from server.wire.protocol import Problem
 from worker.database.faults import database_away, is_away, told
 
@@ -173,6 +173,8 @@ def problem_of(error: Exception) -> Problem:
         detail = str(error)
     elif isinstance(error, OperationalError | PoolTimeoutError):
         detail = "try again in a while; if it stays so, the server's log says why"
+    elif isinstance(error, OSError) and is_no_room(error):
+        detail = "the disk is full; free some space, then try again"
     elif isinstance(error, OSError):
         detail = f"{error.strerror or 'the disk failed'}; free some space or look into the server's log"
     else:

@@ -15,6 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from concurrent.futures import CancelledError as FutureCancelledError
 from contextlib import suppress
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 
 from sqlalchemy.exc import IntegrityError
@@ -43,6 +44,7 @@ TAKEN_OVER = "another machine had begun this bake; it starts again here"
 log = logging.getLogger(__name__)
 
 MAX_ATTEMPTS = 3
+SAID_ONCE_S = 1.0
 
 
 @dataclass
@@ -68,6 +70,7 @@ class BakeRunner:
     _entered: tuple[Phase | None, float] = (None, 0.0)
     _is_working: bool = False
     _parts: Parts | None = None
+    _lost_s: float = -inf
 
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
@@ -188,13 +191,20 @@ class BakeRunner:
                     f"{attempt} worker processes died of the same task, most likely for want of memory; free memory "
                     "or take fewer lights or a smaller size, then bake again; finished parts are kept"
                 ) from error
-            about = {"fields": {"bake": self.job.bake_id}}
-            log.warning("a worker process died; task %s is given to another", task, extra=about)
+            self._say_lost()
             waiting.append((task, attempt + 1))
             return
         self._record(task, cost, attempt)
         self._is_working = True
         progress.add(task, cost, here=True)
+
+    def _say_lost(self) -> None:
+        """Once of a process, which had more than one task."""
+        now_s = time.monotonic()
+        if now_s > self._lost_s + SAID_ONCE_S:
+            about = {"fields": {"bake": self.job.bake_id}}
+            log.warning("a worker process died; what it was at is given to another", extra=about)
+        self._lost_s = now_s
 
     def _record(self, task: Task, cost: TaskCost, attempt: int) -> None:
         """A task is finished: its shards are stored, where others may go on with them, before it counts."""

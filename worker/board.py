@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
-from relume.errors import NotFoundError
+from relume.errors import DiskFullError, NotFoundError
 from worker.database.faults import AWAY, Complaint
-from worker.ledger import Ledger
 from worker.status import BakeStatus
 
 POLL_S = 0.5
@@ -59,10 +59,14 @@ class Subscription:
 
 
 class StatusBoard:
-    """Reads the ledger for all subscriptions: at once when this process changed it, else every half second."""
+    """Looks at bakes for all subscriptions: at once when this process changed any, else every half second.
 
-    def __init__(self, ledger: Ledger) -> None:
-        self._ledger = ledger
+    Args:
+        read: a bake as it is now. Raises NotFoundError.
+    """
+
+    def __init__(self, read: Callable[[str], BakeStatus]) -> None:
+        self._read = read
         self._lock = threading.Lock()
         self._subscriptions: set[Subscription] = set()
         self._wake = threading.Event()
@@ -72,7 +76,7 @@ class StatusBoard:
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake. Raises NotFoundError."""
-        subscription = Subscription(self, bake_id, self._ledger.bake(bake_id))
+        subscription = Subscription(self, bake_id, self._read(bake_id))
         with self._lock:
             self._subscriptions.add(subscription)
             if self._thread is None:
@@ -109,7 +113,7 @@ class StatusBoard:
             self._wake.clear()
             for bake_id in {subscription.bake_id for subscription in subscriptions}:
                 try:
-                    status = self._ledger.bake(bake_id)
+                    status = self._read(bake_id)
                 except NotFoundError:
                     for subscription in [s for s in subscriptions if s.bake_id == bake_id]:
                         subscription.close()
@@ -121,3 +125,32 @@ class StatusBoard:
                 for subscription in subscriptions:
                     if subscription.bake_id == bake_id:
                         subscription.put(status)
+
+
+class Hindered:
+    """What hinders bakes that the ledger cannot be told of, as on a full disk, and how far each was then."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[float, str]] = {}
+
+    def __bool__(self) -> bool:
+        """Whether anything does."""
+        return bool(self._found)
+
+    def meet(self, status: BakeStatus, error: Exception) -> None:
+        """A bake could not be claimed, or could not go on."""
+        if isinstance(error, DiskFullError):
+            self._found[status.id] = status.progress, str(error)
+
+    def over(self, bake_id: str) -> None:
+        """It goes on."""
+        self._found.pop(bake_id, None)
+
+    def told(self, status: BakeStatus) -> BakeStatus:
+        """A status with what hinders it, unless it has gone on elsewhere."""
+        progress, said = self._found.get(status.id, (status.progress, ""))
+        if status.final or status.progress > progress:
+            self.over(status.id)
+        elif said and status.problem is None:
+            return replace(status, problem=f"{said}; the bake goes on by itself")
+        return status

@@ -18,7 +18,7 @@ from relume.errors import NotFoundError, ParameterError
 from relume.store import code_of
 from worker.backup.restore import refuse_unfinished
 from worker.bake import BakeRunner, check_published
-from worker.board import StatusBoard, Subscription
+from worker.board import Hindered, StatusBoard, Subscription
 from worker.budget import check_budget
 from worker.database import open_database
 from worker.database.faults import Complaint
@@ -72,7 +72,8 @@ class BakeService:
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
         self._methods = methods
         self._executors = Executors(scheduler, num_workers)
-        self._board = StatusBoard(self.ledger)
+        self._hindered = Hindered()
+        self._board = StatusBoard(self.get)
         self._complaints = {
             tiny: Complaint(log, f"the queue of {kind} cannot be worked on")
             for tiny, kind in ((False, "bakes"), (True, "small bakes"))
@@ -145,11 +146,11 @@ class BakeService:
 
     def get(self, bake_id: str) -> BakeStatus:
         """A bake. Raises NotFoundError."""
-        return self.ledger.bake(bake_id)
+        return self._hindered.told(self.ledger.bake(bake_id))
 
     def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
         """All bakes, or those of a scene; newest first."""
-        return self.ledger.bakes(scene_id)
+        return [self._hindered.told(status) for status in self.ledger.bakes(scene_id)]
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake, whichever process runs it. Raises NotFoundError."""
@@ -224,7 +225,8 @@ class BakeService:
             try:
                 self._wakes[tiny].clear()
                 has_run = self._run_next(tiny)
-                self._complaints[tiny].well()
+                if has_run or not self._hindered:  # a bake that waits for its own lease says nothing of the disk
+                    self._complaints[tiny].well()
                 if has_run:
                     at_work_s = time.monotonic()
                     continue
@@ -239,10 +241,15 @@ class BakeService:
         turns = self._turns[tiny]
         for work in turns.order(self.ledger.claimable()):
             status = self.ledger.bake(work.id)
-            if is_tiny(status.plan) == tiny and self.ledger.claim(work.id, self._owner):
-                turns.take(work.client)
-                self._run(status, tiny)
-                return True
+            try:
+                if is_tiny(status.plan) == tiny and self.ledger.claim(work.id, self._owner):
+                    self._hindered.over(work.id)
+                    turns.take(work.client)
+                    self._run(status, tiny)
+                    return True
+            except Exception as error:
+                self._hindered.meet(self.ledger.bake(work.id), error)
+                raise
         return False
 
     def _run(self, status: BakeStatus, tiny: bool) -> None:

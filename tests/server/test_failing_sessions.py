@@ -22,7 +22,7 @@ def fails_with(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
 @pytest.mark.parametrize(
     ("error", "code", "sentence"),
     [
-        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), 1011, "No space left on device; free some space"),
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), 1011, "the disk is full; free some space"),
         (OSError(errno.EIO, os.strerror(errno.EIO)), 1011, "Input/output error; free some space"),
     ],
 )

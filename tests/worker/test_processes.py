@@ -3,6 +3,7 @@
 import gc
 import hashlib
 import json
+import logging
 import os
 import signal
 import socket
@@ -66,7 +67,7 @@ def wait_for(log: Path, num_tasks: int) -> None:
 
 
 def test_worker_killed_during_a_task_is_replaced_and_a_task_that_kills_all_fails_clearly(
-    tmp_path: Path, expected: str
+    tmp_path: Path, expected: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     log = tmp_path / "log"
     once = FakeMethod(num_rays=LARGE, delay_s=0.02, log=str(log), kill="once")
@@ -79,6 +80,9 @@ def test_worker_killed_during_a_task_is_replaced_and_a_task_that_kills_all_fails
             with service.subscribe(identity) as changes:
                 last[method] = list(changes)[-1]
             assert (tmp_path / "log.died").exists()
+            if method == "fake":
+                said = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+                assert said == ["a worker process died; what it was at is given to another"]
     assert last["fake"].state == "ready"
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
     assert last["deadly"].state == "failed"

@@ -144,6 +144,29 @@ def test_a_lane_that_cannot_go_on_says_so_once_while_the_other_is_well(
     assert "that is over" not in caplog.text
 
 
+def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("worker.service.POLL_S", 0.02)
+    service, has_room = open_service(tmp_path), threading.Event()
+    claim = service.ledger.claim
+
+    def claims(*of: Any) -> bool:
+        if not has_room.is_set():
+            raise DiskFullError("the database")
+        return claim(*of)
+
+    monkeypatch.setattr(service.ledger, "claim", claims)
+    with service, service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
+        waiting = next(status for status in changes if status.problem)
+        assert "disk is full" in (waiting.problem or "")
+        assert "goes on by itself" in (waiting.problem or "")
+        assert service.bakes() == [waiting]
+        has_room.set()
+        assert list(changes)[-1].state == "ready"
+        assert service.bakes()[0].problem is None
+
+
 def test_defect_of_a_method_is_named_and_the_service_lives_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     with open_service(tmp_path, problem="defect") as service:
         status = follow(service, service.submit(SCENE.id, RECIPE))
