@@ -6,7 +6,7 @@ which no ray that leaves at random finds where the light is small.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numba as nb
@@ -27,17 +27,16 @@ F64 = NDArray[np.float64]
 MOST_PLANES = 4  # of a scene
 _FLAT = 0.9999  # the least cosine between a face and the normals at its corners
 _LEAST_AREA = 1e-4  # of the square of the scene's diagonal
+_NEAR = 8  # times how far rays begin off surfaces: what is no farther from a plane lies in it
 _RAYS_AT_ONCE = 1 << 18
 
 
-@dataclass(frozen=True)
-class FlatMirrors:
+class FlatMirrors(NamedTuple):
     """P planes in which mirrors lie, the largest first.
 
     Attributes:
         normal: unit. (P, 3) float32. offset: n · x on them. (P,) float32. material: index into the scene's. (P,) uint16
         axes: two directions along each. (P, 2, 3) float32. low, high: how far the mirrors reach along these. (P, 2)
-        of_face: the plane of each of the scene's triangles; −1: none. (faces,) int8
     """
 
     normal: F32
@@ -46,12 +45,16 @@ class FlatMirrors:
     axes: F32
     low: F32
     high: F32
-    of_face: NDArray[np.int8]
 
     @property
     def num_planes(self) -> int:
         """Their number P."""
         return len(self.offset)
+
+    def off(self, plane: NDArray[np.integer] | int, place: NDArray[np.floating]) -> F64:
+        """How far places are off a plane. plane: one, or one each. place: (…, 3)"""
+        normal = self.normal[plane].astype(np.float64)
+        return np.asarray(np.abs((place * normal).sum(axis=-1) - self.offset[plane]), np.float64)
 
     def holding(self, position: F32, epsilon: float) -> NDArray[np.uint8]:
         """Find the planes that points of cells lie in. (C,) uint8, 255 where in none
@@ -61,10 +64,9 @@ class FlatMirrors:
         """
         found = np.full(len(position), 255, np.uint8)
         for p in reversed(range(self.num_planes)):
-            away = np.abs(position @ self.normal[p].astype(np.float64) - self.offset[p])
-            along = position @ self.axes[p].T.astype(np.float64)
-            inside = (along >= self.low[p] - 4 * epsilon) & (along <= self.high[p] + 4 * epsilon)
-            found[(away < 4 * epsilon).all(axis=1) & inside.all(axis=(1, 2))] = p
+            along, near = position @ self.axes[p].T.astype(np.float64), _NEAR * epsilon
+            inside = (along >= self.low[p] - near) & (along <= self.high[p] + near)
+            found[(self.off(p, position) < near).all(axis=1) & inside.all(axis=(1, 2))] = p
         return found
 
 
@@ -88,48 +90,53 @@ def flat_mirrors(scene: Scene, geometry: Geometry) -> FlatMirrors:
     normal, corners = geometry.face_normals[face], geometry.faces[face]
     bent = np.einsum("fkc,fc->fk", geometry.normals[corners], normal) < _FLAT
     face, normal, corners = (array[~bent.any(axis=1)] for array in (face, normal, corners))
-    place = geometry.positions[corners].astype(np.float64)
-    diagonal = float(np.linalg.norm(np.ptp(geometry.positions, axis=0)))
-    offset = np.einsum("fc,fc->f", place.mean(axis=1), normal)
-    keys = [geometry.face_mesh[face], *np.rint(500 * normal).T, np.rint(2000 * offset / diagonal)]
-    _, group = np.unique(np.stack(keys, axis=1), axis=0, return_inverse=True)
+    place, of = geometry.positions[corners].astype(np.float64), geometry.face_material[face]
     twice = np.linalg.norm(np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]), axis=1)
-    area = np.bincount(group.ravel(), twice / 2)
-    chosen = [g for g in np.argsort(-area, kind="stable")[:MOST_PLANES] if area[g] > _LEAST_AREA * diagonal**2]
-    of_face, planes = np.full(len(geometry.faces), -1, np.int8), list[_Plane]()
-    material = np.empty(len(chosen), np.uint16)
-    for p, g in enumerate(chosen):
-        rows = np.flatnonzero(group.ravel() == g)
-        of_face[face[rows]] = p
-        planes.append(_plane(normal[rows], place[rows]))
-        material[p] = geometry.face_material[face[rows[0]]]
+    least = _LEAST_AREA * float(np.square(np.ptp(geometry.positions, axis=0)).sum())
+    planes, left = list[FlatMirrors](), np.ones(len(face), np.bool_)
+    for group in _by_area(normal, place, of, twice / 2, least):
+        if len(planes) == MOST_PLANES:
+            break
+        seed = group[np.argmax(twice[group])]
+        if not left[seed]:
+            continue  # rounding has divided a plane that is known
+        plane = _plane(normal[seed], place[seed], of[seed])
+        aside = np.abs(normal @ plane.normal[0]) < _FLAT
+        within = (of == of[seed]) & ~aside & (plane.off(0, place) < _NEAR * geometry.epsilon).all(axis=1)
+        along = place[within].reshape(-1, 3) @ plane.axes[0].T
+        planes.append(plane._replace(low=along.min(axis=0)[None], high=along.max(axis=0)[None]))
+        left &= ~within
 
-    def stacked(name: str, *shape: int) -> F32:
-        return np.array([getattr(plane, name) for plane in planes], np.float32).reshape(-1, *shape)
+    def joined(name: str, *shape: int) -> F32:
+        return np.concatenate([np.empty((0, *shape)), *(getattr(plane, name) for plane in planes)]).astype(np.float32)
 
-    described = stacked("normal", 3), stacked("offset"), material, stacked("axes", 2, 3)
-    return FlatMirrors(*described, stacked("low", 2), stacked("high", 2), of_face)
-
-
-class _Plane(NamedTuple):
-    """One of `FlatMirrors`."""
-
-    normal: F64
-    offset: float
-    axes: F64
-    low: F64
-    high: F64
+    its_material = np.array([plane.material[0] for plane in planes], np.uint16)
+    described = joined("normal", 3), joined("offset"), its_material, joined("axes", 2, 3)
+    return FlatMirrors(*described, joined("low", 2), joined("high", 2))
 
 
-def _plane(normals: F32, corners: F64) -> _Plane:
-    """Describe the plane of some triangles. normals: (n, 3). corners: (n, 3, 3)"""
-    normal = normals.mean(axis=0, dtype=np.float64)
-    normal /= np.linalg.norm(normal)
-    first = any_tangent(normal[None])[0].astype(np.float64)
-    axes = np.stack([first, np.cross(normal, first)])
-    places = corners.reshape(-1, 3)
-    along = places @ axes.T
-    return _Plane(normal, float((places @ normal).mean()), axes, along.min(axis=0), along.max(axis=0))
+def _by_area(
+    normal: F32, place: F64, material: NDArray[np.integer], area: F64, least: float
+) -> Iterator[NDArray[np.intp]]:
+    """Group triangles that lie in a plane, roughly, the largest first; none whose area is not above `least`."""
+    sign = np.where(normal @ np.array([1.0, 1e-2, 1e-4]) < 0, -1, 1)  # a plane has two sides
+    offset = sign * np.einsum("fc,fc->f", place.mean(axis=1), normal)
+    size = max(float(np.abs(place).max(initial=0)), 1e-9)
+    keys = [material, *np.rint(500 * sign * normal.T), np.rint(2000 / size * offset)]
+    _, group = np.unique(np.stack(keys, axis=1), axis=0, return_inverse=True)
+    total = np.bincount(group.ravel(), area)
+    for g in np.argsort(-total, kind="stable"):
+        if total[g] <= least:
+            return
+        yield np.flatnonzero(group.ravel() == g)
+
+
+def _plane(normal: F32, corners: F64, material: int) -> FlatMirrors:
+    """The plane of one triangle, as far as it is known. normal: (3,). corners: (3, 3)"""
+    exact = normal.astype(np.float64) / np.linalg.norm(normal.astype(np.float64))
+    first = any_tangent(exact[None])[0].astype(np.float64)
+    axes, offset = np.stack([first, np.cross(exact, first)])[None], np.array([(corners @ exact).mean()])
+    return FlatMirrors(exact[None], offset, np.array([material]), axes, *np.empty((2, 1, 2), np.float32))
 
 
 def seen_in(normal: F32, directions: F32) -> F32:
@@ -210,8 +217,11 @@ def _is_free(
     plane, number = np.divmod(light, len(directions))
     way = towards[plane, number]
     hits = trace_from(geometry.embree, points.position, way, points.chance)
-    free = (hits.face >= 0) & (mirrors.of_face[np.maximum(hits.face, 0)] == plane)
-    rows = np.flatnonzero(free)
+    rows = np.flatnonzero(hits.face >= 0)
+    place = points.position[rows] + hits.distance[rows, None].astype(np.float64) * way[rows]
+    is_its = geometry.face_material[hits.face[rows]] == mirrors.material[plane[rows]]
+    rows = rows[is_its & (mirrors.off(plane[rows], place) < _NEAR * geometry.epsilon)]
+    free = np.zeros(len(way), np.bool_)
     met, onwards = hits.rows(rows), directions[number[rows]]
     normal = mirrors.normal[plane[rows]]
     normal = normal * np.sign(np.einsum("nc,nc->n", normal, onwards))[:, None]

@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 
 from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.brdf.albedo import is_diffuse
-from relume.eye.flat_mirrors import MOST_PLANES, flat_mirrors, has_flat_mirrors, lights_in_mirrors
+from relume.eye.flat_mirrors import lights_in_mirrors
 from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
 from relume.methods import bounds
 from relume.methods.last_read import LastRead
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
-from relume.methods.store_io import SHARD_ROWS, read_cells, read_gather_samples, read_lights, read_tiles, read_tree
-from relume.methods.thrown import MOST_GROUPS, Thrown, read_thrown
+from relume.methods.store_io import SHARD_ROWS, read_cells, read_gather_samples, read_tree
+from relume.methods.thrown import make_thrown, most_seen, read_thrown
 from relume.methods.transfer import BouncedViews, described
 from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS
@@ -84,7 +84,7 @@ class GatherMethod:
         bounds.check_gathering(recipe, MAX_CELLS)
         direct, cells, (rays, _) = self._views.plan(scene, recipe), _num_cells(recipe), self._rays_of(recipe)
         points, bits = POINTS_A_CELL * cells, (recipe.num_lights + 7) // 8
-        seen = MOST_PLANES * min(MOST_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
+        seen = most_seen(scene, recipe)
         num_rays = direct.num_rays + direct.num_view_samples * (rays + 2 * seen)
         num_rays += points * (RAYS_A_POINT + recipe.num_lights)
         return Plan(
@@ -165,18 +165,8 @@ class GatherMethod:
         cells = choose_cells(scene, geometry, recipe.views, recipe.size, _num_cells(recipe))
         fields: dict[str, NDArray[Any]] = {**vars(cells), **cells.tree._asdict()}
         del fields["tree"]
-        thrown = self._thrown(scene, store, cells.position)
+        thrown = make_thrown(scene, geometry, store, cells.position)
         return Written({f"cells/{name}": array for name, array in fields.items()} | thrown, 0, 0.0)
-
-    def _thrown(self, scene: Scene, store: StoreReader, cells: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
-        """What is traced over flat mirrors. cells: where their points are. (C, points, 3)"""
-        if not has_flat_mirrors(scene):
-            return {}
-        geometry = self._views.geometry_of(scene)
-        mirrors = flat_mirrors(scene, geometry)
-        plane = mirrors.holding(cells, geometry.epsilon)
-        found = Thrown.of(read_lights(store), read_tiles(store), mirrors, plane)
-        return {f"thrown/{name}": array for name, array in vars(found).items()} if found.num_seen else {}
 
     def _of_cells(self, scene: Scene, task: Task, store: StoreReader) -> Written:
         points, geometry = read_gather_samples(store, task.start, task.stop), self._views.geometry_of(scene)
@@ -204,7 +194,7 @@ class GatherMethod:
         arrays = {f"views/{k}/links": np.concatenate([part.cell for part in parts]), f"views/{k}/number": seed}
         num_rays = sum(part.num_rays for part in parts)
         if (thrown := read_thrown(store)) is not None:
-            seen = lights_in_mirrors(geometry, flat_mirrors(scene, geometry), points, thrown.direction)
+            seen = lights_in_mirrors(geometry, thrown.mirrors, points, thrown.direction)
             arrays[f"views/{k}/thrown"], num_rays = seen.visible, num_rays + seen.num_rays
         return Written(arrays, num_rays, sum(part.trace_s for part in parts))
 

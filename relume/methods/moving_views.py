@@ -21,6 +21,7 @@ from relume.memory import Memory
 from relume.methods.skies_in_lobes import SkiesInLobes
 from relume.methods.store_io import read_cells
 from relume.methods.suns_of_skies import SunsOfSkies
+from relume.methods.thrown import read_thrown
 from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
 from relume.moving.highlights.lobe_lights import LobeLights
@@ -73,7 +74,8 @@ class MovingViews:
         Raises:
             StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
         """
-        lit = BouncedViews(**described_light(store, key, memory), cells=read_cells(store), thrown=None)
+        light = described_light(store, key, memory)
+        lit = BouncedViews(**light, cells=read_cells(store), thrown=read_thrown(store))
         width, height = store.attributes["size"]
         cameras = (read_camera(store, k) for k in range(len(store.attributes["views"])))
         surface = read_surface(store)

@@ -13,6 +13,7 @@ points, the cells), then "visibility and gather rays" (rows of cells and of poin
     points/position, normal, tangent, material               relume.moving.points.lattice.Placed
     points/visibility, points/links                          lights that a point sees, cells that its rays hit
     harmonics/…                                              relume.methods.harmonic_light
+    thrown/…                                                 as in relume.methods.gather, for stills
     error/moving                                             relume.methods.moving_error
 """
 
@@ -35,6 +36,7 @@ from relume.methods.last_read import LastRead
 from relume.methods.moving_views import MovingViews
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, read_targets, triangles_of
 from relume.methods.store_io import MOVING_ERROR, read_gather_samples, read_moving_error, read_tree
+from relume.methods.thrown import make_thrown
 from relume.moving.points.lattice import MAX_POINTS, most_nodes, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.points.surface import pattern_of_points, read_surface_points, tangents_of, textures_of
@@ -169,7 +171,8 @@ class SurfaceMethod:
             make = {"lights": self._lights, "points": self._points, "cells": self._cells}
             return Written(make[task.view](scene, recipe), 0, 0.0)
         if task.view == "harmonics":
-            return Written(make_harmonic_light(store, int(scene.id[:7], 16)), 0, 0.0)
+            thrown = make_thrown(scene, self._views.geometry_of(scene), store, store.read("cells/position"))
+            return Written(make_harmonic_light(store, int(scene.id[:7], 16)) | thrown, 0, 0.0)
         if task.view == "moving error":
             return Written({MOVING_ERROR: moving_error.measured(store, scene, recipe.size)}, 0, 0.0)
         if task.view not in ("cells", "points"):

@@ -12,19 +12,19 @@ with the irradiance E of lights that lie together in direction d, and what the m
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import StoreReader
+from relume.bake import Recipe, StoreReader
 from relume.basis.zernike import SENT_DEGREE
 from relume.brdf.albedo import Reflectances, mirrors_in, reflectances_of
 from relume.brdf.mirror import mirrored, mirrored_part
 from relume.color import luminance
 from relume.errors import ChunkDamagedError, StoreError
-from relume.eye.flat_mirrors import FlatMirrors, seen_in
+from relume.eye.flat_mirrors import MOST_PLANES, FlatMirrors, flat_mirrors, has_flat_mirrors, seen_in
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey
@@ -32,8 +32,11 @@ from relume.memory import Memory
 from relume.methods.cells.between import Leaving
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.reflecting import Arrived
+from relume.methods.store_io import read_lights, read_tiles
 from relume.picture.light import Light
 from relume.project.receivers import ThrownRays
+from relume.scene.model import Scene
+from relume.trace.geometry import Geometry
 
 F32 = NDArray[np.float32]
 
@@ -49,26 +52,20 @@ class Thrown:
     Attributes:
         lights: which of the bake's. (T,) int32. group: that each is in. (T,) int32
         direction: to the groups. (G, 3) float32
-        normal: of the planes. (P, 3) float32. material: of their mirrors. (P,) uint16
+        mirrors: the planes, P of them.
         plane: that each gather cell lies in, `NO_PLANE` where in none. (C,) uint8
     """
 
     lights: NDArray[np.int32]
     group: NDArray[np.int32]
     direction: F32
-    normal: F32
-    material: NDArray[np.uint16]
+    mirrors: FlatMirrors
     plane: NDArray[np.uint8]
-
-    @property
-    def num_planes(self) -> int:
-        """P."""
-        return len(self.normal)
 
     @property
     def num_seen(self) -> int:
         """Groups in all planes together, P G."""
-        return self.num_planes * len(self.direction)
+        return self.mirrors.num_planes * len(self.direction)
 
     @classmethod
     def of(cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: NDArray[np.uint8]) -> Thrown:
@@ -86,20 +83,51 @@ class Thrown:
         np.add.at(towards, group, light[bright, None] * lights.direction[bright])
         direction = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
         chosen = bright.astype(np.int32), group.astype(np.int32), direction
-        return cls(*chosen, mirrors.normal, mirrors.material, plane)
+        return cls(*chosen, mirrors, plane)
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """As a store keeps them."""
+        fields = {**vars(self), **self.mirrors._asdict()}
+        del fields["mirrors"]
+        return {f"thrown/{name}": array for name, array in fields.items()}
+
+
+def most_seen(scene: Scene, recipe: Recipe) -> int:
+    """The most lights that a sample may see in flat mirrors, P G."""
+    return MOST_PLANES * min(MOST_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
+
+
+def make_thrown(scene: Scene, geometry: Geometry, store: StoreReader, cells: F32) -> dict[str, NDArray[Any]]:
+    """Find the arrays of a store from which `read_thrown` reads; none where nothing is thrown.
+
+    Args:
+        scene: that is baked. geometry: its triangles. store: with its lights.
+        cells: where the points of gather cells are. (C, points, 3)
+    """
+    if not has_flat_mirrors(scene):
+        return {}
+    mirrors = flat_mirrors(scene, geometry)
+    found = Thrown.of(read_lights(store), read_tiles(store), mirrors, mirrors.holding(cells, geometry.epsilon))
+    return found.arrays if found.num_seen else {}
 
 
 def read_thrown(store: StoreReader) -> Thrown | None:
     """What a store knows of flat mirrors; None where there is none, or no bright light."""
     try:
-        store.shape("thrown/lights")
+        store.shape("thrown/offset")
     except StoreError:
         return None
-    found = Thrown(**{of.name: store.read(f"thrown/{of.name}") for of in fields(Thrown)})
+
+    def read(name: str) -> NDArray[Any]:
+        return store.read(f"thrown/{name}")
+
+    mirrors = FlatMirrors(*map(read, FlatMirrors._fields))
+    found = Thrown(read("lights"), read("group"), read("direction"), mirrors, read("plane"))
     limits: list[tuple[NDArray[Any], int]] = [
         (found.lights, store.shape("lights/power")[0]),
         (found.group, len(found.direction)),
-        (found.material, len(store.attributes["materials"])),
+        (mirrors.material, len(store.attributes["materials"])),
     ]
     are_known = all(len(numbers) == 0 or 0 <= numbers.min() <= numbers.max() < limit for numbers, limit in limits)
     if not are_known or found.plane.shape != store.shape("cells/material"):
@@ -125,7 +153,7 @@ class ThrownLight:
     ) -> None:
         self._thrown, self._cells, self._lights_in = thrown, cells, lights_in
         self._memory, self._key = memory, key
-        self._directions = seen_in(thrown.normal, thrown.direction).reshape(-1, 3)
+        self._directions = seen_in(thrown.mirrors.normal, thrown.direction).reshape(-1, 3)
 
     @staticmethod
     def is_in(light: Light) -> bool:
@@ -141,9 +169,9 @@ class ThrownLight:
         thrown, gain = self._thrown, np.array(light.environment_gain)
         arriving = np.zeros((len(thrown.direction), 3))
         np.add.at(arriving, thrown.group, gain * self._lights_in(light.environment).irradiance[thrown.lights])
-        cosine, tints = np.abs(thrown.normal @ thrown.direction.T), self._cells.textures[1]
+        cosine, tints = np.abs(thrown.mirrors.normal @ thrown.direction.T), self._cells.textures[1]
         sent = np.zeros((*cosine.shape, 3))
-        for p, material in enumerate(thrown.material):
+        for p, material in enumerate(thrown.mirrors.material):
             on_plane = thrown.plane == p
             tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
             terms = mirrors_in(light.reflectances[material])

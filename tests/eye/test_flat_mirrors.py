@@ -14,7 +14,8 @@ from relume.brdf.fresnel import schlick
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.eye.flat_mirrors import flat_mirrors, lights_in_mirrors
 from relume.memory import Memory
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.methods.stills import Stills
 from relume.render.image import render_image
 from relume.scene.model import Material
 from relume.store import bake_here
@@ -71,9 +72,10 @@ def test_bent_bumpy_and_rough_mirrors_are_not_flat():
     def planes(scene):
         return flat_mirrors(scene, merge(scene)).num_planes
 
-    scene = hall()
+    scene, behind = hall(), quad("back", [[-1, 0, -2], [-1, 0, 2], [-1, 1, 2], [-1, 1, -2]], 0, tangent=(0, 0, 1))
     rough = {**MIRROR.terms[0], "params": {"roughness": 0.3, "f0": F0}}
     assert planes(scene) == 1
+    assert planes(hall(behind)) == 1
     assert planes(hall(sphere("ball", [1, 1, 0], 0.4, 0))) == 1
     assert planes(replace(scene, materials=(replace(MIRROR, terms=(rough,)), FLOOR))) == 0
 
@@ -94,7 +96,8 @@ def thrown(transfer, change=lambda document: None):
             change(document)
             document["transport"] |= {"show": kind, "bounces": 1}
 
-        pictures.append(render_image(transfer, "front", look_of(transfer, shows)).astype(float)[16, :, 0])
+        (view,) = transfer.views
+        pictures.append(render_image(transfer, view, look_of(transfer, shows)).astype(float)[16, :, 0])
     half = np.tan(0.3) * 6
     x = 1 + (np.arange(64) + 0.5 - 32) / 16 * half
     return x, pictures[0] - pictures[1]
@@ -106,8 +109,19 @@ def in_the_patch():
     return ALBEDO / np.pi * across * sun()[1] * COLOR * float(schlick(np.array(sun()[0]), F0))
 
 
-def test_a_flat_mirror_throws_the_sun_as_far_as_it_reaches(lit):
-    x, found = thrown(lit)
+@pytest.fixture(scope="module")
+def resting(tmp_path_factory):
+    """The same where a moving eye rests."""
+    recipe = Recipe("surface", ("front",), (64, 32), 400, num_points=300, gather_samples=1024, gather_rays=64)
+    target = tmp_path_factory.mktemp("resting") / "surface.zarr"
+    moving = open_bake(bake_here(METHODS["surface"], hall(), recipe, target), Memory(1 << 30))
+    stills, camera = Stills(moving.lit, hall()), moving.views["front"].camera
+    return stills.make(camera, (64, 32), True, lambda share: None, lambda: False)
+
+
+@pytest.mark.parametrize("bake", ["lit", pytest.param("resting", marks=pytest.mark.slow)])
+def test_a_flat_mirror_throws_the_sun_as_far_as_it_reaches(bake, request):
+    x, found = thrown(request.getfixturevalue(bake))
     edge = -1 + sun()[0] / sun()[1]
     inside, outside = (x > -0.7) & (x < edge - 0.15), (x > edge + 0.15) & (x < 2.5)
     np.testing.assert_allclose(found[inside], in_the_patch(), rtol=0.01)
