@@ -49,7 +49,7 @@ def scene() -> Scene:
     side[0, 3] = 0.7
     cameras = [Camera("front", front, 0.9), Camera("Seite nº 2: ../c", side, 0.9)]
     radiance = np.random.default_rng(7).random((16, 32, 3), np.float32)
-    radiance[:6, 3:7] += 20
+    radiance[:6, 3:7] += 22
     return make_scene("contract", [floor, wall], materials, cameras, Environment("side", radiance))
 
 
