@@ -1,5 +1,7 @@
 """Several views of one bake side by side: every edit changes all, the one under the pointer goes first."""
 
+import time
+
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -177,3 +179,23 @@ def test_what_is_on_the_screen_comes_first_and_the_rest_when_the_hand_rests(
         for rect in ([width, 0, 1, 1], [0, height, 9, 9]):
             session.send(type="region", view="front", rect=rect)
             assert "some of the picture's" in session.text("problem")["problem"]["detail"]
+
+
+def test_what_is_out_of_sight_does_not_come_while_the_picture_is_on_its_way(
+    client: TestClient, baked: Baked, control: Control
+) -> None:
+    control.tiles_a_step = 100
+    with open_session(client, baked.bake) as session:
+        num_tiles = len(session.exact(0).header["tiles"])
+        session.send(type="region", view="front", rect=[0, 0, 3, 2])
+        session.edit(1, IOR, 2.0)
+        assert session.text("status")["state"] == "freezing"
+        session.edit(2, SIGMA, 0.5)
+        frames = [session.frame().header]
+        while frames[-1]["revision"] < 2:
+            frames.append(session.frame().header)
+        time.sleep(0.3)
+        control.may_freeze.set()
+        rest = session.frame().header
+        assert (frames[-1]["exact"], len(frames[-1]["tiles"])) == (False, 1)
+        assert (rest["exact"], len(rest["tiles"])) == (True, num_tiles)

@@ -145,7 +145,10 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     if not is_sent:
         return Painted(job, advance, None, update_ms, start_s)
     lacking = request.lacking.union(advance.tiles)
-    held_back = _out_of_sight(lacking, request, advance)
+    is_on_its_way = request.is_moving or (job is not None and not advance.exact)
+    held_back = _out_of_sight(lacking, request) if is_on_its_way else frozenset()
+    if lacking and lacking == held_back and request.received_s is None:  # nobody would see anything of it
+        return Painted(job, advance, None, update_ms, start_s, held_back=held_back)
     tiles, payload, alpha = _payload(picture, request, lacking - held_back)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
     of_picture = {
@@ -157,10 +160,9 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     return Painted(job, advance, message, update_ms, start_s, encode_ms, held_back=held_back)
 
 
-def _out_of_sight(lacking: frozenset[Tile], request: FrameRequest, advance: Advance) -> frozenset[Tile]:
-    """Tiles that a frame can do without: those that a step has changed, of a picture that is on its way."""
-    is_on_its_way = request.is_moving or (bool(advance.tiles) and not advance.exact)
-    if request.region is None or request.form == "jpeg" or not is_on_its_way:
+def _out_of_sight(lacking: frozenset[Tile], request: FrameRequest) -> frozenset[Tile]:
+    """Tiles that a frame can do without while its picture is on its way."""
+    if request.region is None or request.form == "jpeg":
         return frozenset()
     left, top, across, down = request.region
     return frozenset(

@@ -179,7 +179,10 @@ class Viewport:
         if painted.message is None:
             self._lacking = self._lacking.union(tiles)
             self._has_unsent = self._has_unsent or bool(tiles)
-            self._wait(is_done, pending)
+            if painted.held_back:  # until what is being made is there, or something else is looked at
+                self.is_settled = is_done
+            else:
+                self._wait(is_done, pending)
             return
         self._lacking = self._all_tiles if request.form == "jpeg" else painted.held_back
         self._has_unsent, self._answered, self.is_exact = False, request.target, exact
