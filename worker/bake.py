@@ -154,7 +154,7 @@ class BakeRunner:
                 waiting.append((task, 1))
         self._beat(progress, self._phase(stage, progress))
         while waiting or self._flying:
-            room = self.window() - len(self._flying)
+            room = self._room(len(waiting))
             while waiting and room > 0:
                 room -= 1
                 task, attempt = waiting.popleft()
@@ -163,6 +163,12 @@ class BakeRunner:
             for future in finished:
                 self._collect(future, waiting, progress)
             self._beat(progress, self._phase(stage, progress))
+
+    def _room(self, num_waiting: int) -> int:
+        """How many tasks more may be handed out. Of the last none waits behind another at one process while the next is
+        idle: a stage may have but one long task for each view."""
+        num_flying, most = len(self._flying), self.window()
+        return (most if num_waiting + num_flying > most else max(1, most // 2)) - num_flying
 
     def _phase(self, stage: int, progress: Progress) -> Phase:
         """What the processes are at: until one of them works, what they do to get ready."""
