@@ -116,6 +116,7 @@ GROUPS = (
     Group("bench.btf", ("btf.compression_error", "btf.compression_ratio", "btf.compression_s")),
     Group("bench.btf_true", ("btf.geometry_rmse", "btf.sphere_rmse", "btf.table_rmse")),
     Group("bench.btf_shown", ("btf.view_fps", "btf.light_ms", "btf.light_bytes")),
+    Group("bench.btf_held", ("btf.held_ms",)),
     Group("bench.in_out", ("in_out.phong_terms_per_exponent", "in_out.torrance_sparrow_terms_sigma2")),
     Group(
         "bench.surface",

@@ -25,7 +25,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from relume.errors import NotFoundError, ParameterError, RelumeError
-from relume.replacing import remove_folder, replacing
+from relume.replacing import UNFINISHED, remove_folder, replacing
 
 log = logging.getLogger(__name__)
 
@@ -116,7 +116,8 @@ class AssetStore:
         """Write a thing's folder, and give it its name when it is complete."""
         folder.mkdir(parents=True, exist_ok=True)
         document = {"format": FORMAT_VERSION, "id": target.name, "name": name, "created": time.time()}
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".") as staging:
+        # by this name a server finds what a killed process left
+        with tempfile.TemporaryDirectory(dir=folder, prefix=UNFINISHED.rstrip("*")) as staging:
             made = Path(staging) / target.name
             made.mkdir()
             (made / self.record).write_text(json.dumps({**document, **fill(made)}))

@@ -21,6 +21,7 @@ from relume.operators.frozen import Frozen, Rough
 from relume.operators.operator import Operator
 from relume.operators.packed import Packed
 from relume.operators.shade import Begun, Shaded, shaded_bytes
+from relume.picture.arrivals import keep_arrived, may_be_kept
 from relume.picture.fidelity import Fidelity
 from relume.picture.light import Light, parts_of
 from relume.picture.live_term import LiveTerm
@@ -246,13 +247,17 @@ class Shade:
 
     def _summed(self, progress: Progress, cancelled: Cancelled) -> Shaded:
         """Shade the parts of the light that no other image has had, and sum all."""
-        cache, live = self.place.images.cache, self.place.live
+        images, material, live = self.place
+        texels = self.term.texels
+        if texels is not None and self.light == live.light and may_be_kept(images, material, texels):
+            arrived = keep_arrived(images, material, texels, self.light, progress, cancelled)
+            return arrived.sent(texels, images.unlit(material))
         if len(self.parts) < 2:
             return self._finished(self.key, self.light, progress, cancelled)
         found: list[tuple[F32, Rgb]] = []
         for done, (key, light, gain) in enumerate(self.parts):
             make = partial(self._finished, key, light, partial(self._tell, progress, done), cancelled)
-            found.append((cache.get(key, Shaded, self.num_bytes, make).image, gain))
+            found.append((images.cache.get(key, Shaded, self.num_bytes, make).image, gain))
         return Shaded(weighted_sum(np.zeros_like(live.ready.image), found))
 
     def _finished(self, key: tuple[Hashable, ...], light: Light, progress: Progress, cancelled: Cancelled) -> Shaded:

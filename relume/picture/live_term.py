@@ -56,7 +56,7 @@ class LiveTerm:
         wanted = Wanted.of(document, self._theta_o, self._levels)
         if wanted.model != self.model:
             self.ready = Shown(np.zeros_like(self.ready.image))
-            self.displayed = replace(self.displayed, bands={})  # of another model: none of the curves that are wanted
+            self.displayed = replace(self.displayed, bands={}, is_outdated=True)  # none of its curves is wanted
         elif self.ready.basis is not None and not self.ready.basis.holds_for(document):
             self.ready = self._go_on_as(self.ready.without_basis())
         self.document, self.term, self.model = wanted.document, wanted.term, wanted.model
@@ -108,6 +108,11 @@ class LiveTerm:
         return not self.newest.fidelity
 
     @property
+    def shows_another(self) -> bool:
+        """Whether nothing of it is ready, and another model or other fixed parameters are shown in its place."""
+        return self.displayed.is_outdated and not self.ready.fidelity
+
+    @property
     def is_firm(self) -> bool:
         """Whether steps may be added to what is ready."""
         return self.ready.is_firm
@@ -139,7 +144,8 @@ class LiveTerm:
     def word(self) -> Word:
         """How near what the picture shows of it is to its look."""
         shown = self.displayed
-        return word_of(shown.fidelity, is_wanted=shown.light == self.light and not shown.differing(self.target))
+        is_wanted = not shown.is_outdated and shown.light == self.light and not shown.differing(self.target)
+        return word_of(shown.fidelity, is_wanted=is_wanted)
 
     def key_of_operator(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
         """What an operator depends on besides view and material: model, light, and the curves that are dormant."""

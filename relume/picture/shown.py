@@ -41,6 +41,7 @@ class Shown:
         anchor: the last image of which every coefficient was summed, where that was in another light.
         exact_in: of what image, see `LiveTerm.key_of_image`, and in which region of the picture, it is the exact one.
         detail: of a preview, how often it was made of more samples.
+        is_outdated: it is of another model than is wanted by now, or of other values of its fixed parameters.
     """
 
     image: F32
@@ -53,6 +54,7 @@ class Shown:
     anchor: Shown | None = None
     exact_in: tuple[Hashable, Tile] | None = None
     detail: int = 0
+    is_outdated: bool = False
 
     @property
     def is_firm(self) -> bool:

@@ -24,7 +24,7 @@ from relume.picture.hand import Hand
 from relume.picture.jobs import Freeze, Job, Place, Shade, goes_on_from
 from relume.picture.light import Light, of_source, vector_of
 from relume.picture.region import is_exact_in, is_seen, region_first
-from relume.picture.routes import operator
+from relume.picture.routes import operator, textures
 from relume.picture.routes.base import LightRoute
 from relume.picture.routes.follow import Follow
 from relume.picture.routes.mix import Mix
@@ -55,6 +55,8 @@ class Transition:
 
     def step(self, max_coefficients: int | None) -> None:
         """Bring every term as near to what is wanted as it can be now."""
+        for place in self._places():
+            textures.step(place)
         self._change_light()
         for place in self._places():
             if not place.live.is_exact():
@@ -133,6 +135,9 @@ class Transition:
             is_opening = all(place.live.is_blank for place in self._places())
             lacking = [place for place in self._unlit() if self._route(place, images.light) is None]
             return Preview.of(images, lacking, "a preview" if is_opening else "the light")
+        outdated = [p for p in self._places() if p.live.shows_another and not images.is_at_hand(p.material, p.live)]
+        if outdated and self._is_watched and can_preview(images):
+            return Preview.of(images, outdated, "what was changed")
         if hand.is_turning and can_preview(images) and not is_prepared(images):
             return Preview.of(images, self._places(), "the light")
         return None
@@ -236,8 +241,10 @@ class Transition:
         A parameter whose only curve is free in all its wavelets needs no nodes: that curve's operator is there, exact.
         """
         touched = hand.touched
-        if touched is None or touched.basis is None or not touched.place.material.num_samples:
+        if touched is None or not touched.place.material.num_samples:
             return None
+        if touched.basis is None:
+            return textures.job_for(touched.place)
         live, basis, active = touched.place.live, touched.basis, touched.place.live.ready.basis
         form = self._form(touched.place, basis)
         if live.differing() or form is None:

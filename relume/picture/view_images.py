@@ -105,6 +105,15 @@ class ViewImages:
         """What arrives at the samples of a material in a light; shadows that the memory lacks are traced."""
         return self.transfer.arriving(self.view, material.index, light, self.cache)
 
+    def unlit(self, material: MaterialImage) -> Receivers:
+        """The samples of a material, without what arrives at them."""
+
+        def read() -> Receivers:
+            return self.view.receivers(material.index, is_lit=False)
+
+        key = self.transfer.key, "receivers", self.view.name, material.index
+        return self.cache.keep(key, read)
+
     def is_default(self, material: MaterialImage, live: LiveTerm, light: Light) -> bool:
         """Whether a material's live term in some light is of the scene's own look: its image stays beside the store."""
         name = self.transfer.material_names[material.index]

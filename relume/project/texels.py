@@ -2,16 +2,14 @@
 
     L(x, ωo) = Σ_v hat_v(ωo) Σ_j α_vj(x) Σ_l E_vkj(l) a_l(x),   a_l = Σ_s w_s hat_l(ω_s)
 
-where a is all light that arrives at a place, shared out to the directions l in which the BTF is known: its values are
-linear between these (`relume.btf.rings`), so that the sum over light is exact for what is known. The weights w have no
-cosine: it is in the BTF's values. Where relief is known, x is from each side v where the same of it is seen
-(`relume.btf.parallax`).
+where a is all light that arrives at a place (`relume.project.arrived`). Where relief is known, x is from each side v
+where the same of it is seen (`relume.btf.parallax`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -20,60 +18,20 @@ from numpy.typing import NDArray
 from relume.basis.arcs import log2_above_one
 from relume.brdf.terms.btf import Texels
 from relume.btf.parallax import height_seen, slant_of, slants
-from relume.btf.rings import Rings, taps
+from relume.btf.rings import taps
 from relume.btf.sent import seen_numpy, sent_numpy
 from relume.light.triangles import TriangleLights
-from relume.project.receivers import Listed, Rays, Receivers
+from relume.project.arrived import arrived_rows, into_texture, texture_axes
+from relume.project.receivers import Receivers
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_LEAST_COSINE = np.float32(1e-3)  # of rays, whose light was weighed by it
+_LEAST_COSINE = np.float32(1e-3)
 _TEXEL = np.float32(0.5)  # side of the texels for a footprint, in footprints: a mean between four is twice as wide
 _MOST_PLACES = 4  # along a footprint
 _APART = np.float32(1.5)  # texels, between them at most
 _LONGEST = np.float32(3)  # footprint, in widths: of longer ones coarser texels are summed
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _turned(x, y, axis):  # type: ignore[no-untyped-def]
-    """Bring a direction of a shading frame into the texture's, whose x and y axes are there axis[:2] and axis[2:]."""
-    return axis[0] * x + axis[1] * y, axis[2] * x + axis[3] * y
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _from_triangles(rings, normal, tangent, axes, visible, direction, irradiance, out):  # type: ignore[no-untyped-def]
-    """Add light triangles that n points see. out: (n, 3, L)"""
-    index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
-    for p in range(out.shape[0]):
-        n, t = normal[p], tangent[p]
-        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
-        for m in range(direction.shape[0]):
-            if not (visible[p, m >> 3] >> (m & 7)) & 1:
-                continue
-            x, y, z = direction[m, 0], direction[m, 1], direction[m, 2]
-            up = n[0] * x + n[1] * y + n[2] * z
-            if up <= 0:
-                continue
-            lx, ly = _turned(t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z, axes[p])
-            left = taps(rings, lx, ly, up, index, weight)
-            for k in range(4):
-                for channel in range(3):
-                    out[p, channel, index[k]] += left * weight[k] * irradiance[m, channel]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _from_listed(rings, axes, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
-    """Add listed rays, whose light has been weighed by the cosine, to their points. out: (n, 3, L)"""
-    index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
-    for p in range(out.shape[0]):
-        for ray in range(first[p], first[p + 1]):
-            up = wi[2, ray]
-            lx, ly = _turned(wi[0, ray], wi[1, ray], axes[p])
-            left = taps(rings, lx, ly, up, index, weight) / max(up, _LEAST_COSINE)
-            for k in range(4):
-                for channel in range(3):
-                    out[p, channel, index[k]] += left * weight[k] * irradiance[channel, ray]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -231,7 +189,7 @@ def _send(rings, tables, texels, relief, arriving, axes, wo, places, out):  # ty
         out[p, :] = 0
         if wo[p, 2] <= 0:
             continue
-        vx, vy = _turned(wo[p, 0], wo[p, 1], axes[p])
+        vx, vy = into_texture(wo[p, 0], wo[p, 1], axes[p])
         taps(rings, vx, vy, wo[p, 2], index, of_view)
         slant = slant_of(rings, vx, vy, wo[p, 2])
         num_places, width = _places_in(levels, relief, places[p], vx, vy, wo[p, 2], slant, of_places)
@@ -258,25 +216,12 @@ def _send(rings, tables, texels, relief, arriving, axes, wo, places, out):  # ty
             out[p, channel] = max(out[p, channel], np.float32(0))
 
 
-class _Covered(NamedTuple):
-    """How points are covered.
-
-    Attributes:
-        axes: of the texture, as `_turned` wants them. (n, 4) float32. places: as `_send` does. (n, 3) float32
-    """
-
-    axes: F32
-    places: F32
-
-
-def _covered(texels: Texels, uv: F32) -> _Covered:
+def _places(texels: Texels, uv: F32) -> F32:
+    """Where points are on the texture. (n, 3), as `_send` wants them"""
     cosine, sine, u, up = math.cos(texels.rotation), math.sin(texels.rotation), uv[:, 0], -uv[:, 1]
-    x = np.stack([np.cos(uv[:, 3]), np.sin(uv[:, 3])], axis=1)
-    y = uv[:, 4:] * np.stack([-x[:, 1], x[:, 0]], axis=1)
-    axes = np.concatenate([cosine * x + sine * y, cosine * y - sine * x], axis=1)
     # up in the texture is down in its coordinates
     places = texels.scale * np.stack([cosine * u + sine * up, sine * u - cosine * up, uv[:, 2]], axis=1)
-    return _Covered(axes.astype(np.float32), places.astype(np.float32))
+    return places.astype(np.float32)
 
 
 def texel_rows(texels: Texels, lights: TriangleLights | None, receivers: Receivers, start: int, stop: int) -> F32:
@@ -289,39 +234,30 @@ def texel_rows(texels: Texels, lights: TriangleLights | None, receivers: Receive
     Returns:
         Radiance. (stop - start, 3) float32
     """
+    return sent_rows(texels, texels.tables, arrived_rows(texels, lights, receivers, start, stop), receivers, start)
+
+
+def sent_rows(texels: Texels, tables: F32, arrived: F32, receivers: Receivers, start: int) -> F32:
+    """Find what points send of light that has been shared out.
+
+    Args:
+        texels: how they are covered. tables: of the BTF, or those that `turned_tables` made of them.
+        arrived: at the points that are asked about, see `arrived_rows`. (n, 3, L)
+        receivers: all points; `uv` says where they are. start: the first that is asked about.
+    Returns:
+        Radiance. (n, 3) float32
+    """
     assert receivers.uv is not None
-    rows, rings, found = slice(start, stop), texels.btf.rings, texels.btf
-    covered = _covered(texels, receivers.uv[rows])
-    arriving = np.zeros((stop - start, 3, rings.num_directions), np.float32)
+    rows, found = slice(start, start + len(arrived)), texels.btf
+    uv, axes = receivers.uv[rows], texture_axes(texels.rotation, receivers.uv[rows])
     n, t, wo = (np.ascontiguousarray(a[rows], np.float32) for a in (receivers.normal, receivers.tangent, receivers.wo))
-    if lights is not None and lights.num_lights and receivers.visible.shape[1]:
-        seen = np.ascontiguousarray(receivers.visible[rows])
-        _from_triangles(rings, n, t, covered.axes, seen, lights.direction, lights.irradiance, arriving)
-    for rays in receivers.rays:
-        _add_rays(rings, rays, receivers, covered.axes, start, stop, arriving)
     local = np.stack([(t * wo).sum(axis=1), (np.cross(n, t) * wo).sum(axis=1), (n * wo).sum(axis=1)], axis=1)
-    out = np.empty((stop - start, 3), np.float32)
+    out = np.empty((len(arrived), 3), np.float32)
     of_texels = found.levels, found.cluster, found.weight
-    relief = found.height, found.height.min(), found.height.max(), slants(rings)
-    _send(
-        rings,
-        texels.tables,
-        of_texels,
-        relief,
-        arriving,
-        covered.axes,
-        np.ascontiguousarray(local),
-        covered.places,
-        out,
-    )
+    relief = found.height, found.height.min(), found.height.max(), slants(found.rings)
+    args = found.rings, tables, of_texels, relief, arrived, axes, np.ascontiguousarray(local), _places(texels, uv), out
+    _send(*args)
     return out
-
-
-def _add_rays(rings: Rings, rays: Rays, receivers: Receivers, axes: F32, start: int, stop: int, out: F32) -> None:
-    most = (stop - start) * rays.rays_a_point
-    listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
-    rays.list_into(listed, receivers, start, stop)
-    _from_listed(rings, axes, listed.first, listed.wi, listed.irradiance, out)
 
 
 def texel_numpy(texels: Texels, directions: F64, irradiance: F64, wo: F64, place: F64, footprint: float = 0.0) -> F64:

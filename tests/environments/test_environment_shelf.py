@@ -17,6 +17,7 @@ from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError, SceneError
+from server.files.importing import remove_strays
 
 
 def test_an_import_is_listed_and_found_by_its_name(shelf):
@@ -44,6 +45,19 @@ def test_a_bad_file_leaves_nothing_behind(tmp_path):
     with pytest.raises(SceneError, match="bad"):
         keep(tmp_path / "shelf", tmp_path / "bad.hdr", "bad")
     assert not (tmp_path / "shelf").exists()
+
+
+def test_what_a_killed_import_left_is_found_by_its_name(tmp_path):
+    def killed(made):
+        (stray,) = (tmp_path / "shelf").iterdir()
+        shutil.copytree(stray, tmp_path / "left" / stray.name)
+        raise SceneError("killed")
+
+    (tmp_path / "some.hdr").write_bytes(b"some")
+    with pytest.raises(SceneError, match="killed"):
+        STORE.keep(tmp_path / "shelf", tmp_path / "some.hdr", "Some", killed)
+    remove_strays(tmp_path, older_than_s=-1)
+    assert not list((tmp_path / "left").iterdir())
 
 
 def test_large_maps_are_kept_smaller_and_as_bright(tmp_path, monkeypatch):

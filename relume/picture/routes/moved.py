@@ -23,7 +23,7 @@ from relume.picture.view_images import ViewImages
 from relume.points import Points
 from relume.project.contraction import contract
 from relume.project.levels import contract_levels
-from relume.project.receivers import LocalRays, Receivers
+from relume.project.receivers import LocalRays
 from relume.trace.local_shadows import arriving
 from relume.trace.preview_light import PreviewLight
 from relume.views.compose import add_even
@@ -102,7 +102,7 @@ class MovedLights:
         self, material: MaterialImage, live: LiveTerm, rays: list[LocalRays], beside: F32 | None = None
     ) -> Shaded:
         """What rays bring a term, in the threads of frames. beside: what is shown already, see `Shader`"""
-        points = replace(self._receivers(material), rays=rays)
+        points = replace(self._images.unlit(material), rays=rays)
         contractions = contract_levels(live.term, live.target, None)
         rows = np.empty((material.num_samples, 3), np.float32)
 
@@ -111,14 +111,6 @@ class MovedLights:
 
         for_shares(add, len(rows))
         return Shaded.of(rows)
-
-    def _receivers(self, material: MaterialImage) -> Receivers:
-        view, index = self._images.view, material.index
-
-        def read() -> Receivers:
-            return view.receivers(index, is_lit=False)
-
-        return self._images.cache.keep((*self._place, "receivers", index), read)
 
     def _points(self) -> Points:
         """Those of the view; of samples that are seen from behind the normals are nothing, and no light arrives."""

@@ -1,7 +1,8 @@
 """A preview of other light: one sample of each small square of pixels is shaded, those between are interpolated.
 
 When the environment is turned or exchanged, or surfaces reflect other light onto each other, every image of a picture
-counts for nothing at once, and shading all samples takes seconds; so it does where a view is opened for the first time.
+counts for nothing at once, and shading all samples takes seconds; so it does where a view is opened for the first time,
+and for one term where a parameter changes that its operators are frozen with.
 A preview costs a few thousand samples whatever the picture's size, holds no operator, and lets the hand see where the
 light goes; colours and textures multiply it at full size. It is never called exact: at rest all is shaded. Where that
 takes long, as of a large picture, finer previews come before, each of eight times as many samples.
@@ -19,6 +20,7 @@ from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
 from relume.look.model import Rgb
+from relume.operators.arrived import arrive, sent_between
 from relume.operators.shade import Shaded, shade
 from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Cancelled, Place, Progress
@@ -155,8 +157,10 @@ class Preview:
     @classmethod
     def of(cls, images: ViewImages, places: Iterable[Place], what: str) -> Preview:
         """Of the terms at these places of a picture's images, in the look as it is now. what: in words."""
+        places = list(places)
         parts = [_Part(place, place.live.term, place.live.target) for place in places]
-        key = images.transfer.key, images.view.name, images.light
+        wanted = (images.key_of_image(place.material, place.live, images.light) for place in places)
+        key = images.transfer.key, images.view.name, images.light, *wanted
         return cls(key, images, images.light, images.gain, parts, what)
 
     def finer(self, detail: int, *, refines: bool) -> Preview:
@@ -168,17 +172,25 @@ class Preview:
         found = []
         for k, part in enumerate(self.parts):
             sparse = _sparse(self.images, part.place.material.index, self.detail)
-            shaded = shade(part.term, part.bands, *sparse.few.arriving(self.light), lambda share: None, cancelled)
-            found.append(_spread(shaded, sparse.weights))
+            found.append(self._glimpsed(part, sparse, cancelled))
             progress((k + 1) / len(self.parts))
         return found
+
+    def _glimpsed(self, part: _Part, sparse: Sparse, cancelled: Cancelled) -> F32:
+        """One term's image, (tiles, 3, samples) float32; of a texture that has its own texels at every sample."""
+        arriving, texels = sparse.few.arriving(self.light), part.term.texels
+        if texels is None:
+            return _spread(shade(part.term, part.bands, *arriving, _unheard, cancelled), sparse.weights)
+        receivers = self.images.unlit(part.place.material)
+        return sent_between(texels, arrive(texels, *arriving, _unheard, cancelled), sparse.weights, receivers).image
 
     def install(self, made: Sequence[F32]) -> None:
         """See `Job`; also where the hand has turned the light further meanwhile."""
         for part, image in zip(self.parts, made, strict=True):
             live = part.place.live
             is_followed = live.ready.fidelity == Fidelity.FOLLOWED and live.ready.light == live.light
-            if not (live.is_firm or is_followed) and part.place.is_there():
+            is_same = live.term.model == part.term.model  # with other fixed parameters it is a glimpse of it as well
+            if is_same and not (live.is_firm or is_followed) and part.place.is_there():
                 live.put(self._over(part, image))
 
     def _over(self, part: _Part, image: F32) -> Shown:
@@ -190,6 +202,10 @@ class Preview:
         which = material.lies_in(ready.exact_in[1])
         kept = with_rows(image, Shaded(ready.image).rows(len(which)), which)
         return replace(rough, image=kept, detail=self.detail)
+
+
+def _unheard(share: float) -> None:
+    """Say nothing: a part of a preview takes some milliseconds."""
 
 
 def _spread(shaded: Shaded, weights: Any) -> F32:

@@ -1,0 +1,141 @@
+"""BTFs in hand at fixed views: texels are summed anew in light that is kept, and no picture is exact before it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sessions import make_next, relative_rmse, settle
+from tiny_scenes import looking, quad, scene_of, studio
+
+from relume.bake import Recipe
+from relume.brdf.registry import TERMS
+from relume.look import validate
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.picture.jobs import Shade
+from relume.picture.light import light_of
+from relume.picture.picture import Picture
+from relume.picture.routes.preview import Preview
+from relume.picture.routes.textures import Arrive
+from relume.project.arrived import arrived_rows, turned_tables
+from relume.render.image import render_image
+from relume.scene.model import Material
+from relume.store import bake_here
+
+GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
+
+
+@pytest.fixture(scope="module")
+def bake(tmp_path_factory):
+    """A floor under a studio."""
+    ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    camera = looking("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
+    materials = [Material("Floor", (GREY,)), Material("Other", (GREY,))]
+    wall = quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1)
+    scene = scene_of(ground, wall, camera=camera, environment=studio(32, 20.0), materials=materials)
+    recipe, folder = Recipe("direct", ("front",), (64, 48), 300), tmp_path_factory.mktemp("floor")
+    return open_bake(bake_here(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Memory(1 << 30))
+
+
+def covered(bake, record, sky=0.0, **params):
+    term = {"model": "measured_btf", "data": record.data, "texture": None, "params": params}
+    look = {"materials": {"Floor": {"terms": [term]}}, "environment": {"rotation": sky}}
+    return validate(look, bake.default_look)
+
+
+@pytest.fixture
+def held(bake, small_btf):
+    """A picture whose floor is covered, and a hand on it; its first image may have come from the disk."""
+    picture = Picture(bake, "front", Memory(1 << 28), is_watched=True)
+    picture.set_look(covered(bake, small_btf.record, scale=2.0))
+    settle(picture).touch("/materials/Floor/terms/0/params/scale")
+    while picture.next_job() is not None:
+        make_next(picture)
+    return picture
+
+
+@pytest.mark.parametrize("change", [{"scale": 3.0}, {"scale": 2.0, "components": 1}])
+def test_texels_follow_the_hand_exactly(bake, small_btf, held, change):
+    for params in ({"scale": 2.5}, change):
+        look = covered(bake, small_btf.record, **params)
+        held.set_look(look)
+        advance = held.advance(None)
+        assert advance.exact
+        assert advance.changed
+        assert held.next_job() is None
+        assert relative_rmse(held.image(), render_image(bake, "front", look)) < 1e-6
+
+
+def test_a_texture_that_is_turned_follows_and_is_exact_at_rest(bake, small_btf, held):
+    before = held.image()
+    for degrees in (10.0, 40.0):
+        look = covered(bake, small_btf.record, scale=2.0, rotation=degrees)
+        held.set_look(look)
+        assert held.advance(None).fidelity == "followed"
+        expected = render_image(bake, "front", look)
+        assert 1e-4 < relative_rmse(held.image(), expected) < 0.2 * relative_rmse(before, expected)
+        assert held.next_job().refines
+    assert relative_rmse(settle(held).image(), expected) < 1e-6
+
+
+def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_btf, monkeypatch):
+    """As in a look that was opened with images from the disk."""
+    monkeypatch.setattr("relume.picture.arrivals._SHARE", 1 << 20)
+    picture = Picture(bake, "front", Memory(1 << 28), is_watched=True)
+    picture.set_look(covered(bake, small_btf.record, scale=2.0))
+    before = settle(picture).image()
+    look = covered(bake, small_btf.record, scale=3.0)
+    picture.set_look(look)
+    assert picture.advance(None).fidelity == "approximate"
+    np.testing.assert_array_equal(picture.image(), before)
+    assert isinstance(make_next(picture), Preview)
+    assert picture.advance(None).fidelity == "preview"
+    expected = render_image(bake, "front", look)
+    assert relative_rmse(picture.image(), expected) < 0.2 * relative_rmse(before, expected)
+    assert isinstance(picture.next_job(), Shade)
+    assert relative_rmse(settle(picture).image(), expected) < 1e-6
+
+
+def test_its_light_is_kept_when_a_hand_takes_hold_of_it(bake, small_btf, held):
+    """The memory has dropped it."""
+    look = covered(bake, small_btf.record, scale=2.0, sky=30.0)
+    held.set_look(look)
+    settle(held)
+    held._images.cache.shrink(0, ())
+    held.touch("/materials/Floor/terms/0/params/scale")
+    assert isinstance(make_next(held), Arrive)
+    assert held.next_job() is None
+    held.set_look(covered(bake, small_btf.record, scale=3.0, sky=30.0))
+    assert held.advance(None).exact
+
+
+def test_other_fixed_parameters_are_glimpsed_too(bake):
+    def look(sigma):
+        term = {"model": "oren_nayar", "params": {"sigma": sigma}}
+        return validate({"materials": {"Floor": {"terms": [term]}}}, bake.default_look)
+
+    picture = Picture(bake, "front", Memory(1 << 28), is_watched=True)
+    picture.set_look(look(0.1))
+    before = settle(picture).image()
+    picture.set_look(look(1.0))
+    assert picture.advance(None).fidelity == "approximate"
+    assert isinstance(make_next(picture), Preview)
+    picture.advance(None)
+    expected = render_image(bake, "front", look(1.0))
+    assert relative_rmse(picture.image(), expected) < 0.3 * relative_rmse(before, expected)
+    assert picture.next_job().refines
+
+
+def test_light_is_turned_with_the_rings(bake, small_btf):
+    """By half a turn every direction of these rings takes another's place."""
+    texels = TERMS["measured_btf"].settled({"model": "measured_btf", "data": small_btf.record.data}).texels
+    light = light_of(covered(bake, small_btf.record), bake.material_names, has_bounces=False)
+    arriving = bake.arriving(bake.views["front"], 0, light, bake.memory)
+    half = replace(texels, rotation=np.pi)
+    rings = texels.btf.rings
+    before, after = (arrived_rows(one, *arriving, 0, 40) for one in (texels, half))
+    tables = np.random.default_rng(3).random((5, rings.num_directions), np.float32)
+    turned = np.einsum("tl,ncl->nct", turned_tables(rings, tables, np.pi), before)
+    np.testing.assert_allclose(turned, np.einsum("tl,ncl->nct", tables, after), rtol=1e-4)
+    between = turned_tables(rings, tables, 0.3)
+    np.testing.assert_allclose(between @ np.ones(81), tables.sum(axis=1), rtol=1e-4)  # none of the light is lost
