@@ -29,6 +29,8 @@ from numpy.typing import NDArray
 from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.errors import PlanError
 from relume.light.gather_rays import make_pattern
+from relume.light.tiles import choose_tiles
+from relume.light.triangles import Unturned, weigh
 from relume.memory import Memory
 from relume.methods import bounds, moving_error
 from relume.methods.harmonic_light import harmonic_bytes, make_harmonic_light
@@ -37,6 +39,7 @@ from relume.methods.moving_views import MovingViews
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, read_targets, triangles_of
 from relume.methods.store_io import MOVING_ERROR, read_gather_samples, read_moving_error, read_tree
 from relume.methods.thrown import make_thrown
+from relume.moving.points.density import by_distance, by_shadows
 from relume.moving.points.lattice import MAX_POINTS, most_nodes, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.points.surface import pattern_of_points, read_surface_points, tangents_of, textures_of
@@ -49,6 +52,7 @@ from relume.trace.links import trace_links
 ROWS_A_SHARD = 4096
 RAYS_A_POINT = 377  # a point alone then errs by less than 1 % of its radiance (`surface.points_rmse`)
 RAYS_A_CELL_POINT = 55
+_LIGHTS_OF_SHADOWS = 32  # by which points are placed
 _FEWEST_CELLS, _MOST_CELLS, _POINTS_A_CELL = 512, 8192, 6
 _MOST_ASKED_CELLS = 4 * _MOST_CELLS
 MIN_POINTS = 64
@@ -192,7 +196,11 @@ class SurfaceMethod:
         cameras = [camera for camera in scene.cameras if camera.name in recipe.views]
         is_open = open_sides(geometry, cameras, int(scene.id[:7], 16))
         eyes = np.array([camera.to_world[:3, 3] for camera in cameras])
-        placed = place_points(geometry, is_open, eyes, recipe.num_points)
+        coarse = by_distance(geometry, eyes)
+        radiance = scene.environment.radiance
+        few = weigh(choose_tiles(radiance, _LIGHTS_OF_SHADOWS), Unturned.of(radiance))
+        coarse = by_shadows(geometry, place_points(geometry, is_open, coarse, recipe.num_points), coarse, few)
+        placed = place_points(geometry, is_open, coarse, recipe.num_points)
         fields = {name: getattr(placed.points, name) for name in ("position", "normal", "tangent")}
         return {
             **{f"lattice/{name}": array for name, array in placed.lattice._asdict().items()},

@@ -18,6 +18,7 @@ from relume.moving.evaluate import send, send_numpy
 from relume.moving.highlights.looking import SkyLight
 from relume.moving.look_up import at_vertices, look
 from relume.moving.pixels import FromVertices, Mirrored, combine
+from relume.moving.points.density import by_distance
 from relume.moving.points.lattice import node_of, num_nodes, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.sky import fill_sky, turn_of
@@ -37,7 +38,8 @@ def moving(tmp_path_factory):
 def placed(scene, num_points=500):
     geometry = merge(scene)
     eyes = np.array([camera.to_world[:3, 3] for camera in scene.cameras])
-    return geometry, place_points(geometry, open_sides(geometry, scene.cameras, 1), eyes, num_points)
+    is_open, coarse = open_sides(geometry, scene.cameras, 1), by_distance(geometry, eyes)
+    return geometry, place_points(geometry, is_open, coarse, num_points)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 255])
@@ -99,7 +101,7 @@ def test_a_scene_without_area_is_refused():
     flat = mesh("line", [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], 0, normals=[[0, 1, 0]] * 3)
     geometry = merge(scene_of(flat, camera=looking("front", (0, 1, 3), (0, 0, 0), 0.7)))
     with pytest.raises(PlanError, match="no surface"):
-        place_points(geometry, np.ones((1, 2), bool), np.zeros((1, 3)), 100)
+        place_points(geometry, np.ones((1, 2), bool), np.ones(1), 100)
 
 
 def test_the_weights_of_a_pixel_put_it_where_it_is(moving):

@@ -31,12 +31,11 @@ F64 = NDArray[np.float64]
 
 MAX_POINTS = 2_000_000
 MOST_ROWS = 255  # of the grid in one face
-_ALIKE, _LEAST_ALIKE = 6, 1  # steps of a unit normal's components, within which points look the same way
+_ALIKE, _LEAST_ALIKE = 3, 1  # steps of a unit normal's components, within which points look the same way
 _TRIALS, _MOST_TRIALS = 6, 40  # after the first, fewer points than asked for are good enough, and each is coarser
 _COARSER = 1.25
 _WIDEST = 16.0  # spacing, beside the longest edge: then all that may be shared is
 _NODES_A_POINT = 8  # more where faces are thin
-_MOST_COARSE = 4.0  # or fine, beside a middling distance from the eye
 _CLOSE_ENOUGH = 0.05  # of the number of points asked for
 
 
@@ -92,13 +91,13 @@ def node_of(rows, i, j):  # type: ignore[no-untyped-def]
     return i * (rows + 1) - (i * (i - 1)) // 2 + j
 
 
-def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_points: int) -> Placed:
-    """Spread about `num_points` points over all sides that can be seen, more where eyes begin.
+def place_points(geometry: Geometry, is_open: NDArray[np.bool_], coarse: F64, num_points: int) -> Placed:
+    """Spread about `num_points` points over all sides that can be seen.
 
     Args:
         geometry: the scene's triangles. is_open: which sides of faces can be seen. (faces, 2)
-        eyes: places that the scene is seen from at first; what is twice as far from them has a quarter of the points.
-            (eyes, 3)
+        coarse: how many times farther apart than elsewhere points of each face are, powers of two, see
+            `relume.moving.points.density`. (faces,)
         num_points: at most `MAX_POINTS`.
     Raises:
         PlanError: no surface has any area.
@@ -110,7 +109,6 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
     total = float((is_open * area[:, None]).sum())
     if total <= 0:
         raise PlanError("no surface of the scene has any area; there is nothing to put points on")
-    coarse = _coarseness(corners.mean(axis=1), area, eyes)
     longest, count = edges.max(axis=1) / coarse, is_open.sum(axis=1)
     spacing, most = math.sqrt(total / num_points), most_nodes(len(geometry.faces), num_points)
 
@@ -139,15 +137,6 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], eyes: F64, num_
     vertices, vertex = find_vertices(nodes, chosen)
     kept = nodes.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
     return Placed(lattice._replace(node=vertex), vertices, kept, nodes.material[chosen], spacing)
-
-
-def _coarseness(centre: F64, area: F64, eyes: F64) -> F64:
-    """How many times farther apart the points of each face are than those at a middling distance: powers of
-    two. (faces,)"""
-    distance = np.min([np.linalg.norm(centre - eye, axis=1) for eye in eyes], axis=0)
-    middling = np.sqrt(np.average(distance**2, weights=area))
-    coarse = np.clip(distance / max(middling, 1e-30), 1 / _MOST_COARSE, _MOST_COARSE)
-    return np.asarray(2.0 ** np.rint(np.log2(coarse)))
 
 
 def pieces_of(geometry: Geometry) -> NDArray[np.int32]:
