@@ -1,7 +1,7 @@
 """What a moving eye sees past surfaces, and on grounds that only catch shadows.
 
-As in fixed views (`relume.picture.backdrop`), a catcher shows what lies behind it times what arrives there over what
-would arrive if nothing but the ground were there; where nothing would, nothing is hidden.
+As in fixed views (`relume.picture.background.backdrop`), a catcher shows what lies behind it times what arrives there
+over what would arrive if nothing but the ground were there; where nothing would, nothing is hidden.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from relume.moving.points.surface import Surface
 from relume.moving.sky import fill_sky
 from relume.moving.transfer import MovingTransfer
 from relume.parallel import for_shares
-from relume.picture.backdrop import MOST_SHARE
+from relume.picture.background.backdrop import MOST_SHARE
 from relume.picture.light import Light
 
 F32 = NDArray[np.float32]

@@ -21,7 +21,7 @@ from relume.operators.frozen import Frozen, Rough
 from relume.operators.operator import Operator
 from relume.operators.packed import Packed
 from relume.operators.shade import Begun, Shaded, shaded_bytes
-from relume.picture.routes.arrivals import keep_arrived, may_be_kept
+from relume.picture.arrivals import keep_arrived, may_be_kept
 from relume.picture.fidelity import Fidelity
 from relume.picture.light import Light, parts_of
 from relume.picture.live_term import LiveTerm

@@ -14,7 +14,7 @@ from relume.errors import ParameterError
 from relume.look import Look
 from relume.memory import Memory
 from relume.operators.shade import shaded_bytes
-from relume.picture.backdrop import Backdrop
+from relume.picture.background.backdrop import Backdrop
 from relume.picture.fidelity import Word, worst
 from relume.picture.hand import Hand, Held
 from relume.picture.jobs import Freeze, Job, Place

@@ -80,7 +80,7 @@ def test_a_texture_that_is_turned_follows_and_is_exact_at_rest(bake, small_btf, 
 
 def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_btf, monkeypatch):
     """As in a look that was opened with images from the disk."""
-    monkeypatch.setattr("relume.picture.routes.arrivals._SHARE", 1 << 20)
+    monkeypatch.setattr("relume.picture.arrivals._SHARE", 1 << 20)
     picture = Picture(bake, "front", Memory(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
     before = settle(picture).image()

@@ -19,7 +19,7 @@ from relume.eye.view_samples import sample_view
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.picture import MovingPicture
-from relume.picture.coverage import Coverage
+from relume.picture.background.coverage import Coverage
 from relume.reference.image import reference_image
 from relume.render.image import render_image
 from relume.scene.model import Glass, Material

@@ -29,7 +29,7 @@ from relume.environments.equirect import lookup, texel_directions, texel_solid_a
 from relume.imageio.files import to_bytes
 from relume.light.blur import blurred, reduced
 from relume.memory import Memory
-from relume.picture.backdrop import MOST_SHARE, Backdrop
+from relume.picture.background.backdrop import MOST_SHARE, Backdrop
 from relume.picture.picture import Picture
 from relume.render.image import render_image
 from relume.scene.model import Material

@@ -12,7 +12,7 @@ from typing import Literal
 
 from relume.brdf.terms.btf import Texels
 from relume.operators.arrived import Arrived
-from relume.picture.routes.arrivals import keep_arrived, known_arrived, may_be_kept
+from relume.picture.arrivals import keep_arrived, known_arrived, may_be_kept
 from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Cancelled, Place, Progress
 from relume.picture.light import Light

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from relume.color import luminance, srgb_encode
 from relume.look import EnvironmentKey, Look
 from relume.look.model import BackgroundLook, Rgb
-from relume.picture.coverage import Coverage
+from relume.picture.background.coverage import Coverage
+from relume.picture.background.unshadowed import Unshadowed
 from relume.picture.light import Light, Source
 from relume.picture.material_image import MaterialImage
 from relume.picture.mirrors import rectangles_of
-from relume.picture.unshadowed import Unshadowed
 from relume.picture.view_images import ViewImages
 
 F32 = NDArray[np.float32]

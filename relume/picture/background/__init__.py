@@ -1,0 +1,1 @@
+"""What is behind a picture, and how much of it is hidden."""
