@@ -20,6 +20,8 @@ from relume.project.texels import sent_rows
 F32 = NDArray[np.float32]
 
 _SAMPLES_A_RANGE = 1024
+_CLUSTERS_ABOUT = 8  # a sample, in which its texels are, at most
+_QUICK = 12_000_000  # rows of tables: half a second of two cores
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +59,12 @@ class Arrived:
 
         for_ranges(send, len(rows), _SAMPLES_A_RANGE)
         return Shaded.of(rows)
+
+
+def is_quick(texels: Texels, num_samples: int) -> bool:
+    """Whether a frame can wait for texels to be summed anew: each sample sums the tables of clusters about it."""
+    clusters = min(texels.btf.mean.shape[1], _CLUSTERS_ABOUT)
+    return bool(num_samples * clusters * texels.tables.shape[2] <= _QUICK)
 
 
 def arrived_bytes(texels: Texels, num_samples: int) -> int:

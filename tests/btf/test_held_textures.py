@@ -96,6 +96,17 @@ def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_bt
     assert relative_rmse(settle(picture).image(), expected) < 1e-6
 
 
+def test_no_frame_waits_for_many_texels(bake, small_btf, held, monkeypatch):
+    """They are glimpsed, and summed in kept light beside the frames."""
+    monkeypatch.setattr("relume.operators.arrived._QUICK", 0)
+    look = covered(bake, small_btf.record, scale=2.9)
+    held.set_look(look)
+    assert held.advance(None).fidelity == "approximate"
+    assert isinstance(make_next(held), Preview)
+    assert held.advance(None).fidelity == "preview"
+    assert relative_rmse(settle(held).image(), render_image(bake, "front", look)) < 1e-6
+
+
 def test_its_light_is_kept_when_a_hand_takes_hold_of_it(bake, small_btf, held):
     """The memory has dropped it."""
     look = covered(bake, small_btf.record, scale=2.0, sky=30.0)

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
 from relume.look.model import Rgb
-from relume.operators.arrived import arrive, sent_between
+from relume.operators.arrived import arrive, is_quick, sent_between
 from relume.operators.shade import Shaded, shade
 from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Cancelled, Place, Progress
@@ -177,9 +177,9 @@ class Preview:
         return found
 
     def _glimpsed(self, part: _Part, sparse: Sparse, cancelled: Cancelled) -> F32:
-        """One term's image, (tiles, 3, samples) float32; of a texture that has its own texels at every sample."""
+        """One term's image, (tiles, 3, samples) float32; a texture's samples have texels of their own, if quick."""
         arriving, texels = sparse.few.arriving(self.light), part.term.texels
-        if texels is None:
+        if texels is None or not is_quick(texels, part.place.material.num_samples):
             return _spread(shade(part.term, part.bands, *arriving, _unheard, cancelled), sparse.weights)
         receivers = self.images.unlit(part.place.material)
         return sent_between(texels, arrive(texels, *arriving, _unheard, cancelled), sparse.weights, receivers).image

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from relume.brdf.terms.btf import Texels
-from relume.operators.arrived import Arrived
+from relume.operators.arrived import Arrived, is_quick
 from relume.picture.arrivals import keep_arrived, known_arrived, may_be_kept
 from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Cancelled, Place, Progress
@@ -26,7 +26,7 @@ def step(place: Place) -> None:
     if texels is None or live.is_firm:
         return
     known = known_arrived(images, material, texels, live.light)
-    if known is not None:
+    if known is not None and is_quick(texels, material.num_samples):
         image = known.sent(texels, images.unlit(material)).image
         fidelity = Fidelity.EXACT if known.rotation == texels.rotation else Fidelity.COARSE
         live.put(Shown(image, fidelity, dict(live.target), live.light))
