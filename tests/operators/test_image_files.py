@@ -16,7 +16,7 @@ from relume.methods import transfer as transfer_module
 from relume.methods.registry import open_transfer
 from relume.operators.image_files import ImageFiles
 from relume.operators.shade import Shaded
-from relume.picture import jobs as need
+from relume.picture.jobs import Shade
 
 SHAPE = (1, 3, 64)
 FILE_BYTES = 128 + 4 * 3 * 64
@@ -69,13 +69,13 @@ def test_what_other_code_made_is_never_found_and_goes_when_this_code_keeps_its_f
 
 def test_after_an_upgrade_an_image_is_made_anew(baked, tmp_path, monkeypatch):
     store = shutil.copytree(baked, tmp_path / "store.zarr", ignore=shutil.ignore_patterns(*KEPT))
-    made, shade = [], need.shade
+    made, finished = [], Shade._finished
 
     def counted(*args):
         made.append(1)
-        return shade(*args)
+        return finished(*args)
 
-    monkeypatch.setattr(need, "shade", counted)
+    monkeypatch.setattr(Shade, "_finished", counted)
     opened(open_transfer(store, Memory(BUDGET)))
     num_images = len(made)
     assert num_images > 0
@@ -89,7 +89,7 @@ def test_after_an_upgrade_an_image_is_made_anew(baked, tmp_path, monkeypatch):
 def test_the_image_of_an_edited_look_is_there_after_a_restart(transfer, monkeypatch):
     look = look_of(transfer, sigma(0.23456))
     before = opened(transfer, look=look).image()
-    monkeypatch.setattr(need, "shade", lambda *args: refuse())
+    monkeypatch.setattr(Shade, "_finished", lambda *args: refuse())
     np.testing.assert_array_equal(opened(transfer, look=look).image(), before)
     with pytest.raises(AssertionError, match="made again"):
         opened(transfer, look=look_of(transfer, sigma(0.23457)))
