@@ -15,6 +15,7 @@ import numpy as np
 
 from bench.btf_made import Made, kept_folder
 from bench.figure import Figure
+from bench.moving_scene import rest
 from relume.bake import Recipe
 from relume.btf.shelf import STORE, BtfRecord
 from relume.look import Look, validate
@@ -52,7 +53,5 @@ def _edit_s(picture: Picture, look: Look) -> float:
     began = time.perf_counter()
     picture.set_look(look)
     picture.advance(None)
-    while (job := picture.next_job()) is not None:
-        picture.install(job, job.make(lambda share: None, lambda: False))
-    picture.advance(None)
+    rest(picture)
     return time.perf_counter() - began

@@ -21,6 +21,7 @@ from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake, open_transfer
 from relume.moving.look_up import look as look_around
 from relume.moving.picture import MovingPicture
+from relume.picture.picture import Picture
 from relume.render.image import render_image
 from relume.scene.built_in import built_in
 from relume.scene.model import Scene
@@ -60,13 +61,13 @@ def follow(picture: MovingPicture) -> None:
         _make(picture, job)
 
 
-def rest(picture: MovingPicture) -> None:
+def rest(picture: MovingPicture | Picture) -> None:
     """What follows when a hand rests: all its light is found."""
     while (job := picture.next_job()) is not None:
         _make(picture, job)
 
 
-def _make(picture: MovingPicture, job: Any) -> None:
+def _make(picture: MovingPicture | Picture, job: Any) -> None:
     picture.install(job, job.make(lambda share: None, lambda: False))
     picture.advance(None)
 

@@ -91,13 +91,13 @@ def flat_mirrors(scene: Scene, geometry: Geometry) -> FlatMirrors:
     bent = np.einsum("fkc,fc->fk", geometry.normals[corners], normal) < _FLAT
     face, normal, corners = (array[~bent.any(axis=1)] for array in (face, normal, corners))
     place, of = geometry.positions[corners].astype(np.float64), geometry.face_material[face]
-    twice = np.linalg.norm(np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]), axis=1)
+    area = geometry.face_areas[face]
     least = _LEAST_AREA * float(np.square(np.ptp(geometry.positions, axis=0)).sum())
     planes, left = list[FlatMirrors](), np.ones(len(face), np.bool_)
-    for group in _by_area(normal, place, of, twice / 2, least):
+    for group in _by_area(normal, place, of, area, least):
         if len(planes) == MOST_PLANES:
             break
-        seed = group[np.argmax(twice[group])]
+        seed = group[np.argmax(area[group])]
         if not left[seed]:
             continue  # rounding has divided a plane that is known
         plane = _plane(normal[seed], place[seed], of[seed])

@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.errors import PlanError
 from relume.light.gather_rays import make_pattern
-from relume.light.tiles import choose_tiles
-from relume.light.triangles import Unturned, weigh
+from relume.light.triangles import subdivide
 from relume.memory import Memory
 from relume.methods import bounds, moving_error
 from relume.methods.harmonic_light import harmonic_bytes, make_harmonic_light
@@ -197,8 +196,7 @@ class SurfaceMethod:
         is_open = open_sides(geometry, cameras, int(scene.id[:7], 16))
         eyes = np.array([camera.to_world[:3, 3] for camera in cameras])
         coarse = by_distance(geometry, eyes)
-        radiance = scene.environment.radiance
-        few = weigh(choose_tiles(radiance, _LIGHTS_OF_SHADOWS), Unturned.of(radiance))
+        few = subdivide(scene.environment.radiance, _LIGHTS_OF_SHADOWS)
         coarse = by_shadows(geometry, place_points(geometry, is_open, coarse, recipe.num_points), coarse, few)
         placed = place_points(geometry, is_open, coarse, recipe.num_points)
         fields = {name: getattr(placed.points, name) for name in ("position", "normal", "tangent")}

@@ -17,6 +17,7 @@ from relume.trace.embree import EmbreeScene
 from relume.trace.primary import trace_from
 
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,12 @@ class Geometry:
         a, b, c = self.positions[self.faces].astype(np.float64).transpose(1, 0, 2)
         normal = np.cross(b - a, c - a)
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
+
+    @cached_property
+    def face_areas(self) -> F64:
+        """Of the triangles, square metres. (num_faces,) float64"""
+        a, b, c = self.positions[self.faces].astype(np.float64).transpose(1, 0, 2)
+        return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
     def is_front(self, eye: F32, points: F32) -> NDArray[np.bool_]:
         """Tell which points on surfaces (n, 3) are seen from places, (3,) or (n, 3), on their outer side."""

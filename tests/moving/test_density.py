@@ -6,8 +6,7 @@ from sessions import relative_rmse
 from tiny_scenes import looking, mesh, quad, scene_of, studio
 
 from relume.bake import Recipe
-from relume.light.tiles import choose_tiles
-from relume.light.triangles import Unturned, weigh
+from relume.light.triangles import subdivide
 from relume.look import validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
@@ -39,11 +38,10 @@ def scene():
 
 
 def shadowed(scene):
-    geometry, radiance = merge(scene), scene.environment.radiance
+    geometry = merge(scene)
     coarse = by_distance(geometry, EYE)
     placed = place_points(geometry, open_sides(geometry, scene.cameras, 1), coarse, 1500)
-    few = weigh(choose_tiles(radiance, 32), Unturned.of(radiance))
-    return geometry, coarse, by_shadows(geometry, placed, coarse, few)
+    return geometry, coarse, by_shadows(geometry, placed, coarse, subdivide(scene.environment.radiance, 32))
 
 
 def test_far_from_the_eye_points_are_farther_apart(scene):

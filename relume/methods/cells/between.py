@@ -108,10 +108,8 @@ def _between(
     number, directed = 1, min(last, _DIRECTED) if len(rows) else 1
     total, total_vectors = (float(first == 1) * array.astype(np.float64) for array in (even, vectors))
     while number < directed:
-        (even, vectors), number = (
-            reflecting.sent(arriving(Leaving(even, rows, vectors, reflecting.widening))),
-            number + 1,
-        )
+        leaving = Leaving(even, rows, vectors, reflecting.widening)
+        (even, vectors), number = reflecting.sent(arriving(leaving)), number + 1
         if number >= first:
             total, total_vectors = total + even, total_vectors + vectors
     if number < last:

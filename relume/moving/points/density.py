@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relume.color import luminance
 from relume.light.triangles import TriangleLights
-from relume.moving.points.lattice import Lattice, Placed, node_of
+from relume.moving.points.lattice import Lattice, Placed, node_of, num_nodes
 from relume.points import Points
 from relume.trace.geometry import Geometry
 from relume.trace.visibility import trace_visibility
@@ -38,7 +38,7 @@ def by_distance(geometry: Geometry, eyes: F64) -> F64:
     Returns:
         Powers of two. (faces,)
     """
-    area, centre = area_of(geometry), geometry.positions[geometry.faces].astype(np.float64).mean(axis=1)
+    area, centre = geometry.face_areas, geometry.positions[geometry.faces].astype(np.float64).mean(axis=1)
     distance = np.min([np.linalg.norm(centre - eye, axis=1) for eye in eyes], axis=0)
     middling = np.sqrt(np.average(distance**2, weights=area)) if area.any() else 1.0
     coarse = np.clip(distance / max(middling, 1e-30), 1 / _MOST_COARSE, _MOST_COARSE)
@@ -54,34 +54,18 @@ def by_shadows(geometry: Geometry, placed: Placed, coarse: F64, lights: Triangle
     Returns:
         Powers of two. (faces,)
     """
-    face, node = _faces_of_nodes(placed.lattice)
-    point = placed.vertices.point[placed.lattice.node[node], 0]
+    lattice, vertices = placed.lattice, placed.vertices
+    face = np.repeat(np.arange(lattice.num_rows.size) // 2, num_nodes(lattice.num_rows.ravel()))
+    point = vertices.point[lattice.node, 0]
     differs = _differing(geometry, placed.points, _pairs(placed), lights)
     num_faces = len(geometry.faces)
     of_face = np.bincount(face, differs[point] ** 2, num_faces) / np.maximum(np.bincount(face, minlength=num_faces), 1)
-    weight = area_of(geometry) / coarse**2 * (of_face > 0)
+    weight = geometry.face_areas / coarse**2 * (of_face > 0)
     if not weight.any():
         return coarse
     wanted = -0.5 * _POWER * np.log2(np.maximum(of_face, 1e-30))
     wanted -= np.average(wanted, weights=weight)
     return np.asarray(coarse * 2.0 ** np.rint(np.clip(wanted, _FINER, _COARSER)))
-
-
-def area_of(geometry: Geometry) -> F64:
-    """Of each face, square metres. (faces,)"""
-    corners = geometry.positions[geometry.faces].astype(np.float64)
-    return np.asarray(
-        0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    )
-
-
-def _faces_of_nodes(lattice: Lattice) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Face of each node, and the node."""
-    rows = lattice.num_rows.astype(np.int64).ravel()
-    counts = np.where(rows > 0, (rows + 1) * (rows + 2) // 2, 0)
-    side = np.repeat(np.arange(len(rows)), counts)
-    first = np.repeat(lattice.first.ravel().astype(np.int64) - (np.cumsum(counts) - counts), counts)
-    return side // 2, first + np.arange(len(side))
 
 
 def _pairs(placed: Placed) -> NDArray[np.int64]:

@@ -104,7 +104,7 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], coarse: F64, nu
     """
     corners = geometry.positions[geometry.faces].astype(np.float64)
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = geometry.face_areas
     is_open = is_open & (area > 0)[:, None]
     total = float((is_open * area[:, None]).sum())
     if total <= 0:
