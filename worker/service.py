@@ -301,9 +301,10 @@ class BakeService:
 
     def _remove_strays(self) -> None:
         """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again."""
-        staging = self.data_dir / "bakes" / "staging"
+        found = list((self.data_dir / "bakes" / "staging").glob("*.zarr"))
+        # asked after the folders: of a bake that another process begins meanwhile the row comes first
         states = {status.id: status.state for status in self.ledger.bakes()}
-        for folder in staging.glob("*.zarr"):
+        for folder in found:
             state = states.get(folder.name.removesuffix(".zarr"), "ready")
             is_stopped = state in ("failed", "cancelled")
             if state == "ready" or (is_stopped and code_of(folder) != bake_code()):

@@ -14,6 +14,7 @@ from fake_method import RECIPE, FakeMethod, tiny_scene
 from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
 from relume.store import bake_here, open_store
 from worker import lease
+from worker.paths import staging_path
 from worker.scenes import delete_scene, register_scene
 from worker.service import BakeService
 from worker.status import BakeStatus
@@ -274,11 +275,27 @@ def test_scene_deleted_during_its_bake_ends_it(tmp_path: Path) -> None:
         assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
 
 
-def test_stores_that_nobody_will_finish_are_removed_at_the_start(tmp_path: Path) -> None:
-    stray = tmp_path / "bakes" / "staging" / ("0" * 16 + ".zarr")
+def test_stores_that_nobody_will_finish_are_removed_at_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stray = staging_path(tmp_path, "0" * 16)
     stray.mkdir(parents=True)
-    with open_service(tmp_path):
-        assert not stray.exists()
+    service = open_service(tmp_path)
+    listed = service.ledger.bakes
+
+    def bakes_and_then_another_process_begins_one() -> list[BakeStatus]:
+        before = listed()
+        begun.append(staging_path(tmp_path, service.submit(SCENE.id, RECIPE)))
+        begun[0].mkdir()
+        return before
+
+    begun: list[Path] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(service.ledger, "bakes", bakes_and_then_another_process_begins_one)
+        service._remove_strays()
+    service.close()
+    assert not stray.exists()
+    assert begun[0].exists()
 
 
 def test_published_store_of_a_killed_service_is_taken_as_it_is(tmp_path: Path) -> None:
