@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from furnace_method import FurnaceMethod
 from leaves import by_leaves
+from watched_bakes import Bake, Done
 
 from relume.bake import Recipe
 from relume.memory import Memory
@@ -82,9 +83,18 @@ def recipe(method: TransferMethod, scene: Scene) -> Recipe:
 
 
 @pytest.fixture(scope="session")
-def baked(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An undisturbed bake."""
-    return bake_here(method, scene, recipe, tmp_path_factory.mktemp("contract") / "store.zarr")
+def watched(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Bake:
+    """An undisturbed bake, and what was done for it."""
+    done: list[Done] = []
+    store = tmp_path_factory.mktemp("contract") / "store.zarr"
+    bake_here(method, scene, recipe, store, lambda task, of: done.append(Done(task, tuple(of.arrays), of.num_rays)))
+    return Bake(store, done)
+
+
+@pytest.fixture(scope="session")
+def baked(watched: Bake) -> Path:
+    """Its store."""
+    return watched.store
 
 
 @pytest.fixture(scope="session")

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from editor_page import WAIT_MS, Editor, opened_page
+from editor_page import WAIT_MS, Editor, forget, opened_page
 from editor_server import SIZE, Server
-from playwright.sync_api import Browser, expect, sync_playwright
+from playwright.sync_api import Browser, Error, Page, expect, sync_playwright
 from tiny_scenes import still_life
 
 from worker.database import open_database
@@ -69,12 +69,27 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
-@pytest.fixture
-def editor(server: Server, browser: Browser) -> Iterator[Editor]:
-    """The editor of the scene in a fresh browser profile, its first picture exact."""
-    (scene,) = server.call("/api/scenes")
+@pytest.fixture(scope="session")
+def kept_page(browser: Browser) -> Iterator[Page]:
+    """A page for all that `editor` opens: a browser that starts a process for each takes longer than most tests."""
     with opened_page(browser) as page:
-        editor = Editor(page)
-        page.goto(f"{server.url}/?scene={scene['id']}")
-        editor.wait_until_exact()
-        yield editor
+        yield page
+
+
+@pytest.fixture
+def editor(server: Server, kept_page: Page) -> Iterator[Editor]:
+    """The editor of the scene as in a fresh browser profile, its first picture exact; no script on it may fail."""
+    page, errors = kept_page, []
+
+    def take_note(error: Error) -> None:
+        errors.append(str(error))
+
+    page.on("pageerror", take_note)
+    (scene,) = server.call("/api/scenes")
+    editor = Editor(page)
+    page.goto(f"{server.url}/?scene={scene['id']}")
+    editor.wait_until_exact()
+    yield editor
+    forget(page, server.url)
+    page.remove_listener("pageerror", take_note)
+    assert errors == []

@@ -9,9 +9,10 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Browser, Locator, Page
+from playwright.sync_api import Browser, Locator, Page, ViewportSize
 
 WAIT_MS = 120_000
+VIEWPORT: ViewportSize = {"width": 1280, "height": 800}
 # A patch is sent within one animation frame, the status bar follows within another.
 SETTLE = """() => new Promise((done) => {
   let left = 4;
@@ -85,13 +86,23 @@ def wait_until_drawn(page: Page) -> None:
 @contextmanager
 def opened_page(browser: Browser) -> Iterator[Page]:
     """A page in a fresh browser profile, at 1280×800; no script on it may fail."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context = browser.new_context(viewport=VIEWPORT)
     page = context.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     yield page
     context.close()
     assert errors == []
+
+
+def forget(page: Page, url: str) -> None:
+    """Leave the editor, and make the profile of its page as fresh as it was."""
+    page.goto(f"{url}/readyz")  # of the same origin, and without scripts that would keep something
+    page.evaluate("localStorage.clear(), sessionStorage.clear()")
+    page.unroute_all()
+    page.context.clear_cookies()
+    page.context.clear_permissions()
+    page.set_viewport_size(VIEWPORT)
 
 
 def changed(before: NDArray[np.int16], after: NDArray[np.int16]) -> float:

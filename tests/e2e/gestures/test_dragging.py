@@ -147,7 +147,8 @@ def drag(editor: Editor, it: Draggable, sign: int) -> None:
     it.clear(editor)
 
 
-LONG = {"brightness", "drawing", "stretch", "material map", "handle of a light"}  # ways of the same kinds of controls
+# ways of the same kinds of controls
+LONG = {"brightness", "rotation", "light", "drawing", "stretch", "material map", "handle of a light"}
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in DRAGGABLES])

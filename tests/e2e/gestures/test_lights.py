@@ -56,8 +56,12 @@ def test_a_light_is_placed_by_a_click_and_shines_and_undo_takes_it_away(editor: 
     assert changed(before, editor.pixels()) == 0
 
 
-def test_a_light_is_placed_by_keys_alone(editor: Editor) -> None:
+def test_a_light_is_placed_by_keys_alone_and_by_none_where_escape_is_pressed(editor: Editor) -> None:
     page = editor.page
+    start_adding(editor, "Sun")
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("button", name="In the middle")).to_have_count(0)
+    expect(page.locator(".light")).to_have_count(0)
     page.get_by_role("button", name="Add a light").press("Enter")
     page.get_by_role("group", name="Kind of light").get_by_role("button", name="Spot").press("Enter")
     middle = page.get_by_role("button", name="In the middle")
@@ -66,13 +70,6 @@ def test_a_light_is_placed_by_keys_alone(editor: Editor) -> None:
     expect(page.get_by_role("combobox", name="Kind of light")).to_have_value("spot")
     expect(middle).to_have_count(0)
     expect(page.locator(".light .name", has_text="Spot")).to_be_focused()
-
-
-def test_escape_places_nothing(editor: Editor) -> None:
-    start_adding(editor, "Sun")
-    editor.page.keyboard.press("Escape")
-    expect(editor.page.get_by_role("button", name="In the middle")).to_have_count(0)
-    expect(editor.page.locator(".light")).to_have_count(0)
 
 
 def test_a_handle_is_pulled_in_one_step_across_the_picture_and_away(editor: Editor) -> None:
@@ -104,8 +101,9 @@ def test_a_handle_is_pulled_in_one_step_across_the_picture_and_away(editor: Edit
     assert changed(before, editor.pixels()) < 0.005  # the handle has the focus now
 
 
-def test_keys_move_and_aim_a_light(editor: Editor) -> None:
+def test_keys_and_numbers_place_and_aim_a_light_and_escape_leaves_it(editor: Editor) -> None:
     add_by_click(editor, "Panel")
+    assert editor.page.evaluate(NAMELESS) == []
     position, direction = numbers(editor, "Position"), numbers(editor, "Direction")
     before = handle(editor, "move").bounding_box()
     handle(editor, "move").press("ArrowRight")
@@ -118,6 +116,17 @@ def test_keys_move_and_aim_a_light(editor: Editor) -> None:
     handle(editor, "aim").press("ArrowUp")
     assert numbers(editor, "Direction") != direction
     expect(handle(editor, "aim")).to_have_attribute("aria-label", re.compile("Panel, aims at"))
+
+    x, start = editor.page.get_by_role("textbox", name="Position, x"), numbers(editor, "Position")
+    x.fill("7")
+    x.press("Escape")
+    expect(x).not_to_be_focused()
+    assert numbers(editor, "Position") == start
+    x.fill("0.25")
+    x.press("Enter")
+    assert numbers(editor, "Position") == [0.25, *start[1:]]
+    x.press("ArrowUp")
+    np.testing.assert_allclose(numbers(editor, "Position")[0], 0.26, atol=1e-6)
     handle(editor, "aim").press("Delete")
     expect(editor.page.locator(".light")).to_have_count(0)
 
@@ -148,26 +157,6 @@ def test_a_light_is_switched_off_and_seen_alone(editor: Editor) -> None:
     page.get_by_role("button", name="Only the light of the environment").click()
     assert changed(lit, editor.pixels()) < 0.01
     assert page.locator(".tile.step").count() == steps
-
-
-def test_numbers_place_a_light_and_escape_leaves_them(editor: Editor) -> None:
-    add_by_click(editor, "Spot")
-    x = editor.page.get_by_role("textbox", name="Position, x")
-    start = numbers(editor, "Position")
-    x.fill("7")
-    x.press("Escape")
-    expect(x).not_to_be_focused()
-    assert numbers(editor, "Position") == start
-    x.fill("0.25")
-    x.press("Enter")
-    assert numbers(editor, "Position") == [0.25, *start[1:]]
-    x.press("ArrowUp")
-    np.testing.assert_allclose(numbers(editor, "Position")[0], 0.26, atol=1e-6)
-
-
-def test_every_control_of_a_light_has_a_name(editor: Editor) -> None:
-    add_by_click(editor, "Panel")
-    assert editor.page.evaluate(NAMELESS) == []
 
 
 def test_a_light_has_a_temperature_a_power_a_name_a_copy_and_an_aim_that_stays(editor: Editor) -> None:

@@ -45,7 +45,7 @@ def at(editor: Editor, cell: int, x: float, y: float) -> tuple[float, float]:
     return box["x"] + x * box["width"], box["y"] + y * box["height"]
 
 
-def test_one_drag_changes_every_view(both: Editor) -> None:
+def test_one_drag_changes_every_view_and_a_stretch_of_the_curve_tints_each(both: Editor) -> None:
     both.choose("Ball", 1)
     before = cells(both)
     assert min(picture.std() for picture in before) > 10
@@ -55,9 +55,6 @@ def test_one_drag_changes_every_view(both: Editor) -> None:
     assert min(changed(a, b) for a, b in zip(before, after, strict=True)) > 0.005
     assert both.page.evaluate("window.relumeStats.latencies.length") > drawn
 
-
-def test_a_stretch_of_the_curve_tints_every_view(both: Editor) -> None:
-    both.choose("Ball", 1)
     plain = cells(both)
     plot = both.page.locator(".plot").bounding_box()
     assert plot is not None

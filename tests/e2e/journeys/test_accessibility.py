@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from editor_page import NAMELESS, WAIT_MS, Editor
 from editor_server import Server
 from playwright.sync_api import Browser, Page
@@ -50,30 +49,32 @@ def assert_focus_is_visible(page: Page, num_stops: int) -> None:
     assert [html for html, visible in stops if not visible] == []
 
 
-@pytest.mark.parametrize("term", [0, 1])
-def test_every_control_of_the_editor_has_a_name(editor: Editor, term: int) -> None:
-    editor.choose("Ball", term)
-    assert editor.page.evaluate(NAMELESS) == []
-
-
-def test_every_control_of_the_editor_is_in_a_landmark(editor: Editor) -> None:
-    editor.choose("Ball", 1)
+def test_every_control_of_the_editor_can_be_read_found_and_reached_by_keys(
+    editor: Editor,
+) -> None:
+    announced = editor.page.locator(".announce[role=status]")
+    assert announced.get_attribute("aria-live") == "polite"
+    assert "Connected" in announced.inner_text()
+    for term in (0, 1):
+        editor.choose("Ball", term)
+        assert editor.page.evaluate(NAMELESS) == []
     editor.page.get_by_role("separator").wait_for()
     assert editor.page.evaluate(OUTSIDE_LANDMARKS) == []
-
-
-def test_what_undone_steps_are_called_can_be_read(editor: Editor) -> None:
+    points = editor.page.locator(".plot [role=slider]")
+    points.first.wait_for(timeout=WAIT_MS)
+    assert points.count() >= 2
+    for point in points.all():
+        low, now, high = (float(point.get_attribute(f"aria-value{end}") or "nan") for end in ("min", "now", "max"))
+        assert low <= now <= high
+        assert "degrees" in (point.get_attribute("aria-valuetext") or "")
+    editor.page.locator("body").click(position={"x": 640, "y": 2})
+    assert_focus_is_visible(editor.page, 60)
+    editor.page.reload()  # nothing has the focus
+    editor.wait_until_exact()
     editor.page.keyboard.press(".")
     editor.page.keyboard.press("Control+z")
     caption = editor.page.locator(".tile.step.undone .tile-name")
     assert caption.evaluate(CONTRAST) >= 4.5
-
-
-def test_focus_is_visible_in_the_editor(editor: Editor) -> None:
-    editor.choose("Ball", 1)
-    editor.page.locator(".plot [role=slider]").first.wait_for(timeout=WAIT_MS)
-    editor.page.locator("body").click(position={"x": 640, "y": 2})
-    assert_focus_is_visible(editor.page, 60)
 
 
 def test_start_page_has_names_and_visible_focus(server: Server, browser: Browser) -> None:
@@ -83,20 +84,3 @@ def test_start_page_has_names_and_visible_focus(server: Server, browser: Browser
     assert page.evaluate(NAMELESS) == []
     assert_focus_is_visible(page, 5)
     page.close()
-
-
-def test_curve_points_are_sliders(editor: Editor) -> None:
-    editor.choose("Ball", 1)
-    points = editor.page.locator(".plot [role=slider]")
-    points.first.wait_for(timeout=WAIT_MS)
-    assert points.count() >= 2
-    for point in points.all():
-        low, now, high = (float(point.get_attribute(f"aria-value{end}") or "nan") for end in ("min", "now", "max"))
-        assert low <= now <= high
-        assert "degrees" in (point.get_attribute("aria-valuetext") or "")
-
-
-def test_what_happens_is_announced(editor: Editor) -> None:
-    announced = editor.page.locator(".announce[role=status]")
-    assert announced.get_attribute("aria-live") == "polite"
-    assert "Connected" in announced.inner_text()

@@ -14,11 +14,23 @@ from playwright.sync_api import Browser, expect
 SIGMA = "Roughness σ"
 
 
-def test_opens_and_shows_the_picture(editor: Editor) -> None:
+def test_opens_and_a_click_on_an_object_selects_its_material(editor: Editor) -> None:
     pixels = editor.pixels()
     assert pixels.mean() > 20
     assert pixels.std(axis=(0, 1)).min() > 10
     expect(editor.page.get_by_role("heading", level=1)).to_have_text("still life")
+    box = editor.canvas.bounding_box()
+    assert box is not None
+    selected = editor.page.locator("[role=option][aria-selected=true]")
+    expect(selected).to_have_count(0)
+    editor.canvas.hover()
+    editor.page.wait_for_function("() => document.querySelector('.probe .material')")
+    fits = "(all) => all.every((each) => each.scrollWidth <= each.clientWidth)"
+    assert editor.page.locator(".probe, .probe .material").evaluate_all(fits)
+    editor.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    expect(selected).to_have_text("Ball")
+    editor.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.85 * box["height"])
+    expect(selected).to_have_text("Floor")
 
 
 def test_a_click_on_a_scene_card_opens_it(server: Server, browser: Browser) -> None:
@@ -32,18 +44,7 @@ def test_a_click_on_a_scene_card_opens_it(server: Server, browser: Browser) -> N
     page.close()
 
 
-def test_a_click_on_an_object_selects_its_material(editor: Editor) -> None:
-    box = editor.canvas.bounding_box()
-    assert box is not None
-    selected = editor.page.locator("[role=option][aria-selected=true]")
-    expect(selected).to_have_count(0)
-    editor.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-    expect(selected).to_have_text("Ball")
-    editor.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.85 * box["height"])
-    expect(selected).to_have_text("Floor")
-
-
-def test_dragging_a_slider_changes_the_picture_and_ends_exact(editor: Editor) -> None:
+def test_dragging_a_slider_changes_the_picture_and_is_one_step_where_it_rests_on_the_way(editor: Editor) -> None:
     editor.choose("Ball", 1)
     before = editor.pixels()
     drawn = editor.page.evaluate("window.relumeStats.latencies.length")
@@ -52,11 +53,8 @@ def test_dragging_a_slider_changes_the_picture_and_ends_exact(editor: Editor) ->
     assert changed(before, after) > 0.01
     assert editor.page.evaluate("window.relumeStats.latencies.length") > drawn
 
-
-def test_a_drag_that_rests_on_the_way_is_one_step(editor: Editor) -> None:
-    editor.choose("Ball", 1)
     steps = editor.page.locator(".tile.step")
-    before = steps.count()
+    count = steps.count()
     box = editor.slider(SIGMA).bounding_box()
     assert box is not None
     mouse, y = editor.page.mouse, box["y"] + box["height"] / 2
@@ -66,10 +64,16 @@ def test_a_drag_that_rests_on_the_way_is_one_step(editor: Editor) -> None:
         editor.page.wait_for_timeout(1000)
         mouse.move(box["x"] + at * box["width"], y)
     mouse.up()
-    expect(steps).to_have_count(before + 1)
+    expect(steps).to_have_count(count + 1)
 
 
-def test_keys_are_the_pages_again_after_a_number_and_after_a_list(editor: Editor) -> None:
+def test_panels_do_not_scroll_sideways_and_keys_are_the_pages_again_after_a_number_and_a_list(editor: Editor) -> None:
+    editor.choose("Ball", 1)
+    for panel in (".inspector", ".outline"):
+        style = editor.page.locator(panel).evaluate("element => getComputedStyle(element).overflowX")
+        assert style == "hidden", panel
+        beyond = editor.page.locator(panel).evaluate("element => element.scrollWidth - element.clientWidth")
+        assert beyond == 0, f"{panel} could be scrolled sideways by a script"
     editor.choose("Ball", 0)
     focused = "document.activeElement.tagName"
     number = editor.page.locator(".inspector input.number").first
@@ -83,22 +87,6 @@ def test_keys_are_the_pages_again_after_a_number_and_after_a_list(editor: Editor
     tone_map.focus()
     editor.page.keyboard.press("ArrowUp")
     assert editor.page.evaluate(focused) == "SELECT"
-
-
-def test_what_is_probed_is_read_whole(editor: Editor) -> None:
-    editor.canvas.hover()
-    editor.page.wait_for_function("() => document.querySelector('.probe .material')")
-    fits = "(all) => all.every((each) => each.scrollWidth <= each.clientWidth)"
-    assert editor.page.locator(".probe, .probe .material").evaluate_all(fits)
-
-
-def test_panels_do_not_scroll_sideways(editor: Editor) -> None:
-    editor.choose("Ball", 1)
-    for panel in (".inspector", ".outline"):
-        style = editor.page.locator(panel).evaluate("element => getComputedStyle(element).overflowX")
-        assert style == "hidden", panel
-        beyond = editor.page.locator(panel).evaluate("element => element.scrollWidth - element.clientWidth")
-        assert beyond == 0, f"{panel} could be scrolled sideways by a script"
 
 
 def test_keys_do_what_dragging_does(editor: Editor) -> None:
