@@ -50,7 +50,9 @@ def lit_points(scene: Scene, size: tuple[int, int], num_points: int, num_lights:
     rows = np.nonzero(wanted)[0]
     rng = np.random.default_rng(5)
     chosen = np.sort(rng.permutation(rows)[:num_points])
-    points = points_of(samples, {"diffuse": samples.surface.diffuse, "specular": samples.surface.specular}).rows(chosen)
+    of_surface = samples.surface
+    textures = {"diffuse": of_surface.diffuse, "specular": of_surface.specular}
+    points = points_of(samples, textures, of_surface.roughness).rows(chosen)
     lights = subdivide(scene.environment.radiance, num_lights)
     visible = trace_visibility(geometry.embree, points.position, points.normal, lights.direction).visible
     return Lit(geometry, points, lights, Receivers(samples.surface.points.rows(chosen), points.wo, visible))

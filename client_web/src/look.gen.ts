@@ -109,13 +109,13 @@ export interface SpotLook {
   cone: [number, number];
 }
 
-/** One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give. `data` names the measured material, for models that need one and for no other. `roughness_map`: the width of the term is scaled by the material's map of roughness, where it has one. `texture` names one of the material's own images by its channel, or "image:<id>", one that was sent. */
+/** One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give. `data` names the measured material, for models that need one and for no other. `roughness_map`: the width of the term is scaled by the material's map of roughness, where it has one, or by "image:<id>", one that was sent. `texture` names one of the material's own images by its channel, or one that was sent. */
 export interface TermLook {
   model: string;
   data?: string;
   color: [number, number, number];
   texture: string | null;
-  roughness_map?: boolean;
+  roughness_map?: boolean | string;
   params: Record<string, number | [number, number, number]>;
   curves: Record<string, DrawnCurve | DrawnCurve[]>;
 }

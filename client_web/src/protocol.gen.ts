@@ -481,7 +481,7 @@ export interface HelloMessage {
   moving_error: MovingError | null;
 }
 
-/** An image that terms of looks may name as their `texture`, in the place of their material's own. `size`: width and height. `warnings`: what was changed when its file was read. */
+/** An image that terms of looks may name as `texture` or `roughness_map`, in the place of their material's own. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. */
 export interface ImageBody {
   id: string;
   texture: string;
@@ -489,6 +489,7 @@ export interface ImageBody {
   created: string;
   size: [number, number];
   warnings: string[];
+  roughness: number;
   thumbnail: string;
 }
 
@@ -585,7 +586,7 @@ export interface MeasuredBody {
   homomorphic_error: [number, number, number];
 }
 
-/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the parameter that maps of roughness scale, `mirrors_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`). */
+/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the parameter that maps of roughness scale, `width_power` the power of a roughness that it grows with, `mirrors_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`). */
 export interface ModelBody {
   model: string;
   label: string;
@@ -594,6 +595,7 @@ export interface ModelBody {
   texture: string;
   needs_data: boolean;
   width: string | null;
+  width_power: number | null;
   mirrors_below: number | null;
   data_prefix: string | null;
   parameters: ParameterBody[];

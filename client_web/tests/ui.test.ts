@@ -100,6 +100,7 @@ describe("terms", () => {
     texture: "specular",
     needs_data: false,
     width: name === "flat" ? null : "roughness",
+    width_power: name === "flat" ? null : 1,
     mirrors_below: null,
     data_prefix: null,
     parameters: parameters.map((p) => ({

@@ -22,9 +22,9 @@ IMAGES = AssetStore("image", "image:", "image.json", SceneError, max_entries=1_0
 """Where such images are kept, by `relume.images.shelf`."""
 
 
-def is_image(texture: str | None) -> TypeGuard[str]:
-    """Whether a term's `texture` names an image rather than a channel."""
-    return texture is not None and texture.startswith(IMAGES.prefix)
+def is_image(texture: str | bool | None) -> TypeGuard[str]:
+    """Whether a term's `texture` or `roughness_map` names an image rather than one of the material's own."""
+    return isinstance(texture, str) and texture.startswith(IMAGES.prefix)
 
 
 def channel_of(document: Mapping[str, Any]) -> str | None:
@@ -49,6 +49,26 @@ def images_of(documents: Sequence[Mapping[str, Any]]) -> Images:
     return found.get(1), found.get(2)
 
 
+def roughness_image(documents: Sequence[Mapping[str, Any]]) -> str | None:
+    """What the terms of a material name in the place of its map of roughness; None where they name nothing.
+
+    Args:
+        documents: its terms.
+    """
+    return next((name for one in documents if is_image(name := one.get("roughness_map"))), None)
+
+
+def check_map(pointer: Pointer, follows: Any) -> bool | str:
+    """A term's `roughness_map`. Raises ParameterError unless it is yes, no, or an image that is here.
+
+    Args:
+        pointer: where it stands in its look. follows: what stands there.
+    """
+    if isinstance(follows, bool) or (isinstance(follows, str) and IMAGES.is_known(follows)):
+        return follows
+    raise fail(pointer, follows, "true, false, or an image that was sent to /api/images and is here")
+
+
 def check_texture(pointer: Pointer, texture: Any) -> str | None:
     """A term's `texture`. Raises ParameterError unless it is a channel, an image that is here, or nothing.
 
@@ -62,11 +82,12 @@ def check_texture(pointer: Pointer, texture: Any) -> str | None:
 
 
 def check_shared(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
-    """Raises ParameterError where terms of one channel are multiplied by different textures.
+    """Raises ParameterError where terms of one channel are multiplied by different textures, or follow different maps.
 
     Args:
         pointer: where the list stands in its look. documents: complete terms of one material.
     """
+    _check_one_map(pointer, documents)
     textures: dict[int, str | None] = {}
     for k, document in enumerate(documents):
         texture = document["texture"]
@@ -75,3 +96,13 @@ def check_shared(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> No
             channel = channel_of(document)
             allowed = f"{first!r}, as the other {channel} terms of this material have; change them together"
             raise fail((*pointer, k, "texture"), texture, allowed)
+
+
+def _check_one_map(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
+    """Samples of a material have one level of roughness each: its terms follow one map, or none."""
+    image = roughness_image(documents)
+    for k, document in enumerate(documents):
+        follows = document.get("roughness_map", False)
+        if image is not None and follows not in (False, image):
+            allowed = f"false, or {image!r}, as other terms of this material have; change them together"
+            raise fail((*pointer, k, "roughness_map"), follows, allowed)

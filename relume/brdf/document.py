@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from relume.brdf.channels import check_texture
+from relume.brdf.channels import check_map, check_texture
 from relume.brdf.curves import CHANNELS
 from relume.brdf.edited import RELATIVE, is_relative
 from relume.brdf.registry import TERMS
@@ -61,14 +61,14 @@ def complete_term(pointer: Pointer, given: Any, known: Mapping[str, Any] | None)
 
 
 def _checked_map(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:
-    """Whether the material's map of roughness scales the term's width; left out of terms that do not say."""
+    """Whether the material's map of roughness scales the term's width, or which image does; left out of terms that do
+    not say."""
     if "roughness_map" not in given:
         return {}
     follows = given["roughness_map"]
-    if term.width is None or not isinstance(follows, bool):
-        allowed = f"nothing: {term.model!r} has no width" if term.width is None else "true or false"
-        raise fail(pointer, follows, allowed)
-    return {"roughness_map": follows}
+    if term.width is None:
+        raise fail(pointer, follows, f"nothing: {term.model!r} has no width")
+    return {"roughness_map": check_map(pointer, follows)}
 
 
 def _checked_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:

@@ -56,6 +56,7 @@ def describe() -> list[dict[str, Any]]:
             "texture": term.texture,
             "needs_data": term.needs_data,
             "width": None if term.width is None else term.width[0],
+            "width_power": None if term.width is None else term.width[1],
             "data_prefix": None if term.data is None else term.data.prefix,
             "parameters": [
                 asdict(parameter) | {"fixed": parameter.name in term.fixed} for parameter in term.parameters

@@ -72,8 +72,14 @@ class ViewSamples:
         return self.weight[:, None] * self.through
 
 
-def _morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
-    """Interleave the bits of x and y: the order of a Z-curve. (n,) uint64"""
+def morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
+    """Interleave the bits of x and y: the order of a Z-curve.
+
+    Args:
+        pixel: row-major numbers. (n,) width: of the picture.
+    Returns:
+        (n,) uint64
+    """
     code = np.zeros(len(pixel), np.uint64)
     x, y = (pixel % width).astype(np.uint64), (pixel // width).astype(np.uint64)
     for bit in range(14):
@@ -90,8 +96,14 @@ def _shared_chances(pixel: NDArray[np.int64]) -> F32:
     return np.asarray((places + offset) / POSITIONS_A_PIXEL + 1e-6, np.float32).ravel()
 
 
-def _thresholds(pixel: NDArray[np.int64], width: int) -> F32:
-    """Numbers between 0 and 1 that differ much from pixel to pixel (interleaved gradient noise, Jimenez 2014). (n,)"""
+def thresholds(pixel: NDArray[np.int64], width: int) -> F32:
+    """Numbers between 0 and 1 that differ much from pixel to pixel (interleaved gradient noise, Jimenez 2014).
+
+    Args:
+        pixel: row-major numbers. (n,) width: of the picture.
+    Returns:
+        (n,) float32
+    """
     y, x = np.divmod(pixel, width)
     return np.asarray((52.9829189 * ((0.06711056 * x + 0.00583715 * y) % 1)) % 1, np.float32)
 
@@ -184,10 +196,10 @@ def _sorted_samples(
     hit = chosen.seen.hits.face >= 0
     face = np.maximum(chosen.seen.hits.face, 0)
     material = np.where(hit, geometry.face_material[face], BACKGROUND).astype(np.uint16)
-    order = np.lexsort((_morton(chosen.pixel, width), material))
+    order = np.lexsort((morton(chosen.pixel, width), material))
     seen = chosen.seen.rows(order)
     full = surface_at(geometry, seen.hits, seen.directions, scene.materials, pixel_angle)
-    level = _levels(scene, material[order], full.roughness, _thresholds(chosen.pixel[order], width))
+    level = _levels(scene, material[order], full.roughness, thresholds(chosen.pixel[order], width))
     if level.any():
         by_level = np.lexsort((level, material[order]))
         order, full, seen, level = order[by_level], full.rows(by_level), seen.rows(by_level), level[by_level]

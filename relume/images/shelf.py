@@ -1,5 +1,8 @@
 """Images that were sent for materials; `relume.asset_store` keeps them.
 
+An image in the place of a map of roughness says by its green how rough each texel is, as files of glTF do: the number
+itself, no display value.
+
     <folder>/<id>/texels.npy       bytes of display values, or reflectances. (height, width, 3) uint8 or float16
                   thumbnail.png
                   image.json       name, and what had to be changed
@@ -15,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from relume.brdf.channels import IMAGES
@@ -26,6 +30,7 @@ from relume.scene.model import Coding, Texture
 
 THUMBNAIL_SIDE = 96
 _TEXELS, _THUMBNAIL = "texels.npy", "thumbnail.png"
+_LEAST_ROUGHNESS = 1 / 255  # of a mean: black images are smooth everywhere
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,7 @@ class ImageRecord:
 
     Attributes:
         created: seconds since 1970. size: width and height. warnings: what was changed, one sentence each.
+        roughness: the mean of it, as a map of roughness.
     """
 
     id: str
@@ -41,6 +47,7 @@ class ImageRecord:
     created: float
     size: tuple[int, int]
     warnings: tuple[Remark, ...]
+    roughness: float
 
     @property
     def texture(self) -> str:
@@ -62,7 +69,8 @@ def keep(folder: Path, source: Path, name: str) -> ImageRecord:
     def fill(made: Path) -> dict[str, Any]:
         np.save(made / _TEXELS, texture.pixels)
         (made / _THUMBNAIL).write_bytes(_thumbnail(texture))
-        return {"size": [width, height], "warnings": [remark.document() for remark in said]}
+        said_so = [remark.document() for remark in said]
+        return {"size": [width, height], "warnings": said_so, "roughness": _mean(_shares(texture))}
 
     return get_record(folder, IMAGES.keep(folder, source, name, fill))
 
@@ -79,8 +87,10 @@ def get_record(folder: Path, identity: str) -> ImageRecord:
     size, warnings = document.get("size"), document.get("warnings")
     if not isinstance(warnings, list) or not isinstance(size, list) or [*map(type, size)] != [int, int]:
         raise IMAGES.damaged(path)
-    said = tuple(map(remark_of, warnings))
-    return ImageRecord(identity, document["name"], document["created"], (size[0], size[1]), said)
+    said, roughness = tuple(map(remark_of, warnings)), document.get("roughness")
+    if not isinstance(roughness, float):  # kept before images were maps of roughness
+        roughness = mean_roughness(IMAGES.prefix + identity)
+    return ImageRecord(identity, document["name"], document["created"], (size[0], size[1]), said, roughness)
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:
@@ -95,6 +105,33 @@ def texture_of(name: str) -> Texture:
         NotFoundError: it is not here. SceneError: its files are damaged.
     """
     return _load(IMAGES.found(name))
+
+
+def roughness_of(name: str) -> Texture:
+    """What a term's `roughness_map` names: roughness over its mean. Raises what `texture_of` raises."""
+    return _load_roughness(IMAGES.found(name))
+
+
+def mean_roughness(name: str) -> float:
+    """The mean of it, before it was divided by that. Raises what `texture_of` raises."""
+    return _mean(_shares(texture_of(name)))
+
+
+@lru_cache(maxsize=4)
+def _load_roughness(path: Path) -> Texture:
+    shares = _shares(_load(path))
+    most = 1 / max(_mean(shares), _LEAST_ROUGHNESS)
+    return Texture(shares, coding=Coding("share", (most, most, most)))
+
+
+def _shares(texture: Texture) -> NDArray[np.uint8]:
+    """Roughness as bytes. (height, width, 1)"""
+    green = texture.pixels[..., 1:2]
+    return np.ascontiguousarray(green if texture.coding else np.rint(255 * green.astype(np.float32)).astype(np.uint8))
+
+
+def _mean(shares: NDArray[np.uint8]) -> float:
+    return float(shares.mean() / 255)
 
 
 @lru_cache(maxsize=16)

@@ -36,15 +36,15 @@ class TermLook(TypedDict):
     """One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give.
 
     `data` names the measured material, for models that need one and for no other. `roughness_map`: the width of the
-    term is scaled by the material's map of roughness, where it has one. `texture` names one of the material's own
-    images by its channel, or "image:<id>", one that was sent.
+    term is scaled by the material's map of roughness, where it has one, or by "image:<id>", one that was sent.
+    `texture` names one of the material's own images by its channel, or one that was sent.
     """
 
     model: str
     data: NotRequired[str]
     color: Rgb
     texture: str | None
-    roughness_map: NotRequired[bool]
+    roughness_map: NotRequired[bool | str]
     params: dict[str, float | Rgb]
     curves: dict[str, DrawnCurve | list[DrawnCurve]]
 

@@ -12,6 +12,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     views/<k>/position, normal, tangent, diffuse, specular, uv
     scene/face_emission, views/<k>/emission                  where surfaces shine as images say: relume.scene.emission
     views/<k>/level                                          of roughness: relume.scene.roughness
+    views/<k>/normal_length                                  of scenes with bumps, relume.trace.surface.Surface
     views/<k>/through, eye, is_mirrored, mirror, mirror_cosine, mirror_tint
                                                              of scenes with glass or mirrors: relume.eye.view_samples
     views/<k>/visibility                                     samples on surfaces only
@@ -40,7 +41,7 @@ from relume.methods.last_read import LastRead
 from relume.methods.store_io import SHARD_ROWS, read_lights, read_traced_directions
 from relume.scene.emission import has_images, shares_of_faces
 from relume.scene.model import Camera, Scene
-from relume.scene.roughness import levels_of
+from relume.scene.roughness import levels_of, shortest_normal
 from relume.trace.coherent import Targets, targets_of, trace_coherent
 from relume.trace.geometry import Geometry, merge
 from relume.views.store_io import read_chance
@@ -48,7 +49,7 @@ from relume.views.store_io import read_chance
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
-_EMISSION_BYTES = 12
+_EMISSION_BYTES, _BUMP_BYTES = 12, 4
 _LAYER_BYTES = 12 + 12 + 1 + MOST_MIRRORS * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
@@ -99,6 +100,7 @@ class SampledViews:
         samples = bounds.samples_of_view(scene, recipe) * len(recipe.views)
         bits = (recipe.num_lights + 7) // 8
         surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_images(scene) else 0)
+        surface_bytes += _BUMP_BYTES if _has_bumps(scene) else 0
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
         in_store = samples * (bits + surface_bytes) + bounds.lights_bytes(scene, recipe)
         num_rays = samples * recipe.num_lights + bounds.camera_rays(scene, recipe) + bounds.tinted_rays(scene, samples)
@@ -131,6 +133,7 @@ class SampledViews:
             "has_layers": has_layers(scene.materials),
             "has_emission_images": has_images(scene),
             "roughness_levels": [list(levels_of(material)) for material in scene.materials],
+            "shortest_normals": list(map(shortest_normal, scene.materials)),
             "views": [_described(cameras[view]) for view in recipe.views],
         }
 
@@ -186,6 +189,8 @@ class SampledViews:
             }  # fmt: skip
         if has_images(scene):
             arrays["emission"] = samples.surface.emission
+        if _has_bumps(scene):
+            arrays["normal_length"] = samples.surface.normal_length
         prefix = f"views/{recipe.views.index(task.view)}"
         return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
 
@@ -205,6 +210,10 @@ class SampledViews:
             if self._geometry is None or self._geometry[0] != scene.id:
                 self._geometry = scene.id, merge(scene)
             return self._geometry[1]
+
+
+def _has_bumps(scene: Scene) -> bool:
+    return any(material.normal_map is not None for material in scene.materials)
 
 
 def _sampled_views(smooths_edges: bool) -> SampledViews:

@@ -201,7 +201,7 @@ class BakedViews:
             return ()
 
         def remembered(geometry: LightGeometry, points: Points) -> Shadows:
-            key = (self.key, view.name, material, "shadows", geometry)
+            key = (self.key, *view.place(material), "shadows", geometry)
             num_bytes = len(points.position) * -(-num_samples(geometry, self.local.samples_of(geometry)) // 8)
             return memory.get(key, Shadows, num_bytes, lambda: self.local.shadows(geometry, points))
 
@@ -342,7 +342,7 @@ class BouncedViews(BakedViews):
     def _thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
         """The lights that a material's samples see in flat mirrors. (n, bytes) uint8"""
         rows = view.rows(material)
-        return None if self.thrown is None else self.store.read(f"views/{view.index}/thrown", rows.start, rows.stop)
+        return None if self.thrown is None else view.store.read(f"views/{view.index}/thrown", rows.start, rows.stop)
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""

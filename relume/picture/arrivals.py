@@ -15,7 +15,7 @@ _SHARE = 4  # of the memory that one may take
 
 def _key(images: ViewImages, material: MaterialImage, texels: Texels, light: Light) -> tuple[Hashable, ...]:
     rings = (part.tobytes() for part in texels.btf.rings)
-    return images.transfer.key, images.view.name, material.index, light, "arrived", *rings
+    return images.transfer.key, *images.view.place(material.index), light, "arrived", *rings
 
 
 def may_be_kept(images: ViewImages, material: MaterialImage, texels: Texels) -> bool:

@@ -17,6 +17,7 @@ from relume.brdf.levels import Levels
 from relume.brdf.mirror import mirrored_share
 from relume.operators.edit_basis import EditBasis
 from relume.operators.frozen import tiles_of
+from relume.operators.shade import Shaded
 from relume.picture.fidelity import Fidelity, Word, word_of
 from relume.picture.light import Light
 from relume.picture.shown import Shown
@@ -50,6 +51,18 @@ class LiveTerm:
         self.model: Hashable = None
         self.set_document(document)
         self.displayed, self.mirror = self.ready, self.document
+
+    def go_on_showing(self, before: LiveTerm, rows: NDArray[np.integer]) -> None:
+        """Show what another term of the same samples does, until something of this one is ready.
+
+        Args:
+            before: the other. rows: of its samples, which each of these is. (n,)
+        """
+        if before.displayed.fidelity:
+            image = Shaded.of(Shaded(before.displayed.image).rows(len(rows))[rows]).image
+            alone = before.displayed.without_basis()
+            self.displayed = replace(alone, image=image, bands={}, anchor=None, exact_in=None, is_outdated=True)
+            self.mirror, self.is_composed = before.mirror, False
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""

@@ -49,6 +49,19 @@ class MaterialImage:
         self._num_squares: dict[int, int] = {}
         self._in_region: tuple[Tile, NDArray[np.bool_]] | None = None
 
+    def seen_in(self, view: View) -> None:
+        """The view has other samples of other materials, and the same of this one."""
+        self._view, self._is_current = view, False
+
+    def go_on_showing(self, before: MaterialImage, rows: NDArray[np.integer]) -> None:
+        """Show what the same material's image does, until something of this one is ready.
+
+        Args:
+            before: that image. rows: of its samples, which each of these is. (n,)
+        """
+        for ours, theirs in zip(self.terms, before.terms, strict=True):
+            ours.go_on_showing(theirs, rows)
+
     def num_squares(self, step: int) -> int:
         """How many squares of step × step pixels it is seen in."""
         if step not in self._num_squares:

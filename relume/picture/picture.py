@@ -89,17 +89,27 @@ class Picture:
                 is not known, as after an undo.
             solo: names of sources of light that alone are shown, see `light_of`; None: all.
         Raises:
-            ParameterError: `hand` points to nothing that a hand may hold. NotFoundError, SceneError: the environment
-                cannot be had. The picture stays as it was.
+            ParameterError: `hand` points to nothing that a hand may hold. NotFoundError, SceneError: the environment or
+                an image cannot be had. StoreError: the bake is too old for images. The picture stays as it was.
         """
         moved = None if hand is None else parse_pointer(hand)
-        before, images = self._images.light, self._images
+        before, images = self._images.light, self._images.following(look)
         images.set_look(look, solo)
+        if images is not self._images:
+            self._show(images)
         self._moved = moved if isinstance(moved, CurvePointer | ParameterPointer) else None
         self._pointer = moved or self._pointer
         if (images.light.environment, images.light.local) != (before.environment, before.local):
             self._touched = None  # the hand has moved on to a light
         self._look = look
+
+    def _show(self, images: ViewImages) -> None:
+        """Go on with other images of the same view."""
+        self._images, self._view = images, images.view
+        for material in images.by_name.values():
+            material.seen_in(images.view)
+        self._backdrop = Backdrop(images)
+        self._transition.go_on_with(images)
 
     def look_at(self, region: Tile | None) -> None:
         """What is seen of the picture, and is to be exact first: x, y, width, height in pixels; None: all."""

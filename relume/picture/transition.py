@@ -51,6 +51,12 @@ class Transition:
         self.light, self.gain = images.light, images.gain
         images.shine_in(self.light)
 
+    def go_on_with(self, images: ViewImages) -> None:
+        """Bring other images of the same picture to what is wanted from now on: some of its samples are sorted anew."""
+        self._images, self._follow, self._previewed = images, Follow(images), None
+        self._routes = (Recall(), self._mix, self._follow)
+        images.shine_in(self.light)
+
     # what a frame shows
 
     def step(self, max_coefficients: int | None) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from copy import copy
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.channels import roughness_image
 from relume.brdf.document import complete_term
 from relume.errors import ParameterError
 from relume.light.triangles import TriangleLights
@@ -24,6 +26,7 @@ from relume.picture.mirrors import Mirrors
 from relume.picture.pointer import CurvePointer, ParameterPointer
 from relume.picture.transfer import Axis, Transfer
 from relume.project.receivers import Receivers
+from relume.views.rougher import rougher
 from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
@@ -54,6 +57,7 @@ class ViewImages:
     def __init__(self, transfer: Transfer, view_name: str, cache: Memory) -> None:
         self.transfer, self.cache = transfer, cache
         self.view = transfer.views[view_name]
+        self._rows = np.arange(self.view.num_surface_samples)  # as they were baked
         self.default = validate(transfer.default_look, transfer.default_look)
         self.light = self.default_light = self._light_of(self.default)
         self.by_name = {
@@ -63,6 +67,30 @@ class ViewImages:
         self.gain = gain_of(self.default)
         self.mirrors = Mirrors(self.view)
         self.region: Tile | None = None
+
+    def following(self, look: Look) -> ViewImages:
+        """The images of the view whose samples are as rough as the images say that a look names; the same where none
+        is named that was not before. Materials that are sorted anew go on showing what they do; others are shared.
+
+        Raises what `relume.views.rougher.rougher` raises; then nothing has changed.
+        """
+        maps = tuple(roughness_image(documents_of(look, name)) for name in self.transfer.material_names)
+        if maps == (self.view.maps or (None,) * len(maps)):
+            return self
+        changed, view = copy(self), self.transfer.views[self.view.name]
+        changed.view, rows = rougher(view, maps)
+        changed.mirrors, changed.by_name = Mirrors(changed.view), {}
+        place = np.empty(len(rows), np.int64)
+        place[self._rows] = np.arange(len(rows))  # of the samples as they were baked, in this view
+        changed._rows = rows
+        for index, (name, before) in enumerate(self.by_name.items()):
+            image = before
+            if changed.view.place(index) != self.view.place(index):
+                of_material = changed.view.rows(index)
+                image = MaterialImage(changed.view, index, before.documents, self.light)
+                image.go_on_showing(before, place[rows[of_material]] - of_material.start)
+            changed.by_name[name] = image
+        return changed
 
     def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
         """All that this view sees anything of."""
@@ -111,13 +139,14 @@ class ViewImages:
         def read() -> Receivers:
             return self.view.receivers(material.index, is_lit=False)
 
-        key = self.transfer.key, "receivers", self.view.name, material.index
+        key = self.transfer.key, "receivers", *self.view.place(material.index)
         return self.cache.keep(key, read)
 
     def is_default(self, material: MaterialImage, live: LiveTerm, light: Light) -> bool:
         """Whether a material's live term in some light is of the scene's own look: its image stays beside the store."""
         name = self.transfer.material_names[material.index]
-        return light == self.default_light and live.document in documents_of(self.default, name)
+        is_own = not any(self.view.maps[material.index : material.index + 1])
+        return is_own and light == self.default_light and live.document in documents_of(self.default, name)
 
     def _light_of(self, look: Look, solo: Solo = None) -> Light:
         has_bounces = Axis.BOUNCES in self.transfer.axes
@@ -156,7 +185,7 @@ class ViewImages:
         return None if curve.outgoing else CurveBasis.of(curve)
 
     def _place(self, material: MaterialImage) -> tuple[Hashable, ...]:
-        return self.transfer.key, self.view.name, material.index  # the store comes first: a memory asks whose it is
+        return self.transfer.key, *self.view.place(material.index)  # the store comes first: a memory asks whose it is
 
     def key_of_operator(
         self,

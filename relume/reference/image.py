@@ -23,7 +23,7 @@ from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.methods.direct import DirectMethod
-from relume.reference.images import textures_of
+from relume.reference.images import roughness_at, textures_of
 from relume.reference.indirect import reference_indirect
 from relume.reference.kinds import kinds_of
 from relume.reference.local import LocalLamp, emission_of, lamps_of
@@ -186,7 +186,8 @@ def _shoot(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _Shot:
     samples = sample_view(scene, geometry, view, size, follows_mirrors=False)  # here mirrors are lobes like others
     light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
     texels = texels_of(light, look.environment.rotation).times(look.environment.gain)
-    points = points_of(samples, textures_of(scene, look, samples.surface, samples.material))
+    of_look = scene, look, samples.surface, samples.material
+    points = points_of(samples, textures_of(*of_look), roughness_at(*of_look))
     return _Shot(scene, geometry, look, samples, points, light, texels, lamps_of(scene, look))
 
 
@@ -239,12 +240,12 @@ def _add_reflected(
         progress((block + 1) / num_blocks)
 
 
-def points_of(samples: ViewSamples, textures: Mapping[str, F32]) -> Points:
+def points_of(samples: ViewSamples, textures: Mapping[str, F32], roughness: F32) -> Points:
     """View samples as points; those of the background have no surface and are not meant.
 
-    samples: of a view. textures: there, see `Points`.
+    samples: of a view. textures, roughness: there, see `Points`.
     """
-    points, roughness = samples.surface.points, samples.surface.roughness
+    points = samples.surface.points
     towards = samples.eye.astype(np.float64) - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
     chance = chance_of(samples.through)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.channels import TEXTURES, images_of
-from relume.images.shelf import texture_of
+from relume.brdf.channels import TEXTURES, images_of, roughness_image
+from relume.images.shelf import mean_roughness, roughness_of, texture_of
 from relume.look import Look
 from relume.scene.model import Scene
+from relume.scene.roughness import widened
 from relume.trace.surface import Surface
 from relume.trace.texture import sample_image
 
@@ -31,4 +32,24 @@ def textures_of(scene: Scene, look: Look, surface: Surface, material: NDArray[np
                 rows = np.flatnonzero(material == index)
                 found[channel] = found[channel].copy()
                 found[channel][rows] = sample_image(texture_of(name), surface.uv[rows])
+    return found
+
+
+def roughness_at(scene: Scene, look: Look, surface: Surface, material: NDArray[np.integer]) -> F32:
+    """How rough places on surfaces are, over what terms say.
+
+    Args:
+        scene, look, surface, material: as in `textures_of`.
+    Returns:
+        (n,) float32
+    """
+    found = surface.roughness
+    for index, own in enumerate(scene.materials):
+        name = roughness_image(look.materials[own.name].terms)
+        if name is not None:
+            rows = np.flatnonzero(material == index)
+            found = found.copy()
+            found[rows] = sample_image(roughness_of(name), surface.uv[rows])[:, 0]
+            if own.normal_map is not None and (mean := mean_roughness(name)):
+                found[rows] = widened(found[rows], surface.normal_length[rows], mean)
     return found

@@ -23,7 +23,7 @@ from relume.brdf.evaluate import eval_brdf
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.look import Look, Paths
 from relume.reference.covers import Cover
-from relume.reference.images import textures_of
+from relume.reference.images import roughness_at, textures_of
 from relume.reference.kinds import Kinds, kinds_of
 from relume.reference.lobes import Lobe
 from relume.reference.local import lamps_of
@@ -174,7 +174,8 @@ def _places(
     surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE)
     material = geometry.face_material[some.face]
     textures = textures_of(scene, look, surface, material)
-    return Points(*surface.points[:3], -directions[hit], textures, surface.roughness), material
+    roughness = roughness_at(scene, look, surface, material)
+    return Points(*surface.points[:3], -directions[hit], textures, roughness), material
 
 
 def _covers(kinds: Kinds, points: Points, kind: NDArray[np.integer], seed: int) -> Covers:

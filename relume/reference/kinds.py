@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.channels import roughness_image
 from relume.brdf.levels import at_ratio, follows_map
 from relume.brdf.mirror import is_mirror, mirrored_share
+from relume.images.shelf import mean_roughness, roughness_of
 from relume.look import Look
-from relume.scene.model import Scene
-from relume.scene.roughness import level_of, levels_of
+from relume.scene.model import Material, Scene
+from relume.scene.roughness import level_of, levels_between, levels_of, shortest_normal
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -52,11 +54,19 @@ class Kinds:
         return kind
 
 
+def _levels(material: Material, terms: Terms) -> tuple[float, ...]:
+    """Of the map that terms of a material follow."""
+    name = roughness_image(terms)
+    if name is None:
+        return levels_of(material)
+    return levels_between(roughness_of(name), mean_roughness(name) or None, shortest_normal(material))
+
+
 def kinds_of(scene: Scene, look: Look) -> Kinds:
     """Find the kinds of a scene's surfaces under a look."""
     of_materials = [look.materials[material.name].terms for material in scene.materials]
     ends = [
-        levels_of(m) if any(map(follows_map, terms)) else ()
+        _levels(m, terms) if any(map(follows_map, terms)) else ()
         for m, terms in zip(scene.materials, of_materials, strict=True)
     ]
     num = min(_EACH, max(2, _ALL // max(1, sum(map(bool, ends)))))

@@ -32,16 +32,23 @@ _LEAST_LENGTH = 0.2  # of a mean of normals: rougher than anything is
 def levels_of(material: Material) -> tuple[float, ...]:
     """The levels of a material: roughness over what its terms say, rising. None where it has no map, or a plain one."""
     texture, own = material.textures.get("roughness"), widening_base(material)
-    if texture is None and own is None:
-        return ()
+    return levels_between(texture, own, 1.0 if own is None else shortest_normal(material))
+
+
+def levels_between(texture: Texture | None, own: float | None, shortest: float) -> tuple[float, ...]:
+    """The levels between the ends of a map, as `levels_of` has them.
+
+    Args:
+        texture: roughness over its mean, of bytes; None: one everywhere. own: that mean, see `widened`; None: bumps
+            widen nothing. shortest: from `shortest_normal`.
+    """
     low = high = 1.0
     if texture is not None:
         roots, count = _histogram(texture)
         share = np.cumsum(count) / count.sum()
         low, high = roots[np.searchsorted(share, _STRAYS)], roots[np.searchsorted(share, 1 - _STRAYS)]
-    if own is not None and material.normal_map is not None:
-        shortest = np.array([_shortest(material.normal_map)])
-        high = float(np.sqrt(widened(np.array([high**2], np.float32), shortest.astype(np.float32), own)[0]))
+    if own is not None and shortest < 1:
+        high = float(np.sqrt(widened(np.array([high**2], np.float32), np.array([shortest], np.float32), own)[0]))
     num = 1 + min(MAX_LEVELS - 1, int(np.ceil((high - low) / _STEP)))
     if num < 3:
         return ()
@@ -87,10 +94,14 @@ def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5
     return np.asarray(place + 1 - threshold, np.uint8)
 
 
-def _shortest(normal_map: Texture) -> float:
-    """About the shortest mean of normals that a pixel covers: of blocks of some sizes, but for strays."""
-    lengths = []
-    for rows in rows_of(normal_map):
+def shortest_normal(material: Material) -> float:
+    """About the shortest mean of normals that a pixel covers: of blocks of some sizes, but for strays.
+
+    Args:
+        material: any; one without bumps has 1.
+    """
+    lengths = [1.0]
+    for rows in () if material.normal_map is None else rows_of(material.normal_map):
         for side in _BLOCKS:
             height, width = (max(1, size // side) for size in rows.shape[:2])
             cut = rows[: height * side, : width * side]

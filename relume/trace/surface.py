@@ -35,6 +35,7 @@ class Surface:
             in radians, −1 where the texture is seen mirrored, else 1. Where a triangle has no place in textures, it
             is that of a projection along the axis of the world that it faces most, in metres. (n, 5) float32
         roughness: over what the material's terms say, 1 where it has no map. (n,) float32
+        normal_length: of the mean of the normals that a pixel covers, 1 where there are no bumps. (n,) float32
         emission: over the mean of the material's surfaces, 1 where it has no image. (n, 3) float32
     """
 
@@ -43,13 +44,14 @@ class Surface:
     specular: F32
     uv: F32
     roughness: F32
+    normal_length: F32
     emission: F32
 
     def rows(self, chosen: NDArray[np.integer]) -> Surface:
         """Choose some of them; their seeds are their new numbers."""
         points = self.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
-        textures = self.diffuse[chosen], self.specular[chosen]
-        return Surface(points, *textures, self.uv[chosen], self.roughness[chosen], self.emission[chosen])
+        of_surface = self.diffuse, self.specular, self.uv, self.roughness, self.normal_length, self.emission
+        return Surface(points, *(each[chosen] for each in of_surface))
 
 
 def _unit(v: F32, otherwise: F32) -> F32:
@@ -97,9 +99,9 @@ def surface_at(
 
     for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
     columns = zip(*(parts[start] for start in sorted(parts)), strict=True)
-    position, normal, tangent, diffuse, specular, uv, roughness, emission = map(np.concatenate, columns)
+    position, normal, tangent, *of_surface = map(np.concatenate, columns)
     seed = np.arange(len(directions), dtype=np.uint32)
-    return Surface(Points(position, normal, tangent, seed), diffuse, specular, uv, roughness, emission)
+    return Surface(Points(position, normal, tangent, seed), *of_surface)
 
 
 def places_on(geometry: Geometry, face: NDArray[np.integer], uv: F32, normal: F32) -> F32:
@@ -126,7 +128,7 @@ def _surface_at(
     materials: Sequence[Material],
     pixel_angle: float,
 ) -> tuple[F32, ...]:
-    """Interpolate a range of `surface_at`: position, normal, tangent, diffuse, specular, uv, roughness, emission."""
+    """Interpolate a range of `surface_at`: position, normal, tangent, and the others of `Surface` in their order."""
     hit = hits.face >= 0
     corners = geometry.faces[np.maximum(hits.face, 0)]
     p = geometry.positions[corners]
@@ -143,6 +145,7 @@ def _surface_at(
     position = (p * b).sum(axis=1) + geometry.epsilon * face_normal
     channels = dict(zip(_IMAGES, np.ones((3, *position.shape), np.float32), strict=True))
     channels["roughness"] = np.ones((len(uv), 1), np.float32)
+    length = np.ones(len(uv), np.float32)
     footprint = np.zeros(len(uv), np.float32)
     if materials:
         (du_0, dv_0), (du_1, dv_1) = np.diff(geometry.uvs[corners], axis=1).transpose(1, 2, 0)
@@ -160,9 +163,9 @@ def _surface_at(
             if m.normal_map is not None and len(rows):
                 pyramid = MipMap.of(m.normal_map)
                 mapped = pyramid.sample(uv[rows], footprint[rows])
+                length[rows] = covered_length(mapped, pyramid.texels(footprint[rows]))
                 if (own := widening_base(m)) is not None:
-                    length = covered_length(mapped, pyramid.texels(footprint[rows]))
-                    channels["roughness"][rows, 0] = widened(channels["roughness"][rows, 0], length, own)
+                    channels["roughness"][rows, 0] = widened(channels["roughness"][rows, 0], length[rows], own)
                 normal[rows] = _mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
     normal = _towards(normal, directions)
     tangent = _across(tangents[:, :3], normal)
@@ -180,6 +183,7 @@ def _surface_at(
         channels["specular"],
         place.astype(np.float32),
         channels["roughness"][:, 0],
+        length,
         channels["emission"],
     )
 

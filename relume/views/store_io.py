@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.errors import SceneError, StoreError
+from relume.errors import ChunkDamagedError, SceneError, StoreError
 from relume.eye.tinted import chance_of
 from relume.light.gather_rays import Pattern, make_pattern
 from relume.points import ALIKE, Points
@@ -115,6 +115,32 @@ def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
     except StoreError:
         return None
     return np.asarray(store.read(f"views/{k}/uv", start, stop), np.float32)
+
+
+def read_normal_length(store: StoreReader, k: int, start: int, stop: int) -> F32:
+    """Read how long the means of the normals are that pixels cover; one in stores that do not say so.
+
+    Args:
+        store: an open store. k: number of the view. start, stop: rows of its arrays.
+    Returns:
+        (stop - start,) float32
+    """
+    try:
+        return np.asarray(store.read(f"views/{k}/normal_length", start, stop), np.float32)
+    except ChunkDamagedError:
+        raise
+    except StoreError:
+        return np.ones(stop - start, np.float32)
+
+
+def read_shortest_normals(store: StoreReader) -> list[float]:
+    """Read about the shortest of them for each material, see `relume.scene.roughness.shortest_normal`.
+
+    Args:
+        store: an open store.
+    """
+    found = store.attributes.get("shortest_normals")
+    return [1.0] * len(store.attributes["materials"]) if found is None else list(map(float, found))
 
 
 def read_ratios(store: StoreReader) -> tuple[tuple[float, ...], ...]:

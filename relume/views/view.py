@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -57,6 +57,8 @@ class View:
         is_mirrored: which samples on surfaces are mirrors whose picture others have. (surface samples,)
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
         level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
+        maps: images that levels follow in the place of each material's own map, see `relume.views.rougher`; none where
+            nothing is named.
     """
 
     camera: Camera
@@ -78,6 +80,11 @@ class View:
     cos_theta_o: NDArray[np.float64]
     level: NDArray[np.uint8]
     ratios: tuple[tuple[float, ...], ...]
+    maps: tuple[str | None, ...] = ()
+
+    def place(self, material: int) -> tuple[Hashable, ...]:
+        """Name a material's samples among those of the bake: with the image that they are sorted by, if any."""
+        return self.name, material, *filter(None, self.maps[material : material + 1])
 
     @property
     def name(self) -> str:
@@ -125,7 +132,7 @@ class View:
                 raise StoreError("this bake is too old to show images; bake the scene again")
             return sample_image(texture_of(name), uv)
 
-        return self.memory.keep((self.key, "image", self.name, material, name), found)
+        return self.memory.keep((self.key, "image", *self.place(material), name), found)
 
     def shining(self, material: int) -> F32:
         """Read how brightly a material's samples shine, over its mean. (n, 1) float32, (n, 3) where images say it"""
@@ -182,7 +189,7 @@ class View:
         def read() -> NDArray[np.uint8]:
             return self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
 
-        return self.memory.passing.keep((self.key, "visibility", self.name, material), read)
+        return self.memory.passing.keep((self.key, "visibility", *self.place(material)), read)
 
     def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
         """Read from the store the rays of a material's samples that bring what gather cells send."""
@@ -195,7 +202,7 @@ class View:
             tents = int(self.store.attributes.get("gather_tents", 1))
             return sharing(self.pixel[self.rows(material)], self.width, self.points(material), tents)
 
-        return self.memory.keep((self.key, "sharing", self.name, material), found)
+        return self.memory.keep((self.key, "sharing", *self.place(material)), found)
 
     def background(self) -> F32:
         """Read the radiance of the samples after the surfaces. (n, 3) float32"""
@@ -250,12 +257,12 @@ class View:
         return touched
 
 
-def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
+def open_view(store: StoreReader, index: int, memory: Memory, key: str, maps: tuple[str | None, ...] = ()) -> View:
     """Read what every frame of a view needs; visibility stays in the store until a material is frozen.
 
     Args:
         store: of the bake. index: of the view in it.
-        memory: where what neighbouring samples share is kept. key: of the bake in it.
+        memory: where what neighbouring samples share is kept. key: of the bake in it. maps: see `View`.
     Raises:
         ChunkDamagedError: arrays of the store do not fit each other.
     """
@@ -306,6 +313,7 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str) -> View:
         cos_theta_o=np.clip(cosine, 0, 1),
         level=level,
         ratios=ratios,
+        maps=maps,
     )
 
 

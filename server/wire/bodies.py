@@ -171,9 +171,10 @@ class EnvironmentBody(Body):
 
 
 class ImageBody(Body):
-    """An image that terms of looks may name as their `texture`, in the place of their material's own.
+    """An image that terms of looks may name as `texture` or `roughness_map`, in the place of their material's own.
 
-    `size`: width and height. `warnings`: what was changed when its file was read.
+    `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green,
+    how rough a material is that has it as its map.
     """
 
     id: str
@@ -182,6 +183,7 @@ class ImageBody(Body):
     created: str
     size: tuple[int, int]
     warnings: list[str]
+    roughness: float
     thumbnail: str
 
 

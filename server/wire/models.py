@@ -42,8 +42,8 @@ class CurveBody(Body):
 
 class ModelBody(Body):
     """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the
-    parameter that maps of roughness scale, `mirrors_below` where it makes a mirror, and `data_prefix` how the names of
-    such data begin (see `data`)."""
+    parameter that maps of roughness scale, `width_power` the power of a roughness that it grows with, `mirrors_below`
+    where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`)."""
 
     model: str
     label: str
@@ -52,6 +52,7 @@ class ModelBody(Body):
     texture: str
     needs_data: bool
     width: str | None
+    width_power: float | None
     mirrors_below: float | None
     data_prefix: str | None
     parameters: list[ParameterBody]

@@ -1,15 +1,13 @@
 /** The image in the place of a material's base colour: choose one, send one, take it off. */
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import { isImage } from "../document/texture";
 import type { Term } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { baseTexture } from "./colour";
+import { FileOfImage } from "./FileOfImage";
 import { imageOf, images, loadImages, offerToDelete, putImage, sending, sendOnto, takeOff } from "./images";
 
-const TYPES = ".png,.jpg,.jpeg,.webp,.exr";
-
 export function BaseImage({ material, terms }: { material: string; terms: readonly Term[] }) {
-  const file = useRef<HTMLInputElement>(null);
   useEffect(() => void loadImages(), []);
   const texture = baseTexture(terms);
   const shown = isImage(texture) ? texture : null;
@@ -36,25 +34,11 @@ export function BaseImage({ material, terms }: { material: string; terms: readon
             </option>
           ))}
         </select>
-        <button type="button" disabled={sending.value !== null} onClick={() => file.current?.click()}>
-          Image…
-        </button>
+        <FileOfImage label="File of an image" onFile={(file) => void sendOnto(material, file)} />
         {image !== undefined && (
           <IconButton icon="trash" label={`Delete the image ${image.name}`} onClick={() => offerToDelete(material, image)} />
         )}
       </div>
-      <input
-        ref={file}
-        type="file"
-        hidden
-        accept={TYPES}
-        aria-label="File of an image"
-        onChange={(event) => {
-          const chosen = event.currentTarget.files?.[0];
-          event.currentTarget.value = "";
-          if (chosen !== undefined) void sendOnto(material, chosen);
-        }}
-      />
       <p class="aside" role="status">
         {sending.value}
       </p>

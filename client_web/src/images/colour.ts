@@ -50,7 +50,8 @@ export function withoutBaseImage(terms: readonly Term[], own: readonly Term[]): 
 
 /** Last words of file names, as libraries of textures write them, and what such images are maps of. */
 const MAPS: readonly (readonly [RegExp, string])[] = [
-  [/^(rough(ness)?|gloss(iness)?)$/, "roughness"],
+  [/^rough(ness)?$/, "roughness"],
+  [/^gloss(iness)?$/, "gloss"],
   [/^(metal(lic|ness)?)$/, "metal"],
   [/^(arm|orm|rma|metallicroughness)$/, "roughness and metal"],
   [/^(nor|nrm|normals?|bump|height|disp(lacement)?)(gl|dx)?$/, "bumps"],

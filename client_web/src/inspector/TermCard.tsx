@@ -7,6 +7,8 @@ import { edit } from "../edit/edit";
 import { isImage } from "../document/texture";
 import { withTexture } from "../images/colour";
 import { imageOf } from "../images/images";
+import { RoughnessImage } from "../images/RoughnessImage";
+import { withMap } from "../images/roughness";
 import { hold } from "../live/touch";
 import type { ModelBody, Rgb, Term } from "../protocol";
 import { defaultLook } from "../state/look";
@@ -92,32 +94,18 @@ function Texture({ channels, value, onChange }: TextureProps) {
   );
 }
 
-interface RoughnessProps {
-  label: string;
-  /** Of the width's curves some are drawn. */
-  isDrawn: boolean;
-  value: boolean;
-  onChange(value: boolean): void;
-}
-
-/** Whether the term is as rough as the material's image says. */
-function RoughnessMap({ label, isDrawn, value, onChange }: RoughnessProps) {
+/** What becomes of the map that a term follows. */
+function OfMap({ term, model }: { term: Term; model: ModelBody }) {
+  const width = model.width as string;
+  if (model.curves.some((curve) => curve.parameters.includes(width) && term.curves?.[curve.name] !== undefined)) {
+    return <p class="aside">Curves that are drawn replace the map.</p>;
+  }
+  const label = model.parameters.find((info) => info.name === width)?.label ?? width;
   return (
-    <>
-      <label class="param texture">
-        <span class="param-label">Roughness map</span>
-        <select value={value ? "map" : ""} onChange={(event) => onChange(event.currentTarget.value === "map")}>
-          <option value="">None</option>
-          <option value="map">As in the scene</option>
-        </select>
-      </label>
-      {value && (
-        <p class="aside">
-          {isDrawn ? "Curves that are drawn replace the map." : `“${label}” scales the map; curves show its mean`}
-          {!isDrawn && (moves.value ? ", and so does the view while the eye moves." : ".")}
-        </p>
-      )}
-    </>
+    <p class="aside">
+      {`“${label}” scales the map; curves show its mean`}
+      {moves.value ? ", and so does the view while the eye moves." : "."}
+    </p>
   );
 }
 
@@ -127,6 +115,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
   const initial = defaultLook.value?.materials[material]?.terms[index];
   const same = initial?.model === term.model ? initial : undefined;
   const open = selectedTerm.value === index;
+  const follows = (term.roughness_map ?? false) !== false;
   const kept = useTold(open ? btfOf(term) : null, keptOf);
   const changeModel = (name: string) => {
     edit("Change model", path, withModel(term, name, models.value));
@@ -172,14 +161,16 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             value={term.texture ?? null}
             onChange={(value) => edit("Texture", pointer("materials", material, "terms"), withTexture(terms.value, index, value))}
           />
-          {model?.width != null && hasRoughnessMap(material) && (
-            <RoughnessMap
-              label={model.parameters.find((info) => info.name === model.width)?.label ?? model.width}
-              isDrawn={model.curves.some((curve) => curve.parameters.includes(model.width as string) && term.curves?.[curve.name] !== undefined)}
-              value={term.roughness_map === true}
-              onChange={(value) => edit("Roughness map", `${path}/roughness_map`, value)}
+          {model?.width != null && (
+            <RoughnessImage
+              material={material}
+              index={index}
+              value={term.roughness_map ?? false}
+              hasOwn={hasRoughnessMap(material)}
+              onChange={(value) => edit("Roughness map", pointer("materials", material, "terms"), withMap(terms.value, index, value))}
             />
           )}
+          {model?.width != null && follows && <OfMap term={term} model={model} />}
           {model?.parameters.map((declared) => upTo(declared, kept)).map((info) => (
             <ParamRow
               key={info.name}

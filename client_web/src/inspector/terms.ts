@@ -20,7 +20,7 @@ export function hasRoughnessMap(material: string): boolean {
 /** Whether a term is so smooth that it is a mirror rather than a highlight, by `relume/brdf/mirror.py`. */
 function isMirror(term: Term): boolean {
   const { mirrors_below: below, width, curves } = modelOf(term) ?? {};
-  if (below == null || width == null || term.roughness_map === true) return false;
+  if (below == null || width == null || (term.roughness_map ?? false) !== false) return false;
   if (term.texture === "diffuse" || isImage(term.texture)) return false;
   const facets = curves?.find(({ angle }) => angle === "theta_h");
   if (facets !== undefined && term.curves?.[facets.name] !== undefined) return false;

@@ -151,7 +151,8 @@ class Backdrop:
             return np.tile((np.array(color) * factor).astype(np.float32), (rows.stop - rows.start, 1))
         blur = background.blur if background.kind == "blurred" else 0.0
         images = self._images
-        key = images.transfer.key, "behind surfaces", self._view.name, material, shown.environment, blur
+        place = (self._view.name, None) if material is None else self._view.place(material)
+        key = images.transfer.key, "behind surfaces", *place, shown.environment, blur
         seen = images.cache.passing.keep(key, lambda: self._map(shown.environment, material, blur))
         return np.asarray(seen * factor, np.float32)
 

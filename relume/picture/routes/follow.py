@@ -120,7 +120,7 @@ class Follow:
 
     def _key(self, place: Place) -> tuple[Hashable, ...]:
         images, material, live = place
-        return images.transfer.key, images.view.name, material.index, "rows", live.model, *live.target_rows
+        return images.transfer.key, *images.view.place(material.index), "rows", live.model, *live.target_rows
 
     def _rows(self, place: Place) -> IndirectOperator | None:
         return self._images.cache.find(self._key(place), IndirectOperator)

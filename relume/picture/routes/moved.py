@@ -36,7 +36,7 @@ class MovedLights:
 
     def __init__(self, images: ViewImages) -> None:
         self._images = images
-        self._place = images.transfer.key, images.view.name
+        self._place = images.transfer.key, images.view.name, images.view.maps
 
     def add_change(self, place: Place, before: Light, after: Light, out: F32) -> None:
         """Add what comes straight to a term's samples from lights that were not there before, and take off what came
@@ -94,8 +94,8 @@ class MovedLights:
         out += self._shaded(material, live, rays, Shaded(out).rows(material.num_samples)).image
 
     def _roughly(self, geometry: LightGeometry) -> PreviewLight:
-        transfer, view = self._images.transfer, self._images.view
-        key = transfer.key, "moved light", view.name, geometry
+        transfer = self._images.transfer
+        key = *self._place, "moved light", geometry
         return self._images.cache.passing.keep(key, lambda: transfer.local.preview(geometry, self._points()))
 
     def _shaded(

@@ -93,7 +93,7 @@ def _sparse(images: ViewImages, material: int, detail: int) -> Sparse:
 
 
 def _key(images: ViewImages, material: int, detail: int = 0) -> tuple[Hashable, ...]:
-    return images.transfer.key, images.view.name, material, "sparse", detail
+    return images.transfer.key, *images.view.place(material), "sparse", detail
 
 
 def _bytes_of(images: ViewImages, material: int) -> int:

@@ -70,5 +70,6 @@ def _body(record: ImageRecord) -> ImageBody:
         created=moment(record.created),
         size=record.size,
         warnings=list(record.warnings),
+        roughness=record.roughness,
         thumbnail=f"/api/images/{record.id}/thumbnail.png",
     )

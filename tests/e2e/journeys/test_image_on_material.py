@@ -32,23 +32,46 @@ def test_an_image_is_put_on_by_a_button_and_by_a_drop(editor: Editor, stripes: P
     page.get_by_role("button", name="Undo", exact=True).click()
     expect(chosen.locator("option:checked")).to_have_text("stripes")
     page.get_by_role("button", name="Undo", exact=True).click()
-    box = editor.canvas.bounding_box()
+    material = drop_on_the_middle(editor, stripes, "dropped.png")
+    expect(page.locator(".inspector h2")).to_have_text(material)
+    expect(chosen.locator("option:checked")).to_have_text("dropped")
+    editor.wait_until_exact()
+
+
+def test_an_image_named_like_a_map_of_roughness_becomes_that(editor: Editor, stripes: Path) -> None:
+    page = editor.page
+    material = drop_on_the_middle(editor, stripes, "tiles_rough.png")
+    expect(page.locator(".inspector h2")).to_have_text(material)
+    editor.choose(material, 1)
+    chosen = page.get_by_label("Roughness map", exact=True)
+    expect(chosen.locator("option:checked")).to_have_text("tiles_rough")
+    editor.wait_until_exact()
+    page.get_by_role("button", name="Undo", exact=True).click()
+    expect(chosen.locator("option:checked")).not_to_have_text("tiles_rough")
+    page.get_by_label("File of a map of roughness").set_input_files(stripes)  # by keys: a button asks for it
+    expect(chosen.locator("option:checked")).to_have_text("stripes")
+    chosen.select_option("")
+    expect(chosen.locator("option:checked")).not_to_have_text("stripes")
+    editor.wait_until_exact()
+
+
+def drop_on_the_middle(editor: Editor, file: Path, name: str) -> str:
+    """Let a file go over the middle of the picture; returns the material that is seen there."""
+    page, box = editor.page, editor.canvas.bounding_box()
     assert box is not None
     place = {"clientX": box["x"] + 0.5 * box["width"], "clientY": box["y"] + 0.5 * box["height"]}
     page.mouse.move(place["clientX"], place["clientY"])
     material = page.locator(".picture-bar .material").inner_text()
-    told = base64.b64encode(stripes.read_bytes()).decode()
+    told = [base64.b64encode(file.read_bytes()).decode(), name]
     carried = page.evaluate_handle(
-        """told => {
+        """([told, name]) => {
           const held = new DataTransfer();
           const bytes = Uint8Array.from(atob(told), (c) => c.charCodeAt(0));
-          held.items.add(new File([bytes], "dropped.png", { type: "image/png" }));
+          held.items.add(new File([bytes], name, { type: "image/png" }));
           return held;
         }""",
         told,
     )
     editor.canvas.dispatch_event("dragover", {"dataTransfer": carried, **place})
     editor.canvas.dispatch_event("drop", {"dataTransfer": carried, **place})
-    expect(page.locator(".inspector h2")).to_have_text(material)
-    expect(chosen.locator("option:checked")).to_have_text("dropped")
-    editor.wait_until_exact()
+    return material

@@ -1,0 +1,59 @@
+import { expect, test } from "vitest";
+import { mapNamed } from "../src/images/colour";
+import { roughPlaces, roughnessImage, withMap, withoutRoughnessImage, withRoughnessImage } from "../src/images/roughness";
+import type { ImageBody, ModelBody, Term } from "../src/protocol";
+import { models } from "../src/state/scene";
+
+const image = { texture: "image:0123456789abcdef", roughness: 0.6 } as ImageBody;
+const width = (name: string, power: number, minimum = 0.01, maximum = 1) => ({
+  texture: "specular",
+  width: name,
+  width_power: power,
+  parameters: [{ name, minimum, maximum, default: 0.4 }],
+});
+models.value = [
+  { model: "lambert", texture: "diffuse", width: null, width_power: null, parameters: [] },
+  { model: "ggx", ...width("roughness", 1) },
+  { model: "ward", ...width("alpha", 2) },
+  { model: "phong", ...width("exponent", -4, 1, 1000) },
+] as unknown as ModelBody[];
+
+const term = (model: string, params: Term["params"] = {}, roughness_map?: Term["roughness_map"]): Term =>
+  ({ model, params, texture: null, ...(roughness_map === undefined ? {} : { roughness_map }) }) as Term;
+
+test("an image is for the terms that follow the scene's map, else for all that have a width", () => {
+  expect(roughPlaces([term("lambert"), term("ggx", {}, true), term("ggx")])).toEqual([1]);
+  expect(roughPlaces([term("lambert"), term("ggx"), term("ward")])).toEqual([1, 2]);
+  expect(roughPlaces([term("lambert")])).toEqual([]);
+});
+
+test("sliders show the mean of the image, in their own measure where that is a power of it", () => {
+  const given = [term("lambert"), term("ggx", { roughness: 0.2 }), term("ward", { alpha: 0.1 }), term("phong", { exponent: 30 })];
+  expect(withRoughnessImage(given, [1, 2, 3], image)).toEqual([
+    term("lambert"),
+    term("ggx", { roughness: 0.6 }, image.texture),
+    term("ward", { alpha: 0.36 }, image.texture),
+    term("phong", { exponent: 30 }, image.texture),
+  ]);
+});
+
+test("terms of a material follow one map", () => {
+  const other = "image:fedcba9876543210";
+  const given = [term("ggx", {}, true), term("ggx", {}, false), term("ggx", {}, true)];
+  const made = withMap(given, 0, other);
+  expect(made).toEqual([term("ggx", {}, other), term("ggx", {}, false), term("ggx", {}, other)]);
+  expect(roughnessImage(made)).toBe(other);
+  expect(withMap(made, 2, true)).toEqual(given);
+  expect(withMap(made, 0, false)).toEqual([term("ggx", {}, false), term("ggx", {}, false), term("ggx", {}, other)]);
+  expect(withMap(given, 0, false)).toEqual([term("ggx", {}, false), term("ggx", {}, false), term("ggx", {}, true)]);
+});
+
+test("without it the scene's own map and slider are back", () => {
+  const own = [term("lambert"), term("ggx", { roughness: 0.2 }, true), term("ward", { alpha: 0.1 })];
+  const back = withoutRoughnessImage(withRoughnessImage(own, [1, 2], image), own);
+  expect(back).toEqual([own[0], own[1], term("ward", { alpha: 0.1 }, false)]);
+});
+
+test("maps of gloss are none of roughness", () => {
+  expect(mapNamed("oak_gloss_2k.jpg")).toBe("gloss");
+});
