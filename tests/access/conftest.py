@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from server_fixtures import ack_seconds, baked, client, control
+from server_fixtures import ack_seconds, baked, client, control, empty_ledger
 from server_fixtures import settings as open_settings
 
 from server.access.access import Access
 from server.settings import Settings
 
-__all__ = ["ack_seconds", "baked", "client", "control", "open_settings"]
+__all__ = ["ack_seconds", "baked", "client", "control", "empty_ledger", "open_settings"]
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 """The server's fixtures, for its hostile clients."""
 
-from server_fixtures import ack_seconds, baked, client, control, settings
+from server_fixtures import ack_seconds, baked, client, control, empty_ledger, settings
 
-__all__ = ["ack_seconds", "baked", "client", "control", "settings"]
+__all__ = ["ack_seconds", "baked", "client", "control", "empty_ledger", "settings"]

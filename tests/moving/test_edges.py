@@ -27,7 +27,7 @@ def opened(tmp_path_factory):
     )
     wall = quad("wall", [[-3, -2, -1], [3, -2, -1], [3, 3, -1], [-3, 3, -1]], 1)
     scene = scene_of(sphere("ball", (0, 0.5, 0), 0.5, 0, rings=24), wall, camera=CAMERA, materials=[black, white])
-    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=4000)
+    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=1500)
     folder = tmp_path_factory.mktemp("edges")
     return open_bake(bake_here(METHODS["surface"], scene, recipe, folder / "s.zarr"), Memory(1 << 30))
 

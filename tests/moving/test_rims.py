@@ -55,7 +55,7 @@ def shiny(tmp_path_factory):
     sky[12, ::8] = 60
     ball = sphere("ball", (0, 0.5, 0), 0.5, 0, rings=24)
     scene = scene_of(ball, camera=CAMERA, environment=sky, materials=[Material("B", (term,))])
-    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=4000)
+    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=1500)
     folder = tmp_path_factory.mktemp("rims")
     return open_bake(bake_here(METHODS["surface"], scene, recipe, folder / "s.zarr"), Memory(1 << 30))
 

@@ -30,7 +30,7 @@ from relume.trace.texture import MipMap
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    recipe = Recipe("surface", ("front",), (48, 36), 60, num_points=3000)
+    recipe = Recipe("surface", ("front",), (48, 36), 60, num_points=1000)
     store = bake_here(METHODS["surface"], still_life(), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
     return open_bake(store, Memory(1 << 30))
 
