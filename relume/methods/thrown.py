@@ -135,6 +135,24 @@ def read_thrown(store: StoreReader) -> Thrown | None:
     return found
 
 
+@dataclass(frozen=True)
+class MoreThrown:
+    """How much more flat mirrors throw in one light than in another; a `relume.picture.transfer.MoreThrown`.
+
+    Attributes:
+        direction: of what is thrown. (K, 3) float32 across: what comes across it. (K, 3) float32
+        by_cells: what other cells see of the same in the mean, which is no part of what samples get. (C, 3) float32
+    """
+
+    direction: F32
+    across: F32
+    by_cells: F32
+
+    def rays(self, visible: NDArray[np.uint8]) -> ThrownRays:
+        """What comes to samples. visible: of the lights by the planes. (n, bytes) uint8"""
+        return ThrownRays(self.direction, self.across, visible)
+
+
 class ThrownLight:
     """Of one bake, in any look; safe to use from several threads.
 
@@ -166,6 +184,23 @@ class ThrownLight:
         Args:
             light: that `is_in` says has any. visible: see `relume.eye.flat_mirrors.Seen`. (n, bytes) uint8
         """
+        return ThrownRays(self._directions, self._sent(light), visible)
+
+    def more(self, before: Light, after: Light) -> MoreThrown | None:
+        """What changes of it where surfaces do, as when a hand drags a mirror's colour; None for nothing.
+
+        Args:
+            before, after: in the same environment.
+        """
+        here, there = (self._sent(light) if self.is_in(light) else np.float32(0) for light in (before, after))
+        change = np.asarray(there - here, np.float32)
+        if not change.any():
+            return None
+        taken = [self.taken(light).seen(self._cells) if self.is_in(light) else 0 for light in (before, after)]
+        return MoreThrown(self._directions, change, np.asarray(taken[1] - taken[0], np.float32))
+
+    def _sent(self, light: Light) -> F32:
+        """What each group sends by each plane, across its way. (P G, 3) float32"""
         thrown, gain = self._thrown, np.array(light.environment_gain)
         arriving = np.zeros((len(thrown.direction), 3))
         np.add.at(arriving, thrown.group, gain * self._lights_in(light.environment).irradiance[thrown.lights])
@@ -176,7 +211,7 @@ class ThrownLight:
             tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
             terms = mirrors_in(light.reflectances[material])
             sent[p] = mirrored(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
-        return ThrownRays(self._directions, (sent * arriving).reshape(-1, 3).astype(np.float32), visible)
+        return np.asarray((sent * arriving).reshape(-1, 3), np.float32)
 
     def taken(self, light: Light) -> Leaving:
         """What cells in the planes send of the same lights, as functions have it."""

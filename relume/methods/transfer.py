@@ -30,7 +30,7 @@ from relume.methods.on_cells import LightOnCells
 from relume.methods.reflected import Reflected
 from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
 from relume.methods.thinned import ThinnedStore
-from relume.methods.thrown import Thrown, ThrownLight
+from relume.methods.thrown import MoreThrown, Thrown, ThrownLight
 from relume.operators.image_files import ImageFiles
 from relume.picture.light import Light
 from relume.picture.transfer import Arriving, Axis, Eyes
@@ -207,6 +207,14 @@ class BakedViews:
 
         return self.local.all_rays(light, view.points(material), remembered)
 
+    def thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
+        """The lights that a material's samples see in flat mirrors: none without gather rays. See `Transfer`."""
+        return None
+
+    def more_thrown(self, before: Light, after: Light) -> MoreThrown | None:
+        """How much more flat mirrors throw after than before: nothing. See `Transfer`."""
+        return None
+
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
         whole = view.receivers(material)
@@ -326,7 +334,7 @@ class BouncedViews(BakedViews):
         local = super()._rays(view, material, light, memory)
         if not light.paths.reflect:
             return local
-        rays, seen = view.gather_rays(material, _NOTHING), self._thrown_to(view, material)
+        rays, seen = view.gather_rays(material, _NOTHING), self.thrown_to(view, material)
         return (*self.between_surfaces(light, rays, seen), *local)
 
     def between_surfaces(
@@ -339,14 +347,24 @@ class BouncedViews(BakedViews):
         beside = self.reflected.beside(light, by_mirrors.taken)
         return replace(gathered, sent=beside), by_mirrors.rays(light, thrown)
 
-    def _thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
+    def thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
         """The lights that a material's samples see in flat mirrors. (n, bytes) uint8"""
+        if self.thrown is None:
+            return None
         rows = view.rows(material)
-        return None if self.thrown is None else view.store.read(f"views/{view.index}/thrown", rows.start, rows.stop)
+
+        def read() -> NDArray[np.uint8]:
+            return view.store.read(f"views/{view.index}/thrown", rows.start, rows.stop)
+
+        return self.memory.passing.keep((self.key, "thrown", *view.place(material)), read)
+
+    def more_thrown(self, before: Light, after: Light) -> MoreThrown | None:
+        """How much more flat mirrors throw after than before. See `Transfer`."""
+        return None if self.thrown_light is None else self.thrown_light.more(before, after)
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
-        few, seen = super().some(view, material, chosen), self._thrown_to(view, material)
+        few, seen = super().some(view, material, chosen), self.thrown_to(view, material)
         thrown = None if seen is None else seen[chosen]
         return replace(few, gathered=view.gather_rays(material, _NOTHING).alone(chosen), thrown=thrown)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.operators.image_files import ImageFiles
     from relume.picture.light import Light, Source
     from relume.points import Points
-    from relume.project.receivers import LocalRays, Receivers
+    from relume.project.receivers import LocalRays, Receivers, ThrownRays
     from relume.scene.model import Camera
     from relume.trace.preview_light import PreviewLight
     from relume.views.view import View
@@ -90,6 +90,20 @@ class Local(Protocol):
 
     def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
         """What would come to points from a light of unit emission if nothing were in its way. (n,)"""
+        ...
+
+
+class MoreThrown(Protocol):
+    """How much more flat mirrors throw in one light than in another.
+
+    Attributes:
+        by_cells: what of it cells on those mirrors send by lobes. (C, 3)
+    """
+
+    @property
+    def by_cells(self) -> F32: ...
+    def rays(self, visible: NDArray[np.uint8]) -> ThrownRays:
+        """What comes to samples. visible: from `Transfer.thrown_to`. (n, bytes)"""
         ...
 
 
@@ -176,6 +190,14 @@ class Transfer(Opened, Protocol):
 
     def merged(self, light: Light) -> TriangleLights:
         """The triangles by which light comes straight to a picture, merged into a few that know their parts."""
+        ...
+
+    def thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
+        """The lights that a material's samples see in flat mirrors; None where that was not baked. (n, bytes)"""
+        ...
+
+    def more_thrown(self, before: Light, after: Light) -> MoreThrown | None:
+        """How much more flat mirrors throw after than before, in the same environment; None for nothing."""
         ...
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> Few:

@@ -22,6 +22,7 @@ from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Cancelled, Job, Place, Progress
 from relume.picture.light import Light, is_same_environment
 from relume.picture.routes.moved import MovedLights
+from relume.picture.transfer import MoreThrown
 from relume.picture.view_images import ViewImages
 from relume.project.sent import evenly
 
@@ -74,7 +75,7 @@ class Follow:
     def __init__(self, images: ViewImages) -> None:
         self._images, self._moved = images, MovedLights(images)
         self._reflected = images.transfer.reflected
-        self._change: tuple[Light, Light, F32] | None = None
+        self._change: tuple[Light, Light, F32, MoreThrown | None] | None = None
 
     def has_room(self) -> bool:
         """Whether the memory has room for all rows, where any are needed, beside other things."""
@@ -99,7 +100,7 @@ class Follow:
 
     def apply(self, place: Place, light: Light) -> None:
         """See `LightRoute`."""
-        live = place.live
+        live, images = place.live, self._images
         anchor, rows = live.ready.anchor, self._rows(place)
         if anchor is None or anchor.light is None:
             return
@@ -107,16 +108,23 @@ class Follow:
         np.copyto(image, anchor.image)
         self._moved.add_change(place, anchor.light, light, image)
         if rows is not None:
-            rows.add(self._sent_more(anchor.light, light), image)
+            sent, thrown = self._sent_more(anchor.light, light)
+            rows.add(sent, image)
+            seen = None if thrown is None else images.transfer.thrown_to(images.view, place.material.index)
+            if thrown is not None and seen is not None:
+                self._moved.add_thrown(place, thrown.rays(seen), image)
         live.put(replace(live.ready, image=image, fidelity=self.fidelity, bands=anchor.bands, light=light))
 
-    def _sent_more(self, before: Light, after: Light) -> F32:
-        """Haar coefficients of what cells send out more; the same for all terms. (padded cells, 3) float32"""
+    def _sent_more(self, before: Light, after: Light) -> tuple[F32, MoreThrown | None]:
+        """Haar coefficients of what cells send out more, (padded cells, 3) float32, and what flat mirrors throw more;
+        the same for all terms."""
         reflected = self._reflected
         assert reflected is not None
         if self._change is None or self._change[:2] != (before, after):
-            self._change = before, after, haar(reflected.preview_change(before, after)).astype(np.float32)
-        return self._change[2]
+            change, thrown = reflected.preview_change(before, after), self._images.transfer.more_thrown(before, after)
+            by_lobes = change if thrown is None else change - thrown.by_cells
+            self._change = before, after, haar(by_lobes).astype(np.float32), thrown
+        return self._change[2:]
 
     def _key(self, place: Place) -> tuple[Hashable, ...]:
         images, material, live = place

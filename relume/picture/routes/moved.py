@@ -23,7 +23,7 @@ from relume.picture.view_images import ViewImages
 from relume.points import Points
 from relume.project.contraction import contract
 from relume.project.levels import contract_levels
-from relume.project.receivers import LocalRays
+from relume.project.receivers import LocalRays, Receivers, ThrownRays
 from relume.trace.local_shadows import arriving
 from relume.trace.preview_light import PreviewLight
 from relume.views.compose import add_even
@@ -57,6 +57,19 @@ class MovedLights:
             weighted_sum(out, [(self._before(material, live, element), (-red, -green, -blue))])
         if come:
             self._add_now(material, live, come, out)
+
+    def add_thrown(self, place: Place, rays: ThrownRays, out: F32) -> None:
+        """Add what flat mirrors throw to a term's samples, the few that see any of it.
+
+        Args:
+            place, out: as of `add_change`. rays: to all samples of its material.
+        """
+        _, material, live = place
+        lit = np.flatnonzero(rays.visible.any(axis=1))
+        if len(lit):
+            some = replace(self._images.unlit(material).places(lit), rays=[rays.alone(lit)])
+            tile, offset = np.divmod(lit, out.shape[2])
+            out[tile, :, offset] += self._rows(live, some, len(lit), None)
 
     def _before(self, material: MaterialImage, live: LiveTerm, light: Light) -> F32:
         """What comes straight from a light that stood still, as exact as in the picture that was shaded; the same in
@@ -103,14 +116,18 @@ class MovedLights:
     ) -> Shaded:
         """What rays bring a term, in the threads of frames. beside: what is shown already, see `Shader`"""
         points = replace(self._images.unlit(material), rays=rays)
+        return Shaded.of(self._rows(live, points, material.num_samples, beside))
+
+    @staticmethod
+    def _rows(live: LiveTerm, points: Receivers, num_samples: int, beside: F32 | None) -> F32:
         contractions = contract_levels(live.term, live.target, None)
-        rows = np.empty((material.num_samples, 3), np.float32)
+        rows = np.empty((num_samples, 3), np.float32)
 
         def add(start: int, stop: int) -> None:
             rows[start:stop] = shaded_rows(live.term, contractions, NO_LIGHTS, points, start, stop, beside)
 
         for_shares(add, len(rows))
-        return Shaded.of(rows)
+        return rows
 
     def _points(self) -> Points:
         """Those of the view; of samples that are seen from behind the normals are nothing, and no light arrives."""
