@@ -114,14 +114,18 @@ def roughness_of(name: str) -> Texture:
 
 def mean_roughness(name: str) -> float:
     """The mean of it, before it was divided by that. Raises what `texture_of` raises."""
-    return _mean(_shares(texture_of(name)))
+    return _load_mean(IMAGES.found(name))
 
 
 @lru_cache(maxsize=4)
 def _load_roughness(path: Path) -> Texture:
-    shares = _shares(_load(path))
-    most = 1 / max(_mean(shares), _LEAST_ROUGHNESS)
-    return Texture(shares, coding=Coding("share", (most, most, most)))
+    most = 1 / max(_load_mean(path), _LEAST_ROUGHNESS)
+    return Texture(_shares(_load(path)), coding=Coding("share", (most, most, most)))
+
+
+@lru_cache(maxsize=1_000)
+def _load_mean(path: Path) -> float:
+    return _mean(_shares(_load(path)))
 
 
 def _shares(texture: Texture) -> NDArray[np.uint8]:
