@@ -55,6 +55,7 @@ export function withoutRoughnessImage(terms: readonly Term[], own: readonly Term
     const width = modelOf(term)?.width;
     const value = width == null ? undefined : before?.params?.[width];
     const params = width == null || value === undefined ? term.params : { ...term.params, [width]: value };
-    return { ...term, params, roughness_map: before?.roughness_map ?? false };
+    const { roughness_map: _image, ...bare } = term;
+    return { ...bare, params, ...(before?.roughness_map === undefined ? {} : { roughness_map: before.roughness_map }) };
   });
 }
