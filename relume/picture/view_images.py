@@ -57,7 +57,6 @@ class ViewImages:
     def __init__(self, transfer: Transfer, view_name: str, cache: Memory) -> None:
         self.transfer, self.cache = transfer, cache
         self.view = transfer.views[view_name]
-        self._rows = np.arange(self.view.num_surface_samples)  # as they were baked
         self.default = validate(transfer.default_look, transfer.default_look)
         self.light = self.default_light = self._light_of(self.default)
         self.by_name = {
@@ -77,18 +76,16 @@ class ViewImages:
         maps = tuple(roughness_image(documents_of(look, name)) for name in self.transfer.material_names)
         if maps == (self.view.maps or (None,) * len(maps)):
             return self
-        changed, view = copy(self), self.transfer.views[self.view.name]
-        changed.view, rows = rougher(view, maps)
-        changed.mirrors, changed.by_name = Mirrors(changed.view), {}
-        place = np.empty(len(rows), np.int64)
-        place[self._rows] = np.arange(len(rows))  # of the samples as they were baked, in this view
-        changed._rows = rows
+        changed, view = copy(self), rougher(self.transfer.views[self.view.name], maps)
+        changed.view, changed.mirrors, changed.by_name = view, Mirrors(view), {}
+        place = np.empty(view.num_surface_samples, np.int64)
+        place[self.view.as_baked()] = np.arange(len(place))  # of the samples as they were baked, in this view
         for index, (name, before) in enumerate(self.by_name.items()):
             image = before
-            if changed.view.place(index) != self.view.place(index):
-                of_material = changed.view.rows(index)
-                image = MaterialImage(changed.view, index, before.documents, self.light)
-                image.go_on_showing(before, place[rows[of_material]] - of_material.start)
+            if view.place(index) != self.view.place(index):
+                rows = view.rows(index)
+                image = MaterialImage(view, index, before.documents, self.light)
+                image.go_on_showing(before, place[view.as_baked()[rows]] - rows.start)
             changed.by_name[name] = image
         return changed
 

@@ -72,31 +72,32 @@ class Reordered:
         return np.concatenate([found, self._store.read(path, len(self._rows), end)])  # behind all surfaces
 
 
-def rougher(view: View, maps: Names) -> tuple[View, Rows]:
+def rougher(view: View, maps: Names) -> View:
     """Let materials of a baked view follow images in the place of their maps of roughness.
 
     Args:
         view: as it was baked. maps: "image:<id>" for each material, None for its own.
     Returns:
-        The view; and which of the baked one's samples on surfaces each of its own is, (surface samples,).
+        The view; the same object for all who have it.
     Raises:
         StoreError: the store does not say where samples lie in textures. NotFoundError, SceneError: an image cannot be
             had.
     """
-    rows = np.arange(view.num_surface_samples)
-    if not any(maps):
-        return view, rows
-    level, ratios = view.level.copy(), list(view.ratios)
+    known = view.rougher.get(maps)
+    if known is not None or not any(maps):
+        return known or view
+    rows, level, ratios = view.as_baked(), view.level.copy(), list(view.ratios)
     for material, name in enumerate(maps):
         if name is None:
             continue
         of_material = view.rows(material)
-        ratios[material], found = _levels_in(view, material, name)
+        ratios[material], of_samples = _levels_in(view, material, name)
         code = morton(view.pixel[of_material].astype(np.int64), view.width)
-        order = np.lexsort((code, found))
-        level[of_material], rows[of_material] = found[order], rows[of_material][order]
+        order = np.lexsort((code, of_samples))
+        level[of_material], rows[of_material] = of_samples[order], rows[of_material][order]
     store = Reordered(view.store, view.index, rows, level, ratios)
-    return open_view(store, view.index, view.memory, view.key, maps), rows
+    view.rougher[maps] = found = open_view(store, view.index, view.memory, view.key, maps, rows)
+    return found
 
 
 def _levels_in(view: View, material: int, name: str) -> Levels:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,8 @@ class View:
         level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
         maps: images that levels follow in the place of each material's own map, see `relume.views.rougher`; none where
             nothing is named.
+        sorted: where each sample on surfaces is among those that were baked; None: in that order. (surface samples,)
+        rougher: views of the same samples that follow such images, by these, for as long as a picture has them.
     """
 
     camera: Camera
@@ -81,10 +84,16 @@ class View:
     level: NDArray[np.uint8]
     ratios: tuple[tuple[float, ...], ...]
     maps: tuple[str | None, ...] = ()
+    sorted: NDArray[np.int64] | None = field(default=None, repr=False)
+    rougher: WeakValueDictionary[tuple[str | None, ...], View] = field(default_factory=WeakValueDictionary, repr=False)
 
     def place(self, material: int) -> tuple[Hashable, ...]:
         """Name a material's samples among those of the bake: with the image that they are sorted by, if any."""
         return self.name, material, *filter(None, self.maps[material : material + 1])
+
+    def as_baked(self) -> NDArray[np.int64]:
+        """Find where each sample on surfaces is among those that were baked. (surface samples,)"""
+        return np.arange(self.num_surface_samples) if self.sorted is None else self.sorted
 
     @property
     def name(self) -> str:
@@ -257,12 +266,20 @@ class View:
         return touched
 
 
-def open_view(store: StoreReader, index: int, memory: Memory, key: str, maps: tuple[str | None, ...] = ()) -> View:
+def open_view(
+    store: StoreReader,
+    index: int,
+    memory: Memory,
+    key: str,
+    maps: tuple[str | None, ...] = (),
+    rows: NDArray[np.int64] | None = None,
+) -> View:
     """Read what every frame of a view needs; visibility stays in the store until a material is frozen.
 
     Args:
         store: of the bake. index: of the view in it.
-        memory: where what neighbouring samples share is kept. key: of the bake in it. maps: see `View`.
+        memory: where what neighbouring samples share is kept. key: of the bake in it.
+        maps: see `View`. rows: `View.sorted`.
     Raises:
         ChunkDamagedError: arrays of the store do not fit each other.
     """
@@ -314,6 +331,7 @@ def open_view(store: StoreReader, index: int, memory: Memory, key: str, maps: tu
         level=level,
         ratios=ratios,
         maps=maps,
+        sorted=rows,
     )
 
 
