@@ -15,9 +15,13 @@ from relume.trace.normals import normals_at
 
 F32 = NDArray[np.float32]
 
-# eight positions that no row or column shares (a rook pattern), pixel units
-POSITIONS = (np.array([(0, 5), (1, 2), (2, 7), (3, 0), (4, 4), (5, 1), (6, 6), (7, 3)]) + 0.5) / 8
-POSITIONS_A_PIXEL = len(POSITIONS)
+# positions that no row or column shares (rook patterns), pixel units; fewer where most pixels of a picture are edges
+PATTERNS = (
+    (np.array([(0, 5), (1, 2), (2, 7), (3, 0), (4, 4), (5, 1), (6, 6), (7, 3)]) + 0.5) / 8,
+    (np.array([(0, 1), (1, 3), (2, 0), (3, 2)]) + 0.5) / 4,
+    (np.array([(0, 0), (1, 1)]) + 0.5) / 2,
+)
+POSITIONS_A_PIXEL = len(PATTERNS[0])
 
 
 class Chosen(NamedTuple):
@@ -33,15 +37,19 @@ class Chosen(NamedTuple):
     seen: Layer
 
 
-def merged(geometry: Geometry, layer: Layer, pixels: NDArray[np.int64]) -> Chosen:
-    """Group the rays of a layer by what they see, of the eight rays of each of some pixels.
+def merged(
+    geometry: Geometry, layer: Layer, pixels: NDArray[np.int64], positions: NDArray[np.float64] = PATTERNS[0]
+) -> Chosen:
+    """Group the rays of a layer by what they see, of the rays of each of some pixels.
 
-    Of each group the ray next to its middle is kept, for as many eighths of the pixel as the group has rays.
+    Of each group the ray next to its middle is kept, for the share of the pixel that the group has of its rays.
 
     Args:
-        geometry: the triangles. layer: of the rays, eight of a pixel in a row. pixels: whose they are. (p,)
+        geometry: the triangles. layer: of the rays, those of a pixel in a row. pixels: whose they are. (p,)
+        positions: of the rays in each pixel. (n, 2)
     """
-    shape, seen = (len(pixels), POSITIONS_A_PIXEL), layer.shown
+    num = len(positions)
+    shape, seen = (len(pixels), num), layer.shown
     row, is_direct = seen.ray, layer.chain is None
     key, normal, is_hit = np.full(shape, -2), np.zeros((*shape, 3), np.float32), np.zeros(shape, np.bool_)
     distance, rays, through = np.ones(shape, np.float32), np.ones((*shape, 3), np.float32), np.ones((*shape, 3))
@@ -53,25 +61,25 @@ def merged(geometry: Geometry, layer: Layer, pixels: NDArray[np.int64]) -> Chose
     ):
         out.reshape(-1, 3)[row] = values
     group = np.where(key == -2, -2, -1)
-    for candidate in range(POSITIONS_A_PIXEL):
+    for candidate in range(num):
         # rays of the same mesh, turned alike and near the plane of the first that has no group yet
         one = slice(candidate, candidate + 1)
         if is_direct:
             is_alike = ~is_off_plane(normal[:, one], distance[:, one], rays[:, one], distance, rays)
         else:  # no eye in common; of the background each sees a part of its own, the rim of a sun perhaps
             is_alike = np.einsum("pkc,pc->pk", rays, rays[:, candidate]) > COS_TURN
-            is_alike &= is_hit | (np.arange(POSITIONS_A_PIXEL) == candidate)
+            is_alike &= is_hit | (np.arange(num) == candidate)
         is_alike &= np.einsum("pkc,pc->pk", normal, normal[:, candidate]) > COS_TURN
         same = (group == -1) & (key == key[:, one]) & (is_alike | (is_direct & ~is_hit))
         same &= (group[:, candidate] == -1)[:, None]
         group[same] = candidate
-    pixel, first = np.nonzero(group == np.arange(POSITIONS_A_PIXEL))
+    pixel, first = np.nonzero(group == np.arange(num))
     is_in = group[pixel] == first[:, None]
     size = is_in.sum(axis=1)
-    kept = pixel * POSITIONS_A_PIXEL + _most_central(is_in, size)
+    kept = pixel * num + _most_central(is_in, size, positions)
     mean = np.einsum("gk,gkc->gc", is_in, through[pixel]) / size[:, None]
     of_group = seen.rows(np.searchsorted(row, kept))._replace(through=mean.astype(np.float32))
-    return Chosen(pixels[pixel], (size / POSITIONS_A_PIXEL).astype(np.float32), of_group)
+    return Chosen(pixels[pixel], (size / num).astype(np.float32), of_group)
 
 
 def alone(layer: Layer, is_edge: NDArray[np.bool_]) -> Chosen:
@@ -86,12 +94,15 @@ def joined(parts: Sequence[Chosen], most_mirrors: int) -> Chosen:
     return Chosen(np.concatenate(pixel), np.concatenate(weight), Layer.joined(seen, most_mirrors))
 
 
-def _most_central(is_in: NDArray[np.bool_], size: NDArray[np.int64]) -> NDArray[np.int64]:
+def _most_central(
+    is_in: NDArray[np.bool_], size: NDArray[np.int64], positions: NDArray[np.float64]
+) -> NDArray[np.int64]:
     """Choose of each group the position next to their mean: any other would shift what it shows to one side.
 
     Args:
-        is_in: which positions are of a group. (groups, 8). size: how many those are. (groups,)
+        is_in: which positions are of a group. (groups, n). size: how many those are. (groups,)
+        positions: of all. (n, 2)
     """
-    mean = is_in @ POSITIONS / size[:, None]
-    away = np.sum((POSITIONS - mean[:, None]) ** 2, axis=-1)
+    mean = is_in @ positions / size[:, None]
+    away = np.sum((positions - mean[:, None]) ** 2, axis=-1)
     return np.asarray(np.where(is_in, away, np.inf).argmin(axis=1), np.int64)

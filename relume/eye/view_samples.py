@@ -7,20 +7,23 @@ of them: a silhouette has eight levels of coverage for a few samples, and thin c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.equirect import lookup
 from relume.eye.layers import Layer, layers_of, most_shown
-from relume.eye.merged import POSITIONS, POSITIONS_A_PIXEL, Chosen, alone, joined, merged
+from relume.eye.merged import PATTERNS, POSITIONS_A_PIXEL, Chosen, alone, joined, merged
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.eye.pixel_edges import bright_edges_of, edges_of, is_partly_there
 from relume.eye.tinted import NUM_CHANNELS, has_tinted_glass, parted, sees_tinted_light
 from relume.eye.ways import Chain
-from relume.scene.model import Material, Scene
+from relume.scene.model import Camera, Material, Scene
 from relume.scene.roughness import level_of, levels_of
 from relume.trace.cutout_filter import EVERYWHERE
 from relume.trace.geometry import Geometry
@@ -30,6 +33,8 @@ from relume.trace.surface import Surface, surface_at
 F32 = NDArray[np.float32]
 
 BACKGROUND = 65_535
+EDGES_A_BLOCK = 1 << 17
+_SAMPLES_A_SIDE = 2048  # of a pixel's samples, by the root of the number of pixels; a tuft of blades takes 1,600
 
 _GOLDEN = (5**0.5 - 1) / 2
 
@@ -89,11 +94,11 @@ def morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
     return code
 
 
-def _shared_chances(pixel: NDArray[np.int64]) -> F32:
-    """Chances of the eight rays of pixels, an eighth apart: a surface that blends has its share of them. (8n,)"""
+def _shared_chances(pixel: NDArray[np.int64], num: int) -> F32:
+    """Chances of as many rays of each of p pixels, evenly apart: a surface that blends has its share. (p · num,)"""
     places = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # not in the order of the rows that the positions lie in
     offset = (pixel[:, None] * _GOLDEN) % 1  # eighths alone would be seen as steps
-    return np.asarray((places + offset) / POSITIONS_A_PIXEL + 1e-6, np.float32).ravel()
+    return np.asarray((places[places < num] + offset) / num + 1e-6, np.float32).ravel()
 
 
 def thresholds(pixel: NDArray[np.int64], width: int) -> F32:
@@ -150,26 +155,70 @@ def sample_view(
     is_edge = np.zeros(width * height, np.bool_)
     if smooths_edges:
         is_edge = _edges(scene, geometry, coarse, origin, directions, size)
-    edge_pixel = np.nonzero(is_edge)[0]
-    more_x = (x[edge_pixel, None] + POSITIONS[:, 0]).astype(np.float32).ravel()
-    more_y = (y[edge_pixel, None] + POSITIONS[:, 1]).astype(np.float32).ravel()
-    fine = layers(camera_directions(camera, size, more_x, more_y), _shared_chances(edge_pixel))
-    parts = [alone(layer, is_edge) for layer in coarse], [merged(geometry, layer, edge_pixel) for layer in fine]
-    chosen = joined([part for of_rays in parts for part in of_rays], MOST_MIRRORS)
-    num_rays = sum(len(layer.ray) for layer in (*coarse, *fine))
-    samples = _sorted_samples(scene, geometry, chosen, width, pixel_angle, num_rays)
-    if not has_tinted_glass(scene.materials):
-        return samples
-    return _by_channel(scene, geometry, samples, most_samples(scene.materials, width * height))
+    kept = [alone(layer, is_edge) for layer in coarse]
+    most = most_samples(scene.materials, width * height)
+    across = _Across(geometry, camera, size, layers, np.nonzero(is_edge)[0])
+    room, num_rays = most - sum(len(part.pixel) for part in kept), sum(len(layer.ray) for layer in coarse)
+    for positions in PATTERNS:
+        parts, num_traced = across.seen(positions, room)
+        num_rays += num_traced
+        if parts is not None:
+            kept += parts
+            break
+    samples = _sorted_samples(scene, geometry, joined(kept, MOST_MIRRORS), width, pixel_angle, num_rays)
+    return _by_channel(scene, geometry, samples, most) if has_tinted_glass(scene.materials) else samples
+
+
+class _Across(NamedTuple):
+    """Pixels across edges, which several rays are sent through.
+
+    Attributes:
+        geometry: the triangles. camera: that sees them. size: of its picture.
+        layers: of rays in some directions, and of their chances.
+        pixel: row-major numbers. (p,)
+    """
+
+    geometry: Geometry
+    camera: Camera
+    size: tuple[int, int]
+    layers: Callable[[F32, F32], list[Layer]]
+    pixel: NDArray[np.int64]
+
+    def seen(self, positions: NDArray[np.float64], room: int) -> tuple[list[Chosen] | None, int]:
+        """What is seen through some positions, merged; a block of pixels at a time, as all of them may be edges.
+
+        Args:
+            positions: in each pixel. (n, 2) room: for samples; for two of each pixel there must be some.
+        Returns:
+            Samples of each layer; None where they are more than there is room for. The number of rays traced.
+        """
+        found: list[list[Chosen]] = []
+        num_rays = num_samples = 0
+        for start in range(0, max(1, len(self.pixel)), EDGES_A_BLOCK):
+            pixel = self.pixel[start : start + EDGES_A_BLOCK]
+            y, x = np.divmod(pixel, self.size[0])
+            at_x, at_y = ((a[:, None] + positions[:, k]).astype(np.float32).ravel() for k, a in enumerate((x, y)))
+            directions = camera_directions(self.camera, self.size, at_x, at_y)
+            fine = self.layers(directions, _shared_chances(pixel, len(positions)))
+            found.append([merged(self.geometry, layer, pixel, positions) for layer in fine])
+            num_rays += sum(len(layer.ray) for layer in fine)
+            num_samples += sum(len(part.pixel) for part in found[-1])
+            if num_samples > room:
+                return None, num_rays
+        return [part for of_layer in zip_longest(*found) for part in of_layer if part is not None], num_rays
 
 
 def most_samples(materials: Sequence[Material], num_pixels: int) -> int:
     """Bound the samples of a view: each position of a pixel sees something else, glass before it, more in mirrors.
 
+    Edges are lines: twice as many pixels a side are twice as many edges among four times as many pixels. So a large
+    picture has room for fewer samples of each pixel; where leaves or hair would take more, edges have fewer positions.
+
     Args:
         materials: of the scene. num_pixels: of the picture.
     """
-    return POSITIONS_A_PIXEL * num_pixels * most_shown(materials)
+    a_pixel = min(max(_SAMPLES_A_SIDE / math.sqrt(num_pixels), len(PATTERNS[-1])), POSITIONS_A_PIXEL)
+    return math.ceil(a_pixel * num_pixels) * most_shown(materials)
 
 
 def _edges(

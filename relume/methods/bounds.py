@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from relume.bake import Recipe
 from relume.errors import PlanError
-from relume.eye.layers import most_layers
-from relume.eye.merged import POSITIONS_A_PIXEL
+from relume.eye.layers import most_layers, most_shown
+from relume.eye.merged import PATTERNS, POSITIONS_A_PIXEL
 from relume.eye.tinted import RAYS_TO_TINTED, has_tinted_glass
-from relume.eye.view_samples import most_samples
+from relume.eye.view_samples import EDGES_A_BLOCK, most_samples
 from relume.light.gather_rays import MAX_RAYS
 from relume.scene.emission import has_images
 from relume.scene.model import Mesh, Scene, Texture
@@ -42,7 +42,8 @@ def samples_of_view(scene: Scene, recipe: Recipe) -> int:
 def camera_rays(scene: Scene, recipe: Recipe) -> int:
     """Rays that find the samples of all views: one through each pixel, then all positions of each, and all layers."""
     width, height = recipe.size
-    return (1 + POSITIONS_A_PIXEL) * width * height * len(recipe.views) * most_layers(scene.materials)
+    of_pixel = 1 + sum(map(len, PATTERNS))  # where many found too much, fewer are tried
+    return of_pixel * width * height * len(recipe.views) * most_layers(scene.materials)
 
 
 def tinted_rays(scene: Scene, num_samples: int) -> int:
@@ -86,12 +87,18 @@ def num_triangles(scene: Scene) -> int:
     return sum(len(mesh.faces) for mesh in scene.meshes)
 
 
-def work_s(scene: Scene, num_rays: int, ray_ns: float, triangle_us: float) -> float:
+def of_every_position(scene: Scene, recipe: Recipe) -> float:
+    """Samples by all positions of all pixels ÷ those that a plan counts: work goes with the number of pixels."""
+    num_pixels = recipe.size[0] * recipe.size[1]
+    return POSITIONS_A_PIXEL * num_pixels * most_shown(scene.materials) / samples_of_view(scene, recipe)
+
+
+def work_s(scene: Scene, num_rays: float, ray_ns: float, triangle_us: float) -> float:
     """What one core takes for a bake, about.
 
     Args:
         scene: whose triangles take their part: they are merged, and searched, and some are looked at one by one.
-        num_rays: as planned. ray_ns, triangle_us: of a planned ray, and of a triangle, as measured of a method.
+        num_rays: of all positions. ray_ns, triangle_us: of one of them, and of a triangle, as measured of a method.
     """
     return 1e-9 * ray_ns * num_rays + 1e-6 * triangle_us * num_triangles(scene)
 
@@ -116,9 +123,16 @@ def process_bytes(scene: Scene) -> int:
 
 def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
     """What a task of the first stage takes besides: the lights, or the samples of a view."""
+    num_pixels = recipe.size[0] * recipe.size[1]
+    at_once = num_pixels + POSITIONS_A_PIXEL * min(num_pixels, EDGES_A_BLOCK)
+    num_rays = at_once * most_layers(scene.materials) + samples_of_view(scene, recipe)
+    return max(weighing_bytes(scene), num_rays * BYTES_A_RAY)
+
+
+def weighing_bytes(scene: Scene) -> int:
+    """What it takes to choose the lights."""
     height, width, _ = scene.environment.radiance.shape
-    num_rays = camera_rays(scene, recipe) // len(recipe.views)
-    return max(int(height * width) * LIGHT_BYTES_A_TEXEL, num_rays * BYTES_A_RAY)
+    return int(height * width) * LIGHT_BYTES_A_TEXEL
 
 
 def _textures(scene: Scene) -> list[Texture]:

@@ -90,7 +90,7 @@ class GatherMethod:
         return Plan(
             num_view_samples=direct.num_view_samples,
             num_rays=num_rays,
-            work_s=bounds.work_s(scene, num_rays, _RAY_NS, _TRIANGLE_US),
+            work_s=bounds.work_s(scene, num_rays * bounds.of_every_position(scene, recipe), _RAY_NS, _TRIANGLE_US),
             store_bytes=direct.store_bytes
             + direct.num_view_samples * (2 * rays + 4 + -(-seen // 8))
             + cells * _BYTES_A_CELL
@@ -99,6 +99,7 @@ class GatherMethod:
             + cells * _MAKING_BYTES_A_CELL
             + bounds.num_triangles(scene) * _NORMAL_BYTES
             + SHARD_ROWS * (3 * 2 * rays + _SHARD_ROW_BYTES + 2 * seen),
+            lone_bytes=direct.lone_bytes,
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:

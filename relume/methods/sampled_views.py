@@ -104,13 +104,15 @@ class SampledViews:
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
         in_store = samples * (bits + surface_bytes) + bounds.lights_bytes(scene, recipe)
         num_rays = samples * recipe.num_lights + bounds.camera_rays(scene, recipe) + bounds.tinted_rays(scene, samples)
+        sampling, tracing = bounds.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)
+        besides = max(tracing, bounds.weighing_bytes(scene))  # while a single view is sampled, others do this at most
         return Plan(
             num_view_samples=samples,
             num_rays=num_rays,
-            work_s=bounds.work_s(scene, num_rays, _RAY_NS, _TRIANGLE_US),
+            work_s=bounds.work_s(scene, num_rays * bounds.of_every_position(scene, recipe), _RAY_NS, _TRIANGLE_US),
             store_bytes=in_store + bounds.triangles_bytes(scene) + _METADATA_BYTES,
-            peak_bytes=bounds.process_bytes(scene)
-            + max(bounds.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)),
+            peak_bytes=bounds.process_bytes(scene) + max(sampling, tracing),
+            lone_bytes=max(0, sampling - besides) if len(recipe.views) == 1 else 0,
         )
 
     def prepare(self, scene: Scene) -> None:

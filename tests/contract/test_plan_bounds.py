@@ -80,6 +80,19 @@ def test_what_a_scene_brings_is_planned(make: object) -> None:
     check(METHODS["direct"], make(), Recipe("direct", ("front",), (32, 32), 40))  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("name", sorted(set(METHODS) - MOVING))
+def test_a_picture_of_3840_pixels_fits_where_one_process_samples_it(name: str, blades: Scene) -> None:
+    views = [replace(blades.cameras[0], name=view) for view in ("front", "again")]
+    plans = [
+        METHODS[name].plan(replace(blades, cameras=views), Recipe(name, of, (3840, 2160), 1000))
+        for of in (("front",), ("front", "again"))
+    ]
+    assert plans[0].peak_bytes < 9e9
+    assert plans[0].peak_bytes - plans[0].lone_bytes < 2e9
+    assert plans[0].store_bytes < 25e9
+    assert plans[1].lone_bytes == 0  # two processes may sample at once
+
+
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_what_a_scene_brings_is_in_the_plan(name: str, blades: Scene) -> None:
     recipe = Recipe(name, ("front",), (32, 32), 40)

@@ -7,7 +7,7 @@ from relume.brdf import document as terms
 from relume.brdf.channels import IMAGES
 from relume.environments import asset_store as environments
 from relume.environments import reading as environment
-from relume.eye.merged import POSITIONS_A_PIXEL
+from relume.eye.view_samples import most_samples
 from relume.imageio import decoding as images
 from relume.images import reading
 from relume.light import tiles
@@ -89,8 +89,9 @@ def test_the_table_of_limits_says_what_the_code_checks() -> None:
 
 def test_what_is_said_of_plans_is_what_plans_count() -> None:
     text = " ".join(OPERATIONS.read_text(encoding="utf-8").split())
-    assert POSITIONS_A_PIXEL == 8
-    assert "eight view samples a pixel" in text
+    assert [most_samples([], side * side) / side**2 for side in (256, 512, 1024, 4096)] == [8, 4, 2, 2]
+    assert "eight view samples a pixel in pictures up to 256 × 256" in text
+    assert "two from 1024 × 1024 on" in text
     assert f"the process ({bounds.PROGRAM_BYTES // MILLION} MB)" in text
     assert f"({bounds.LIGHT_BYTES_A_TEXEL} bytes a texel)" in text
-    assert f"({bounds.BYTES_A_RAY} bytes each, nine a pixel)" in text
+    assert f"({bounds.BYTES_A_RAY} bytes each, three a pixel of a large one" in text

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from foliage import tuft
 from tiny_scenes import checker, looking, mesh, quad, scene_of, sphere, still_life, studio
 
 from relume.environments.equirect import direction_to_uv
+from relume.eye import view_samples
 from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.scene.model import Material, Texture
 from relume.trace.geometry import merge
@@ -64,6 +66,28 @@ def test_edges_have_more_samples_and_smooth_places_one(still):
     assert (count[several] >= 2).all()
     assert (count > 1).mean() < 0.25
     assert (count[-6:-1, 1:-1] == 1).all()  # the floor in the foreground
+
+
+def test_edges_found_in_blocks_are_those_found_at_once(still, monkeypatch):
+    scene, samples = still
+    monkeypatch.setattr(view_samples, "EDGES_A_BLOCK", 100)
+    parted = sampled(scene)
+    assert parted.num_rays == samples.num_rays
+    for name in ("pixel", "weight", "material"):
+        np.testing.assert_array_equal(getattr(parted, name), getattr(samples, name))
+    np.testing.assert_array_equal(parted.surface.points.position, samples.surface.points.position)
+
+
+@pytest.mark.parametrize(("room", "most"), [(4, 8), (3, 4), (2, 2)])
+def test_where_all_is_edges_a_pixel_has_as_many_as_there_is_room_for(room, most, monkeypatch):
+    size, scene = (24, 24), tuft(4000)
+    monkeypatch.setattr(view_samples, "_SAMPLES_A_SIDE", room * size[0])
+    samples = sampled(scene, size)
+    count = np.bincount(samples.pixel, minlength=size[0] * size[1])
+    assert 1.5 < count.mean() <= room
+    assert count.max() == most
+    assert len(samples.pixel) <= view_samples.most_samples(scene.materials, size[0] * size[1])
+    np.testing.assert_allclose(weight_by_pixel(samples, slice(None), size), 1, atol=1e-6)
 
 
 def disc_coverage(radius, size, yfov, distance, fine=32):
