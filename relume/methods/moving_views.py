@@ -24,6 +24,7 @@ from relume.methods.suns_of_skies import SunsOfSkies
 from relume.methods.thrown import read_thrown
 from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
+from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights
 from relume.moving.parted import find_parted
 from relume.moving.points.images import dressed
@@ -309,6 +310,10 @@ class MovingViews:
     def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
         """The light triangles of an environment, as lobes of some widths look for them."""
         return self._in_lobes.lights(environment, widths)
+
+    def sky_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> SkyLights:
+        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        return self._in_lobes.summed(environment, is_preview=is_preview)
 
     def lamps_in(self, environment: EnvironmentKey) -> F32:
         """Lamps of an environment, turned; see `relume.moving.highlights.looking.SkyLight`. (lamps, 7) float32"""

@@ -11,8 +11,9 @@ from relume.color import luminance
 from relume.environments.equirect import turned
 from relume.light.blur import blurred, reduced
 from relume.light.suns import LAMPS, Divided, without_suns
-from relume.look import EnvironmentKey
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 from relume.methods.transfer import BakedViews
+from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights, lobe_lights
 from relume.moving.sky import Sky, sky_of
 
@@ -63,3 +64,15 @@ class SkiesInLobes:
             return lobe_lights(self.lit.traced_directions, self.lit.lights.radius, beside, of_lamps, widths)
 
         return self.lit.memory.passing.keep((self.lit.key, "lights of lobes", environment, widths), listed)
+
+    def summed(self, environment: EnvironmentKey, *, is_preview: bool) -> SkyLights:
+        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        is_baked = environment == BAKED_ENVIRONMENT
+
+        def made() -> SkyLights:
+            lit = self.lit
+            lights = lit.preview_lights_in(environment) if is_preview and not is_baked else lit.lights_in(environment)
+            return SkyLights.of(lights.direction, lights.irradiance, lit.lights.radius)
+
+        key = self.lit.key, "lights of highlights", environment, is_preview and not is_baked
+        return self.lit.memory.passing.keep(key, made)

@@ -20,6 +20,7 @@ from relume.moving.bumps import towards_light
 from relume.moving.edges import resolve
 from relume.moving.evaluate import Sent, send
 from relume.moving.highlights.between_points import add_sky_in_highlights
+from relume.moving.highlights.by_lights import by_lights
 from relume.moving.highlights.glances import glance
 from relume.moving.highlights.lobe_lights import MOST_LAMPS, widths_of
 from relume.moving.highlights.looking import SkyLight
@@ -247,7 +248,8 @@ def _summed(
     glances = _glanced(transfer, wanted, eye, points, glances)
     sky = _sky_in(transfer, wanted.light)
     sent = send(surface, arriving.total, arriving.others, materials.tables, eye, points, sent)
-    add_sky_in_highlights(surface, lobes, sky, eye, glances, points, sent, is_fine=wanted.is_fine)
+    lit = _lit(transfer, wanted, eye, points)
+    add_sky_in_highlights(surface, lobes, sky, eye, glances, lit, points, sent, is_fine=wanted.is_fine)
     broad, along = at_vertices(surface, vertices, sent.radiance, broad), at_vertices(surface, vertices, glances, along)
     towards = _towards_light(transfer, arriving, seen) if towards is None else towards
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
@@ -268,6 +270,15 @@ def _glanced(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray
         return np.zeros((len(points), 1 + MOST_LAMPS), np.float32) if out is None else out
     listed = transfer.lobe_lights(light.environment, widths)
     return glance(transfer.surface, transfer.visible, listed, lobes, eye, points, out)
+
+
+def _lit(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8]) -> F32:
+    """What points send of the lights that they see in their highlights."""
+    lobes, light = wanted.materials.lobes, wanted.light
+    if not len(lobes.shape) or not light.shows_sky:
+        return np.zeros((len(points), 3), np.float32)
+    lights = transfer.sky_lights(light.environment, is_preview=wanted.is_rough)
+    return by_lights(transfer.surface, transfer.visible, lights, lobes, eye, points)
 
 
 def _add_beams(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.brdf.channels import Images
 from relume.look import EnvironmentKey
 from relume.moving.beams.beam import Beam
+from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights
 from relume.moving.points.surface import Surface
 from relume.moving.sky import Sky
@@ -62,6 +63,10 @@ class MovingTransfer(Opened, Protocol):
 
     def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
         """The light triangles of an environment, as lobes of some widths look for them."""
+        ...
+
+    def sky_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> SkyLights:
+        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
         ...
 
     def sky_in(self, name: str | None) -> Sky:

@@ -33,6 +33,7 @@ from relume.store import bake_here
 from relume.trace.geometry import merge
 
 GLOSSY = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 30.0}}
+TOLD = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}
 NARROW = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 3000.0}}
 CAMERA = looking("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 
@@ -156,20 +157,21 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_less_what_pi
     surface, rng, light = moving.surface, np.random.default_rng(7), sky_light(rotation)
     num, eye = surface.points.num_points, np.array([0.4, 1.5, 3.0], np.float32)
     glances = rng.random((num, 3), np.float32)
-    terms = [[{**GLOSSY, "texture": "diffuse"}]]
-    lobes = lobes_of(terms)
+    lobes = lobes_of([[{**TOLD, "texture": "diffuse"}]])
+    lit = rng.random((num, 3), np.float32)
     sky = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
     sent = np.zeros((num, 3, 3), np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    add_sky_in_highlights(surface, lobes, light, eye, glances, is_needed, Sent(sent, sky), is_fine=is_fine)
+    add_sky_in_highlights(surface, lobes, light, eye, glances, lit, is_needed, Sent(sent, sky), is_fine=is_fine)
     assert not sent[is_needed == 0].any()
     held, most = 0, float(lobes.most[0])
     for point in np.flatnonzero(is_needed)[::17]:
         at, _, _ = seen_along(lobes, surface, eye.astype(np.float64), point)
-        said, found = (
-            at(lobes.albedo) * sky_numpy(*lobe(lobes, surface, eye.astype(np.float64), point), light, glances[point])
+        both, shown = (
+            sky_numpy(*lobe(lobes, surface, eye.astype(np.float64), point), light, glances[point])
             for lobe in (two_numpy, two_numpy if is_fine else one_numpy)
         )
+        said, found = at(lobes.albedo) * (at(lobes.believed) * both + lit[point] * light.gain), at(lobes.albedo) * shown
         expected = np.clip(sky[point], said / most, said * most)
         held += int((expected != sky[point]).sum())
         np.testing.assert_allclose(sent[point], expected - found, rtol=2e-3, atol=3e-4 * max(1, np.abs(said).max()))
@@ -178,16 +180,18 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_less_what_pi
     assert not sent[:, [0, 2]].any()
 
 
-def test_what_the_in_basis_cannot_tell_is_a_lobe_alone(shiny_ball):
+def test_what_is_narrower_than_lights_is_a_lobe_alone(shiny_ball):
     surface, rng = shiny_ball[0].surface, np.random.default_rng(7)
     assert is_narrow(of_white(NARROW))
     lobes = lobes_of([[NARROW, GLOSSY]])
     assert lobes.most.tolist() == [1]
+    np.testing.assert_allclose(lobes.believed, 1, atol=1e-5)
     num = surface.points.num_points
     sent, everywhere = np.zeros((num, 3, 3), np.float32), np.ones(num, np.uint8)
     sky = rng.normal(size=(num, 3, 3)).astype(np.float32)
     eye, glances = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
-    add_sky_in_highlights(surface, lobes, sky_light(), eye, glances, everywhere, Sent(sent, sky), is_fine=True)
+    nothing, light = np.zeros((num, 3), np.float32), sky_light()
+    add_sky_in_highlights(surface, lobes, light, eye, glances, nothing, everywhere, Sent(sent, sky), is_fine=True)
     assert np.abs(sent).max() < 1e-4 * lobes.albedo.max()
 
 

@@ -31,6 +31,7 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_mirrored
 from relume.moving.basis.out_factors import NUM_ROWS, OutFactors, cosines, of_white, text_of_white
+from relume.moving.basis.shapes import NUM_PLACES, about_mirror, places, shapes_of
 from relume.moving.basis.two_lobes import NUM_NUMBERS, fit_two
 
 F32 = NDArray[np.float32]
@@ -62,6 +63,8 @@ class Lobes(NamedTuple):
         most: what the in-basis says of the sky is believed up to so many times of what the lobe says, and down to that
             part of it; 1: it is not believed, since it cannot tell the terms. (lobes,) float32
         is_two: whether one lobe for both would stand for it badly. (lobes,) bool
+        shape, flatness, believed: of the whole, see `relume.moving.basis.shapes`: T, α² and 1 − β.
+            (lobes, `NUM_ROWS`, widths, places), (lobes,), (lobes, `NUM_ROWS`) float32
         of: lobe of each material, −1 for none. (materials,) int32
     """
 
@@ -73,6 +76,9 @@ class Lobes(NamedTuple):
     wide: F32
     most: F32
     is_two: NDArray[np.bool_]
+    shape: F32
+    flatness: F32
+    believed: F32
     of: NDArray[np.int32]
 
     @classmethod
@@ -87,6 +93,11 @@ class Lobes(NamedTuple):
 def is_narrow(known: OutFactors) -> bool:
     """Whether the in-basis cannot tell a term. known: its factors"""
     return known.missed > _bound_of(known)
+
+
+def is_told(known: OutFactors) -> bool:
+    """Whether the in-basis tells what the lobe of a term does not: how it looks from around."""
+    return not known.is_isotropic and not is_narrow(known)
 
 
 def _bound_of(known: OutFactors) -> float:
@@ -109,7 +120,9 @@ def are_lobes(known: Sequence[OutFactors]) -> list[bool]:
 
 
 def _most_of(known: Sequence[OutFactors]) -> float:
-    """What the in-basis is believed: any multiple where it misses nothing, none where it misses `NARROW`."""
+    """What the in-basis is believed: any multiple where it misses nothing, none where it misses too much."""
+    if not all(map(is_told, known)):
+        return 1.0
     return max(1.0, min(_bound_of(one) / max(one.missed, _LEAST_MISSED) for one in known) ** 2)
 
 
@@ -122,6 +135,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
     of = np.full(len(materials), -1, np.int32)
     albedo: list[F64] = []
     shape: list[F64] = []
+    everywhere: list[F64] = []
     most: list[float] = []
     for index, terms in enumerate(materials):
         known = [of_white(term) for term in terms]
@@ -131,14 +145,21 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         of[index] = len(albedo)
         most.append(_most_of([*compress(known, is_seen)]))
         by_group, about = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros((NUM_ROWS, _NUM_SHAPE))
+        at_places = np.zeros((NUM_ROWS, NUM_PLACES))
         for term in compress(terms, is_seen):
-            found = _lobe_of(text_of_white(term))
+            found, its_places = _lobe_of(text_of_white(term))
             sent = found[:, :3] * np.asarray(term["color"], np.float64)
             by_group[:, group_of(term)] += sent
             about += sent.mean(axis=1, keepdims=True) * found[:, 3:]
+            at_places += sent.mean(axis=1, keepdims=True) * its_places
         total = by_group.sum(axis=1).mean(axis=1)[:, None]
         albedo.append(by_group)
         shape.append(np.where(total > 0, about / np.maximum(total, 1e-30), 1))
+        everywhere.append(np.where(total > 0, at_places / np.maximum(total, 1e-30), 0))
+    whole = shapes_of(
+        np.reshape(everywhere, (len(shape), NUM_ROWS, NUM_PLACES)),
+        np.reshape(shape, (len(shape), NUM_ROWS, _NUM_SHAPE))[..., :NUM_NUMBERS],
+    )
     shapes = np.reshape(np.array(shape, np.float32), (len(shape), NUM_ROWS, _NUM_SHAPE))
     cosine, sigma = (np.ascontiguousarray(shapes[..., k : k + 2]) for k in (0, 3))
     first, mean, wide = (np.ascontiguousarray(shapes[..., k]) for k in (2, 5, 6))
@@ -146,7 +167,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
     is_two = is_unlike[:, cosines() > _ASLANT].any(axis=1)
     return Lobes(
         np.reshape(np.array(albedo, np.float32), (len(albedo), NUM_ROWS, NUM_GROUPS, 3)),
-        cosine, first, sigma, mean, wide, np.array(most, np.float32), is_two, of,
+        cosine, first, sigma, mean, wide, np.array(most, np.float32), is_two, *whole, of,
     )  # fmt: skip
 
 
@@ -170,11 +191,14 @@ class _Even(NamedTuple):
 
     Attributes:
         quadrature: for φo = 0. moments: about it, see `_about_lobe`.
+        at_places, cosine: of the places of shapes, and cos θi there. (rows, places) float32
         x, z: of ωi there. (rows, n) float32. area: solid angles. (n,) float32
     """
 
     quadrature: Quadrature
     moments: F64
+    at_places: Quadrature
+    cosine: F64
     x: F32
     z: F32
     area: F32
@@ -184,7 +208,10 @@ class _Even(NamedTuple):
 def _even() -> _Even:
     wi, wo, moments = _about_lobe(0.0, _SPOKES // 2)
     x, z = (np.ascontiguousarray(part, np.float32) for part in (-wi[..., 0], wi[..., 2]))
-    return _Even(Quadrature(wi, wo), moments, x, z, _about_mirror(_SPOKES // 2)[1].astype(np.float32))
+    at, _ = about_mirror(places(), 0.0)
+    cosine = np.maximum(at[..., 2], 0)
+    area = _about_mirror(_SPOKES // 2)[1].astype(np.float32)
+    return _Even(Quadrature(wi, wo), moments, Quadrature(at, wo), cosine, x, z, area)
 
 
 def _about_lobe(phi: float, num_spokes: int) -> tuple[F64, F64, F64]:
@@ -197,42 +224,67 @@ def _about_lobe(phi: float, num_spokes: int) -> tuple[F64, F64, F64]:
         eye along the surface, and z = cos θi (rows, n, 3).
     """
     away, area = _about_mirror(num_spokes)
-    cosine, aside = cosines()[:, None], np.array([np.cos(phi), np.sin(phi), 0.0])
-    sine = np.sqrt(1 - cosine**2)
-    wo = sine * aside + cosine * [0, 0, 1]
-    across = np.broadcast_to([-np.sin(phi), np.cos(phi), 0.0], wo.shape)
-    wi = away @ np.stack([cosine * aside + sine * [0, 0, 1], across, cosine * [0, 0, 1] - sine * aside], axis=1)
-    x, z = -(wi @ aside), wi[..., 2]
+    wi, wo = about_mirror(away, phi)
+    x, z = -(wi @ [np.cos(phi), np.sin(phi), 0]), wi[..., 2]
     weight = np.maximum(z, 0) * area
-    return wi, wo[:, None], np.stack([weight, weight * x, weight * z], axis=-1)
+    return wi, wo, np.stack([weight, weight * x, weight * z], axis=-1)
+
+
+def _eyes(document: Mapping[str, Any]) -> list[tuple[float, float]]:
+    """φo of the eyes over which a term that is not isotropic is averaged, and the share of each."""
+    phi, times = np.arange(_EYES) * (2 * np.pi / _EYES), np.ones(_EYES)  # how many eyes each stands for
+    if is_mirrored(document):
+        phi, times = phi[: _EYES // 4 + 1], np.array([2.0, *[4.0] * (_EYES // 4 - 1), 2.0])
+    return [*zip(phi.tolist(), (times / times.sum()).tolist(), strict=True)]
 
 
 def _moments_of(document: Mapping[str, Any]) -> F64:
     """∫ ρ (1, x, z) cos θi dωi, the mean over φo. (channels, rows, 3)"""
-    eyes, times = np.arange(_EYES) * (2 * np.pi / _EYES), np.ones(_EYES)  # how many eyes each stands for
-    if is_mirrored(document):
-        eyes, times = eyes[: _EYES // 4 + 1], np.array([2.0, *[4.0] * (_EYES // 4 - 1), 2.0])
     total = np.zeros((3, NUM_ROWS, 3))
-    for phi, share in zip(eyes, times / times.sum(), strict=True):
+    for phi, share in _eyes(document):
         wi, wo, moments = _about_lobe(phi, _SPOKES)
         total += share * np.einsum("rnc,rnk->crk", eval_brdf(document, wi, wo), moments, optimize=True)
     return total
 
 
+def _at_places_of(document: Mapping[str, Any]) -> F64:
+    """ρ cos θi at the places of shapes, the mean over channels, φo and both sides of it. (rows, places)"""
+    total = np.zeros((NUM_ROWS, NUM_PLACES))
+    for phi, share in _eyes(document):
+        for away in (places(), places() * [1, -1, 1]):
+            wi, wo = about_mirror(away, phi)
+            total += share / 2 * eval_brdf(document, wi, wo).mean(axis=-1) * np.maximum(wi[..., 2], 0)
+    return total
+
+
 @lru_cache(maxsize=_MOST_KNOWN)
-def _lobe_of(term_text: str) -> F64:
-    """a of each channel; cos θ of both lobes, s_1, σ of both; cos θm, √(1 − R). (`NUM_ROWS`, 10)"""
+def _lobe_of(term_text: str) -> tuple[F64, F64]:
+    """a of each channel; cos θ of both lobes, s_1, σ of both; cos θm, √(1 − R); and ρ cos θi / a at the places of
+    shapes, the mean over channels. (`NUM_ROWS`, 10), (`NUM_ROWS`, `NUM_PLACES`)"""
     document = json.loads(term_text)
     if not of_white(document).is_isotropic:
-        moments = _moments_of(document)
+        moments, at_places = _moments_of(document), _at_places_of(document)
         mean, wide = _one_of(moments)
-        return np.column_stack([moments[..., 0].T, mean, mean, np.full(NUM_ROWS, 0.5), wide, wide, mean, wide])
-    even = _even()
-    value = even.quadrature.values(document)
-    moments = (value[..., None, :] @ even.moments)[..., 0, :]
-    sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
-    albedo = np.broadcast_to(moments[..., 0], (3, NUM_ROWS)).T
-    return np.column_stack([albedo, fit_two(even.x, even.z, even.area, sent), *_one_of(moments)])
+        numbers: tuple[NDArray[Any], ...] = (
+            moments[..., 0].T,
+            mean,
+            mean,
+            np.full(NUM_ROWS, 0.5),
+            wide,
+            wide,
+            mean,
+            wide,
+        )
+    else:
+        even = _even()
+        value, at_places = (quadrature.values(document) for quadrature in (even.quadrature, even.at_places))
+        at_places = at_places.mean(axis=0) * even.cosine
+        moments = (value[..., None, :] @ even.moments)[..., 0, :]
+        sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
+        albedo = np.broadcast_to(moments[..., 0], (3, NUM_ROWS)).T
+        numbers = albedo, fit_two(even.x, even.z, even.area, sent), *_one_of(moments)
+    a = moments[..., 0].mean(axis=0)[:, None]
+    return np.column_stack(numbers), np.where(a > 0, at_places / np.maximum(a, 1e-30), 0)
 
 
 def _one_of(moments: F64) -> tuple[F64, F64]:

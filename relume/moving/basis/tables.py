@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relume.basis.zernike import NUM_FUNCTIONS, WINDOW, ladder
 from relume.brdf.channels import group_of
-from relume.moving.basis.lobes import NUM_GROUPS, are_lobes, is_narrow
+from relume.moving.basis.lobes import NUM_GROUPS, are_lobes, is_told
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS, out_factors
 
 F32 = NDArray[np.float32]
@@ -59,9 +59,9 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
         found_of = [out_factors(term) for term in terms]
         every = [*zip(map(group_of, terms), found_of, are_lobes(found_of), strict=True)]
         for group in range(NUM_GROUPS):
-            shared = [(one.table, is_lobe, is_narrow(one)) for of_group, one, is_lobe in every if of_group == group]
+            shared = [(one.table, is_lobe, is_told(one)) for of_group, one, is_lobe in every if of_group == group]
             plain = [table for table, is_lobe, _ in shared if not is_lobe]
-            told = [table for table, is_lobe, narrow in shared if is_lobe and not narrow]
+            told = [table for table, is_lobe, is_also in shared if is_lobe and is_also]
             others = [table * WINDOW for table, is_lobe, _ in shared if is_lobe]
             for first, found in ((0, plain), (2, told), (4, others)):
                 for kind, kept, tables in (

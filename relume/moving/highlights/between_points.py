@@ -4,9 +4,9 @@
 
 L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate; in fine frames,
 and where one lobe would stand for the highlight badly, L_2, the sky in two. It is what turns fastest where surfaces are
-curved, twice as fast as their normals. B = Σ_k p_k t_k of the sky is what the in-basis says. Beside what is bright it
-rings, and says what cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the
-multiple, down to L_2 itself.
+curved, twice as fast as their normals. B is summed over lights (`relume.moving.highlights.by_lights`). Of terms that
+depend on φo, Σ_k p_k t_k of the sky tells more. Beside what is bright it rings, and says what cannot be: it is held
+within a multiple of B; the more the in-basis misses, the smaller is the multiple, down to B itself.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ F32 = NDArray[np.float32]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add(points, material, lobes, light, eye, glances, is_fine, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
+def _add(points, material, lobes, light, eye, glances, lit, is_fine, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
     """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
     position, normal, _, _, _ = points
     shown, both = np.empty(3, np.float32), np.empty(3, np.float32)
@@ -50,7 +50,10 @@ def _add(points, material, lobes, light, eye, glances, is_fine, rows, start, sto
         else:
             _, _, ray, wide = along_lobe(lobes, lobe, n, d)
             add_sky_in_lobe(light, seen, ray, wide, np.float32(1), shown)
-        most = lobes.most[lobe]
+        most, near = lobes.most[lobe], lobes.believed[lobe, row]
+        believed = near + share * (lobes.believed[lobe, row + 1] - near)
+        for channel in range(3):
+            both[channel] = believed * both[channel] + lit[p, channel]
         for group in range(sent.shape[1]):
             for channel in range(3):
                 near = lobes.albedo[lobe, row, group, channel]
@@ -66,6 +69,7 @@ def add_sky_in_highlights(
     light: SkyLight,
     eye: F32,
     glances: F32,
+    lit: F32,
     is_needed: NDArray[np.uint8],
     sent: Sent,
     *,
@@ -76,10 +80,11 @@ def add_sky_in_highlights(
     Args:
         surface: whose points. lobes: of all materials. light: that they show. eye: where it is. (3,) float32
         glances: of the points along their lobes, from `relume.moving.highlights.glances`. (points, 3)
+        lit: by lights, from `relume.moving.highlights.by_lights`. (points, 3)
         is_needed: points that are asked. (points,) uint8
         sent: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
     """
     rows = np.flatnonzero(is_needed.view(np.bool_))
-    seen = np.ascontiguousarray(eye, np.float32), glances
+    seen = np.ascontiguousarray(eye, np.float32), glances, lit
     args = (surface.points, surface.material, lobes, light, *seen, is_fine, rows)
     for_shares(lambda start, stop: _add(*args, start, stop, *sent), len(rows))

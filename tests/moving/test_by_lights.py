@@ -1,0 +1,111 @@
+"""What points send of the sky in highlights, summed over the lights that they see."""
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, scene_of, sphere, studio
+
+from relume.bake import Recipe
+from relume.brdf.evaluate import eval_brdf
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.moving.basis.lobes import lobes_of
+from relume.moving.basis.out_factors import cosines
+from relume.moving.highlights.by_lights import SkyLights, by_lights, by_lights_numpy
+from relume.scene.model import Material
+from relume.store import bake_here
+
+CAMERA = looking("front", [0, 0.5, 3], [0, 0, 0], 0.75)
+EYE = np.array([0.4, 1.5, 3.0], np.float32)
+
+
+def document(model, **params):
+    return {"model": model, "color": [1.0, 1.0, 1.0], "texture": None, "params": params, "curves": {}}
+
+
+@pytest.fixture(scope="module")
+def surface(tmp_path_factory):
+    material = Material("Ball", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
+    ball = sphere("ball", [0, 0, 0], 1, 0, 24)
+    scene = scene_of(ball, camera=CAMERA, environment=studio(64, 20.0), materials=[material])
+    store = tmp_path_factory.mktemp("ball") / "surface.zarr"
+    bake_here(METHODS["surface"], scene, Recipe("surface", ("front",), (32, 24), 500, num_points=300), store)
+    return open_bake(store, Memory(1 << 30)).surface
+
+
+def lights_of(rng, num, radius):
+    towards = rng.normal(size=(num, 3)).astype(np.float32)
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    return towards, rng.uniform(0, 2, (num, 3)).astype(np.float32), np.broadcast_to(np.float32(radius), num)
+
+
+def facing(surface, least):
+    """Points that see the eye from not too aslant."""
+    towards = EYE - surface.points.position
+    cosine = np.einsum("pk,pk->p", surface.points.normal, towards) / np.linalg.norm(towards, axis=1)
+    return np.flatnonzero(cosine > least)
+
+
+@pytest.mark.parametrize("term", [document("ggx", roughness=0.4, f0=0.9), document("blinn_phong", exponent=400.0)])
+def test_the_kernel_does_what_its_twin_does(surface, term):
+    rng, num = np.random.default_rng(5), surface.points.num_points
+    lobes = lobes_of([[term]])
+    lights = SkyLights.of(*lights_of(rng, 150, rng.uniform(0, 0.3, 150).astype(np.float32)))
+    visible = rng.integers(0, 256, (num, 19)).astype(np.uint8)
+    visible[:, 8:16] *= rng.integers(0, 2, (num, 1)).astype(np.uint8)  # whole blocks that nobody sees
+    is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
+    found = by_lights(surface, visible, lights, lobes, EYE, is_needed)
+    assert not found[is_needed == 0].any()
+    for point in np.flatnonzero(is_needed)[::7]:
+        expected = by_lights_numpy(surface, visible, lights, lobes, EYE, point)
+        np.testing.assert_allclose(found[point], expected, rtol=2e-3, atol=2e-3 * np.abs(found).max())
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        document("ggx", roughness=0.6, f0=0.9),
+        document("ggx", roughness=0.4, f0=0.04),
+        document("ward", alpha=0.35),
+        document("phong", exponent=20.0),
+    ],
+)
+def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
+    """Small lights, all of them seen, against the terms themselves."""
+    rng, num, lobes = np.random.default_rng(6), surface.points.num_points, lobes_of([[term]])
+    assert not lobes.believed[0, cosines() > 0.4].any()
+    towards, light, radius = lights_of(rng, 400, 0.01)
+    found = by_lights(
+        surface, np.full((num, 50), 255, np.uint8), SkyLights.of(towards, light, radius), lobes, EYE,
+        np.ones(num, np.uint8),
+    )  # fmt: skip
+    off, size = [], []
+    for point in facing(surface, 0.4):
+        n, t = surface.points.normal[point], surface.points.tangent[point, :3]
+        to_local = np.stack([t, np.cross(n, t), n]).astype(np.float64)
+        wo = to_local @ (EYE - surface.points.position[point])
+        wi = towards @ to_local.T
+        sent = eval_brdf(term, wi, wo / np.linalg.norm(wo)) * np.maximum(wi[:, 2:], 0)
+        expected = (sent * light).sum(axis=0)
+        place = np.sqrt(1 - wo[2] / np.linalg.norm(wo)) * (lobes.albedo.shape[1] - 1)
+        albedo = np.interp(place, np.arange(lobes.albedo.shape[1]), lobes.albedo[0, :, 0, 0])
+        off.append(albedo * found[point] - expected)
+        size.append(expected)
+    assert np.sqrt(np.mean(np.square(off)) / np.mean(np.square(size))) < 0.03
+
+
+@pytest.mark.parametrize("roughness", [0.02, 0.1, 0.25])
+def test_under_a_white_sky_nothing_is_gained_or_lost(surface, roughness):
+    """Lights as wide as those of a bake, on a grid of their own; what lobes show of it is one."""
+    num, lobes = surface.points.num_points, lobes_of([[document("ggx", roughness=roughness, f0=0.9)]])
+    k = np.arange(2000) + 0.5
+    cosine, phi = 1 - k / 1000, np.pi * (1 + 5**0.5) * k
+    sine = np.sqrt(1 - cosine**2)
+    towards = np.stack([sine * np.cos(phi), cosine, sine * np.sin(phi)], axis=-1).astype(np.float32)
+    light = np.full((2000, 3), 4 * np.pi / 2000, np.float32)
+    lights = SkyLights.of(towards, light, np.full(2000, 0.07, np.float32))
+    summed = by_lights(surface, np.full((num, 250), 255, np.uint8), lights, lobes, EYE, np.ones(num, np.uint8))
+    for point in facing(surface, 0.4)[::3]:
+        wo = EYE - surface.points.position[point]
+        place = np.sqrt(1 - surface.points.normal[point] @ wo / np.linalg.norm(wo)) * (lobes.believed.shape[1] - 1)
+        believed = np.interp(place, np.arange(lobes.believed.shape[1]), lobes.believed[0])
+        assert believed + summed[point] == pytest.approx(1, abs=0.07)
