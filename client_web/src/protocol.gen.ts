@@ -765,6 +765,14 @@ export interface SceneView {
   is_placed: boolean;
 }
 
+/** Sizes of tables of highlights, see `relume.moving.basis.shapes`: rings, half an octave each, from the float that has the bits `least_bits`; spokes; widths of lights. */
+export interface ShapesBody {
+  rings: number;
+  spokes: number;
+  widths: number;
+  least_bits: number;
+}
+
 /** What a link shows; `lacking`: what of it is not here any more, one sentence each. */
 export interface ShareBody {
   bake: string;
@@ -822,6 +830,7 @@ export interface SurfaceBody {
   expansions: number[][];
   first_points: number[];
   lobe_lists: LobeListsBody;
+  shapes: ShapesBody;
   has_holes: boolean;
   arrays: string[];
 }

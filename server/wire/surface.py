@@ -28,6 +28,16 @@ class LobeListsBody(Body):
     widths: int
 
 
+class ShapesBody(Body):
+    """Sizes of tables of highlights, see `relume.moving.basis.shapes`: rings, half an octave each, from the float that
+    has the bits `least_bits`; spokes; widths of lights."""
+
+    rings: int
+    spokes: int
+    widths: int
+    least_bits: int
+
+
 class SurfaceBody(Body):
     """Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K).
     `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET
@@ -41,5 +51,6 @@ class SurfaceBody(Body):
     expansions: list[list[float]]
     first_points: list[int]
     lobe_lists: LobeListsBody
+    shapes: ShapesBody
     has_holes: bool
     arrays: list[str]

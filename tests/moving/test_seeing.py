@@ -27,6 +27,8 @@ from relume.store import bake_here
 from relume.trace.geometry import merge
 from relume.trace.texture import MipMap
 
+TOLD = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells from around
+
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
@@ -125,7 +127,7 @@ def test_what_points_send_is_that_of_the_oracle(moving):
     """Of terms without a highlight all light; of the others what is not the sky's, which does not ring below black."""
     materials = [
         [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "texture": "diffuse"}],
-        [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": {}, "texture": None}],
+        [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": TOLD, "texture": None}],
         [{"model": "blinn_phong", "color": [0.2, 0.1, 0.3], "params": {"exponent": 20.0}, "texture": None}],
     ]
     names = len(moving.material_names)

@@ -45,7 +45,7 @@ const KEPT: Record<string, [Kind, number]> = {
   levels: ["uint32", 4],
 };
 /** What points ask for, beside light vectors. */
-const OF_POINTS = ["places", "point_normals", "tangents", "even", "uneven", "lobes", "sky", "seen_lights", "lobe_lights", "lobe_lists", "lobe_firsts", "lights_of_lamps"];
+const OF_POINTS = ["places", "point_normals", "tangents", "even", "uneven", "lobes", "sky", "seen_lights", "lobe_lights", "lobe_lists", "lobe_firsts", "lights_of_lamps", "sky_lights"];
 const SAMPLES = 4; // a pixel
 const NEAREST = 1e-4; // of the size of the scene, to the nearest that is seen
 const FARTHEST = 100;
@@ -195,6 +195,8 @@ export class Evaluator {
       const program = this.use(made, OF_POINTS);
       this.bindVectors(program, "vectors", k, OF_POINTS.length);
       this.bindVectors(program, "others", k, OF_POINTS.length + 1);
+      this.texels.bind(`shapes/${k}`, OF_POINTS.length + 2);
+      gl.uniform1i(program.at("uShapes"), OF_POINTS.length + 2);
       gl.uniform1i(program.at("uFirst"), first);
       gl.uniform2iv(program.at("uTables"), tables.plain);
       gl.uniform4iv(program.at("uHighlights"), tables.highlights);

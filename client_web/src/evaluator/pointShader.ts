@@ -1,10 +1,11 @@
 /** What points send to an eye: the sum over the in-basis of `relume.moving.evaluate`, what they see along lobes
- * (`highlights.glances`), how the sky in these differs from what lobes say (`highlights.between_points`), and where their
+ * (`highlights.glances`), how the sky in highlights differs from what lobes say (`highlights.by_lights`), and where their
  * light comes from (`bumps`), written from the ladder. Sixteen numbers of each point: radiance of three groups, the
  * direction of the light, the share of the sky along the lobe, that of two lamps. */
 import type { SurfaceBody } from "../protocol";
 import { albedoOf, GROUPS, HEAD, LOBES, PLACE, rowOf, SKY, WIDTH } from "./common";
 import { glance } from "./glanceShader";
+import { byLights } from "./highlightShader";
 
 const CHANNELS = [0, 1, 2];
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
@@ -145,14 +146,16 @@ function sum(surface: SurfaceBody, features: PointFeatures, of: Sent, name: stri
   ${groups.join("\n  ")}`;
 }
 
-/** The sky in highlights: what the in-basis says, within what two lobes allow, less these, which pixels find. */
+/** The sky in highlights: what lights say, which holds what the in-basis tells besides, less what pixels find in lobes. */
 function sky(surface: SurfaceBody, features: PointFeatures): string {
-  if (!isAsked(features.sky)) return "";
+  const isTold = isAsked(features.sky);
   const add = (group: number) =>
-    `albedo = ${albedoOf(`of - ${GROUPS - group}`)} * both; sent${group} += clamp(told${group}, albedo / most, albedo * most) - albedo;`;
-  return `${sum(surface, features, "sky", "told")}
-  float most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a;
-  vec3 both = skyInBoth(lobes, glance.xyz), albedo;
+    `albedo = ${albedoOf(`of - ${GROUPS - group}`)}; said = albedo * lit;
+  sent${group} += ${isTold ? `clamp(told${group}, said / most, said * most)` : "said"} - albedo * both;`;
+  return `${isTold ? sum(surface, features, "sky", "told") : ""}
+  float most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a, believed;
+  vec3 both = skyInBoth(lobes, glance.xyz), lit = uSkyGain * byLights(p, row, share, n, wo, cosine, believed), albedo, said;
+  lit += believed * both;
   ${range(GROUPS).map(add).join("\n  ")}`;
 }
 
@@ -195,7 +198,7 @@ export function pointShader(surface: SurfaceBody, features: PointFeatures, layer
   glance.xyz = glanceAlong(lobes, p);
   ${sky(surface, features)}`;
   const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance"];
-  return `${HEAD}${rowOf(surface.rows)}${lobe ? `${PLACE}${SKY}${LOBES}${glance(surface)}` : ""}${UNIFORMS}
+  return `${HEAD}${rowOf(surface.rows)}${lobe ? `${PLACE}${SKY}${LOBES}${glance(surface)}${byLights(surface)}` : ""}${UNIFORMS}
 ${outputs(layers)}
 ${declared(surface, features)}
 void main() {

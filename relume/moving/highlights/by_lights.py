@@ -27,7 +27,7 @@ F64 = NDArray[np.float64]
 
 BLOCK = 64  # lights that are summed together, or not at all where none of them is seen
 _LEAST = np.float32(2.0**LEAST_EXPONENT)
-_LEAST_BITS = np.int32(np.float32(_LEAST).view(np.int32))
+LEAST_BITS = np.int32(np.float32(_LEAST).view(np.int32))
 _HALF_OCTAVE = np.float32(2.0**-22)  # of bits of a float: a ring
 _LAST_RING, _LAST_SPOKE = np.float32(NUM_RINGS - 1.001), np.float32(NUM_SPOKES - 1.001)
 _WIDTH_OF_RADIUS = 8.0  # a triangle's r² over that of the circle about it: of an equilateral one, along an axis
@@ -129,7 +129,7 @@ def _sum(points, material, visible, lights, lobes, eye, rows, start, stop, out):
                 below = max(np.float32(2) - np.float32(2) * half, np.float32(0)) + flatness
                 scale[k] = bits[k] / (below * below)
             for k in range(BLOCK):
-                ring: Any = min(np.float32(bits_of_x[k] - _LEAST_BITS) * _HALF_OCTAVE, _LAST_RING)
+                ring: Any = min(np.float32(bits_of_x[k] - LEAST_BITS) * _HALF_OCTAVE, _LAST_RING)
                 spoke: Any = min(max(psi[k] * _PER_SPOKE - np.float32(0.5), np.float32(0)), _LAST_SPOKE)
                 r, s = np.int32(ring), np.int32(spoke)
                 fr, fs = ring - np.float32(r), spoke - np.float32(s)

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from relume.basis.zernike import NUM_FUNCTIONS, ladder
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS
+from relume.moving.basis.shapes import NUM_RINGS, NUM_SPOKES, WIDTHS
 from relume.moving.bumps import expansions
+from relume.moving.highlights.by_lights import LEAST_BITS
 from relume.moving.highlights.lobe_lights import LIGHTS_A_LAMP, NARROWEST, NUM_LISTED, NUM_WIDTHS, SIDE
 from relume.moving.points.lattice import Lattice, num_nodes
 from relume.moving.points.surface import Surface, Textures
@@ -34,7 +36,8 @@ def constants(transfer: MovingTransfer) -> dict[str, Any]:
     texts = {"ladder": rungs, "expansions": expansions().tolist(), "first_points": first}
     lists: dict[str, float] = {"side": SIDE, "listed": NUM_LISTED, "lights_a_lamp": LIGHTS_A_LAMP}
     lists |= {"narrowest": NARROWEST, "widths": NUM_WIDTHS}
-    return {**sizes, **texts, "lobe_lists": lists, "has_holes": transfer.has_holes}
+    shapes = {"rings": NUM_RINGS, "spokes": NUM_SPOKES, "widths": len(WIDTHS), "least_bits": int(LEAST_BITS)}
+    return {**sizes, **texts, "lobe_lists": lists, "shapes": shapes, "has_holes": transfer.has_holes}
 
 
 def first_points(transfer: MovingTransfer) -> NDArray[np.int64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -12,7 +13,10 @@ from numpy.typing import NDArray
 from relume.basis.zernike import DEGREE, DEGREES, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.brdf.channels import TEXTURES
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
+from relume.moving.basis.out_factors import NUM_ROWS
+from relume.moving.basis.shapes import NUM_PLACES, NUM_SPOKES
 from relume.moving.frame import Materials, Wanted
+from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights, widths_of
 from relume.moving.points.surface import EMISSION, NORMAL_MAP
 from relume.moving.shader.geometry import first_points, textures_with
@@ -27,6 +31,7 @@ Texels = NDArray[Any]
 _ROUGH = num_functions(QUICK_DEGREE)  # that are not nothing in what is found quickly
 _KEPT = np.array([1, _ROUGH, NUM_FUNCTIONS])  # how many are sent: a shader is written for each number
 _MISSED = 1e-3  # of a table's size, by the functions that a shader leaves out
+_MOST_HALF = 65504.0
 _LARGEST = 2.0**14  # of light vectors: well inside half precision
 
 
@@ -80,6 +85,7 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
         for k in np.flatnonzero(most * np.diff(first)):
             of_points, key = vectors[first[k] : first[k + 1]], f"{name}/{k}"
             parts[key] = Part((versions[1], most[k]), partial(_light, key, of_points, int(most[k])))
+    parts |= _in_highlights(transfer, wanted)
     if len(lobes.most) or background.kind == "map":
         parts["sky"] = Part(
             light.environment.map, lambda: {"sky": _words(transfer.sky_in(light.environment.map).texels)}
@@ -125,6 +131,43 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
         "lobes": _lobes(lobes),
         "materials": _rows(transfer, wanted, wanted.materials),
     }
+
+
+def _in_highlights(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Part]:
+    """The lights of the sky, and for each material with a lobe the shape of its highlight."""
+    environment, lobes, is_rough = wanted.light.environment, wanted.materials.lobes, wanted.is_rough
+    shapes = {
+        f"shapes/{k}": Part(json.dumps(wanted.materials.each[k].terms, sort_keys=True), partial(_shape, lobes, k))
+        for k in np.flatnonzero(lobes.of >= 0).tolist()
+    }
+    if not shapes:
+        return {}
+    lights = Part((environment, is_rough), lambda: _sky_lights(transfer.sky_lights(environment, is_preview=is_rough)))
+    return {**shapes, "sky_lights": lights}
+
+
+def _sky_lights(lights: SkyLights) -> dict[str, Texels]:
+    """Of each light where it is and the number of the tables that are as wide as it is; then what it brings."""
+    width = (lights.table // NUM_PLACES).astype(np.float32)
+    rows = np.stack([np.vstack([lights.towards, width]).T, _padded(lights.irradiance.T)], axis=1)
+    return {"sky_lights": np.ascontiguousarray(rows.reshape(-1, 4))}
+
+
+def _padded(rows: F32) -> F32:
+    """With a fourth number. (n, 4)"""
+    return np.pad(rows, ((0, 0), (0, 1)))
+
+
+def _shape(lobes: Lobes, material: int) -> dict[str, Texels]:
+    """Of each row of a material's table 1 − β and α²; then, for each width, of each ring the numbers of its first four
+    spokes, and of its last four. (rows · (1 + widths · rings · 2), 4) float16"""
+    lobe = int(lobes.of[material])
+    rings = lobes.shape[lobe].reshape(NUM_ROWS, -1, NUM_SPOKES)
+    head = np.zeros((NUM_ROWS, 1, 4), np.float32)
+    head[:, 0, 0], head[:, 0, 1] = lobes.believed[lobe], lobes.flatness[lobe]
+    halves = np.stack([rings[..., :4], rings[..., -4:]], axis=2).reshape(NUM_ROWS, -1, 4)
+    texels = np.clip(np.concatenate([head, halves], axis=1), -_MOST_HALF, _MOST_HALF)
+    return {f"shapes/{material}": texels.astype(np.float16).reshape(-1, 4)}
 
 
 def _lobes(lobes: Lobes) -> F32:
