@@ -46,6 +46,8 @@ from relume.views.store_io import read_camera
 
 F32 = NDArray[np.float32]
 
+_PERMUTED = 4096  # points whose bits are unpacked at once
+
 
 @dataclass(frozen=True)
 class MovingViews:
@@ -306,6 +308,16 @@ class MovingViews:
     @cached_property
     def _in_lobes(self) -> SkiesInLobes:
         return SkiesInLobes(self.lit)
+
+    @cached_property
+    def seen_lights(self) -> NDArray[np.uint8]:
+        """Which light triangles points see, those beside each other one after another. (points, bytes) uint8"""
+        order, out = self._in_lobes.order, np.empty_like(self.visible)
+        for rows in np.array_split(np.arange(len(out)), len(out) // _PERMUTED + 1):
+            bits = np.unpackbits(self.visible[rows], axis=1, bitorder="little")
+            bits[:, : len(order)] = bits[:, order]
+            out[rows] = np.packbits(bits, axis=1, bitorder="little")
+        return out
 
     def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
         """The light triangles of an environment, as lobes of some widths look for them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,11 @@ class SkiesInLobes:
         key = self.lit.owner_of(name), "lamps", name
         return self.lit.memory.keep(key, lambda: without_suns(self.lit.radiance_of(name), LAMPS))
 
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """The light triangles, those beside each other one after another. (lights,)"""
+        return np.argsort(self.lit.tiles.along, kind="stable")
+
     def sky(self, name: str | None) -> Sky:
         """An environment and what it is when it is blurred without its lamps."""
 
@@ -51,7 +57,7 @@ class SkiesInLobes:
         return np.ascontiguousarray(np.hstack([direction, light, 1 - length]), np.float32)
 
     def lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
-        """The light triangles of an environment, as lobes of some widths look for them."""
+        """The light triangles of an environment, as lobes of some widths look for them, in `order`."""
 
         def listed() -> LobeLights:
             luminous = luminance(self.lit.preview_lights_in(environment).irradiance)
@@ -61,7 +67,8 @@ class SkiesInLobes:
                 tile = self.lit.tiles.locate(turned(sun.towards.reshape(-1, 3), environment.rotation))
                 share += np.bincount(tile, minlength=len(luminous)) / np.float32(len(tile))
             beside = np.maximum(luminous - luminance(self.lamps(environment)[:, 3:6]) @ of_lamps, 0)
-            return lobe_lights(self.lit.traced_directions, self.lit.lights.radius, beside, of_lamps, widths)
+            of_lights = self.lit.traced_directions[self.order], self.lit.lights.radius[self.order], beside[self.order]
+            return lobe_lights(*of_lights, of_lamps[:, self.order], widths)
 
         return self.lit.memory.passing.keep((self.lit.key, "lights of lobes", environment, widths), listed)
 
@@ -72,7 +79,9 @@ class SkiesInLobes:
         def made() -> SkyLights:
             lit = self.lit
             lights = lit.preview_lights_in(environment) if is_preview and not is_baked else lit.lights_in(environment)
-            return SkyLights.of(lights.direction, lights.irradiance, lit.lights.radius)
+            return SkyLights.of(
+                *(each[self.order] for each in (lights.direction, lights.irradiance, lit.lights.radius))
+            )
 
         key = self.lit.key, "lights of highlights", environment, is_preview and not is_baked
         return self.lit.memory.passing.keep(key, made)

@@ -269,7 +269,7 @@ def _glanced(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray
     if not widths:
         return np.zeros((len(points), 1 + MOST_LAMPS), np.float32) if out is None else out
     listed = transfer.lobe_lights(light.environment, widths)
-    return glance(transfer.surface, transfer.visible, listed, lobes, eye, points, out)
+    return glance(transfer.surface, transfer.seen_lights, listed, lobes, eye, points, out)
 
 
 def _lit(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8]) -> F32:
@@ -278,7 +278,7 @@ def _lit(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.
     if not len(lobes.shape) or not light.shows_sky:
         return np.zeros((len(points), 3), np.float32)
     lights = transfer.sky_lights(light.environment, is_preview=wanted.is_rough)
-    return by_lights(transfer.surface, transfer.visible, lights, lobes, eye, points)
+    return by_lights(transfer.surface, transfer.seen_lights, lights, lobes, eye, points)
 
 
 def _add_beams(

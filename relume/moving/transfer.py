@@ -57,8 +57,9 @@ class MovingTransfer(Opened, Protocol):
     @property
     def vectors_shape(self) -> tuple[int, int, int]: ...
     @property
-    def visible(self) -> NDArray[np.uint8]:
-        """Which light triangles points see: triangle l in bit l & 7 of byte l >> 3. (points, bytes) uint8"""
+    def seen_lights(self) -> NDArray[np.uint8]:
+        """Which light triangles points see, in the order of `lobe_lights`: triangle l in bit l & 7 of byte l >> 3.
+        (points, bytes) uint8"""
         ...
 
     def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:

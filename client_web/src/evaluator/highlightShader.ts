@@ -23,10 +23,10 @@ vec3 byLights(int p, int row, float share, vec3 n, vec3 wo, float facing, out fl
     uvec4 bits = texelFetch(uSeenLights, at(p * uSeenTexels + (word >> 2)), 0);
     int part = word & 3;
     uint here = part == 0 ? bits.x : part == 1 ? bits.y : part == 2 ? bits.z : bits.w;
-    for (int light = 32 * word; here != 0u; light++) {
-      bool isSeen = (here & 1u) != 0u;
-      here >>= 1u;
-      if (!isSeen) continue;
+    for (int group = 8 * word; here != 0u; group++) {
+      int light = 16 * group + int(here & 15u);
+      here >>= 4u;
+      if ((light & 15) == 0) continue;
       vec4 towards = texelFetch(uSkyLights, at(2 * light), 0);
       float off = clamp(2.0 - 2.0 * dot(mirror, towards.xyz), intBitsToFloat(${least_bits}), 4.0);
       float turn = arcCosine(clamp(dot(across, towards.xyz) * inversesqrt(max(off * (1.0 - 0.25 * off), 1e-12)), -1.0, 1.0));

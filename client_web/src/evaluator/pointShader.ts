@@ -146,16 +146,20 @@ function sum(surface: SurfaceBody, features: PointFeatures, of: Sent, name: stri
   ${groups.join("\n  ")}`;
 }
 
-/** The sky in highlights: what lights say, which holds what the in-basis tells besides, less what pixels find in lobes. */
+/** The sky in highlights, less what pixels find in lobes: what the in-basis says, within what two lobes allow; or lights. */
 function sky(surface: SurfaceBody, features: PointFeatures): string {
   const isTold = isAsked(features.sky);
+  const told = (group: number) => `clamp(told${group}, albedo / most, albedo * most) - albedo`;
   const add = (group: number) =>
-    `albedo = ${albedoOf(`of - ${GROUPS - group}`)}; said = albedo * lit;
-  sent${group} += ${isTold ? `clamp(told${group}, said / most, said * most)` : "said"} - albedo * both;`;
-  return `${isTold ? sum(surface, features, "sky", "told") : ""}
-  float most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a, believed;
-  vec3 both = skyInBoth(lobes, glance.xyz), lit = uSkyGain * byLights(p, row, share, n, wo, cosine, believed), albedo, said;
-  lit += believed * both;
+    `albedo = ${albedoOf(`of - ${GROUPS - group}`)} * ${isTold ? "both" : "rest"}; sent${group} += ${isTold ? told(group) : "albedo"};`;
+  const found = isTold
+    ? `${sum(surface, features, "sky", "told")}
+  float most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a;`
+    : `float believed;
+  vec3 rest = uSkyGain * byLights(p, row, share, n, wo, cosine, believed);
+  rest -= (1.0 - believed) * both;`;
+  return `vec3 both = skyInBoth(lobes, glance.xyz), albedo;
+  ${found}
   ${range(GROUPS).map(add).join("\n  ")}`;
 }
 
@@ -198,7 +202,7 @@ export function pointShader(surface: SurfaceBody, features: PointFeatures, layer
   glance.xyz = glanceAlong(lobes, p);
   ${sky(surface, features)}`;
   const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance"];
-  return `${HEAD}${rowOf(surface.rows)}${lobe ? `${PLACE}${SKY}${LOBES}${glance(surface)}${byLights(surface)}` : ""}${UNIFORMS}
+  return `${HEAD}${rowOf(surface.rows)}${lobe ? `${PLACE}${SKY}${LOBES}${glance(surface)}${isAsked(features.sky) ? "" : byLights(surface)}` : ""}${UNIFORMS}
 ${outputs(layers)}
 ${declared(surface, features)}
 void main() {

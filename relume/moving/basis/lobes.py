@@ -38,6 +38,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 NARROW = 0.1  # what the in-basis misses of a term that it cannot tell, see `OutFactors.missed`
+_TOLD = 0.03  # the same, up to which it tells as much of the sky in a highlight as lights do, in less time
 _NARROW_UNEVEN = 0.2  # the same of terms that are not isotropic, which one round lobe tells less of
 _DIRECTED = 3, 0.15  # a degree, and what its functions miss of a term that has a highlight
 NUM_GROUPS = 1 + len(TEXTURES)
@@ -61,10 +62,10 @@ class Lobes(NamedTuple):
         sigma: of both, radians. (lobes, `NUM_ROWS`, 2) float32
         mean: cos θm. (lobes, `NUM_ROWS`) float32. wide: √(1 − R), σ of one lobe for both. (lobes, `NUM_ROWS`) float32
         most: what the in-basis says of the sky is believed up to so many times of what the lobe says, and down to that
-            part of it; 1: it is not believed, since it cannot tell the terms. (lobes,) float32
+            part of it; 1: it is not believed, since it cannot tell the terms: lights do. (lobes,) float32
         is_two: whether one lobe for both would stand for it badly. (lobes,) bool
-        shape, flatness, believed: of the whole, see `relume.moving.basis.shapes`: T, α² and 1 − β.
-            (lobes, `NUM_ROWS`, widths, places), (lobes,), (lobes, `NUM_ROWS`) float32
+        shape, flatness, believed: of the whole, see `relume.moving.basis.shapes`: T, α², and 1 − β, which is one where
+            the in-basis is believed. (lobes, `NUM_ROWS`, widths, places), (lobes,), (lobes, `NUM_ROWS`) float32
         of: lobe of each material, −1 for none. (materials,) int32
     """
 
@@ -95,9 +96,9 @@ def is_narrow(known: OutFactors) -> bool:
     return known.missed > _bound_of(known)
 
 
-def is_told(known: OutFactors) -> bool:
-    """Whether the in-basis tells what the lobe of a term does not: how it looks from around."""
-    return not known.is_isotropic and not is_narrow(known)
+def is_told(known: Sequence[OutFactors]) -> bool:
+    """Whether the in-basis tells the sky in a highlight of a material. known: factors of its terms"""
+    return all(one.missed <= (_TOLD if one.is_isotropic else _NARROW_UNEVEN) for one in known)
 
 
 def _bound_of(known: OutFactors) -> float:
@@ -120,8 +121,8 @@ def are_lobes(known: Sequence[OutFactors]) -> list[bool]:
 
 
 def _most_of(known: Sequence[OutFactors]) -> float:
-    """What the in-basis is believed: any multiple where it misses nothing, none where it misses too much."""
-    if not all(map(is_told, known)):
+    """What the in-basis is believed: any multiple where it misses nothing, none where it does not tell the sky."""
+    if not is_told(known):
         return 1.0
     return max(1.0, min(_bound_of(one) / max(one.missed, _LEAST_MISSED) for one in known) ** 2)
 
@@ -160,6 +161,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         np.reshape(everywhere, (len(shape), NUM_ROWS, NUM_PLACES)),
         np.reshape(shape, (len(shape), NUM_ROWS, _NUM_SHAPE))[..., :NUM_NUMBERS],
     )
+    whole.believed[np.array(most) > 1] = 1
     shapes = np.reshape(np.array(shape, np.float32), (len(shape), NUM_ROWS, _NUM_SHAPE))
     cosine, sigma = (np.ascontiguousarray(shapes[..., k : k + 2]) for k in (0, 3))
     first, mean, wide = (np.ascontiguousarray(shapes[..., k]) for k in (2, 5, 6))

@@ -27,7 +27,7 @@ F64 = NDArray[np.float64]
 LEAST_EXPONENT = -24  # of two: x below which highlights are flat
 NUM_RINGS, NUM_SPOKES = 2 * (2 - LEAST_EXPONENT) + 1, 6
 NUM_PLACES = NUM_RINGS * NUM_SPOKES
-WIDTHS = 0.003, 0.01, 0.025, 0.06  # σ of lights along an axis, radians, that there is a table for
+WIDTHS = 0.003, 0.01, 0.025, 0.06, 0.15  # σ of lights along an axis, radians, that there is a table for
 _BELIEVED = 0.035, 0.105  # σ of lobes up to which they are, and from which on they are not
 _FAR = 0.25  # of the peak, which a distribution of microfacets has where x_h = α²
 _LEAST_FLATNESS = 0.002  # below, rows of grazing eyes have nothing in common with those beside them

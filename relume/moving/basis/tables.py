@@ -7,6 +7,7 @@ light than the sky, in Σ_k w_k p_k t_k, w takes that away for a little blur (do
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -57,12 +58,14 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
     of = np.full((len(materials), NUM_GROUPS, 6), -1, np.int32)
     for index, terms in enumerate(materials):
         found_of = [out_factors(term) for term in terms]
-        every = [*zip(map(group_of, terms), found_of, are_lobes(found_of), strict=True)]
+        of_lobe = are_lobes(found_of)
+        tells_sky = is_told([*compress(found_of, of_lobe)])
+        every = [*zip(map(group_of, terms), found_of, of_lobe, strict=True)]
         for group in range(NUM_GROUPS):
-            shared = [(one.table, is_lobe, is_told(one)) for of_group, one, is_lobe in every if of_group == group]
-            plain = [table for table, is_lobe, _ in shared if not is_lobe]
-            told = [table for table, is_lobe, is_also in shared if is_lobe and is_also]
-            others = [table * WINDOW for table, is_lobe, _ in shared if is_lobe]
+            shared = [(one.table, is_lobe) for of_group, one, is_lobe in every if of_group == group]
+            plain = [table for table, is_lobe in shared if not is_lobe]
+            told = [table for table, is_lobe in shared if is_lobe and tells_sky]
+            others = [table * WINDOW for table, is_lobe in shared if is_lobe]
             for first, found in ((0, plain), (2, told), (4, others)):
                 for kind, kept, tables in (
                     (0, even, [t[:, 0][..., rungs.cosine] for t in found if t.shape[1] == 1]),

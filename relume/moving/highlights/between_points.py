@@ -4,9 +4,9 @@
 
 L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate; in fine frames,
 and where one lobe would stand for the highlight badly, L_2, the sky in two. It is what turns fastest where surfaces are
-curved, twice as fast as their normals. B is summed over lights (`relume.moving.highlights.by_lights`). Of terms that
-depend on φo, Σ_k p_k t_k of the sky tells more. Beside what is bright it rings, and says what cannot be: it is held
-within a multiple of B; the more the in-basis misses, the smaller is the multiple, down to B itself.
+curved, twice as fast as their normals. B is summed over lights (`relume.moving.highlights.by_lights`), or it is what
+the in-basis says, Σ_k p_k t_k of the sky, where that tells as much. Beside what is bright this rings, and says what
+cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple.
 """
 
 from __future__ import annotations

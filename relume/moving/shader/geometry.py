@@ -71,7 +71,7 @@ def arrays_of(transfer: MovingTransfer) -> Mapping[str, Callable[[], Texels]]:
         "places": lambda: _four(points.position, 0),
         "point_normals": lambda: _four(points.normal, 0).astype(np.float16),
         "tangents": lambda: _four(points.tangent, 0).astype(np.float16),
-        "seen_lights": lambda: _bits(transfer.visible),
+        "seen_lights": lambda: _bits(transfer.seen_lights),
     }
     if len(surface.textures.wraps):
         found |= _of_textures(surface, surface.textures)

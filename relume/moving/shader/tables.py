@@ -134,11 +134,12 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
 
 
 def _in_highlights(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Part]:
-    """The lights of the sky, and for each material with a lobe the shape of its highlight."""
+    """The lights of the sky, and the shape of the highlight of each material that they are summed for."""
     environment, lobes, is_rough = wanted.light.environment, wanted.materials.lobes, wanted.is_rough
     shapes = {
         f"shapes/{k}": Part(json.dumps(wanted.materials.each[k].terms, sort_keys=True), partial(_shape, lobes, k))
         for k in np.flatnonzero(lobes.of >= 0).tolist()
+        if lobes.most[lobes.of[k]] == 1
     }
     if not shapes:
         return {}
@@ -149,13 +150,9 @@ def _in_highlights(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Part]:
 def _sky_lights(lights: SkyLights) -> dict[str, Texels]:
     """Of each light where it is and the number of the tables that are as wide as it is; then what it brings."""
     width = (lights.table // NUM_PLACES).astype(np.float32)
-    rows = np.stack([np.vstack([lights.towards, width]).T, _padded(lights.irradiance.T)], axis=1)
+    towards, irradiance = np.split(lights.lights, 2, axis=1)
+    rows = np.column_stack([towards, width, irradiance, np.zeros_like(width)])
     return {"sky_lights": np.ascontiguousarray(rows.reshape(-1, 4))}
-
-
-def _padded(rows: F32) -> F32:
-    """With a fourth number. (n, 4)"""
-    return np.pad(rows, ((0, 0), (0, 1)))
 
 
 def _shape(lobes: Lobes, material: int) -> dict[str, Texels]:
