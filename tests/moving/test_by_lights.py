@@ -6,6 +6,7 @@ from tiny_scenes import looking, scene_of, sphere, studio
 
 from relume.bake import Recipe
 from relume.brdf.evaluate import eval_brdf
+from relume.light.tiles import Tiles
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.basis.lobes import lobes_of
@@ -96,15 +97,13 @@ def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
 
 @pytest.mark.parametrize("roughness", [0.02, 0.1, 0.25])
 def test_under_a_white_sky_nothing_is_gained_or_lost(surface, roughness):
-    """Lights as wide as those of a bake, on a grid of their own; what lobes show of it is one."""
+    """Lights as wide as those of a bake; what lobes show of it is one."""
     num, lobes = surface.points.num_points, lobes_of([[document("ggx", roughness=roughness, f0=0.9)]])
-    k = np.arange(2000) + 0.5
-    cosine, phi = 1 - k / 1000, np.pi * (1 + 5**0.5) * k
-    sine = np.sqrt(1 - cosine**2)
-    towards = np.stack([sine * np.cos(phi), cosine, sine * np.sin(phi)], axis=-1).astype(np.float32)
-    light = np.full((2000, 3), 4 * np.pi / 2000, np.float32)
-    lights = SkyLights.of(towards, light, np.full(2000, 0.07, np.float32))
-    summed = by_lights(surface, np.full((num, 250), 255, np.uint8), lights, lobes, EYE, np.ones(num, np.uint8))
+    tiles = Tiles(np.arange(8 << 8, 16 << 8, dtype=np.uint64))
+    light = np.broadcast_to(tiles.solid_angles[:, None], (2048, 3)).astype(np.float32)
+    radius = np.linalg.norm(tiles.corners[:, 0] - tiles.centroids, axis=1)
+    lights = SkyLights.of(tiles.centroids.astype(np.float32), light, radius.astype(np.float32))
+    summed = by_lights(surface, np.full((num, 256), 255, np.uint8), lights, lobes, EYE, np.ones(num, np.uint8))
     for point in facing(surface, 0.4)[::3]:
         wo = EYE - surface.points.position[point]
         place = np.sqrt(1 - surface.points.normal[point] @ wo / np.linalg.norm(wo)) * (lobes.believed.shape[1] - 1)

@@ -1,7 +1,7 @@
 /** What points send of the sky in highlights: sums over the lights that they see, as `relume.moving.highlights.by_lights`. */
 import type { SurfaceBody } from "../protocol";
 
-/** Of unit albedo, without the sky's gain; and how far lobes are believed besides. Asks for `glance`. */
+/** Of unit albedo, without the sky's gain; how far lobes are believed besides, and how far all of it where normals bend. Asks for `glance`. */
 export const byLights = ({ shapes: { rings, spokes, widths, least_bits } }: SurfaceBody) => `
 uniform sampler2D uSkyLights, uShapes;
 const int SHAPE = ${1 + widths * rings * 2};
@@ -14,9 +14,10 @@ float onRing(int row, float share, int ring, int spoke, float part) {
   vec2 two = offset == 0 ? four.xy : offset == 1 ? four.yz : four.zw;
   return mix(two.x, two.y, part);
 }
-vec3 byLights(int p, int row, float share, vec3 n, vec3 wo, float facing, out float believed) {
+vec3 byLights(int p, int row, float share, vec3 n, vec3 wo, float facing, out float believed, out float flatly) {
   vec4 head = shapeTexel(row, 0, share);
   believed = head.x;
+  flatly = head.z;
   vec3 mirror = 2.0 * facing * n - wo, across = n - facing * mirror, found = vec3(0.0);
   across *= inversesqrt(max(dot(across, across), 1e-12));
   for (int word = 0; word < 4 * uSeenTexels; word++) {

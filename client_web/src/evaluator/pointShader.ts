@@ -155,9 +155,9 @@ function sky(surface: SurfaceBody, features: PointFeatures): string {
   const found = isTold
     ? `${sum(surface, features, "sky", "told")}
   float most = texelFetch(uLobes, at(of - ${GROUPS}), 0).a;`
-    : `float believed;
-  vec3 rest = uSkyGain * byLights(p, row, share, n, wo, cosine, believed);
-  rest -= (1.0 - believed) * both;`;
+    : `float believed, flatly;
+  vec3 rest = uSkyGain * byLights(p, row, share, n, wo, cosine, believed, flatly);
+  rest = flatly * (rest - (1.0 - believed) * both);`;
   return `vec3 both = skyInBoth(lobes, glance.xyz), albedo;
   ${found}
   ${range(GROUPS).map(add).join("\n  ")}`;

@@ -6,7 +6,8 @@ L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of
 and where one lobe would stand for the highlight badly, L_2, the sky in two. It is what turns fastest where surfaces are
 curved, twice as fast as their normals. B is summed over lights (`relume.moving.highlights.by_lights`), or it is what
 the in-basis says, Σ_k p_k t_k of the sky, where that tells as much. Beside what is bright this rings, and says what
-cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple.
+cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple. Lights are
+summed for the normal of a point: where a normal map bends it by more than a lobe is wide, L_2 alone is believed.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ from relume.parallel import for_shares
 
 F32 = NDArray[np.float32]
 
+BUMPY = np.float32(4)  # σ² of normals over that of a lobe, which turns twice as far
+
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add(points, material, lobes, light, eye, glances, lit, is_fine, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
+def _add(points, material, lobes, light, eye, glances, lit, bumpiness, is_fine, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
     """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
     position, normal, _, _, _ = points
     shown, both = np.empty(3, np.float32), np.empty(3, np.float32)
@@ -52,8 +55,10 @@ def _add(points, material, lobes, light, eye, glances, lit, is_fine, rows, start
             add_sky_in_lobe(light, seen, ray, wide, np.float32(1), shown)
         most, near = lobes.most[lobe], lobes.believed[lobe, row]
         believed = near + share * (lobes.believed[lobe, row + 1] - near)
+        sigma = min(sigma, sigma_2)
+        flat = sigma * sigma / (sigma * sigma + BUMPY * bumpiness[material[p]])
         for channel in range(3):
-            both[channel] = believed * both[channel] + lit[p, channel]
+            both[channel] += flat * (lit[p, channel] - (np.float32(1) - believed) * both[channel])
         for group in range(sent.shape[1]):
             for channel in range(3):
                 near = lobes.albedo[lobe, row, group, channel]
@@ -85,6 +90,6 @@ def add_sky_in_highlights(
         sent: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
     """
     rows = np.flatnonzero(is_needed.view(np.bool_))
-    seen = np.ascontiguousarray(eye, np.float32), glances, lit
+    seen = np.ascontiguousarray(eye, np.float32), glances, lit, surface.textures.bumpiness()
     args = (surface.points, surface.material, lobes, light, *seen, is_fine, rows)
     for_shares(lambda start, stop: _add(*args, start, stop, *sent), len(rows))

@@ -112,6 +112,17 @@ class Textures(NamedTuple):
     wraps: NDArray[np.int64]
     of_material: NDArray[np.int64]
 
+    def bumpiness(self) -> F32:
+        """Find the variance of the normals of each material about their mean, from its map's coarsest level.
+        (materials,) float32; nothing where it has no map"""
+        out = np.zeros(len(self.of_material), np.float32)
+        for material, texture in enumerate(self.of_material[:, NORMAL_MAP]):
+            if texture >= 0:
+                begin, height, width = self.levels[self.first[texture + 1] - 1]
+                mean = self.texels[begin : begin + height * width].mean(axis=0)
+                out[material] = max(1 - float(mean @ mean), 0)
+        return out
+
 
 @dataclass(frozen=True)
 class Surface:

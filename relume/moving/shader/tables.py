@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 from relume.basis.zernike import DEGREE, DEGREES, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.brdf.channels import TEXTURES
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
-from relume.moving.basis.out_factors import NUM_ROWS
-from relume.moving.basis.shapes import NUM_PLACES, NUM_SPOKES
 from relume.moving.frame import Materials, Wanted
-from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights, widths_of
 from relume.moving.points.surface import EMISSION, NORMAL_MAP
 from relume.moving.shader.geometry import first_points, textures_with
+from relume.moving.shader.highlights import shape_of, sky_lights
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.picture.light import emission_of
@@ -31,7 +29,6 @@ Texels = NDArray[Any]
 _ROUGH = num_functions(QUICK_DEGREE)  # that are not nothing in what is found quickly
 _KEPT = np.array([1, _ROUGH, NUM_FUNCTIONS])  # how many are sent: a shader is written for each number
 _MISSED = 1e-3  # of a table's size, by the functions that a shader leaves out
-_MOST_HALF = 65504.0
 _LARGEST = 2.0**14  # of light vectors: well inside half precision
 
 
@@ -136,35 +133,16 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
 def _in_highlights(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Part]:
     """The lights of the sky, and the shape of the highlight of each material that they are summed for."""
     environment, lobes, is_rough = wanted.light.environment, wanted.materials.lobes, wanted.is_rough
+    bumpiness, each = transfer.surface.textures.bumpiness(), wanted.materials.each
     shapes = {
-        f"shapes/{k}": Part(json.dumps(wanted.materials.each[k].terms, sort_keys=True), partial(_shape, lobes, k))
+        f"shapes/{k}": Part(json.dumps(each[k].terms, sort_keys=True), partial(shape_of, lobes, k, bumpiness))
         for k in np.flatnonzero(lobes.of >= 0).tolist()
         if lobes.most[lobes.of[k]] == 1
     }
     if not shapes:
         return {}
-    lights = Part((environment, is_rough), lambda: _sky_lights(transfer.sky_lights(environment, is_preview=is_rough)))
+    lights = Part((environment, is_rough), lambda: sky_lights(transfer.sky_lights(environment, is_preview=is_rough)))
     return {**shapes, "sky_lights": lights}
-
-
-def _sky_lights(lights: SkyLights) -> dict[str, Texels]:
-    """Of each light where it is and the number of the tables that are as wide as it is; then what it brings."""
-    width = (lights.table // NUM_PLACES).astype(np.float32)
-    towards, irradiance = np.split(lights.lights, 2, axis=1)
-    rows = np.column_stack([towards, width, irradiance, np.zeros_like(width)])
-    return {"sky_lights": np.ascontiguousarray(rows.reshape(-1, 4))}
-
-
-def _shape(lobes: Lobes, material: int) -> dict[str, Texels]:
-    """Of each row of a material's table 1 − β and α²; then, for each width, of each ring the numbers of its first four
-    spokes, and of its last four. (rows · (1 + widths · rings · 2), 4) float16"""
-    lobe = int(lobes.of[material])
-    rings = lobes.shape[lobe].reshape(NUM_ROWS, -1, NUM_SPOKES)
-    head = np.zeros((NUM_ROWS, 1, 4), np.float32)
-    head[:, 0, 0], head[:, 0, 1] = lobes.believed[lobe], lobes.flatness[lobe]
-    halves = np.stack([rings[..., :4], rings[..., -4:]], axis=2).reshape(NUM_ROWS, -1, 4)
-    texels = np.clip(np.concatenate([head, halves], axis=1), -_MOST_HALF, _MOST_HALF)
-    return {f"shapes/{material}": texels.astype(np.float16).reshape(-1, 4)}
 
 
 def _lobes(lobes: Lobes) -> F32:
