@@ -161,6 +161,7 @@ BOUNDED = {
     "measured/asset_store.py",
     "moving/basis/lobes.py",
     "moving/basis/out_factors.py",
+    "moving/basis/shapes.py",
     "basis/zernike.py",
     "moving/bumps.py",
     "moving/relief/tables.py",
