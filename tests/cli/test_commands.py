@@ -280,6 +280,7 @@ def test_interrupt_is_noted_and_raised_nowhere_else() -> None:
         assert asked.wait(60)
 
 
+@pytest.mark.slow
 def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data: Path) -> None:
     process = subprocess.Popen(
         [*RELUME, *LONG], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts

@@ -103,6 +103,7 @@ def test_names_are_checked(client, dusk_file):
     assert client.delete(f"{URL}/studio").status_code == 422
 
 
+@pytest.mark.slow
 def test_a_session_shows_what_a_batch_renders_in_an_imported_light(client, imported, bake, tmp_path):
     look = {"environment": {"map": imported["map"]}}
     with open_session(client, bake) as session:

@@ -105,6 +105,7 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
     assert np.allclose(probe["radiance"], picture[HEIGHT // 2, WIDTH // 2], atol=0.01 * max(probe["radiance"]))
 
 
+@pytest.mark.slow
 def test_frame_is_true(real: TestClient) -> None:
     """The comparison over REST, with the real reference: what it finds is the bake's error, not its own noise."""
     glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")

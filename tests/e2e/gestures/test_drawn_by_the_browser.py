@@ -163,6 +163,7 @@ def test_a_context_that_is_lost_in_a_drag_is_made_anew_twice(moving: tuple[Edito
     assert np.abs(here - settled(editor)).mean() < 1
 
 
+@pytest.mark.slow
 def test_materials_and_lights_follow_twice(moving: tuple[Editor, list[int]]) -> None:
     editor, _ = moving
     page = editor.page

@@ -47,6 +47,7 @@ def moved(page: Page, before: str) -> str:
     return str(page.locator(".finder canvas").evaluate(SEEN))
 
 
+@pytest.mark.slow
 def test_every_gesture_moves_the_camera_twice(page: Page) -> None:
     dialog = page.get_by_role("dialog")
     canvas = dialog.locator("canvas")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from editor_page import Editor, changed
 from playwright.sync_api import expect
 
 SIGMA = "Roughness σ"
 
 
+@pytest.mark.slow
 def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Editor) -> None:
     page = editor.page
     editor.choose("Ball", 1)

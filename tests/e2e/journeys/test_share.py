@@ -21,6 +21,7 @@ def visitor(browser: Browser) -> Iterator[Editor]:
     context.close()
 
 
+@pytest.mark.slow
 def test_a_link_opens_what_was_shared_and_stays_what_it_was(editor: Editor, visitor: Editor, server: Server) -> None:
     page = editor.page
     page.get_by_role("button", name="left", exact=True).click()
