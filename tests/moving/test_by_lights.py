@@ -69,8 +69,8 @@ def test_the_kernel_does_what_its_twin_does(surface, term):
     [
         document("ggx", roughness=0.6, f0=0.9),
         document("ggx", roughness=0.4, f0=0.04),
-        document("ward", alpha=0.35),
-        document("phong", exponent=20.0),
+        document("cook_torrance", sigma=0.35),
+        document("ggx", roughness=0.5, f0=0.5),
     ],
 )
 def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):

@@ -38,7 +38,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 NARROW = 0.1  # what the in-basis misses of a term that it cannot tell, see `OutFactors.missed`
-_TOLD = 0.03  # the same, up to which it tells as much of the sky in a highlight as lights do, in less time
+_TOLD = 0.03  # the same, up to which it tells the sky in a highlight as well as lights do, in less time
 _NARROW_UNEVEN = 0.2  # the same of terms that are not isotropic, which one round lobe tells less of
 _DIRECTED = 3, 0.15  # a degree, and what its functions miss of a term that has a highlight
 NUM_GROUPS = 1 + len(TEXTURES)
@@ -96,9 +96,23 @@ def is_narrow(known: OutFactors) -> bool:
     return known.missed > _bound_of(known)
 
 
-def is_told(known: Sequence[OutFactors]) -> bool:
-    """Whether the in-basis tells the sky in a highlight of a material. known: factors of its terms"""
-    return all(one.missed <= (_TOLD if one.is_isotropic else _NARROW_UNEVEN) for one in known)
+def is_told(terms: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the in-basis tells the sky in a highlight: it misses nothing, or little of one that has no skirt.
+
+    Args:
+        terms: that the highlight consists of, of a complete look.
+    """
+    return all(map(_is_told, terms))
+
+
+def _is_told(term: Mapping[str, Any]) -> bool:
+    known = of_white(term)
+    return known.missed <= _TOLD or not (is_narrow(known) or _are_unlike(_lobe_of(text_of_white(term))[0][:, 6:8]))
+
+
+def _are_unlike(sigma: F64) -> bool:
+    """Whether one lobe would stand for both badly. sigma: of both. (rows, 2)"""
+    return bool((sigma.max(axis=1) > _ALIKE * sigma.min(axis=1))[cosines() > _ASLANT].any())
 
 
 def _bound_of(known: OutFactors) -> float:
@@ -120,11 +134,11 @@ def are_lobes(known: Sequence[OutFactors]) -> list[bool]:
     return narrow if any(narrow) else [_has_highlight(one) for one in known]
 
 
-def _most_of(known: Sequence[OutFactors]) -> float:
+def _most_of(terms: Sequence[Mapping[str, Any]]) -> float:
     """What the in-basis is believed: any multiple where it misses nothing, none where it does not tell the sky."""
-    if not is_told(known):
+    if not is_told(terms):
         return 1.0
-    return max(1.0, min(_bound_of(one) / max(one.missed, _LEAST_MISSED) for one in known) ** 2)
+    return max(1.0, min(_bound_of(one) / max(one.missed, _LEAST_MISSED) for one in map(of_white, terms)) ** 2)
 
 
 def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
@@ -144,7 +158,7 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         if not any(is_seen):
             continue
         of[index] = len(albedo)
-        most.append(_most_of([*compress(known, is_seen)]))
+        most.append(_most_of([*compress(terms, is_seen)]))
         by_group, about = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros((NUM_ROWS, _NUM_SHAPE))
         at_places = np.zeros((NUM_ROWS, NUM_PLACES))
         for term in compress(terms, is_seen):
@@ -157,16 +171,11 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         albedo.append(by_group)
         shape.append(np.where(total > 0, about / np.maximum(total, 1e-30), 1))
         everywhere.append(np.where(total > 0, at_places / np.maximum(total, 1e-30), 0))
-    whole = shapes_of(
-        np.reshape(everywhere, (len(shape), NUM_ROWS, NUM_PLACES)),
-        np.reshape(shape, (len(shape), NUM_ROWS, _NUM_SHAPE))[..., :NUM_NUMBERS],
-    )
-    whole.believed[np.array(most) > 1] = 1
     shapes = np.reshape(np.array(shape, np.float32), (len(shape), NUM_ROWS, _NUM_SHAPE))
     cosine, sigma = (np.ascontiguousarray(shapes[..., k : k + 2]) for k in (0, 3))
     first, mean, wide = (np.ascontiguousarray(shapes[..., k]) for k in (2, 5, 6))
-    is_unlike = sigma.max(axis=2) > _ALIKE * sigma.min(axis=2)
-    is_two = is_unlike[:, cosines() > _ASLANT].any(axis=1)
+    is_two = np.array([_are_unlike(one) for one in sigma], np.bool_)
+    whole = shapes_of(everywhere, [numbers[:, :NUM_NUMBERS] for numbers in shape], np.array(most) > 1)
     return Lobes(
         np.reshape(np.array(albedo, np.float32), (len(albedo), NUM_ROWS, NUM_GROUPS, 3)),
         cosine, first, sigma, mean, wide, np.array(most, np.float32), is_two, *whole, of,

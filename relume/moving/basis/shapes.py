@@ -13,6 +13,7 @@ than lights do: what these are believed, 1 − β, is taken out of the table, bl
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -101,36 +102,46 @@ def _areas() -> F64:
 
 
 @lru_cache(maxsize=1)
-def _blurs() -> F64:
-    """What blurs a table by each width. (widths, `NUM_PLACES`, `NUM_PLACES`)"""
+def _blurs() -> F32:
+    """What blurs a table by each width. (`NUM_PLACES`, widths · `NUM_PLACES`) float32"""
     at, area = places(), _areas()
     other_side = at * [1, -1, 1]
     found = []
     for width in WIDTHS:
         kernel = sum(np.exp((at @ side.T - 1) / width**2) for side in (at, other_side)) * area
         found.append((kernel / kernel.sum(axis=1, keepdims=True)).T)
-    return np.stack(found)
+    return np.concatenate(found, axis=1).astype(np.float32)
 
 
-def shapes_of(sent: F64, lobes: F64) -> Shapes:
+def shapes_of(sent: Sequence[F64], lobes: Sequence[F64], is_told: NDArray[np.bool_]) -> Shapes:
     """Make the tables of highlights.
 
     Args:
-        sent: f cos θi / a at all places. (n, rows, `NUM_PLACES`)
-        lobes: that stand for them: cos θ of both, s_1, σ of both. (n, rows, 5)
+        sent: of each, f cos θi / a at all places. (rows, `NUM_PLACES`)
+        lobes: that stand for it: cos θ of both, s_1, σ of both. (rows, 5)
+        is_told: whether the in-basis tells it, and its table is not asked for. (n,)
     """
+    num, num_rows = len(sent), len(cosines())
+    tables = np.zeros((num, num_rows, len(WIDTHS), NUM_PLACES), np.float32)
+    flatness, believed = np.ones(num, np.float32), np.ones((num, num_rows), np.float32)
+    for k in np.flatnonzero(~is_told).tolist():
+        tables[k], flatness[k], believed[k] = _shape_of(sent[k], lobes[k])
+    return Shapes(tables, flatness, believed)
+
+
+def _shape_of(sent: F64, lobes: F64) -> tuple[F32, float, F64]:
+    """Make that of one: T (rows, widths, `NUM_PLACES`), α², 1 − β (rows,)."""
     low, high = _BELIEVED
-    share = np.clip((lobes[..., 3:].min(axis=-1) - low) / (high - low), 0, 1)
-    believed = 1 - share**2 * (3 - 2 * share)
-    flatness = np.array([_flatness(one) for one in sent])
-    flat = np.square(_off_normal() + flatness[:, None, None])
-    left = np.array(sent)
+    share = np.clip((lobes[:, 3:].min(axis=1) - low) / (high - low), 0, 1)
+    believed, flatness = 1 - share**2 * (3 - 2 * share), _flatness(sent)
+    left = sent.astype(np.float32)
     if believed.any():
         by_lobes, area = _of_lobes(lobes), _areas()
         alike = (sent @ area) / np.maximum(by_lobes @ area, 1e-30)  # neither is told well where all is in a ring
-        left -= (believed * alike)[..., None] * by_lobes
-    tables = np.stack([left @ blur * flat for blur in _blurs()], axis=2).astype(np.float32)
-    return Shapes(tables, flatness.astype(np.float32), believed.astype(np.float32))
+        left -= (believed * alike)[:, None] * by_lobes
+    blurred = (left @ _blurs()).reshape(-1, len(WIDTHS), NUM_PLACES)
+    flat = np.square(_off_normal() + flatness).astype(np.float32)
+    return blurred * flat[:, None], flatness, believed
 
 
 def _flatness(sent: F64) -> float:
@@ -148,13 +159,13 @@ def _in_plane() -> tuple[F64, F64]:
 
 
 def _of_lobes(lobes: F64) -> F64:
-    """What two round lobes have at all places. lobes: (n, rows, 5). (n, rows, `NUM_PLACES`)"""
-    (x, z), total = _in_plane(), np.zeros((*lobes.shape[:2], NUM_PLACES))
-    first = lobes[..., 2]
-    for cosine, share, sigma in ((lobes[..., 0], first, lobes[..., 3]), (lobes[..., 1], 1 - first, lobes[..., 4])):
+    """What two round lobes have at all places. lobes: (rows, 5). (rows, `NUM_PLACES`)"""
+    (x, z), total = _in_plane(), np.zeros((len(lobes), NUM_PLACES))
+    first = lobes[:, 2]
+    for cosine, share, sigma in ((lobes[:, 0], first, lobes[:, 3]), (lobes[:, 1], 1 - first, lobes[:, 4])):
         kappa = 1 / sigma**2
         peak = share * kappa / (2 * np.pi * -np.expm1(-2 * kappa))
         sine = np.sqrt(np.maximum(1 - cosine**2, 0))
-        off = 1 - sine[..., None] * x - cosine[..., None] * z
-        total += peak[..., None] * np.exp(-kappa[..., None] * off)
+        off = 1 - sine[:, None] * x - cosine[:, None] * z
+        total += peak[:, None] * np.exp(-kappa[:, None] * off)
     return total

@@ -59,7 +59,7 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
     for index, terms in enumerate(materials):
         found_of = [out_factors(term) for term in terms]
         of_lobe = are_lobes(found_of)
-        tells_sky = is_told([*compress(found_of, of_lobe)])
+        tells_sky = is_told([*compress(terms, of_lobe)])
         every = [*zip(map(group_of, terms), found_of, of_lobe, strict=True)]
         for group in range(NUM_GROUPS):
             shared = [(one.table, is_lobe) for of_group, one, is_lobe in every if of_group == group]

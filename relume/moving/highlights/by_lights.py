@@ -76,11 +76,11 @@ def _sum(points, material, visible, sky, lobes, eye, rows, start, stop, out):  #
     """Sum the lights of the points that are [start, stop) of rows. out: (points, 3), written there"""
     position, normal, _, _, _ = points
     lights, table_of = sky
+    shape = lobes.shape.reshape(lobes.shape.shape[0], lobes.shape.shape[1], lobes.shape.shape[2] * NUM_PLACES)
     num_groups = lights.shape[0] >> GROUP
     seen, ring = np.empty(num_groups, np.int32), np.empty(num_groups, np.float32)
     spoke, scale = np.empty(num_groups, np.float32), np.empty(num_groups, np.float32)
     ring_bits = ring.view(np.int32)
-    table = np.empty(lobes.shape.shape[2] * NUM_PLACES, np.float32)
     for p in rows[start:stop]:
         out[p, 0] = out[p, 1] = out[p, 2] = 0
         lobe = lobes.of[material[p]]
@@ -92,10 +92,6 @@ def _sum(points, material, visible, sky, lobes, eye, rows, start, stop, out):  #
         ox, oy, oz = per * ox, per * oy, per * oz
         facing: Any = min(max(nx * ox + ny * oy + nz * oz, LEAST_COSINE), np.float32(1))
         row, share = row_of(facing)
-        for width in range(lobes.shape.shape[2]):
-            for k in range(NUM_PLACES):
-                near = lobes.shape[lobe, row, width, k]
-                table[width * NUM_PLACES + k] = near + share * (lobes.shape[lobe, row + 1, width, k] - near)
         flatness, double = lobes.flatness[lobe], np.float32(2) * facing
         mx, my, mz = double * nx - ox, double * ny - oy, double * nz - oz
         # across the mirror direction, in the plane of n and o
@@ -138,9 +134,14 @@ def _sum(points, material, visible, sky, lobes, eye, rows, start, stop, out):  #
             r, s = np.int32(place), np.int32(spoke[k])
             fr, fs = place - np.float32(r), spoke[k] - np.float32(s)
             at = table_of[light] + r * NUM_SPOKES + s
-            near = table[at] + fs * (table[at + 1] - table[at])
-            far = table[at + NUM_SPOKES] + fs * (table[at + NUM_SPOKES + 1] - table[at + NUM_SPOKES])
-            sent = scale[k] * (near + fr * (far - near))
+            wa, wb = (np.float32(1) - fr) * (np.float32(1) - fs), (np.float32(1) - fr) * fs
+            wc, wd = fr * (np.float32(1) - fs), fr * fs
+            a, b, c, d = at, at + 1, at + NUM_SPOKES, at + NUM_SPOKES + 1
+            this = wa * shape[lobe, row, a] + wb * shape[lobe, row, b]
+            this += wc * shape[lobe, row, c] + wd * shape[lobe, row, d]
+            beside = wa * shape[lobe, row + 1, a] + wb * shape[lobe, row + 1, b]
+            beside += wc * shape[lobe, row + 1, c] + wd * shape[lobe, row + 1, d]
+            sent = scale[k] * (this + share * (beside - this))
             red += sent * lights[light, 3]
             green += sent * lights[light, 4]
             blue += sent * lights[light, 5]
