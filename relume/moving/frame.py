@@ -275,7 +275,7 @@ def _glanced(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray
 def _lit(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8]) -> F32:
     """What points send of the lights that they see in their highlights."""
     lobes, light = wanted.materials.lobes, wanted.light
-    if not len(lobes.shape) or not light.shows_sky:
+    if not (lobes.most == 1).any() or not light.shows_sky:
         return np.zeros((len(points), 3), np.float32)
     lights = transfer.sky_lights(light.environment, is_preview=wanted.is_rough)
     return by_lights(transfer.surface, transfer.seen_lights, lights, lobes, eye, points)

@@ -107,7 +107,7 @@ def is_told(terms: Sequence[Mapping[str, Any]]) -> bool:
 
 def _is_told(term: Mapping[str, Any]) -> bool:
     known = of_white(term)
-    return known.missed <= _TOLD or not (is_narrow(known) or _are_unlike(_lobe_of(text_of_white(term))[0][:, 6:8]))
+    return known.missed <= _TOLD or not (is_narrow(known) or _are_unlike(_lobe_of(text_of_white(term))[:, 6:8]))
 
 
 def _are_unlike(sigma: F64) -> bool:
@@ -161,12 +161,14 @@ def lobes_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         most.append(_most_of([*compress(terms, is_seen)]))
         by_group, about = np.zeros((NUM_ROWS, NUM_GROUPS, 3)), np.zeros((NUM_ROWS, _NUM_SHAPE))
         at_places = np.zeros((NUM_ROWS, NUM_PLACES))
+        is_asked = most[-1] == 1  # else the in-basis tells it
         for term in compress(terms, is_seen):
-            found, its_places = _lobe_of(text_of_white(term))
+            found = _lobe_of(text_of_white(term))
             sent = found[:, :3] * np.asarray(term["color"], np.float64)
             by_group[:, group_of(term)] += sent
             about += sent.mean(axis=1, keepdims=True) * found[:, 3:]
-            at_places += sent.mean(axis=1, keepdims=True) * its_places
+            if is_asked:
+                at_places += np.mean(term["color"]) * _at_places(text_of_white(term))
         total = by_group.sum(axis=1).mean(axis=1)[:, None]
         albedo.append(by_group)
         shape.append(np.where(total > 0, about / np.maximum(total, 1e-30), 1))
@@ -269,33 +271,28 @@ def _at_places_of(document: Mapping[str, Any]) -> F64:
 
 
 @lru_cache(maxsize=_MOST_KNOWN)
-def _lobe_of(term_text: str) -> tuple[F64, F64]:
-    """a of each channel; cos θ of both lobes, s_1, σ of both; cos θm, √(1 − R); and ρ cos θi / a at the places of
-    shapes, the mean over channels. (`NUM_ROWS`, 10), (`NUM_ROWS`, `NUM_PLACES`)"""
+def _lobe_of(term_text: str) -> F64:
+    """a of each channel; cos θ of both lobes, s_1, σ of both; cos θm, √(1 − R). (`NUM_ROWS`, 10)"""
     document = json.loads(term_text)
     if not of_white(document).is_isotropic:
-        moments, at_places = _moments_of(document), _at_places_of(document)
+        moments = _moments_of(document)
         mean, wide = _one_of(moments)
-        numbers: tuple[NDArray[Any], ...] = (
-            moments[..., 0].T,
-            mean,
-            mean,
-            np.full(NUM_ROWS, 0.5),
-            wide,
-            wide,
-            mean,
-            wide,
-        )
-    else:
-        even = _even()
-        value, at_places = (quadrature.values(document) for quadrature in (even.quadrature, even.at_places))
-        at_places = at_places.mean(axis=0) * even.cosine
-        moments = (value[..., None, :] @ even.moments)[..., 0, :]
-        sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
-        albedo = np.broadcast_to(moments[..., 0], (3, NUM_ROWS)).T
-        numbers = albedo, fit_two(even.x, even.z, even.area, sent), *_one_of(moments)
-    a = moments[..., 0].mean(axis=0)[:, None]
-    return np.column_stack(numbers), np.where(a > 0, at_places / np.maximum(a, 1e-30), 0)
+        return np.column_stack([moments[..., 0].T, mean, mean, np.full(NUM_ROWS, 0.5), wide, wide, mean, wide])
+    even = _even()
+    value = even.quadrature.values(document)
+    moments = (value[..., None, :] @ even.moments)[..., 0, :]
+    sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
+    albedo = np.broadcast_to(moments[..., 0], (3, NUM_ROWS)).T
+    return np.column_stack([albedo, fit_two(even.x, even.z, even.area, sent), *_one_of(moments)])
+
+
+@lru_cache(maxsize=_MOST_KNOWN)
+def _at_places(term_text: str) -> F64:
+    """ρ cos θi at the places of shapes, the mean over channels. (`NUM_ROWS`, `NUM_PLACES`)"""
+    document, even = json.loads(term_text), _even()
+    if not of_white(document).is_isotropic:
+        return _at_places_of(document)
+    return np.asarray(even.at_places.values(document).mean(axis=0) * even.cosine)
 
 
 def _one_of(moments: F64) -> tuple[F64, F64]:
