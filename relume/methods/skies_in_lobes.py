@@ -74,14 +74,12 @@ class SkiesInLobes:
 
     def summed(self, environment: EnvironmentKey, *, is_preview: bool) -> SkyLights:
         """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
-        is_baked = environment == BAKED_ENVIRONMENT
+        lit, is_quick = self.lit, is_preview and environment != BAKED_ENVIRONMENT
 
         def made() -> SkyLights:
-            lit = self.lit
-            lights = lit.preview_lights_in(environment) if is_preview and not is_baked else lit.lights_in(environment)
+            lights = lit.preview_lights_in(environment) if is_quick else lit.lights_in(environment)
             return SkyLights.of(
                 *(each[self.order] for each in (lights.direction, lights.irradiance, lit.lights.radius))
             )
 
-        key = self.lit.key, "lights of highlights", environment, is_preview and not is_baked
-        return self.lit.memory.passing.keep(key, made)
+        return lit.memory.passing.keep((lit.key, "lights of highlights", environment, is_quick), made)

@@ -155,19 +155,17 @@ def by_lights(
     lobes: Lobes,
     eye: F32,
     is_needed: NDArray[np.uint8],
-    out: F32 | None = None,
 ) -> F32:
     """Sum the lights that points see in their highlights.
 
     Args:
         surface: whose points. visible: light l of a point in bit l & 7 of byte l >> 3. (points, bytes) uint8
         lights: of the sky. lobes: of all materials. eye: where it is. (3,) float32
-        is_needed: points that are asked. (points,) uint8
-        out: written where needed; None: the others get nothing.
+        is_needed: points that are asked; the others get nothing. (points,) uint8
     Returns:
         Σ, of unit albedo, of what neither lobes nor the in-basis are believed. (points, 3) float32
     """
-    found = np.zeros((len(visible), 3), np.float32) if out is None else out
+    found = np.zeros((len(visible), 3), np.float32)
     rows = np.flatnonzero(is_needed.view(np.bool_))
     args = surface.points, surface.material, visible, lights, lobes, np.ascontiguousarray(eye, np.float32), rows
     for_shares(lambda start, stop: _sum(*args, start, stop, found), len(rows))
