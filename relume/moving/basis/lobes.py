@@ -10,9 +10,10 @@ docs/adr/0098-core-and-skirt.md),
     L_2(ωo) = a(θo) · Σ_n s_n L̄(ω_n, σ_n),   s_1 + s_2 = 1 ,
 
 and for each pixel, too, where both are not alike. What the in-basis cannot tell is summed over lights, by the shape of
-the terms (`relume.moving.basis.shapes`), and where these are narrower than lights it is L_2. L is what changes fastest from point to point, and what is sent less L is interpolated:
-B(pixel) = L(pixel) + Σ_points w (B − L) (docs/adr/0048-highlights-between-points.md). All stand in tables over θo, as
-out-factors do; of terms that depend on φo as well, the mean over it, and one lobe.
+the terms (`relume.moving.basis.shapes`), and where these are narrower than lights it is L_2. L is what changes fastest
+from point to point, and what is sent less L is interpolated: B(pixel) = L(pixel) + Σ_points w (B − L)
+(docs/adr/0048-highlights-between-points.md). All stand in tables over θo, as out-factors do; of terms that depend on
+φo as well, the mean over it, and one lobe.
 """
 
 from __future__ import annotations

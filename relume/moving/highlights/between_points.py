@@ -90,6 +90,6 @@ def add_sky_in_highlights(
         sent: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
     """
     rows = np.flatnonzero(is_needed.view(np.bool_))
-    seen = np.ascontiguousarray(eye, np.float32), glances, lit, surface.textures.bumpiness()
+    seen = np.ascontiguousarray(eye, np.float32), glances, lit, surface.bumpiness
     args = (surface.points, surface.material, lobes, light, *seen, is_fine, rows)
     for_shares(lambda start, stop: _add(*args, start, stop, *sent), len(rows))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,17 +113,6 @@ class Textures(NamedTuple):
     wraps: NDArray[np.int64]
     of_material: NDArray[np.int64]
 
-    def bumpiness(self) -> F32:
-        """Find the variance of the normals of each material about their mean, from its map's coarsest level.
-        (materials,) float32; nothing where it has no map"""
-        out = np.zeros(len(self.of_material), np.float32)
-        for material, texture in enumerate(self.of_material[:, NORMAL_MAP]):
-            if texture >= 0:
-                begin, height, width = self.levels[self.first[texture + 1] - 1]
-                mean = self.texels[begin : begin + height * width].mean(axis=0)
-                out[material] = max(1 - float(mean @ mean), 0)
-        return out
-
 
 @dataclass(frozen=True)
 class Surface:
@@ -152,6 +142,19 @@ class Surface:
     uv_scale: F32
     textures: Textures
     uv_faces: NDArray[np.uint32]
+
+    @cached_property
+    def bumpiness(self) -> F32:
+        """The variance of the normals of each material about their mean, from its map's coarsest level; nothing where
+        it has no map. (materials,) float32"""
+        textures = self.textures
+        out = np.zeros(len(textures.of_material), np.float32)
+        for material, texture in enumerate(textures.of_material[:, NORMAL_MAP]):
+            if texture >= 0:
+                begin, height, width = textures.levels[textures.first[texture + 1] - 1]
+                mean = textures.texels[begin : begin + height * width].mean(axis=0)
+                out[material] = max(1 - float(mean @ mean), 0)
+        return out
 
 
 def read_surface_points(store: StoreReader, start: int = 0, stop: int | None = None) -> Points:

@@ -37,7 +37,7 @@ def shape_of(lobes: Lobes, material: int, bumpiness: F32) -> dict[str, Texels]:
     """The table of a material's highlight.
 
     Args:
-        lobes: of all materials. material: one with a lobe. bumpiness: of all, see `Textures.bumpiness`. (materials,)
+        lobes: of all materials. material: one with a lobe. bumpiness: of all, see `Surface.bumpiness`. (materials,)
     Returns:
         Of each row 1 − β, α², and how far the table is believed where normals bend; then, for each width, of each ring
         the numbers of its first four spokes, and of its last four. (rows · (1 + widths · rings · 2), 4) float16

@@ -133,7 +133,7 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
 def _in_highlights(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Part]:
     """The lights of the sky, and the shape of the highlight of each material that they are summed for."""
     environment, lobes, is_rough = wanted.light.environment, wanted.materials.lobes, wanted.is_rough
-    bumpiness, each = transfer.surface.textures.bumpiness(), wanted.materials.each
+    bumpiness, each = transfer.surface.bumpiness, wanted.materials.each
     shapes = {
         f"shapes/{k}": Part(json.dumps(each[k].terms, sort_keys=True), partial(shape_of, lobes, k, bumpiness))
         for k in np.flatnonzero(lobes.of >= 0).tolist()
