@@ -110,6 +110,19 @@ def checker(size=16, squares=8):
     return Texture(np.repeat(on[..., None], 3, axis=2).astype(np.float32))
 
 
+def corner(materials):
+    """A floor and a ball on it of the first material, before a wall of the second, under a small bright light."""
+    meshes = [
+        quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
+        quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1),
+        sphere("ball", [0.2, 0.3, 0.1], 0.3, 0, rings=8),
+    ]
+    sky = np.full((16, 32, 3), 0.3, np.float32)
+    sky[2:5, 14:18] = 30
+    camera = looking("front", (0.6, 1.2, 2.4), (0, 0.2, 0), 0.7)
+    return scene_of(*meshes, camera=camera, environment=sky, materials=materials)
+
+
 def still_life():
     """A ball and a wall on a checkered floor, two views, every BRDF model in use."""
     terms = {

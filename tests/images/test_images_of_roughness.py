@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from sessions import bake_corner, relative_rmse, settle
-from tiny_scenes import looking, quad, scene_of, sphere
+from tiny_scenes import corner
 
 from relume.brdf.channels import IMAGES
 from relume.errors import NotFoundError, ParameterError
@@ -47,15 +47,7 @@ def plain():
     floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, {**shiny, "roughness_map": True}
     wall = {**floor[0], "color": [0.8, 0.5, 0.2]}, shiny
     materials = [Material("Floor", floor, {}, bumps()), Material("Wall", wall)]
-    meshes = [
-        quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
-        quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1),
-        sphere("ball", [0.2, 0.3, 0.1], 0.3, 0, rings=8),
-    ]
-    sky = np.full((16, 32, 3), 0.3, np.float32)
-    sky[2:5, 14:18] = 30
-    camera = looking("front", (0.6, 1.2, 2.4), (0, 0.2, 0), 0.7)
-    return scene_of(*meshes, camera=camera, environment=sky, materials=materials)
+    return corner(materials)
 
 
 def with_own(scene, name):

@@ -7,7 +7,7 @@ import pytest
 import twins
 from oracle import exact_image
 from sessions import BUDGET, bake_corner, look_of, make_next, relative_rmse, settle
-from tiny_scenes import looking, quad, scene_of, sphere
+from tiny_scenes import corner
 
 from relume.bake import Recipe
 from relume.errors import ChunkDamagedError
@@ -41,15 +41,7 @@ def scene():
         Material("Floor", floor, {"roughness": roughness_map()}),
         Material("Wall", ({"model": "lambert", "color": [0.8, 0.5, 0.2]}, {**shiny, "params": {"roughness": 0.5}})),
     ]
-    meshes = [
-        quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
-        quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1),
-        sphere("ball", [0.2, 0.3, 0.1], 0.3, 0, rings=8),
-    ]
-    sky = np.full((16, 32, 3), 0.3, np.float32)
-    sky[2:5, 14:18] = 30
-    camera = looking("front", (0.6, 1.2, 2.4), (0, 0.2, 0), 0.7)
-    return scene_of(*meshes, camera=camera, environment=sky, materials=materials)
+    return corner(materials)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@ import type { Term } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { baseTexture } from "./colour";
 import { FileOfImage } from "./FileOfImage";
-import { imageOf, images, loadImages, offerToDelete, putImage, sending, sendOnto, takeOff } from "./images";
+import { ImageOptions } from "./ImageOptions";
+import { imageOf, loadImages, offerToDelete, putImage, sending, sendOnto, takeOff } from "./images";
 
 export function BaseImage({ material, terms }: { material: string; terms: readonly Term[] }) {
   useEffect(() => void loadImages(), []);
@@ -27,12 +28,7 @@ export function BaseImage({ material, terms }: { material: string; terms: readon
           }}
         >
           <option value="">{shown === null && texture !== null ? "The scene’s own image" : "No image"}</option>
-          {shown !== null && image === undefined && <option value={shown}>An image that is not here</option>}
-          {images.value.map((each) => (
-            <option key={each.id} value={each.texture}>
-              {each.name}
-            </option>
-          ))}
+          <ImageOptions shown={shown} image={image} />
         </select>
         <FileOfImage label="File of an image" onFile={(file) => void sendOnto(material, file)} />
         {image !== undefined && (

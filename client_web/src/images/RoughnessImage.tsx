@@ -4,7 +4,8 @@ import { isImage } from "../document/texture";
 import type { Term } from "../protocol";
 import { IconButton } from "../ui/Button";
 import { FileOfImage } from "./FileOfImage";
-import { imageOf, images, letGoOver, loadImages, offerToDelete, putRoughness, sendOnto, takeRoughnessOff } from "./images";
+import { ImageOptions } from "./ImageOptions";
+import { imageOf, letGoOver, loadImages, offerToDelete, putRoughness, sendOnto, takeRoughnessOff } from "./images";
 
 interface Props {
   material: string;
@@ -38,12 +39,7 @@ export function RoughnessImage({ material, index, value, hasOwn, onChange }: Pro
         >
           <option value="">None</option>
           {hasOwn && <option value="map">As in the scene</option>}
-          {shown !== null && image === undefined && <option value={shown}>An image that is not here</option>}
-          {images.value.map((each) => (
-            <option key={each.id} value={each.texture}>
-              {each.name}
-            </option>
-          ))}
+          <ImageOptions shown={shown} image={image} />
         </select>
         <FileOfImage label="File of a map of roughness" onFile={(file) => void sendOnto(material, file, put)} />
         {image !== undefined && (
