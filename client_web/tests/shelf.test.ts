@@ -1,5 +1,8 @@
 import { beforeEach, expect, test, vi } from "vitest";
-import { exchange, shelf, unusedName } from "../src/looks/shelf";
+import { history } from "../src/edit/history";
+import { exchange, renameLook, shelf, unusedName } from "../src/looks/shelf";
+import type { SavedLook } from "../src/looks/shelf";
+import { undo } from "../src/looks/undo";
 import { LOOK } from "./look";
 
 let asked: string[];
@@ -49,4 +52,26 @@ test("a name that is taken is said to be, not that somebody changed it", async (
   vi.stubGlobal("fetch", () => Promise.resolve(new Response("{}", { status: 412 })));
   await expect(exchange(old, { name: "Taken", look: LOOK })).rejects.toThrow("There is a look called “Taken” already");
   await expect(exchange(old, { ...old, look: { ...LOOK, lights: {} } })).rejects.toThrow("was changed elsewhere");
+});
+
+test("undo, pressed while a look is being renamed, takes the renaming back and not the step before", async () => {
+  history.clear();
+  let erased = (): void => undefined;
+  const answer = vi.fn((_: string, init: RequestInit) => {
+    const response = () => new Response(init.method === "DELETE" ? null : "{}", { headers: { etag: '"2"' } });
+    if (init.method !== "DELETE") return Promise.resolve(response());
+    return new Promise<Response>((resolve) => (erased = () => resolve(response())));
+  });
+  vi.stubGlobal("fetch", answer);
+  const renaming = renameLook(shelf.value[0] as SavedLook, "New");
+  await vi.waitFor(() => expect(names()).toEqual(["Old", "New"])); // written, the old one is being deleted
+  const undoing = undo();
+  erased();
+  await renaming;
+  expect(names()).toEqual(["New"]);
+  await vi.waitFor(() => expect(names()).toEqual(["New", "Old"]));
+  erased();
+  await undoing;
+  await vi.waitFor(() => expect(history.cursor.value).toBe(0));
+  expect(names()).toEqual(["Old"]);
 });

@@ -112,12 +112,26 @@ export async function exchange(from: NamedLook | null, to: NamedLook | null): Pr
   await erase(from.name);
 }
 
-async function perform(label: string, before: NamedLook | null, after: NamedLook | null): Promise<void> {
+/** The change of the shelf that is under way, and those that wait for it. */
+let underWay: Promise<void> | null = null;
+
+/** When no change is under way: each is a step of the history then. Null where none is. */
+export const settled = (): Promise<void> | null => underWay;
+
+async function change(label: string, before: NamedLook | null, after: NamedLook | null): Promise<void> {
   await attempt(async () => {
     await exchange(before, after);
     history.record({ of: "shelf", label, before, after });
     history.seal();
   });
+}
+
+/** Change the shelf when the changes before this are done: an undo in between would undo the step before. */
+async function perform(label: string, before: NamedLook | null, after: NamedLook | null): Promise<void> {
+  const mine = (underWay ?? Promise.resolve()).then(() => change(label, before, after));
+  underWay = mine;
+  await mine;
+  if (underWay === mine) underWay = null;
 }
 
 const named = ({ name, look }: NamedLook): NamedLook => ({ name, look });

@@ -9,7 +9,7 @@ import { look } from "../state/look";
 import { isTogether } from "../state/together";
 import { attempt, note } from "../ui/toasts";
 import { keyframes } from "./keyframes";
-import { exchange } from "./shelf";
+import { exchange, settled } from "./shelf";
 
 function reversed({ before, after, patch, inverse }: LookStep): Change {
   return { before: after, after: before, patch: inverse, inverse: patch };
@@ -37,5 +37,12 @@ export function goTo(count: number): void {
   leavePassing();
   void attempt(() => history.goTo(count, perform));
 }
-export const undo = () => goTo(history.heading - 1);
-export const redo = () => goTo(history.heading + 1);
+
+/** A look that is being saved, renamed or deleted is a step when that is done: the press is of what was seen by then. */
+async function move(by: 1 | -1): Promise<void> {
+  const pending = settled();
+  if (pending !== null) await pending;
+  goTo(history.heading + by);
+}
+export const undo = () => move(-1);
+export const redo = () => move(1);
