@@ -18,6 +18,7 @@ F32 = NDArray[np.float32]
 COS_TURN = np.cos(np.radians(4.0))  # one sample would show a sharp reflection from one side only
 _COS_EDGE = np.cos(np.radians(20.0))  # a crease
 _DEPTH_EDGE = 0.02  # of the distance, off the plane of the surface beside
+NOT_IN = -2  # the key of pixels whose ray a layer has not
 _BRIGHT = 1.0  # of the mean radiance around; darker details of a map are left to its own filter
 _MOST_TURNING = 1 / 6  # of all pixels; where more turn, as on coarse bumps, those that turn most
 
@@ -26,7 +27,7 @@ def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) 
     """Find pixels that differ from a neighbour, and the least cosine between the normals of each and its neighbours.
 
     Args:
-        key: what is hit. normal, distance: of the hits. directions: of the rays. All are (height, width, …).
+        key: what is hit, `NOT_IN` where a layer has no ray. normal, distance: of the hits. directions: of the rays. All are (height, width, …).
     Returns:
         (height, width) both
     """
@@ -40,7 +41,8 @@ def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) 
             for one, other in ((here, there), (there, here))
         ]
         # off both planes: of one alone may be a surface that is seen along itself
-        differs = (key[here] != key[there]) | (between < _COS_EDGE) | (off[0] & off[1])
+        is_seen = (key[here] != NOT_IN) & (key[there] != NOT_IN)
+        differs = (key[here] != key[there]) | (is_seen & ((between < _COS_EDGE) | (off[0] & off[1])))
         for side in (here, there):
             edge[side] |= differs
             cosine[side] = np.minimum(cosine[side], between)
@@ -77,7 +79,7 @@ def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray
     """
     width, height = size
     normals = normals_at(geometry, layer.hits, layer.directions)
-    key, normal = np.full(width * height, -2), np.zeros((width * height, 3), np.float32)
+    key, normal = np.full(width * height, NOT_IN), np.zeros((width * height, 3), np.float32)
     distance, directions = np.full(width * height, np.inf, np.float32), np.ones((width * height, 3), np.float32)
     key[layer.ray] = layer.key
     normal[layer.ray] = normals

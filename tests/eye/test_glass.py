@@ -97,6 +97,14 @@ def test_a_pane_dims_by_its_tint_and_what_it_reflects_and_bends_nothing():
     np.testing.assert_allclose(behind.hits.distance, 4 / -directions[:, 2], rtol=1e-4)
 
 
+def test_only_the_rim_of_a_small_pane_is_an_edge_of_what_lies_behind_it():
+    corners = np.array([[-0.3, -0.3, 0], [0.3, -0.3, 0], [0.3, 0.3, 0], [-0.3, 0.3, 0]])
+    scene = scene_with(quad("pane", corners, 1), material=glass())
+    samples = sample_view(scene, merge(scene), "front", SIZE)
+    assert np.bincount(samples.pixel).max() > 2
+    assert samples.num_rays < 2.5 * SIZE[0] * SIZE[1]
+
+
 @pytest.mark.parametrize("ior", [1.0, 1.5, 2.4])
 def test_a_slab_shifts_what_is_behind_it_as_snell_says(ior):
     depth, directions = 0.5, slanted()
