@@ -27,7 +27,8 @@ def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) 
     """Find pixels that differ from a neighbour, and the least cosine between the normals of each and its neighbours.
 
     Args:
-        key: what is hit, `NOT_IN` where a layer has no ray. normal, distance: of the hits. directions: of the rays. All are (height, width, …).
+        key: what is hit, `NOT_IN` where a layer has no ray. normal, distance: of the hits. directions: of the rays.
+            All are (height, width, …).
     Returns:
         (height, width) both
     """
