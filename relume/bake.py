@@ -8,14 +8,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import IO, Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from relume.scene.model import Scene
 from relume.scene.placed_camera import PlacedCamera, with_cameras
 
-Arrays = Mapping[str, NDArray[Any]]
+
+class Rows(Protocol):
+    """Rows that need not be in memory together: an array, or what reads them when they are asked for."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of all rows."""
+        ...
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of a number."""
+        ...
+
+    def __getitem__(self, rows: slice, /) -> NDArray[Any]:
+        """Some rows that follow each other."""
+        ...
+
+
+Arrays = Mapping[str, Rows]
 
 
 @dataclass(frozen=True)
@@ -134,6 +154,14 @@ class StoreReader(Protocol):
         ...
 
 
+class TaskStore(StoreReader, Protocol):
+    """What a task reads, and where it puts aside what it would not hold in memory."""
+
+    def scratch(self) -> IO[bytes]:
+        """A file, open for writing and reading, that is gone when it is closed."""
+        ...
+
+
 class BakeMethod(Protocol):
     """How one paper's light transport is baked; `relume.methods.base.TransferMethod` opens it as well."""
 
@@ -177,7 +205,7 @@ class BakeMethod(Protocol):
         """
         ...
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
         """Compute a task's rows; pure, seeded by (scene id, task).
 
         Args:

@@ -82,10 +82,10 @@ def merged(
     return Chosen(pixels[pixel], (size / num).astype(np.float32), of_group)
 
 
-def alone(layer: Layer, is_edge: NDArray[np.bool_]) -> Chosen:
-    """The rays of a layer through the middles of pixels that are no edges. is_edge: of all pixels. (pixels,)"""
-    rows = np.flatnonzero(layer.is_shown & ~is_edge[layer.ray])
-    return Chosen(layer.ray[rows], np.ones(len(rows), np.float32), layer.rows(rows))
+def alone(layer: Layer, pixels: NDArray[np.int64]) -> Chosen:
+    """The rays of a layer through the middles of pixels that are no edges. pixels: of all rays. (p,)"""
+    seen = layer.shown
+    return Chosen(pixels[seen.ray], np.ones(len(seen.ray), np.float32), seen)
 
 
 def joined(parts: Sequence[Chosen], most_mirrors: int) -> Chosen:

@@ -63,20 +63,27 @@ def is_off_plane(normal: F32, distance: F32, direction: F32, other_distance: F32
         return np.asarray(np.abs(other_distance - distance * slope) > _DEPTH_EDGE * nearer)
 
 
-def _turning(edge: NDArray[np.bool_], cosine: F32, key: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Find pixels that are no edges, but whose normals turn enough for reflections to alias. (height, width)"""
-    turning = ~edge & (cosine < COS_TURN) & (key >= 0)
-    most = int(_MOST_TURNING * edge.size)
+def is_turning(cosine: F32) -> NDArray[np.bool_]:
+    """Find pixels that are no edges, but whose normals turn enough for reflections to alias. (pixels,)
+
+    Args:
+        cosine: of all pixels of a picture, from `edges_of`. (pixels,)
+    """
+    turning = cosine < COS_TURN
+    most = int(_MOST_TURNING * cosine.size)
     if np.count_nonzero(turning) > most:
         turning &= cosine < np.partition(cosine[turning], most)[most]
     return np.asarray(turning)
 
 
-def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Find pixels that want more rays by what a layer shows. (pixels,)
+def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> tuple[NDArray[np.bool_], F32]:
+    """Find pixels that want more rays by what a layer shows.
 
     Args:
         geometry: the triangles. layer: of one ray through the middle of each pixel. size: width and height in pixels.
+    Returns:
+        (pixels,) both: whether it is an edge; else the least cosine between its normal and its neighbours', 1 where
+        there is nothing that turns.
     """
     width, height = size
     normals = normals_at(geometry, layer.hits, layer.directions)
@@ -90,20 +97,25 @@ def edges_of(geometry: Geometry, layer: Layer, size: tuple[int, int]) -> NDArray
     shape = (height, width)
     seen = key.reshape(shape)
     differs, cosine = _edges(seen, normal.reshape(*shape, 3), distance.reshape(shape), directions.reshape(*shape, 3))
-    return np.asarray((differs | _turning(differs, cosine, seen)).ravel())
+    cosine[differs | (seen < 0)] = 1
+    return differs.ravel(), cosine.ravel()
 
 
-def bright_edges_of(layer: Layer, environment: F32, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Find pixels where the background, seen in mirrors, has the rim of something bright, as a sun. (pixels,)
+def brightness_of(environment: F32) -> float:
+    """By how much neighbours differ where one shows something bright, as a sun. environment: (h, w, 3) float32"""
+    return _BRIGHT * float(luminance(environment).mean())
+
+
+def bright_edges_of(layer: Layer, environment: F32, bright: float, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Find pixels where the background, seen in mirrors, has the rim of something bright. (pixels,)
 
     Args:
         layer: of one ray through the middle of each pixel. environment: its radiance. (h, w, 3) float32
-        size: width and height of the picture in pixels.
+        bright: from `brightness_of`. size: width and height of the picture in pixels.
     """
     width, height = size
     value, rows = np.full(width * height, np.nan), np.flatnonzero(layer.hits.face < 0)
     value[layer.ray[rows]] = luminance(lookup(environment, layer.directions[rows]))
-    bright = _BRIGHT * float(luminance(environment).mean())
     edge = np.zeros((height, width), np.bool_)
     seen = value.reshape(height, width)
     for here, there in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):

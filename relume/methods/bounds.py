@@ -16,7 +16,8 @@ from relume.errors import PlanError
 from relume.eye.layers import most_layers, most_shown
 from relume.eye.merged import PATTERNS, POSITIONS_A_PIXEL
 from relume.eye.tinted import RAYS_TO_TINTED, has_tinted_glass
-from relume.eye.view_samples import EDGES_A_BLOCK, most_samples
+from relume.eye.view_samples import most_samples
+from relume.eye.windows import SIDE
 from relume.light.gather_rays import MAX_RAYS
 from relume.scene.emission import has_images
 from relume.scene.model import Mesh, Scene, Texture
@@ -27,6 +28,9 @@ PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled ke
 _TREE_BYTES_A_TRIANGLE = 160  # Embree's, while it is built
 LIGHT_BYTES_A_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
 BYTES_A_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
+_PIXEL_BYTES = 16  # of what is known of every pixel before samples are made, and while they are looked through
+_PARTED_BYTES = 40  # of a sample, while it is found which are of one channel
+_WRITING_BYTES = 64 << 20  # a shard of a column, as it is, compressed, and while it is read
 _HALVINGS = 1 / 3  # of a texture's texels, in half precision
 _HALVING = 2  # of the largest texture's bytes, while its first halving is made
 _CUTOUT_BYTES = 80  # of a material: its row of `relume.trace.cutouts.Cutouts`
@@ -42,7 +46,7 @@ def samples_of_view(scene: Scene, recipe: Recipe) -> int:
 def camera_rays(scene: Scene, recipe: Recipe) -> int:
     """Rays that find the samples of all views: one through each pixel, then all positions of each, and all layers."""
     width, height = recipe.size
-    of_pixel = 1 + sum(map(len, PATTERNS))  # where many found too much, fewer are tried
+    of_pixel = 2 + sum(map(len, PATTERNS))  # where many found too much, fewer are tried
     return of_pixel * width * height * len(recipe.views) * most_layers(scene.materials)
 
 
@@ -124,9 +128,10 @@ def process_bytes(scene: Scene) -> int:
 def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
     """What a task of the first stage takes besides: the lights, or the samples of a view."""
     num_pixels = recipe.size[0] * recipe.size[1]
-    at_once = num_pixels + POSITIONS_A_PIXEL * min(num_pixels, EDGES_A_BLOCK)
-    num_rays = at_once * most_layers(scene.materials) + samples_of_view(scene, recipe)
-    return max(weighing_bytes(scene), num_rays * BYTES_A_RAY)
+    num_rays = (1 + POSITIONS_A_PIXEL) * min(num_pixels, SIDE**2) * most_layers(scene.materials)
+    parted = _PARTED_BYTES * samples_of_view(scene, recipe) if has_tinted_glass(scene.materials) else 0
+    sampling = num_rays * BYTES_A_RAY + num_pixels * _PIXEL_BYTES + parted + _WRITING_BYTES
+    return max(weighing_bytes(scene), sampling)
 
 
 def weighing_bytes(scene: Scene) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, Written
 from relume.memory import Memory
 from relume.methods import bounds
 from relume.methods.sampled_views import SampledViews
@@ -46,7 +46,7 @@ class DirectMethod:
         """The visibility of each view; the arrays of the first stage are made by its tasks. See `BakeMethod`."""
         return self._views.arrays(stage, scene, recipe, store)
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
         """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
         return self._views.compute(scene, recipe, task, store)
 

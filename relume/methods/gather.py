@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, Written
 from relume.brdf.albedo import is_diffuse
 from relume.eye.flat_mirrors import lights_in_mirrors
 from relume.light.gather_rays import make_pattern
@@ -148,7 +148,7 @@ class GatherMethod:
         ]
         return [*of_cells, *of_views]
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
         """One task; seeds are the scene's and the numbers of rows: the same bits anywhere. See `BakeMethod`."""
         if task.stage < _CELLS:
             return self._views.compute(scene, recipe, task, store)

@@ -28,11 +28,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, Written
 from relume.errors import PlanError
 from relume.eye.layers import has_layers
 from relume.eye.mirrors import MOST_MIRRORS
-from relume.eye.view_samples import BACKGROUND, sample_view
+from relume.eye.view_samples import BACKGROUND, eye_of, sampled
 from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.light.triangles import Unturned, weigh
 from relume.look import default_look
@@ -102,7 +102,8 @@ class SampledViews:
         surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_images(scene) else 0)
         surface_bytes += _BUMP_BYTES if _has_bumps(scene) else 0
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
-        in_store = samples * (bits + surface_bytes) + bounds.lights_bytes(scene, recipe)
+        # while samples are sorted, files of them are there twice, and no bits yet
+        in_store = samples * (surface_bytes + max(bits, surface_bytes)) + bounds.lights_bytes(scene, recipe)
         num_rays = samples * recipe.num_lights + bounds.camera_rays(scene, recipe) + bounds.tinted_rays(scene, samples)
         sampling, tracing = bounds.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)
         besides = max(tracing, bounds.weighing_bytes(scene))  # while a single view is sampled, others do this at most
@@ -168,33 +169,16 @@ class SampledViews:
             for k in range(len(recipe.views))
         ]
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
         """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
         if task.stage == 1:
             return self._visibility(scene, recipe.views.index(task.view), task, store)
         if not task.view:
             return Written({**lights_of(scene, recipe), **triangles_of(self.geometry_of(scene), scene)}, 0, 0.0)
-        geometry = self.geometry_of(scene)
-        samples = sample_view(scene, geometry, task.view, recipe.size, smooths_edges=self._smooths_edges)
-        points = samples.surface.points
-        arrays: dict[str, NDArray[Any]] = {
-            "pixel": samples.pixel, "weight": samples.weight, "material": samples.material,
-            "position": points.position, "normal": points.normal, "tangent": points.tangent,
-            "diffuse": samples.surface.diffuse, "specular": samples.surface.specular, "uv": samples.surface.uv,
-            "level": samples.level,
-        }  # fmt: skip
-        if has_layers(scene.materials):
-            chain = samples.chain
-            arrays |= {
-                "through": samples.through, "eye": samples.eye, "is_mirrored": samples.is_mirrored,
-                "mirror": chain.material, "mirror_cosine": chain.cos_theta_i, "mirror_tint": chain.tint,
-            }  # fmt: skip
-        if has_images(scene):
-            arrays["emission"] = samples.surface.emission
-        if _has_bumps(scene):
-            arrays["normal_length"] = samples.surface.normal_length
+        eye = eye_of(scene, self.geometry_of(scene), task.view, recipe.size)
+        columns, num_rays = sampled(eye, store.scratch, _columns(scene), smooths_edges=self._smooths_edges)
         prefix = f"views/{recipe.views.index(task.view)}"
-        return Written({f"{prefix}/{name}": a for name, a in arrays.items()}, samples.num_rays, 0.0)
+        return Written({f"{prefix}/{name}": column for name, column in columns.items()}, num_rays, 0.0)
 
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
         prefix = f"views/{k}"
@@ -212,6 +196,16 @@ class SampledViews:
             if self._geometry is None or self._geometry[0] != scene.id:
                 self._geometry = scene.id, merge(scene)
             return self._geometry[1]
+
+
+def _columns(scene: Scene) -> list[str]:
+    """What is kept of view samples."""
+    names = ["pixel", "weight", "material", "level", "position", "normal", "tangent", "diffuse", "specular", "uv"]
+    if has_layers(scene.materials):
+        names += ["through", "eye", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
+    if has_images(scene):
+        names.append("emission")
+    return names + ["normal_length"] * _has_bumps(scene)
 
 
 def _has_bumps(scene: Scene) -> bool:

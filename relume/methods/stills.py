@@ -8,11 +8,12 @@ is exact as `gather` is, and all that is made from the bake's light is shared wi
 from __future__ import annotations
 
 import hashlib
+import io
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ _SAMPLES, _SHADOWS, _LINKS = 0, 1, 3  # stages of `gather`; the one between them
 
 
 class StoreWithView:
-    """A store in which nothing is written: over it the arrays of one more view, the first; a `StoreReader`."""
+    """A store in which nothing is written: over it the arrays of one more view, the first; a `TaskStore`."""
 
     def __init__(self, store: StoreReader, attributes: Mapping[str, Any]) -> None:
         self._store, self._attributes = store, {**store.attributes, **attributes}
@@ -50,6 +51,10 @@ class StoreWithView:
     def shape(self, path: str) -> tuple[int, ...]:
         """Shape of an array."""
         return self.arrays[path].shape if path in self.arrays else self._store.shape(path)
+
+    def scratch(self) -> IO[bytes]:
+        """In memory: a still's view is there all the same."""
+        return io.BytesIO()
 
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """Rows [start, stop) of the array at a path."""
@@ -110,7 +115,8 @@ class Tracing:
     def __init__(self, method: GatherMethod, scene: Scene, recipe: Recipe, store: StoreWithView) -> None:
         self._method, self._scene, self._recipe, self.store = method, scene, recipe, store
         sampling = Task(_SAMPLES, 1, recipe.views[0], 0, 0)
-        store.arrays.update(method.compute(scene, recipe, sampling, store).arrays)
+        found = method.compute(scene, recipe, sampling, store).arrays
+        store.arrays.update({path: np.asarray(rows) for path, rows in found.items()})
         for stage in (_SHADOWS, _LINKS):
             of_view = (s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
             store.arrays.update({spec.path: np.empty(spec.shape, spec.dtype) for spec in of_view})

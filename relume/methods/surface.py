@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, Written
 from relume.errors import PlanError
 from relume.light.gather_rays import make_pattern
 from relume.light.triangles import subdivide
@@ -168,7 +168,7 @@ class SurfaceMethod:
             for name, width, dtype in zip(("visibility", "links"), both, ("uint8", "uint16"), strict=True)
         ]
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
         """One task; seeds are the scene's and the numbers of rows: the same bits anywhere. See `BakeMethod`."""
         if task.stage == 0:
             make = {"lights": self._lights, "points": self._points, "cells": self._cells}

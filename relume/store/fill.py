@@ -76,7 +76,7 @@ def run_task(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, ta
         elif rows.shape[0] != task.stop - task.start:
             raise StoreError(f"task {task} computed {rows.shape[0]} rows of {path}")
         else:
-            writer.write(path, rows, task.start)
+            writer.write(path, rows[:], task.start)
     return written
 
 

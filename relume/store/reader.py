@@ -6,11 +6,12 @@ Zarr fills what it does not find; here a missing shard, a cut shard and a failed
 from __future__ import annotations
 
 import math
+import tempfile
 import threading
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import zarr
@@ -35,7 +36,7 @@ zarr.config.set({"async.concurrency": 4, "threading.max_workers": 4})
 
 
 class Reader:
-    """A store open for reading; implements `relume.bake.StoreReader`. Safe to use from several threads."""
+    """A store open for reading; implements `relume.bake.TaskStore`. Safe to use from several threads."""
 
     def __init__(self, path: Path, attributes: Mapping[str, Any]) -> None:
         self.path = path
@@ -72,6 +73,10 @@ class Reader:
             if not (self.path / "zarr.json").is_file():
                 raise StoreGoneError from error
             raise
+
+    def scratch(self) -> IO[bytes]:
+        """A file beside the arrays, of no name that anybody would read. See `relume.bake.TaskStore`."""
+        return tempfile.TemporaryFile(dir=self.path)
 
     def _rows(self, path: str, start: int, stop: int | None) -> NDArray[Any]:
         spec, array = self._open(path)

@@ -33,6 +33,7 @@ MAX_DIMENSIONS = 5
 
 # What a task creates without announcing it is read whole or in long runs: chunks of about this size suit both.
 UNANNOUNCED_CHUNK_BYTES = 512 << 10
+UNANNOUNCED_CHUNKS_A_SHARD = 32  # a shard is in memory while it is written, as it is and compressed
 
 _SEGMENT = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
@@ -103,7 +104,7 @@ def check_version(attributes: Mapping[str, Any]) -> None:
 
 
 def default_layout(path: str, shape: tuple[int, ...], dtype: str, item_bytes: int) -> ArraySpec:
-    """The layout of an array that its task writes whole: chunks of about half a megabyte, one shard.
+    """The layout of an array that its task writes whole: chunks of about half a megabyte, shards of some of them.
 
     Args:
         path: of the array inside the store. shape: of at least one dimension.
@@ -117,5 +118,5 @@ def default_layout(path: str, shape: tuple[int, ...], dtype: str, item_bytes: in
     rows = 1 << max(0, (UNANNOUNCED_CHUNK_BYTES // row_bytes).bit_length() - 1)
     rows = max(1, min(rows, shape[0]))
     rest = tuple(max(1, n) for n in shape[1:])
-    shard_rows = max(1, -(-shape[0] // rows)) * rows
+    shard_rows = min(max(1, -(-shape[0] // rows)), UNANNOUNCED_CHUNKS_A_SHARD) * rows
     return check_spec(ArraySpec(path, shape, dtype, (rows, *rest), (shard_rows, *rest)))

@@ -18,7 +18,7 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.errors import ContainsGroupError
 from zarr.storage import LocalStore
 
-from relume.bake import ArraySpec
+from relume.bake import ArraySpec, Rows
 from relume.errors import StoreError
 from relume.store.files import read_json
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
@@ -100,10 +100,12 @@ class StoreWriter:
             array = cast("zarr.Array[Any]", self._root[path]).with_config({"write_empty_chunks": True})
             array[start:stop] = rows
 
-    def write_whole(self, path: str, values: NDArray[Any]) -> None:
-        """Create an array that nobody announced, as large as `values`, and write it."""
-        self.create_array(default_layout(path, values.shape, values.dtype.name, values.dtype.itemsize))
-        self.write(path, values)
+    def write_whole(self, path: str, values: Rows) -> None:
+        """Create an array that nobody announced, as large as `values`, and write it shard by shard."""
+        spec = default_layout(path, values.shape, values.dtype.name, values.dtype.itemsize)
+        self.create_array(spec)
+        for start in range(0, spec.shape[0], spec.shards[0]):
+            self.write(path, values[start : start + spec.shards[0]], start)
 
     def _spec(self, path: str) -> ArraySpec | None:
         document = self.path / path / "zarr.json"

@@ -66,7 +66,8 @@ def _trace(intersect, scene, arguments, origins, directions, chance, start, stop
         for k in range(width):
             r = first + k
             face[r], distance[r] = hit_of(packet, k)
-            uv[r, 0], uv[r, 1] = uv_of(packet, k)
+            if face[r] >= 0:  # else there are those of a ray before
+                uv[r, 0], uv[r, 1] = uv_of(packet, k)
 
 
 def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 | np.float32 = _BY_DIRECTION) -> Hits:
@@ -79,7 +80,7 @@ def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 | n
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
     is_coherent, chances = len(origins) == 1, np.atleast_1d(chance)
-    hits = Hits(np.empty(n, np.int32), np.empty((n, 2), np.float32), np.empty(n, np.float32))
+    hits = Hits(np.empty(n, np.int32), np.zeros((n, 2), np.float32), np.empty(n, np.float32))
     arguments = packet_arguments(is_coherent)
     for_ranges(
         lambda start, stop: _trace(

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.brdf.levels import Levels
 from relume.errors import StoreError
-from relume.eye.view_samples import morton, thresholds
+from relume.eye.view_samples import thresholds
+from relume.eye.windows import morton
 from relume.images.shelf import mean_roughness, roughness_of
 from relume.scene.roughness import level_of, levels_between, widened
 from relume.trace.texture import sample_image

@@ -7,7 +7,9 @@ from relume.brdf import document as terms
 from relume.brdf.channels import IMAGES
 from relume.environments import asset_store as environments
 from relume.environments import reading as environment
+from relume.eye.merged import POSITIONS_A_PIXEL
 from relume.eye.view_samples import most_samples
+from relume.eye.windows import SIDE
 from relume.imageio import decoding as images
 from relume.images import reading
 from relume.light import tiles
@@ -94,4 +96,6 @@ def test_what_is_said_of_plans_is_what_plans_count() -> None:
     assert "two from 1024 × 1024 on" in text
     assert f"the process ({bounds.PROGRAM_BYTES // MILLION} MB)" in text
     assert f"({bounds.LIGHT_BYTES_A_TEXEL} bytes a texel)" in text
-    assert f"({bounds.BYTES_A_RAY} bytes each, three a pixel of a large one" in text
+    assert f"({bounds.BYTES_A_RAY} bytes each, nine a pixel" in text
+    assert POSITIONS_A_PIXEL == 8
+    assert f"a window of {SIDE} × {SIDE} of them" in text

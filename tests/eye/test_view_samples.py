@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from foliage import tuft
 from tiny_scenes import checker, looking, mesh, quad, scene_of, sphere, still_life, studio
 
 from relume.environments.equirect import direction_to_uv
-from relume.eye import view_samples
+from relume.eye import view_samples, windows
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.scene.model import Material, Texture
+from relume.scene.model import Coding, Material, Texture
 from relume.trace.geometry import merge
 from relume.trace.primary import camera_directions
 from relume.trace.texture import MipMap
@@ -68,14 +70,29 @@ def test_edges_have_more_samples_and_smooth_places_one(still):
     assert (count[-6:-1, 1:-1] == 1).all()  # the floor in the foreground
 
 
-def test_edges_found_in_blocks_are_those_found_at_once(still, monkeypatch):
-    scene, samples = still
-    monkeypatch.setattr(view_samples, "EDGES_A_BLOCK", 100)
-    parted = sampled(scene)
-    assert parted.num_rays == samples.num_rays
-    for name in ("pixel", "weight", "material"):
-        np.testing.assert_array_equal(getattr(parted, name), getattr(samples, name))
-    np.testing.assert_array_equal(parted.surface.points.position, samples.surface.points.position)
+def flat(record):
+    """All arrays of a record and of the records in it, by name."""
+    fields = record._asdict() if hasattr(record, "_asdict") else vars(record)
+    found = {}
+    for name, value in fields.items():
+        found |= {name: value} if isinstance(value, np.ndarray) else flat(value) if name != "num_rays" else {}
+    return found
+
+
+@pytest.mark.parametrize("is_rough", [False, True])
+def test_samples_found_window_by_window_are_those_found_at_once(still, is_rough, monkeypatch):
+    scene, at_once = still
+    if is_rough:  # in levels, which come before the order in the picture
+        texels = np.random.default_rng(1).integers(80, 255, (32, 32, 1), np.uint8)
+        rough = Texture(texels, coding=Coding("share", (1.0, 1.0, 1.0)))
+        scene = replace(scene, materials=[replace(m, textures={"roughness": rough}) for m in scene.materials])
+        at_once = sampled(scene)
+        assert len(np.unique(at_once.level)) > 4
+    monkeypatch.setattr(windows, "SIDE", 16)
+    by_window = flat(sampled(scene))
+    assert len(windows.windows_of(SIZE)) == 12
+    for name, values in flat(at_once).items():
+        np.testing.assert_array_equal(by_window[name], values, err_msg=name)
 
 
 @pytest.mark.parametrize(("room", "most"), [(4, 8), (3, 4), (2, 2)])

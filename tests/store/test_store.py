@@ -11,7 +11,7 @@ import pytest
 
 from relume.bake import ArraySpec
 from relume.errors import ChunkDamagedError, SchemaVersionError, StoreError, StoreGoneError, StoreNotFoundError
-from relume.store import StoreWriter, create_store, open_store, publish
+from relume.store import StoreWriter, create_store, open_store, publish, schema
 from relume.store.publish import verify_manifest
 
 ROWS = 100
@@ -53,6 +53,17 @@ def test_reopened_store_gives_what_was_written(tmp_path: Path) -> None:
     np.testing.assert_array_equal(reader.read(SPEC.path), bits())
     np.testing.assert_array_equal(reader.read(SPEC.path, 30, 97), bits()[30:97])
     np.testing.assert_array_equal(reader.read("views/front/depth"), np.linspace(0, 1, 5000, dtype=np.float32))
+
+
+def test_arrays_that_nobody_announced_have_shards_of_some_chunks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(schema, "UNANNOUNCED_CHUNK_BYTES", 4000)
+    values = np.random.default_rng(1).random((70_000, 1), np.float32)
+    create_store(tmp_path / "s", {}).write_whole("depth", values)
+    publish(tmp_path / "s", tmp_path / "t")
+    assert sum(p.is_file() for p in (tmp_path / "t" / "depth" / "c").rglob("*")) == 5
+    np.testing.assert_array_equal(open_store(tmp_path / "t").read("depth"), values)
 
 
 def test_same_input_gives_the_same_files_in_any_order_of_writing(tmp_path: Path) -> None:
