@@ -481,7 +481,7 @@ export interface HelloMessage {
   moving_error: MovingError | null;
 }
 
-/** An image that terms of looks may name as `texture` or `roughness_map`, in the place of their material's own. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. */
+/** An image that terms of looks may name as `texture` or `roughness_map`, in the place of their material's own. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says where it is metal; `base`: its base colour, an image, "diffuse" or "scene" of the scene's own textures, or null where that is the same everywhere. */
 export interface ImageBody {
   id: string;
   texture: string;
@@ -490,6 +490,8 @@ export interface ImageBody {
   size: [number, number];
   warnings: string[];
   roughness: number;
+  metalness: string | null;
+  base: string | null;
   thumbnail: string;
 }
 
@@ -584,6 +586,11 @@ export interface MeasuredBody {
   thumbnail: string;
   lobes_error: [number, number, number];
   homomorphic_error: [number, number, number];
+}
+
+/** What its terms become: textures of what scatters light and of highlights, and their mean f0. */
+export interface MetalnessBody {
+  terms: Record<string, unknown>[];
 }
 
 /** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the parameter that maps of roughness scale, `width_power` the power of a roughness that it grows with, `mirrors_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`). */

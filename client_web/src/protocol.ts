@@ -79,6 +79,7 @@ export type LightKind = doc.LightLook["kind"];
 
 /** A library material, its terms in look-document form. */
 export type MeasuredBody = Omit<gen.MeasuredBody, "terms"> & { terms: Term[] };
+export type MetalnessBody = Omit<gen.MetalnessBody, "terms"> & { terms: Term[] };
 export type BtfBody = Omit<gen.BtfBody, "terms"> & { terms: Term[] };
 export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 

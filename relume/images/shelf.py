@@ -5,32 +5,61 @@ itself, no display value.
 
     <folder>/<id>/texels.npy       bytes of display values, or reflectances. (height, width, 3) uint8 or float16
                   thumbnail.png
-                  image.json       name, and what had to be changed
+                  image.json       name, and what had to be changed; of those that `relume.images.metals` makes what of,
+                                   what their values are multiplied by, and how they continue outside
 
 Look documents name one as "image:<id>".
 """
 
 from __future__ import annotations
 
+import json
+import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.brdf.channels import IMAGES
+from relume.brdf.channels import IMAGES, is_image
 from relume.color import srgb_encode
 from relume.imageio.files import png_bytes, to_bytes
 from relume.images.reading import MAX_SIDE, read_image
 from relume.remarks import Remark, remark_of
-from relume.scene.model import Coding, Texture
+from relume.scene.model import WRAPS, Coding, Texture
 
 THUMBNAIL_SIDE = 96
 _TEXELS, _THUMBNAIL = "texels.npy", "thumbnail.png"
 _LEAST_ROUGHNESS = 1 / 255  # of a mean: black images are smooth everywhere
+
+
+class MadeOf(NamedTuple):
+    """What an image was made of that nobody sent, see `relume.images.metals`.
+
+    Attributes:
+        channel: whose place it takes.
+        metalness: the image that says where the material is metal. base: that of the base colour; or "diffuse" or
+            "scene" where the scene's own textures say that colour; None where it is the same everywhere.
+        scene, material: whose textures these are; empty where they were not needed.
+        factor: what multiplies the base colour. dielectric: reflectance head-on of what is no metal. Three numbers each
+    """
+
+    channel: str
+    metalness: str
+    base: str | None
+    scene: str
+    material: str
+    factor: tuple[float, float, float]
+    dielectric: tuple[float, float, float]
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """The images among them."""
+        return tuple(name for name in (self.metalness, self.base) if is_image(name))
 
 
 @dataclass(frozen=True)
@@ -39,7 +68,7 @@ class ImageRecord:
 
     Attributes:
         created: seconds since 1970. size: width and height. warnings: what was changed, one sentence each.
-        roughness: the mean of it, as a map of roughness.
+        roughness: the mean of it, as a map of roughness. made_of: other images; None where it was sent.
     """
 
     id: str
@@ -48,6 +77,7 @@ class ImageRecord:
     size: tuple[int, int]
     warnings: tuple[Remark, ...]
     roughness: float
+    made_of: MadeOf | None = None
 
     @property
     def texture(self) -> str:
@@ -64,15 +94,39 @@ def keep(folder: Path, source: Path, name: str) -> ImageRecord:
         SceneError: the file cannot be used, or the store is full.
     """
     texture, said = read_image(source, name)
-    height, width = texture.pixels.shape[:2]
 
     def fill(made: Path) -> dict[str, Any]:
-        np.save(made / _TEXELS, texture.pixels)
-        (made / _THUMBNAIL).write_bytes(_thumbnail(texture))
-        said_so = [remark.document() for remark in said]
-        return {"size": [width, height], "warnings": said_so, "roughness": _mean(_shares(texture))}
+        return _write(made, texture) | {"warnings": [remark.document() for remark in said]}
 
     return get_record(folder, IMAGES.keep(folder, source, name, fill))
+
+
+def keep_made(folder: Path, name: str, of: MadeOf, make: Callable[[], Texture]) -> ImageRecord:
+    """Keep an image that is made of others under the hash of what it is made of; one that is here is not made again.
+
+    Args:
+        folder: of the asset store. name: what people call it. of: the others. make: its texels, bytes.
+    Raises:
+        SceneError: the store is full. And what `make` raises.
+    """
+
+    def fill(made: Path) -> dict[str, Any]:
+        texture = make()
+        scale = (texture.coding or Coding("srgb")).scale
+        return _write(made, texture) | {"warnings": [], "made_of": of._asdict(), "scale": scale, "wrap": texture.wrap}
+
+    with tempfile.TemporaryDirectory() as unfinished:
+        source = Path(unfinished) / "made_of.json"
+        source.write_text(json.dumps(of._asdict(), sort_keys=True))
+        return get_record(folder, IMAGES.keep(folder, source, name, fill))
+
+
+def _write(folder: Path, texture: Texture) -> dict[str, Any]:
+    """Write an image's files; returns what its record says of them."""
+    height, width = texture.pixels.shape[:2]
+    np.save(folder / _TEXELS, texture.pixels)
+    (folder / _THUMBNAIL).write_bytes(_thumbnail(texture))
+    return {"size": [width, height], "roughness": _mean(_shares(texture))}
 
 
 def records(folder: Path) -> list[ImageRecord]:
@@ -90,7 +144,27 @@ def get_record(folder: Path, identity: str) -> ImageRecord:
     said, roughness = tuple(map(remark_of, warnings)), document.get("roughness")
     if not isinstance(roughness, float):  # kept before images were maps of roughness
         roughness = mean_roughness(IMAGES.prefix + identity)
-    return ImageRecord(identity, document["name"], document["created"], (size[0], size[1]), said, roughness)
+    made = _made_of(document, path)
+    return ImageRecord(identity, document["name"], document["created"], (size[0], size[1]), said, roughness, made)
+
+
+def made_of(name: str) -> MadeOf | None:
+    """What the image that a look names was made of; None where it was sent. Raises what `texture_of` raises."""
+    path = IMAGES.found(name)
+    return _made_of(IMAGES.read(path), path)
+
+
+def _made_of(document: dict[str, Any], path: Path) -> MadeOf | None:
+    """Written by `keep_made`: damaged where anything of it is missing."""
+    said = document.get("made_of")
+    try:
+        if said is None:
+            return None
+        of = MadeOf(**said)
+        (red, green, blue), (r, g, b) = of.factor, of.dielectric
+        return of._replace(factor=(red, green, blue), dielectric=(r, g, b))
+    except (TypeError, ValueError) as error:
+        raise IMAGES.damaged(path) from error
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:
@@ -144,7 +218,13 @@ def _load(path: Path) -> Texture:
     is_image = texels.ndim == 3 and texels.shape[2] == 3 and min(texels.shape[:2]) >= 1
     if not is_image or max(texels.shape[:2]) > MAX_SIDE or texels.dtype not in (np.uint8, np.float16):
         raise IMAGES.damaged(path)
-    return Texture(texels, coding=Coding("srgb") if texels.dtype == np.uint8 else None)
+    if texels.dtype == np.float16:
+        return Texture(texels)
+    document = IMAGES.read(path)
+    scale, wrap = document.get("scale", [1.0, 1.0, 1.0]), document.get("wrap", ["repeat", "repeat"])
+    if [*map(type, scale)] != 3 * [float] or len(wrap) != 2 or not set(wrap) <= set(WRAPS):
+        raise IMAGES.damaged(path)
+    return Texture(texels, (wrap[0], wrap[1]), Coding("srgb", (scale[0], scale[1], scale[2])))
 
 
 def _thumbnail(texture: Texture) -> bytes:

@@ -16,7 +16,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from relume.environments.model import Environment
-from relume.errors import SceneError
+from relume.errors import NotFoundError, SceneError
 from relume.remarks import Remark, remark_of
 from relume.replacing import replacing
 from relume.scene.checks import check_scene
@@ -115,6 +115,23 @@ def load_cameras(folder: str | Path) -> list[Camera]:
         return _cameras(_read_document(Path(folder) / "scene.json"))
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
         raise SceneError(f"the cameras of the scene in {Path(folder).name!r} cannot be read; {REMEDY}") from problem
+
+
+def load_material(folder: str | Path, name: str) -> Material:
+    """One material of what `save_scene` wrote, with its own arrays alone.
+
+    Raises:
+        SceneError: it cannot be read. NotFoundError: the scene has no such material.
+    """
+    folder = Path(folder)
+    try:
+        for index, document in enumerate(_read_document(folder / "scene.json")["materials"]):
+            if document["name"] == name:
+                arrays = _read_arrays(folder / "arrays.npz", f"material{index}_")
+                return _assemble_material(index, document, arrays)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, zipfile.BadZipFile) as problem:
+        raise SceneError(f"the materials of the scene in {folder.name!r} cannot be read; {REMEDY}") from problem
+    raise NotFoundError(f"the scene has no material {name[:80]!r}; give one that it has")
 
 
 def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
@@ -243,8 +260,9 @@ def _read_document(path: Path) -> dict[str, Any]:
     return document
 
 
-def _read_arrays(path: Path) -> Arrays:
-    """Members are stored, not compressed, so that none can be larger than the file that is there."""
+def _read_arrays(path: Path, prefix: str = "") -> Arrays:
+    """Those whose names begin so. Members are stored, not compressed, so that none can be larger than the file that is
+    there."""
     size_bytes = path.stat().st_size
     if size_bytes > MAX_ARRAY_BYTES:
         raise SceneError(f"{path.name} is larger than {MAX_ARRAY_BYTES >> 30} GB; {REMEDY}")
@@ -253,6 +271,8 @@ def _read_arrays(path: Path) -> Arrays:
         for member in archive.infolist():
             if member.compress_type != zipfile.ZIP_STORED or member.file_size > size_bytes:
                 raise SceneError(f"{path.name} was not written by relume; {REMEDY}")
+            if not member.filename.startswith(prefix):
+                continue
             with archive.open(member) as file:
                 arrays[member.filename.removesuffix(".npy")] = _read_array(cast(BinaryIO, file), member.file_size)
     return arrays

@@ -65,6 +65,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/environments/{environment}/thumbnail.png": {"GET": VIEW},
     "/api/images": {"GET": VIEW, "POST": EDIT},
     "/api/images/{image}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/images/{image}/metalness": {"POST": EDIT},
     "/api/images/{image}/thumbnail.png": {"GET": VIEW},
     "/api/bakes": {"GET": VIEW, "POST": EDIT},
     "/api/bakes/{bake}": {"GET": VIEW, "DELETE": EDIT},

@@ -170,23 +170,6 @@ class EnvironmentBody(Body):
     thumbnail: str
 
 
-class ImageBody(Body):
-    """An image that terms of looks may name as `texture` or `roughness_map`, in the place of their material's own.
-
-    `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green,
-    how rough a material is that has it as its map.
-    """
-
-    id: str
-    texture: str
-    name: str
-    created: str
-    size: tuple[int, int]
-    warnings: list[str]
-    roughness: float
-    thumbnail: str
-
-
 class BakeRequest(Body):
     """What to bake. A preset gives size and lights; what is named beside it wins.
 

@@ -5,21 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sessions import relative_rmse, settle
+from opened_bakes import opened, shown
+from sessions import relative_rmse
 from tiny_scenes import mesh, scene_of
 
-from relume.bake import Recipe
 from relume.errors import ParameterError
 from relume.images.shelf import texture_of
 from relume.look import default_look, validate
-from relume.memory import Memory
-from relume.methods.registry import METHODS, open_bake
 from relume.moving.picture import MovingPicture
 from relume.moving.points.images import dressed
-from relume.picture.picture import Picture
 from relume.reference.image import reference_image
 from relume.scene.coding import decode
-from relume.store import bake_here
 from relume.trace.geometry import merge
 from relume.trace.primary import trace_from
 from relume.trace.surface import surface_at
@@ -37,24 +33,6 @@ def with_own(scene, texture):
     """The scene whose floor has the texture in its file; of the same id, which seeds what is drawn."""
     floor, *others = scene.materials
     return replace(scene, materials=(replace(floor, textures={"diffuse": texture}), *others))
-
-
-def opened(scene, method, folder):
-    folder.mkdir(exist_ok=True)
-    recipe = Recipe(method, ("front",), (24, 18), 60, num_points=300 if method == "surface" else None)
-    return open_bake(bake_here(METHODS[method], scene, recipe, folder / "store.zarr"), Memory(1 << 30))
-
-
-def shown(transfer, look, method):
-    if method == "surface":
-        picture = MovingPicture(transfer, "front")
-        picture.set_look(look)
-        picture.advance(None)
-    else:
-        picture = Picture(transfer, "front", transfer.memory)
-        picture.set_look(look)
-        settle(picture)
-    return picture.image()
 
 
 @pytest.fixture(scope="module", params=["gather", "surface"])

@@ -120,6 +120,30 @@ def test_one_that_a_session_shows_stays_until_the_session_is_forgotten(client, s
     assert resumes.naming(sent["texture"], time.monotonic()) == []
 
 
+def test_what_an_image_of_metalness_makes_is_listed_and_goes_with_it(client):
+    image = send(client, png(3, 2), "metal.png").json()
+    url, terms = f"{URL}/{image['id']}", [{"model": "lambert", "texture": None}, {"model": "ggx", "texture": None}]
+    asked = {"scene": 16 * "0", "material": "Ball", "terms": terms}
+    made = client.post(f"{url}/metalness", json=asked)
+    assert made.status_code == 201, made.text
+    textures = [term["texture"] for term in made.json()["terms"]]
+    listed = {one["texture"]: (one["metalness"], one["base"]) for one in client.get(URL).json()}
+    assert [listed[texture] for texture in textures] == 2 * [(image["texture"], None)]
+    for changed, says in (
+        ({"terms": terms[:1]}, "add what is missing"),
+        ({"terms": [{**terms[0], "texture": "diffuse"}, terms[1]]}, "import the scene again"),
+    ):
+        response = client.post(f"{url}/metalness", json={**asked, **changed})
+        assert 400 <= response.status_code < 500
+        assert says in response.json()["detail"]
+    look = {"materials": {"Ball": {"terms": made.json()["terms"]}}}
+    assert client.put("/api/looks/metal", json=look).status_code == 201
+    assert client.delete(url).status_code == 409
+    assert client.delete("/api/looks/metal", headers={"If-Match": "*"}).status_code == 204
+    assert client.delete(url).status_code == 204
+    assert not {*textures, image["texture"]} & {one["texture"] for one in client.get(URL).json()}
+
+
 def wait(is_done):
     for _ in range(600):
         if is_done():

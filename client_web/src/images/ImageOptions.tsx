@@ -1,6 +1,6 @@
 /** The images that a list offers, and the one that is shown where it is not here. */
 import type { ImageBody } from "../protocol";
-import { images } from "./images";
+import { sentImages } from "./images";
 
 interface Props {
   /** What is named in the look; null: no image. */
@@ -13,7 +13,7 @@ export function ImageOptions({ shown, image }: Props) {
   return (
     <>
       {shown !== null && image === undefined && <option value={shown}>An image that is not here</option>}
-      {images.value.map((each) => (
+      {sentImages.value.map((each) => (
         <option key={each.id} value={each.texture}>
           {each.name}
         </option>

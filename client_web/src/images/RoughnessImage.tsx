@@ -2,9 +2,7 @@
 import { useEffect } from "preact/hooks";
 import { isImage } from "../document/texture";
 import type { Term } from "../protocol";
-import { IconButton } from "../ui/Button";
-import { FileOfImage } from "./FileOfImage";
-import { ImageOptions } from "./ImageOptions";
+import { ImageChoice } from "./ImageChoice";
 import { imageOf, letGoOver, loadImages, offerToDelete, putRoughness, sendOnto, takeRoughnessOff } from "./images";
 
 interface Props {
@@ -28,28 +26,22 @@ export function RoughnessImage({ material, index, value, hasOwn, onChange }: Pro
     else onChange(name === "map");
   };
   return (
-    <div class="rough-image" onDrop={() => letGoOver(Promise.resolve(material), put)}>
+    <div class="map-image" onDrop={() => letGoOver(Promise.resolve(material), put)}>
       <span class="param-label">Roughness map</span>
-      <div class="base-image-row">
-        <select
-          aria-label="Roughness map"
-          title="An image whose green says how rough the surface is. An image file can be dropped here, too."
-          value={shown ?? (value === true ? "map" : "")}
-          onChange={(event) => choose(event.currentTarget.value)}
-        >
-          <option value="">None</option>
-          {hasOwn && <option value="map">As in the scene</option>}
-          <ImageOptions shown={shown} image={image} />
-        </select>
-        <FileOfImage label="File of a map of roughness" onFile={(file) => void sendOnto(material, file, put)} />
-        {image !== undefined && (
-          <IconButton
-            icon="trash"
-            label={`Delete the image ${image.name}`}
-            onClick={() => offerToDelete(material, image, takeRoughnessOff)}
-          />
-        )}
-      </div>
+      <ImageChoice
+        label="Roughness map"
+        title="An image whose green says how rough the surface is. An image file can be dropped here, too."
+        file="File of a map of roughness"
+        value={shown ?? (value === true ? "map" : "")}
+        shown={shown}
+        image={image}
+        onChoose={choose}
+        onFile={(file) => void sendOnto(material, file, put)}
+        onDelete={(gone) => offerToDelete(material, gone, takeRoughnessOff)}
+      >
+        <option value="">None</option>
+        {hasOwn && <option value="map">As in the scene</option>}
+      </ImageChoice>
     </div>
   );
 }

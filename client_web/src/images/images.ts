@@ -1,15 +1,18 @@
 /** Images that were sent: the list, sending one, and putting one onto a material. */
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
+import { isImage } from "../document/texture";
 import { pointer } from "../document/pointer";
 import { edit } from "../edit/edit";
 import { history } from "../edit/history";
-import { deleteImage, listImages } from "../net/api";
+import { deleteImage, listImages, withMetalness } from "../net/api";
 import { uploadImage } from "../net/upload";
 import type { ImageBody, Term } from "../protocol";
 import { defaultLook, look } from "../state/look";
+import { scene } from "../state/scene";
 import { select, selectedMaterial } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
-import { mapNamed, withBaseImage, withoutBaseImage } from "./colour";
+import { baseTexture, mapNamed, withBaseImage, withoutBaseImage } from "./colour";
+import { mayBeMetal, metalnessOf, withoutMetalness } from "./metalness";
 import { roughPlaces, withoutRoughnessImage, withRoughnessImage } from "./roughness";
 
 export const IMAGE_TYPES = ["image/png", "image/jpeg", "image/webp"];
@@ -17,8 +20,16 @@ export const images = signal<readonly ImageBody[]>([]);
 /** What is on its way, in words. */
 export const sending = signal<string | null>(null);
 
+/** Those that people sent: others were made of them. */
+export const sentImages = computed(() => images.value.filter(({ metalness }) => metalness === null));
+
+const NO_METAL = "This material cannot become metal: it needs a term that scatters light, and a highlight with f0, such as GGX.";
+
 /** Puts an image onto a material, in some place. */
-type Put = (material: string, image: ImageBody) => void;
+type Put = (material: string, image: ImageBody) => void | Promise<void>;
+
+/** What becomes of a material's terms; `own`: those of the scene. */
+type Make = (terms: readonly Term[], own: readonly Term[]) => Term[];
 
 /** The material that files were let go over, and the place in it where that is known, until they are taken. */
 let target: { material: Promise<string | null>; put: Put | undefined } | null = null;
@@ -37,26 +48,89 @@ export function letGoOver(material: Promise<string | null>, put?: Put): void {
   target = { material, put };
 }
 
-function replaceTerms(label: string, material: string, make: typeof withoutBaseImage): void {
-  const terms = look.value?.materials[material]?.terms;
+const termsOf = (material: string) => look.value?.materials[material]?.terms;
+const ownTerms = (material: string): readonly Term[] => defaultLook.value?.materials[material]?.terms ?? [];
+
+function replaceTerms(label: string, material: string, make: Make): void {
+  const terms = termsOf(material);
   if (terms === undefined) return;
   history.seal();
-  edit(label, pointer("materials", material, "terms"), make(terms, defaultLook.value?.materials[material]?.terms ?? []));
+  edit(label, pointer("materials", material, "terms"), make(terms, ownTerms(material)));
+}
+
+/** Change a material's terms, and let an image say where they are metal: the server makes of it what the terms name. */
+async function makeMetal(label: string, material: string, image: ImageBody, make: Make): Promise<void> {
+  const terms = termsOf(material);
+  const of = scene.value?.id;
+  if (terms === undefined || of === undefined) return;
+  const made = await attempt(() => withMetalness(image.id, of, material, make(terms, ownTerms(material))));
+  if (made === undefined) return;
+  await loadImages(); // those that were made are known before the look names them
+  if (termsOf(material) !== terms) return note("The material was changed meanwhile; put the image on it again.");
+  replaceTerms(label, material, () => made);
+}
+
+/** The image of metalness that stays on a material whose base colour changes. */
+function metalOn(material: string): ImageBody | undefined {
+  const name = metalnessOf(termsOf(material) ?? [], imageOf);
+  return name === null ? undefined : imageOf(name);
+}
+
+/** Change the base colour, which lies under metalness where an image says that. */
+function replaceBase(label: string, material: string, make: Make): void | Promise<void> {
+  const metal = metalOn(material);
+  if (metal === undefined) return replaceTerms(label, material, make);
+  return makeMetal(label, material, metal, (terms, own) => make(withoutMetalness(terms, own, imageOf), own));
+}
+
+/** The texture of the base colour as it is, under metalness too. */
+export function baseOf(terms: readonly Term[]): string | null {
+  const shown = baseTexture(terms);
+  const image = isImage(shown) ? imageOf(shown) : undefined;
+  return image !== undefined && image.metalness !== null ? image.base : shown;
 }
 
 /** Show an image as the base colour of a material. */
-export function putImage(material: string, { texture, name }: ImageBody): void {
-  replaceTerms(`Image · ${name}`, material, (terms) => withBaseImage(terms, texture));
+export async function putImage(material: string, { texture, name }: ImageBody): Promise<void> {
   select(material);
+  await replaceBase(`Image · ${name}`, material, (terms) => withBaseImage(terms, texture));
+}
+
+/** Let an image say where a material is metal; `make` changes the material in the same step. */
+export async function putMetalness(material: string, image: ImageBody, make: Make = (terms) => [...terms]): Promise<void> {
+  if (!mayBeMetal(termsOf(material) ?? [])) return note(NO_METAL);
+  select(material);
+  await makeMetal(`Metalness · ${image.name}`, material, image, make);
+}
+
+/** The material is metal where the scene's own is again. */
+export function takeMetalnessOff(material: string): void {
+  replaceTerms("Metalness image off", material, (terms, own) => withoutMetalness(terms, own, imageOf));
 }
 
 /** Show an image as the roughness of a material: of a term and those that follow a map with it, or of the whole. */
 export function putRoughness(material: string, image: ImageBody, index: number | null = null): void {
   const places = (terms: readonly Term[]) => (index === null ? roughPlaces(terms) : [index]);
-  if (places(look.value?.materials[material]?.terms ?? []).length === 0) return note("Nothing of this material has a roughness.");
+  if (places(termsOf(material) ?? []).length === 0) return note("Nothing of this material has a roughness.");
   replaceTerms(`Roughness · ${image.name}`, material, (terms) => withRoughnessImage(terms, places(terms), image));
   select(material);
 }
+
+/** Show an image as both, as files of glTF pack them: green is roughness, blue is metalness. */
+function putBoth(material: string, image: ImageBody): void | Promise<void> {
+  if (!mayBeMetal(termsOf(material) ?? [])) {
+    note(NO_METAL);
+    return putRoughness(material, image);
+  }
+  return putMetalness(material, image, (terms) => withRoughnessImage(terms, roughPlaces(terms), image));
+}
+
+/** What is put where, by what an image is a map of, and in words. */
+const PLACES: Record<string, { put: Put; as: string }> = {
+  roughness: { put: putRoughness, as: "as roughness" },
+  metal: { put: putMetalness, as: "as metalness" },
+  "roughness and metal": { put: putBoth, as: "as roughness by its green and as metalness by its blue" },
+};
 
 /** The material is as rough as the scene's own again. */
 export function takeRoughnessOff(material: string): void {
@@ -64,8 +138,8 @@ export function takeRoughnessOff(material: string): void {
 }
 
 /** The material shows its own colours again. */
-export function takeOff(material: string): void {
-  replaceTerms("Image off", material, withoutBaseImage);
+export async function takeOff(material: string): Promise<void> {
+  await replaceBase("Image off", material, withoutBaseImage);
 }
 
 /** Send an image, and show it as the base colour of a material, or where `put` puts it. */
@@ -78,7 +152,7 @@ export async function sendOnto(material: string, file: File, put: Put = putImage
   sending.value = null;
   if (image === undefined) return;
   await loadImages();
-  put(material, image);
+  await put(material, image);
   for (const warning of image.warnings) note(warning);
 }
 
@@ -94,22 +168,22 @@ export async function takeImages(files: readonly File[]): Promise<void> {
   const map = mapNamed(file.name);
   if (map === null) return sendOnto(material, file);
   const asColour = { label: "Use as colour", run: () => void sendOnto(material, file) };
-  if (map.includes("roughness")) {
-    const rest = map === "roughness" ? "is shown as roughness" : "is shown as roughness by its green; the rest of it is part of a bake";
-    note(`“${file.name}” ${rest}.`, asColour);
-    return sendOnto(material, file, putRoughness);
+  const place = PLACES[map];
+  if (place !== undefined) {
+    note(`“${file.name}” is shown ${place.as}.`, asColour);
+    return sendOnto(material, file, place.put);
   }
   const told = `“${file.name}” looks like a map of ${map}. Those are part of a bake: import the scene with it, and bake again.`;
   note(told, asColour);
 }
 
 /** Delete an image once that was confirmed; the material shows its own again. What saved looks show stays. */
-export function offerToDelete(material: string, { id, name }: ImageBody, off = takeOff): void {
+export function offerToDelete(material: string, { id, name }: ImageBody, off: (material: string) => void | Promise<void> = takeOff): void {
   note(`Delete the image “${name}”? It can be sent again.`, {
     label: "Delete",
     run: () =>
       void attempt(async () => {
-        off(material);
+        await off(material);
         await deleteImage(id);
         await loadImages();
       }),

@@ -3,6 +3,7 @@ import { pointer } from "../document/pointer";
 import { edit } from "../edit/edit";
 import { history } from "../edit/history";
 import { BaseImage } from "../images/BaseImage";
+import { MetalImage } from "../images/MetalImage";
 import { openLibrary } from "../library/library";
 import { LightInspector } from "../lights/LightInspector";
 import { openLight } from "../lights/lights";
@@ -119,6 +120,7 @@ function MaterialInspector() {
       <Catcher material={material} />
       <Glass material={material} />
       {!isCaught && <BaseImage key={material} material={material} terms={terms.value} />}
+      {!isCaught && <MetalImage material={material} terms={terms.value} />}
       {!isCaught && terms.value.map((term, index) => (
         <TermCard
           key={index}

@@ -18,6 +18,7 @@ import type {
   BtfBody,
   BtfWorkBody,
   MeasuredBody,
+  MetalnessBody,
   ModelBody,
   OcioView,
   Problem,
@@ -138,6 +139,11 @@ export async function getLut(config: string, { display, view }: OcioView): Promi
 export const listImages = () => getJson<ImageBody[]>("/api/images");
 export async function deleteImage(id: string): Promise<void> {
   await request(`/api/images/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+/** What a material's terms become where an image says that it is metal. */
+export async function withMetalness(image: string, scene: string, material: string, terms: readonly Term[]): Promise<Term[]> {
+  const path = `/api/images/${encodeURIComponent(image)}/metalness`;
+  return ((await (await request(path, json("POST", { scene, material, terms }))).json()) as MetalnessBody).terms;
 }
 /** The light that a bake's scene came with. */
 export const ownEnvironmentThumbnail = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.brdf.channels import Images
 from relume.images.shelf import texture_of
 from relume.moving.points.surface import MAX_TEXTURE_SIDE, Surface, Textures, stacked
+from relume.scene.model import WRAPS
 from relume.trace.surface import projected_axes
 
 F32 = NDArray[np.float32]
@@ -35,7 +36,9 @@ def dressed(surface: Surface, positions: F32, images: Sequence[Images]) -> Dress
         NotFoundError, SceneError: an image cannot be had.
     """
     names = sorted({name for of_material in images for name in of_material if name is not None})
-    before, added = surface.textures, stacked([texture_of(name) for name in names], MAX_TEXTURE_SIDE)
+    shown = [texture_of(name) for name in names]
+    before, added = surface.textures, stacked(shown, MAX_TEXTURE_SIDE)
+    wraps = np.array([[WRAPS.index(wrap) for wrap in texture.wrap] for texture in shown], np.int64).reshape(-1, 2)
     of_material = before.of_material.copy()
     for material, of_channels in enumerate(images):
         for channel, name in enumerate(of_channels):
@@ -45,7 +48,7 @@ def dressed(surface: Surface, positions: F32, images: Sequence[Images]) -> Dress
         np.concatenate([before.texels, added.texels]),
         np.concatenate([before.levels, added.levels + np.array([len(before.texels), 0, 0])]),
         np.concatenate([before.first, before.first[-1] + added.first[1:]]),
-        np.concatenate([before.wraps, np.zeros((len(names), 2), np.int64)]),
+        np.concatenate([before.wraps, wraps]),
         of_material,
     )
     has_images = np.array([any(of_channels) for of_channels in images])

@@ -45,16 +45,18 @@ class Blend:
             return Texture(np.ascontiguousarray(base), self.raster.wrap, Coding("srgb", (left, left, left)))
 
         def values(rows: slice) -> F32:
-            return SRGB_TO_LINEAR[_at(base, rows)] * (1 - np.float32(self.metallic) * _share(metallic, rows))
+            return SRGB_TO_LINEAR[rows_of(base, rows)] * (1 - np.float32(self.metallic) * _share(metallic, rows))
 
         return made_of(values, self.raster.size, np.ones(3), self.raster.wrap)
 
     def _f0(self, rows: slice) -> F32:
         metallic = np.float32(self.metallic) * _share(self._metals, rows)
         weight = np.float32(self.specular) * _share(self.raster.channel("specular", 3), rows)
-        tint = SRGB_TO_LINEAR[_at(self.raster.rgb("tint"), rows)]
+        tint = SRGB_TO_LINEAR[rows_of(self.raster.rgb("tint"), rows)]
         head_on = np.minimum(tint * self.dielectric.astype(np.float32), 1) * weight
-        base = SRGB_TO_LINEAR[_at(self.raster.rgb("base"), rows)] if metallic.any() else np.ones((1, 1, 3), np.float32)
+        base = (
+            SRGB_TO_LINEAR[rows_of(self.raster.rgb("base"), rows)] if metallic.any() else np.ones((1, 1, 3), np.float32)
+        )
         return np.asarray(mix(head_on, self.factor.astype(np.float32) * base, metallic), np.float32)
 
     def f0_and_f90(self) -> tuple[F64, F64, F64, float]:
@@ -91,10 +93,14 @@ def mix(a: Any, b: Any, share: Any) -> Any:
     return a + (b - a) * share
 
 
-def _at(values: U8, rows: slice) -> U8:
-    """Rows of an image, or the one texel that stands for all. (rows or 1, width or 1, channels)"""
+def rows_of(values: U8, rows: slice) -> U8:
+    """Rows of an image, or the one texel that stands for all. (rows or 1, width or 1, channels)
+
+    Args:
+        values: of the image, or of that texel. rows: of the image.
+    """
     return values if values.shape[:2] == (1, 1) else values[rows]
 
 
 def _share(values: U8, rows: slice) -> F32:
-    return _at(values, rows).astype(np.float32) / np.float32(255)
+    return rows_of(values, rows).astype(np.float32) / np.float32(255)

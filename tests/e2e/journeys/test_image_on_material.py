@@ -38,20 +38,25 @@ def test_an_image_is_put_on_by_a_button_and_by_a_drop(editor: Editor, stripes: P
     editor.wait_until_exact()
 
 
-def test_an_image_named_like_a_map_of_roughness_becomes_that(editor: Editor, stripes: Path) -> None:
+def test_an_image_named_like_a_map_of_roughness_and_metal_becomes_both(editor: Editor, stripes: Path) -> None:
     page = editor.page
-    material = drop_on_the_middle(editor, stripes, "tiles_rough.png")
-    expect(page.locator(".inspector h2")).to_have_text(material)
-    editor.choose(material, 1)
-    chosen = page.get_by_label("Roughness map", exact=True)
-    expect(chosen.locator("option:checked")).to_have_text("tiles_rough")
-    editor.wait_until_exact()
+    editor.choose("Ball", 1)
+    page.get_by_label("Model").last.select_option("ggx")
+    assert drop_on_the_middle(editor, stripes, "tiles_orm.png") == "Ball"
+    chosen, metal = (page.get_by_label(label, exact=True) for label in ("Roughness map", "Metalness map"))
+    for each in (chosen, metal):
+        expect(each.locator("option:checked")).to_have_text("tiles_orm")
     page.get_by_role("button", name="Undo", exact=True).click()
-    expect(chosen.locator("option:checked")).not_to_have_text("tiles_rough")
+    for each in (chosen, metal):
+        expect(each.locator("option:checked")).not_to_have_text("tiles_orm")
     page.get_by_label("File of a map of roughness").set_input_files(stripes)  # by keys: a button asks for it
     expect(chosen.locator("option:checked")).to_have_text("stripes")
     chosen.select_option("")
     expect(chosen.locator("option:checked")).not_to_have_text("stripes")
+    metal.select_option(label="stripes")
+    expect(page.get_by_label("Delete the image stripes")).to_be_visible()
+    metal.select_option("")
+    expect(page.get_by_label("Delete the image stripes")).to_have_count(0)
     editor.wait_until_exact()
 
 
