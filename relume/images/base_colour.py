@@ -35,6 +35,7 @@ ReadMaterial = Callable[[str, str], Material]
 DIELECTRIC = 0.04
 """Reflectance head-on of what is no metal, where a material does not say it."""
 _MOST_DIELECTRIC = 0.2  # of gems, about: what reflects more than that head-on is metal somewhere
+_NEAR, _NOISE = 0.02, 1e-6  # bytes of display values say it no better; of what is as near, the less metal is likelier
 _ONES = np.ones(3)
 
 
@@ -179,12 +180,20 @@ def _base_map(own: Material) -> Texture:
     return coded(values, raster.size if images else (1, 1), _ONES, raster.wrap)
 
 
-def _unmixed(scattered_light: F64, reflected: F64) -> F64:
-    """b of D and F; the least metallic channel says how metallic all are. (..., 3) each"""
-    total = scattered_light + reflected
-    root = np.sqrt(np.maximum(total**2 - 4 * DIELECTRIC * scattered_light, 0))
-    no_metal = np.minimum(2 * scattered_light / np.maximum(total + root, 1e-9), 1).max(axis=-1, keepdims=True)
-    return np.asarray(np.clip(total - DIELECTRIC * no_metal, 0, 1))
+def _unmixed(scatters: F64, reflects: F64) -> F64:
+    """b of D and F. The mean of the channels has the roots 1 - m and b / d; where both may be 1 - m, that one is by which
+    D rises with D + F from channel to channel, else what is less metal. (..., 3) each"""
+    total = scatters + reflects
+    mean, of_scattered = (values.mean(axis=-1, keepdims=True) for values in (total, scatters))
+    root = np.sqrt(np.maximum(mean**2 - 4 * DIELECTRIC * of_scattered, 0))
+    less, more = 2 * of_scattered / np.maximum(mean + root, 1e-9), (mean + root) / (2 * DIELECTRIC)
+
+    def missed(no_metal: F64) -> F64:
+        apart = scatters - of_scattered - no_metal * (total - mean)
+        return np.asarray((apart**2).sum(axis=-1, keepdims=True))
+
+    is_less = (more > 1 + _NEAR) | (missed(less) + _NOISE < missed(more))
+    return np.asarray(np.clip(total - DIELECTRIC * np.minimum(np.where(is_less, less, more), 1), 0, 1))
 
 
 def _f0_of(term: Document) -> F64:

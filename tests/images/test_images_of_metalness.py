@@ -101,9 +101,10 @@ def test_an_image_of_the_base_colour_stays_under_it(shelf, sent):
         np.testing.assert_allclose(shown(plain, terms), shown(expected, expected.materials[0].terms), atol=1e-6)
 
 
-def test_what_a_file_shared_out_is_put_together_first(shelf, sent):
+@pytest.mark.parametrize("base", [BASE, BASE // 8, np.full_like(BASE, 20)], ids=["bright", "dark", "black"])
+def test_what_a_file_shared_out_is_put_together_first(base, shelf, sent):
     """Of a material with a map of metalness, the base colour is found from its own textures, but for their bytes."""
-    was, expected = imported(BASE, METAL), imported(BASE, 255 - METAL)
+    was, expected = imported(base, METAL), imported(base, 255 - METAL)
     image = sent(255 - METAL, "Other")
     terms = made(shelf, was, complete(was.materials[0].terms), image)
     found, wanted = shown(was, terms), shown(expected, expected.materials[0].terms)
