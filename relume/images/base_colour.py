@@ -181,8 +181,8 @@ def _base_map(own: Material) -> Texture:
 
 
 def _unmixed(scatters: F64, reflects: F64) -> F64:
-    """b of D and F. The mean of the channels has the roots 1 - m and b / d; where both may be 1 - m, that one is by which
-    D rises with D + F from channel to channel, else what is less metal. (..., 3) each"""
+    """b of D and F. The mean of the channels has the roots 1 - m and b / d; where both may be 1 - m, that is by which D
+    rises with D + F from channel to channel, else the less metallic. (..., 3) each"""
     total = scatters + reflects
     mean, of_scattered = (values.mean(axis=-1, keepdims=True) for values in (total, scatters))
     root = np.sqrt(np.maximum(mean**2 - 4 * DIELECTRIC * of_scattered, 0))
