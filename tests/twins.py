@@ -217,7 +217,7 @@ def radiance_of(transfer, view: View, look):
             projector = Projector(term, contract(term, bands, None), lights, receivers)
             image = projector.project(0, rows.stop - rows.start)[:, 0].astype(float) * document["color"]
             if document["texture"] is not None:
-                image *= view.textures[document["texture"]][rows]
+                image *= view.textures[index].get(document["texture"], 1)
             for curve in term.curves:
                 if curve.outgoing:
                     image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T

@@ -80,7 +80,7 @@ def _shaded(documents: Sequence[Mapping[str, Any]], receivers: Receivers) -> NDA
     num = len(receivers.normal)
     radiance = np.zeros((num, 3))
     for document in documents:
-        wanted = Wanted.of(document, np.arccos(receivers.normal[:, 2].astype(np.float64)))
+        wanted = Wanted.of(document, lambda: np.arccos(receivers.normal[:, 2].astype(np.float64)))
         shaded = shade(wanted.term, wanted.bands, _lights(), receivers, lambda share: None, lambda: False)
         rows = shaded.rows(num) * np.asarray(document["color"])
         radiance += rows if wanted.outgoing is None else rows * wanted.outgoing.T

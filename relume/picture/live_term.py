@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -44,13 +45,18 @@ class LiveTerm:
 
     def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, levels: Levels, light: Light) -> None:
         self.light = light
-        self._theta_o, self._levels = np.arccos(cos_theta_o), levels
+        self._cos_theta_o, self._levels = cos_theta_o, levels
         tiles, samples = tiles_of(len(cos_theta_o))
         self.ready = self.displayed = Shown(np.zeros((tiles, 3, samples), np.float32))
         self.is_composed = False
         self.model: Hashable = None
         self.set_document(document)
         self.displayed, self.mirror = self.ready, self.document
+
+    @cached_property
+    def _theta_o(self) -> F64:
+        """Of each sample, radians; kept once a curve of it is there."""
+        return np.arccos(self._cos_theta_o)
 
     def go_on_showing(self, before: LiveTerm, rows: NDArray[np.integer]) -> None:
         """Show what another term of the same samples does, until something of this one is ready.
@@ -66,7 +72,7 @@ class LiveTerm:
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
-        wanted = Wanted.of(document, self._theta_o, self._levels)
+        wanted = Wanted.of(document, lambda: self._theta_o, self._levels)
         if wanted.model != self.model:
             self.ready = Shown(np.zeros_like(self.ready.image))
             self.displayed = replace(self.displayed, bands={}, is_outdated=True)  # none of its curves is wanted

@@ -33,7 +33,7 @@ class MaterialImage:
         self._first = rows.start
         self._cos_theta_o, self._levels = view.cos_theta_o[rows], view.levels(index)
         self._is_mirrored = view.is_mirrored[rows] if view.is_mirrored[rows].any() else None
-        self._textures = {name: texture[rows] for name, texture in view.textures.items()}
+        self._textures = view.textures[index]
         self.documents = list(documents)
         self._light = light
         self.terms = [LiveTerm(document, self._cos_theta_o, self._levels, light) for document in documents]
@@ -141,9 +141,10 @@ class MaterialImage:
         if self._is_current and all(term.is_composed for term in self.terms):
             return False
         for k, term in enumerate(self.terms):
-            color, texture, has_texture = self._factors(term)
+            color, texture = self._factors(term)
             outgoing = self._outgoing(term) if self._factor is None else self._factor
-            add_term(term.displayed.image, color, texture, outgoing, has_texture, self._first, k == 0, radiance)
+            of_view = self._first, self.num_samples
+            add_term(term.displayed.image, color, texture, outgoing, *of_view, k == 0, radiance)
             term.is_composed = True
         own = radiance[:, self._first : self._first + self.num_samples]
         if not self.terms:
@@ -164,14 +165,14 @@ class MaterialImage:
 
     def term_radiance(self, term: LiveTerm, image: F32, radiance: F32) -> None:
         """Write what another image of one term would give alone to `radiance`, (3, samples); the term stays."""
-        color, texture, has_texture = self._factors(term)
-        add_term(image, color, texture, self._outgoing(term), has_texture, self._first, True, radiance)
+        color, texture = self._factors(term)
+        add_term(image, color, texture, self._outgoing(term), self._first, self.num_samples, True, radiance)
 
     def factors_at(self, term: LiveTerm, sample: int) -> NDArray[np.float64]:
         """What multiplies a term's image at one of the material's samples. (3,) float64"""
-        color, texture, has_texture = self._factors(term)
+        color, texture = self._factors(term)
         factor = color.astype(np.float64)
-        if has_texture:
+        if texture is not None:
             factor = factor * texture[sample]
         outgoing = self._outgoing(term)
         return factor if outgoing is None else factor * outgoing[:, sample]
@@ -188,9 +189,10 @@ class MaterialImage:
         lobe = np.where(self._is_mirrored, (1 - share)[:, None], 1).astype(np.float32)
         return lobe if term.outgoing is None else lobe * term.outgoing
 
-    def _factors(self, term: LiveTerm) -> tuple[F32, F32, bool]:
+    def _factors(self, term: LiveTerm) -> tuple[F32, F32 | None]:
+        """What multiplies a term's image: its colour, and its texture per sample, None for one."""
         color = np.asarray(term.document["color"], np.float32)
         name = term.document.get("texture")
         if is_image(name):
-            return color, self._view.image(self.index, name), True
-        return color, self._textures[name or "diffuse"], name is not None
+            return color, self._view.image(self.index, name)
+        return color, None if name is None else self._textures.get(name)

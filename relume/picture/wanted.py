@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,15 +36,16 @@ class Wanted:
     outgoing: F32 | None
 
     @classmethod
-    def of(cls, document: Mapping[str, Any], theta_o: F64, levels: Levels = PLAIN) -> Wanted:
+    def of(cls, document: Mapping[str, Any], theta_o: Callable[[], F64], levels: Levels = PLAIN) -> Wanted:
         """Read a term document.
 
         Args:
-            theta_o: angle at which each sample is seen, radians. (samples,) levels: of roughness, of the samples.
+            theta_o: finds the angle at which each sample is seen, radians, (samples,), where a curve wants it.
+            levels: of roughness, of the samples.
         """
         declared = TERMS[document["model"]]
         term = declared.settled(document)
         bands = {c.name: level_bands(document, c, levels) for c in term.curves if not c.outgoing}
-        values = [level_values(document, c, theta_o, levels) for c in term.curves_in(document) if c.outgoing]
+        values = [level_values(document, c, theta_o(), levels) for c in term.curves_in(document) if c.outgoing]
         outgoing = np.asarray(np.prod(values, axis=0), np.float32) if values else None
         return cls(document, term, (document["model"], declared.fixed_values(document)), bands, outgoing)

@@ -12,13 +12,12 @@ F32 = NDArray[np.float32]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, replace, start, stop, radiance):  # type: ignore[no-untyped-def]
+def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, num, replace, start, stop, radiance):  # type: ignore[no-untyped-def]
     """Add planes [start, stop) of one term, a plane being a channel of a tile, to radiance (3, samples of the view).
 
-    first: the material's first sample in the view.
+    first: the material's first sample in the view. num: of its samples.
     """
     samples = image.shape[2]
-    num = texture.shape[0]
     for plane in range(start, stop):
         tile, channel = plane // 3, plane % 3
         begin = tile * samples
@@ -62,10 +61,10 @@ def add_even(arriving: F32, factor: NDArray[np.floating], image: F32) -> None:
 def add_term(
     image: F32,
     color: F32,
-    texture: F32,
+    texture: F32 | None,
     outgoing: F32 | None,
-    has_texture: bool,
     first: int,
+    num: int,
     replace: bool,
     radiance: F32,
 ) -> None:
@@ -73,12 +72,12 @@ def add_term(
 
     Args:
         image: Σ_j c_j T_j. (tiles, 3, samples) float32
-        color: (3,) float32. texture: per sample, used where `has_texture`. (n, 3) float32
+        color: (3,) float32. texture: per sample. (n, 3) float32, None for 1
         outgoing: product of the curves of the outgoing angle. (3, n) float32, None for 1
-        has_texture: whether the texture multiplies the term.
-        first: the material's first sample in the view. replace: overwrite instead of adding.
+        first: the material's first sample in the view. num: of its samples. replace: overwrite instead of adding.
         radiance: (3, samples of the view) float32, written.
     """
     factor = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
-    args = (image, color, texture, factor, has_texture, outgoing is not None, first, replace)
+    shown = texture if texture is not None else np.empty((0, 3), np.float32)
+    args = (image, color, shown, factor, texture is not None, outgoing is not None, first, num, replace)
     for_shares(lambda start, stop: _add(*args, start, stop, radiance), 3 * len(image))

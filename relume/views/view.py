@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -40,6 +41,8 @@ F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
 
 TILE_PIXELS = 64
+_IMAGES = ("diffuse", "specular")
+_ROWS_AT_ONCE = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -49,13 +52,14 @@ class View:
     Attributes:
         bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
         key: of the bake in `memory`.
-        first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int64
+        first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int32
         order: (n,) int32. gains: what the radiance of each is multiplied by for its pixel, in that order: its share of
             it, and what glass lets through that is before it; nothing of samples that are seen in mirrors, for looks
             say how much these send on. (n, 1) float32, or (n, 3) where there is glass or a mirror
         eye: where the samples on surfaces are seen from. (surface samples, 3) float32, or (1, 3)
         mirrored: samples that are seen in mirrors; None where none is.
         is_mirrored: which samples on surfaces are mirrors whose picture others have. (surface samples,)
+        textures: of each material, the images of the scene in which it is not 1 all over, by their names. (n, 3)
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
         level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
         maps: images that levels follow in the place of each material's own map, see `relume.views.rougher`; none where
@@ -73,13 +77,13 @@ class View:
     key: str
     bounds: NDArray[np.int64]
     pixel: NDArray[np.uint32]
-    first: NDArray[np.int64]
+    first: NDArray[np.int32]
     order: NDArray[np.int32]
     gains: F32
     eye: F32
     mirrored: Mirrored | None
     is_mirrored: NDArray[np.bool_]
-    textures: dict[str, F32]
+    textures: Sequence[Mapping[str, F32]]
     cos_theta_o: NDArray[np.float64]
     level: NDArray[np.uint8]
     ratios: tuple[tuple[float, ...], ...]
@@ -294,7 +298,7 @@ def open_view(
         gains = gains * store.read(f"{prefix}/through")
     num_materials = len(store.attributes["materials"])
     surface = int(np.searchsorted(material, BACKGROUND))
-    if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(np.diff(material.astype(np.int64)) < 0):
+    if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(material[1:] < material[:-1]):
         raise ChunkDamagedError(prefix, "its samples do not fit its size")
     if surface and int(material[surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
@@ -304,8 +308,6 @@ def open_view(
         raise ChunkDamagedError(prefix, "its levels of roughness do not fit its materials")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
     eye = read_eyes(store, index, 0, surface)
-    wo = towards(eye, store.read(f"{prefix}/position", 0, surface))
-    cosine = np.einsum("nc,nc->n", store.read(f"{prefix}/normal", 0, surface), wo.astype(np.float64))
     mirrored = read_mirrored(store, index, order, gains, surface)
     is_mirrored = store.read(f"{prefix}/is_mirrored", 0, surface) if has_layers else np.zeros(surface, np.bool_)
     if mirrored is not None:
@@ -320,19 +322,36 @@ def open_view(
         key=key,
         bounds=bounds,
         pixel=pixel,
-        first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int64),
+        first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int32),
         order=order,
         gains=np.ascontiguousarray(gains[order], np.float32),
         eye=eye,
         mirrored=mirrored,
-        is_mirrored=is_mirrored.astype(np.bool_),
-        textures={key: store.read(f"{prefix}/{key}", 0, surface) for key in ("diffuse", "specular")},
-        cos_theta_o=np.clip(cosine, 0, 1),
+        is_mirrored=is_mirrored.astype(np.bool_, copy=False),
+        textures=[_textures(store, prefix, *ends) for ends in pairwise(bounds.tolist())],
+        cos_theta_o=_cos_theta_o(store, prefix, eye, surface),
         level=level,
         ratios=ratios,
         maps=maps,
         sorted=rows,
     )
+
+
+def _textures(store: StoreReader, prefix: str, start: int, stop: int) -> dict[str, F32]:
+    """Read the images of the scene at a material's samples; none where it is 1 all over, as without an image."""
+    read = {name: store.read(f"{prefix}/{name}", start, stop) for name in _IMAGES}
+    return {name: values for name, values in read.items() if np.any(values != 1)}
+
+
+def _cos_theta_o(store: StoreReader, prefix: str, eye: F32, num: int) -> NDArray[np.float64]:
+    """Find the cosines at which samples on surfaces are seen, some after others. (num,)"""
+    found = np.empty(num)
+    for start in range(0, num, _ROWS_AT_ONCE):
+        rows = slice(start, min(start + _ROWS_AT_ONCE, num))
+        position, normal = (store.read(f"{prefix}/{name}", rows.start, rows.stop) for name in ("position", "normal"))
+        wo = towards(eye if len(eye) == 1 else eye[rows], position)
+        found[rows] = np.clip(np.einsum("nc,nc->n", normal, wo.astype(np.float64)), 0, 1)
+    return found
 
 
 def _are_levels(level: NDArray[np.uint8], ratios: tuple[float, ...]) -> bool:

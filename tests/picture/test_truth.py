@@ -81,7 +81,7 @@ def truth_of(scene, transfer, material, rows, look):
     total = np.zeros((len(rows), 3))
     for document in look.materials[transfer.material_names[material]].terms:
         image = twins.integrate_texels(document, scene.environment.radiance, some, seen) * document["color"]
-        image *= view.textures[document["texture"]][first + rows]
+        image *= transfer.store.read(f"views/0/{document['texture']}")[first + rows]
         for curve in TERMS[document["model"]].curves:
             if curve.outgoing:
                 image *= curve_values(document, curve, np.arccos(view.cos_theta_o[first + rows])).T
