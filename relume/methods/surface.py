@@ -39,19 +39,21 @@ from relume.methods.sampled_views import CHUNK_ROWS, SampledViews, lights_of, re
 from relume.methods.store_io import MOVING_ERROR, read_gather_samples, read_moving_error, read_tree
 from relume.methods.thrown import make_thrown
 from relume.moving.points.density import by_distance, by_shadows
-from relume.moving.points.lattice import MAX_POINTS, most_nodes, place_points
+from relume.moving.points.following import POINTS_A_VERTEX
+from relume.moving.points.lattice import MAX_POINTS, most_nodes, one_row, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.points.surface import pattern_of_points, read_surface_points, tangents_of, textures_of
-from relume.moving.points.vertices import POINTS_A_VERTEX
+from relume.points import Points
 from relume.scene.model import Scene
 from relume.trace.cells import POINTS_A_CELL, choose_cells
-from relume.trace.coherent import trace_coherent
+from relume.trace.coherent import Targets, trace_coherent
+from relume.trace.geometry import Geometry
 from relume.trace.links import trace_links
+from relume.trace.visibility import Traced, trace_visibility
 
 ROWS_A_SHARD = 4096
 RAYS_A_POINT = 377  # a point alone then errs by less than 1 % of its radiance (`surface.points_rmse`)
 RAYS_A_CELL_POINT = 55
-_LIGHTS_OF_SHADOWS = 32  # by which points are placed
 _FEWEST_CELLS, _MOST_CELLS, _POINTS_A_CELL = 512, 8192, 6
 _MOST_ASKED_CELLS = 4 * _MOST_CELLS
 MIN_POINTS = 64
@@ -195,10 +197,10 @@ class SurfaceMethod:
         cameras = [camera for camera in scene.cameras if camera.name in recipe.views]
         is_open = open_sides(geometry, cameras, int(scene.id[:7], 16))
         eyes = np.array([camera.to_world[:3, 3] for camera in cameras])
-        coarse = by_distance(geometry, eyes)
-        few = subdivide(scene.environment.radiance, _LIGHTS_OF_SHADOWS)
-        coarse = by_shadows(geometry, place_points(geometry, is_open, coarse, recipe.num_points), coarse, few)
-        placed = place_points(geometry, is_open, coarse, recipe.num_points)
+        lights = subdivide(scene.environment.radiance, recipe.num_lights)
+        density = by_distance(geometry, eyes, one_row(is_open))
+        density = by_shadows(geometry, place_points(geometry, is_open, density, recipe.num_points), eyes, lights)
+        placed = place_points(geometry, is_open, density, recipe.num_points)
         fields = {name: getattr(placed.points, name) for name in ("position", "normal", "tangent")}
         return {
             **{f"lattice/{name}": array for name, array in placed.lattice._asdict().items()},
@@ -217,23 +219,28 @@ class SurfaceMethod:
         """What some cells or points see, and what their rays hit."""
         geometry, seed = self._views.geometry_of(scene), int(store.attributes["gather_seed"])
         if task.view == "cells":
-            points, pattern = (
-                read_gather_samples(store, task.start, task.stop),
-                make_pattern(RAYS_A_CELL_POINT, 0, seed),
-            )
+            points = read_gather_samples(store, task.start, task.stop)
+            pattern = make_pattern(RAYS_A_CELL_POINT, 0, seed)
         else:
-            points, pattern = (
-                read_surface_points(store, task.start, task.stop),
-                pattern_of_points(store, _rays_of(recipe)),
-            )
-        seen = trace_coherent(geometry.embree, points.position, points.normal, self._targets_of(store))
+            points = read_surface_points(store, task.start, task.stop)
+            pattern = pattern_of_points(store, _rays_of(recipe))
+        seen = _seen(geometry, points, self._targets_of(store), is_even=task.view == "cells")
         links = trace_links(geometry, self._tree_of(store), points, points.normal, pattern)
         num_rows = task.stop - task.start
         arrays: dict[str, NDArray[Any]] = {
             f"{task.view}/visibility": seen.visible.reshape(num_rows, -1),
             f"{task.view}/links": links.cell.reshape(num_rows, -1),
         }
-        return Written(arrays, seen.rays.traced + links.num_rays, seen.trace_s + links.trace_s)
+        return Written(arrays, seen.num_rays + links.num_rays, seen.trace_s + links.trace_s)
+
+
+def _seen(geometry: Geometry, points: Points, targets: Targets, *, is_even: bool) -> Traced:
+    """Find the lights that points see. is_even: they lie evenly, so that much can be predicted; else those that are few
+    about their place would take it from others."""
+    if not is_even:
+        return trace_visibility(geometry.embree, points.position, points.normal, targets.directions)
+    found = trace_coherent(geometry.embree, points.position, points.normal, targets)
+    return Traced(found.visible, found.rays.traced, found.trace_s)
 
 
 def _num_cells(recipe: Recipe) -> int:

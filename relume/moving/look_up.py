@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relume.moving.edges import POSITIONS, find_edges, rays_an_edge
 from relume.moving.panes import Panes, find_glass, panes_of
-from relume.moving.points.lattice import node_of
+from relume.moving.points.grids import nodes_about
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
 from relume.scene.model import Camera
@@ -77,23 +77,6 @@ def _aim(rotation, half_width, half_height, width, height, pixels, places, start
                 out[r, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
-def _nodes_about(lattice, face, side, u, v):  # type: ignore[no-untyped-def]
-    """Find the three nodes about a place in a face, and their weights."""
-    rows = np.int64(lattice.num_rows[face, side])
-    x: Any = u * rows
-    y: Any = v * rows
-    i: Any = min(max(np.int64(x), 0), rows - 1)
-    j: Any = min(max(np.int64(y), 0), rows - 1 - i)
-    fx: Any = x - i
-    fy: Any = y - j
-    first = np.int64(lattice.first[face, side])
-    b, c = first + node_of(rows, i + 1, j), first + node_of(rows, i, j + 1)
-    if fx + fy <= 1 or i + j == rows - 1:
-        return first + node_of(rows, i, j), b, c, np.float32(1 - fx - fy), np.float32(fx), np.float32(fy)
-    return first + node_of(rows, i + 1, j + 1), b, c, np.float32(fx + fy - 1), np.float32(1 - fy), np.float32(1 - fx)
-
-
 @nb.njit(nogil=True, cache=True)
 def _find(lattice, face_normal, face, uv, directions, start, stop, vertex, weight, is_seen):  # type: ignore[no-untyped-def]
     """Find the vertices about hits [start, stop); of a side without any, those of the other."""
@@ -112,7 +95,7 @@ def _find(lattice, face_normal, face, uv, directions, start, stop, vertex, weigh
             side = 1 - side
         if lattice.num_rows[f, side] == 0:
             continue
-        n0, n1, n2, w0, w1, w2 = _nodes_about(lattice, f, side, uv[p, 0], uv[p, 1])
+        n0, n1, n2, w0, w1, w2 = nodes_about(lattice, f, side, uv[p, 0], uv[p, 1])
         vertex[p, 0], vertex[p, 1], vertex[p, 2] = lattice.node[n0], lattice.node[n1], lattice.node[n2]
         weight[p, 0], weight[p, 1], weight[p, 2] = w0, w1, w2
         for k in range(3):

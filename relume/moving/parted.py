@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.moving.look_up import Seen
-from relume.moving.points.lattice import Lattice, node_of
+from relume.moving.points.grids import Lattice, node_of
 from relume.moving.solid import Solid
 from relume.parallel import for_ranges, for_shares
 from relume.trace.embree import occluded, packet_arguments

@@ -71,7 +71,7 @@ def test_where_nothing_hides_light_nothing_is_hidden(moving, fixed):
     """To rounding: both are sums of the same light."""
     lit = changes(WHITE, show("direct"), lambda d: d["lights"].update(Lamp=POINT))
     found = rendered(moving, lit)[inner(fixed, "Ground")]
-    assert (np.abs(found - 1) < 1e-3).all(axis=1).mean() > 0.3
+    assert (np.abs(found - 1) < 1e-3).all(axis=1).mean() > 0.25  # points lie where it is not so
     assert found.min() < 0.5
 
 

@@ -24,7 +24,7 @@ from relume.moving.highlights.lobe_lights import SIDE, lists_numpy, lobe_lights,
 from relume.moving.highlights.looking import SkyLight
 from relume.moving.pixels import combine
 from relume.moving.points.density import by_distance
-from relume.moving.points.lattice import pieces_of, place_points
+from relume.moving.points.lattice import one_row, pieces_of, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.sky import sky_of, turn_of
 from relume.render.image import render_image
@@ -258,7 +258,8 @@ def test_a_surface_takes_from_its_own_points_and_not_from_what_lies_beside_it():
     materials = [Material(name, ({"model": "lambert", "color": [1, 1, 1]},)) for name in ("Balls", "Ground")]
     scene = scene_of(*balls, ground, camera=looking("front", [0, 1, 3], [0, 0, 0], 0.5), materials=materials)
     geometry, eyes = merge(scene), np.array([[0.0, 1.0, 3.0]])
-    found = place_points(geometry, open_sides(geometry, scene.cameras, 1), by_distance(geometry, eyes), 1500)
+    is_open = open_sides(geometry, scene.cameras, 1)
+    found = place_points(geometry, is_open, by_distance(geometry, eyes, one_row(is_open)), 1500)
     vertices, points = found.vertices, found.points
     of_ball = found.material[vertices.point[:, 0]] == 0
     place = np.einsum("vk,vkc->vc", vertices.weight, points.position[vertices.point])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from sessions import relative_rmse
-from tiny_scenes import looking, mesh, quad, scene_of, studio
+from tiny_scenes import looking, quad, scene_of, studio
 
 from relume.bake import Recipe
 from relume.light.triangles import subdivide
@@ -11,7 +11,9 @@ from relume.look import validate
 from relume.memory import Memory
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.points.density import by_distance, by_shadows
-from relume.moving.points.lattice import place_points
+from relume.moving.points.following import linear
+from relume.moving.points.grids import steps_of
+from relume.moving.points.lattice import one_row, place_points
 from relume.moving.points.sides import open_sides
 from relume.render.image import render_image
 from relume.scene.model import Material
@@ -19,47 +21,67 @@ from relume.store import bake_here
 from relume.trace.geometry import merge
 
 EYE = np.array([[0.0, 3.0, 4.0]])
-STEPS = 16  # of the floor, along each side
 
 
 @pytest.fixture(scope="module")
 def scene():
-    """A floor of many faces, and a card that stands on its middle."""
-    z, x = np.meshgrid(*[np.linspace(-4, 4, STEPS + 1)] * 2, indexing="ij")
-    at = np.arange((STEPS + 1) ** 2).reshape(STEPS + 1, -1)
-    corners = [part.ravel() for part in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:])]
-    faces = np.concatenate([np.stack([corners[0], *two], axis=1) for two in (corners[1:3], corners[2:4])])
-    positions = np.stack([x.ravel(), 0 * x.ravel(), z.ravel()], axis=1)
-    floor = mesh("floor", positions, faces, 0, normals=np.tile([0.0, 1, 0], (len(positions), 1)))
+    """A floor of two faces, and a card that stands on its middle."""
+    floor = quad("floor", [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]], 0)
     card = quad("card", [[-0.3, 0, 0.1], [0.3, 0, 0.1], [0.3, 0.5, 0.1], [-0.3, 0.5, 0.1]], 1)
     grey = [Material(name, ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)) for name in ("Floor", "Card")]
     camera = looking("front", EYE[0], [0, 0, 0], 0.5)
     return scene_of(floor, card, camera=camera, environment=studio(32, 20.0), materials=grey)
 
 
-def shadowed(scene):
+def first_placed(scene, num_points=1500):
     geometry = merge(scene)
-    coarse = by_distance(geometry, EYE)
-    placed = place_points(geometry, open_sides(geometry, scene.cameras, 1), coarse, 1500)
-    return geometry, coarse, by_shadows(geometry, placed, coarse, subdivide(scene.environment.radiance, 32))
+    is_open = open_sides(geometry, scene.cameras, 1)
+    density = by_distance(geometry, EYE, one_row(is_open))
+    return geometry, is_open, place_points(geometry, is_open, density, num_points)
+
+
+def by_shadows_of(scene, geometry, placed):
+    return by_shadows(geometry, placed, EYE, subdivide(scene.environment.radiance, 300))
 
 
 def test_far_from_the_eye_points_are_farther_apart(scene):
-    geometry = merge(scene)
-    eye = np.array([0.0, 0.5, 2.0])
-    distance = np.linalg.norm(geometry.positions[geometry.faces].mean(axis=1) - eye, axis=1)
-    coarse = by_distance(geometry, eye[None])
-    assert coarse[distance.argmax()] == 8 * coarse[distance.argmin()]
-    assert set(np.log2(coarse)) <= set(range(-2, 3))
+    geometry, _, placed = first_placed(scene)
+    eye, steps = np.array([0.0, 0.5, 2.0]), steps_of(placed.lattice.num_rows)
+    power = by_distance(geometry, eye[None], placed.lattice).power
+    where = placed.points.position[placed.vertices.point[placed.lattice.node, 0]]
+    distance = np.linalg.norm(where - eye, axis=1)
+    is_floor = geometry.face_material[steps.grid // 2] == 0
+    assert power[is_floor][distance[is_floor].argmax()] == 3 + power[is_floor][distance[is_floor].argmin()]
+    assert set(power) <= set(range(-2, 3))
 
 
 def test_they_are_dense_where_shadows_end(scene):
-    geometry, before, after = shadowed(scene)
-    centre = geometry.positions[geometry.faces].mean(axis=1)
-    is_floor, far = geometry.face_material == 0, np.linalg.norm(centre, axis=1)
-    ratio = after / before
-    assert np.median(ratio[is_floor & (far < 0.8)]) <= 0.5 * np.median(ratio[is_floor & (far > 3)])
-    np.testing.assert_array_equal(np.rint(np.log2(ratio)), np.log2(ratio))
+    geometry, is_open, before = first_placed(scene)
+    after = place_points(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+    near, far = [], []
+    for placed in (before, after):
+        distance = np.linalg.norm(placed.points.position[placed.material == 0], axis=1)
+        near.append((distance < 0.8).sum())
+        far.append((distance > 3).sum())
+    assert near[1] > 2 * near[0]
+    assert far[1] < 0.9 * far[0]
+
+
+def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
+    geometry, is_open, before = first_placed(scene)
+    placed = place_points(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+    lattice, vertices, steps = placed.lattice, placed.vertices, steps_of(placed.lattice.num_rows)
+    is_floor = geometry.face_material[steps.grid // 2] == 0
+    a, b, c = geometry.positions[geometry.faces[steps.grid // 2]].transpose(1, 0, 2)
+    u, v = (steps.i / steps.rows)[:, None], (steps.j / steps.rows)[:, None]
+    where = ((1 - u - v) * a + u * b + v * c)[is_floor]
+    of_nodes = vertices.point[lattice.node], vertices.weight[lattice.node]
+    found = np.einsum("npc,np->nc", placed.points.position[of_nodes[0]], of_nodes[1])[is_floor]
+    off = np.linalg.norm((found - where)[:, [0, 2]], axis=1) / placed.spacing
+    assert len(where) > 2 * len(placed.points.position)
+    assert np.quantile(off, 0.98) < 0.05
+    assert off.max() < 1  # beside nodes that are one with others of another face
+    np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
 
 
 def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
@@ -70,12 +92,27 @@ def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
         return render_image(bake, "front", look)[..., :3]
 
     truth, now = shown("direct", "truth"), shown("surface", "now")
-    monkeypatch.setattr("relume.methods.surface.by_shadows", lambda geometry, placed, coarse, lights: coarse)
-    assert relative_rmse(now, truth) < 0.8 * relative_rmse(shown("surface", "before"), truth)
+    alike = lambda geometry, placed, eyes, lights: by_distance(geometry, eyes, placed.lattice)  # noqa: E731
+    monkeypatch.setattr("relume.methods.surface.by_shadows", alike)
+    assert relative_rmse(now, truth) < 0.7 * relative_rmse(shown("surface", "before"), truth)
 
 
 def test_where_nothing_is_in_the_way_distance_counts_alone():
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     scene = scene_of(ground, camera=looking("front", EYE[0], [0, 0, 0], 0.8), environment=studio(32, 20.0))
-    _, before, after = shadowed(scene)
-    np.testing.assert_array_equal(before, after)
+    geometry, _, placed = first_placed(scene)
+    after = by_shadows_of(scene, geometry, placed)
+    np.testing.assert_array_equal(by_distance(geometry, EYE, placed.lattice).power, after.power)
+
+
+def test_weights_meet_light_that_is_linear():
+    rng = np.random.default_rng(5)
+    towards, normal = rng.normal(size=(200, 3, 4)), np.tile([0.0, 0, 1], (200, 1))
+    weight = rng.random((200, 4))
+    weight /= weight.sum(axis=1, keepdims=True)
+    found = linear(weight, towards, normal)
+    off = [np.linalg.norm(np.einsum("vcp,vp->vc", towards[:, :2], w), axis=1) for w in (weight, found)]
+    assert np.median(off[1] / off[0]) < 0.35
+    assert (off[1] < 1.01 * off[0]).all()
+    assert found.min() >= 0
+    np.testing.assert_allclose(found.sum(axis=1), 1)

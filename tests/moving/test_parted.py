@@ -34,7 +34,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    recipe = Recipe("surface", ("front",), SIZE, 100, num_points=1200)
+    recipe = Recipe("surface", ("front",), SIZE, 100, num_points=500)
     return open_bake(
         bake_here(METHODS["surface"], scene(), recipe, tmp_path_factory.mktemp("parted") / "s.zarr"), Memory(1 << 30)
     )
@@ -77,7 +77,7 @@ def test_the_line_where_it_stands_is_as_bright_as_in_a_fixed_view(moving, monkey
 
     mended = error()
     monkeypatch.setattr(picture_module, "mend", lambda *args: None)
-    assert mended < 0.7 * error()
+    assert mended < 0.8 * error()
 
 
 def test_faces_that_meet_do_not_part_each_other(tmp_path):

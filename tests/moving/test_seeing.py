@@ -19,7 +19,8 @@ from relume.moving.highlights.looking import SkyLight
 from relume.moving.look_up import at_vertices, look
 from relume.moving.pixels import FromVertices, Mirrored, combine
 from relume.moving.points.density import by_distance
-from relume.moving.points.lattice import node_of, num_nodes, place_points
+from relume.moving.points.grids import Density, node_of, num_nodes
+from relume.moving.points.lattice import one_row, place_points
 from relume.moving.points.sides import open_sides
 from relume.moving.sky import fill_sky, turn_of
 from relume.scene.model import Camera
@@ -40,8 +41,8 @@ def moving(tmp_path_factory):
 def placed(scene, num_points=500):
     geometry = merge(scene)
     eyes = np.array([camera.to_world[:3, 3] for camera in scene.cameras])
-    is_open, coarse = open_sides(geometry, scene.cameras, 1), by_distance(geometry, eyes)
-    return geometry, place_points(geometry, is_open, coarse, num_points)
+    is_open = open_sides(geometry, scene.cameras, 1)
+    return geometry, place_points(geometry, is_open, by_distance(geometry, eyes, one_row(is_open)), num_points)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 255])
@@ -102,8 +103,10 @@ def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside()
 def test_a_scene_without_area_is_refused():
     flat = mesh("line", [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], 0, normals=[[0, 1, 0]] * 3)
     geometry = merge(scene_of(flat, camera=looking("front", (0, 1, 3), (0, 0, 0), 0.7)))
+    is_open = np.ones((1, 2), bool)
+    density = Density(one_row(is_open), np.zeros(6, np.int8))
     with pytest.raises(PlanError, match="no surface"):
-        place_points(geometry, np.ones((1, 2), bool), np.ones(1), 100)
+        place_points(geometry, is_open, density, 100)
 
 
 def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
@@ -154,7 +157,7 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
     scene, view, size = still_life(), moving.views["front"], (96, 72)
     surface = moving.surface
     seen = look(surface, moving.embree, view.camera, size)
-    sent = np.zeros((surface.points.num_points, 3, 3), np.float32)
+    sent = np.zeros((len(surface.vertices.normal), 3, 3), np.float32)
     sent[:, 1] = 1
     angle = view.camera.yfov / size[1]
     dark = np.zeros((len(moving.material_names), 3), np.float32)

@@ -8,7 +8,7 @@ import pytest
 from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
 from relume.moving.basis.tables import tables_of
 from relume.moving.frame import Materials
-from relume.moving.points.lattice import Lattice, node_of, num_nodes
+from relume.moving.points.grids import Lattice, node_of, num_nodes
 from relume.moving.points.surface import Textures
 from relume.moving.shader import geometry, tables
 

@@ -14,7 +14,7 @@ def nodes(num, seed=3):
     points = Points(position.astype(np.float32), normal, normal[:, [1, 2, 0]], np.zeros(num, np.uint32))
     material, side = rng.integers(0, 2, num).astype(np.uint16), rng.integers(0, 2, num).astype(np.uint8)
     spacing, piece = 0.3 * 2.0 ** rng.integers(0, 3, num), np.zeros(num, np.int32)
-    return Nodes(points, material, side, piece, spacing, *extent_of(points))
+    return Nodes(points, material, side, piece, spacing, rng.random(num) < 0.8, *extent_of(points))
 
 
 def test_keys_are_those_of_numpy():

@@ -1,10 +1,10 @@
 """Points on all surfaces of a scene: a grid inside each face, shared between faces (mesh colours, Yuksel 2010).
 
-A face whose longest edge is R spacings long has (R + 1)(R + 2) / 2 nodes, rows parallel to its first edge. Nodes of
-different faces that lie together, look the same way and are of one material are one point, so that light is continuous
-across edges, and a mesh finer than the spacing has fewer points than corners, which then follow from the points about
-them (`relume.moving.points.vertices`). Each side of a face that can be seen has nodes of its own
-(`relume.moving.points.sides`).
+A face whose longest edge is R of the least spacings on it long has R rows (`relume.moving.points.grids`); where points
+shall be 2^l times as far apart, every 2^l-th node of both ways is one. Nodes of different faces that lie together, look
+the same way and are of one material are one point, so that light is continuous across edges, and a mesh finer than the
+spacing has fewer points than corners. What is no point follows from those about it (`relume.moving.points.following`).
+Each side of a face that can be seen has nodes of its own (`relume.moving.points.sides`).
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.errors import PlanError
+from relume.moving.points.grids import Density, Lattice, first_nodes, num_nodes, steps_of
 from relume.moving.points.vertices import Nodes, Vertices, extent_of, find_vertices, num_shared, shared_points
 from relume.points import Points
 from relume.trace.geometry import Geometry
@@ -35,22 +35,8 @@ _ALIKE, _LEAST_ALIKE = 3, 1  # steps of a unit normal's components, within which
 _TRIALS, _MOST_TRIALS = 6, 40  # after the first, fewer points than asked for are good enough, and each is coarser
 _COARSER = 1.25
 _WIDEST = 16.0  # spacing, beside the longest edge: then all that may be shared is
-_NODES_A_POINT = 8  # more where faces are thin
+NODES_A_POINT = 8  # more where faces are thin
 _CLOSE_ENOUGH = 0.05  # of the number of points asked for
-
-
-class Lattice(NamedTuple):
-    """The grid of every side of every face; side 0 is the one where the corners are counter-clockwise.
-
-    Attributes:
-        num_rows: R; 0 where the side has no points. (faces, 2) uint8
-        first: where its nodes begin in `node`. (faces, 2) uint32
-        node: which vertex each is. (nodes,) uint32
-    """
-
-    num_rows: NDArray[np.uint8]
-    first: NDArray[np.uint32]
-    node: NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
@@ -71,33 +57,12 @@ class Placed:
     spacing: float
 
 
-class _Placement(NamedTuple):
-    """Where nodes are in faces: face, side, and barycentric coordinates of the second and third corner."""
-
-    face: NDArray[np.int32]
-    side: NDArray[np.uint8]
-    uv: F32
-
-
-def num_nodes(rows: NDArray[np.integer]) -> NDArray[np.int64]:
-    """How many nodes grids with so many rows have; none where there are no rows."""
-    wide = rows.astype(np.int64)
-    return np.where(wide > 0, (wide + 1) * (wide + 2) // 2, 0)
-
-
-@nb.njit(nogil=True, cache=True, inline="always")
-def node_of(rows, i, j):  # type: ignore[no-untyped-def]
-    """Number of a node in a grid of so many rows: i steps towards the second corner, j towards the third."""
-    return i * (rows + 1) - (i * (i - 1)) // 2 + j
-
-
-def place_points(geometry: Geometry, is_open: NDArray[np.bool_], coarse: F64, num_points: int) -> Placed:
+def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Density, num_points: int) -> Placed:
     """Spread about `num_points` points over all sides that can be seen.
 
     Args:
         geometry: the scene's triangles. is_open: which sides of faces can be seen. (faces, 2)
-        coarse: how many times farther apart than elsewhere points of each face are, powers of two, see
-            `relume.moving.points.density`. (faces,)
+        density: how far apart points are, see `relume.moving.points.density`; of `one_row` at first.
         num_points: at most `MAX_POINTS`.
     Raises:
         PlanError: no surface has any area.
@@ -109,32 +74,40 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], coarse: F64, nu
     total = float((is_open * area[:, None]).sum())
     if total <= 0:
         raise PlanError("no surface of the scene has any area; there is nothing to put points on")
-    longest, count = edges.max(axis=1) / coarse, is_open.sum(axis=1)
+    least, most_apart = density.of_faces()
+    longest, count = edges.max(axis=1) / 2.0**least, is_open.sum(axis=1)
     spacing, most = math.sqrt(total / num_points), most_nodes(len(geometry.faces), num_points)
 
+    def rows_at(spacing: float) -> NDArray[np.int64]:
+        return _rows(longest, spacing, (most_apart - least).astype(np.int64))
+
     def is_too_fine(spacing: float) -> bool:
-        return int((num_nodes(_rows(longest, spacing)) * count).sum()) > most
+        return int((num_nodes(rows_at(spacing)) * count).sum()) > most
 
     while is_too_fine(spacing) and spacing < longest.max():
         spacing *= _COARSER
-    normals, piece = geometry.face_normals, pieces_of(geometry)
-    rows, alike = _rows(longest, spacing), _ALIKE
-    lattice, nodes = _grids(geometry, normals, piece, is_open, rows, spacing * coarse)
+    surfaces = _Surfaces(geometry, geometry.face_normals, pieces_of(geometry), is_open, density)
+    rows, alike = rows_at(spacing), _ALIKE
+    lattice, nodes = _grids(surfaces, rows, spacing)
+    power, last, before = -2.0, 0, spacing  # of the spacing, that points are as many as; how many there were
     for trial in range(_MOST_TRIALS):
         alike = max(_LEAST_ALIKE, _ALIKE - max(0, trial - _TRIALS))  # where directions alone are too many
-        ratio = num_shared(nodes, alike) / num_points
+        found = num_shared(nodes, alike)
+        ratio = found / num_points
         if abs(ratio - 1) < _CLOSE_ENOUGH or (ratio < 1 and trial >= _TRIALS):
             break
-        finer = spacing * math.sqrt(ratio) * (1 if trial < _TRIALS else _COARSER)
-        if ratio < 1 and is_too_fine(finer):
+        if last and found != last and spacing != before:
+            power = min(max(math.log(found / last) / math.log(spacing / before), -2.0), -0.25)
+        finer = spacing * ratio ** (-1 / power) * (1 if trial < _TRIALS else _COARSER)
+        if ratio < 1 and is_too_fine(finer) and is_too_fine(finer := math.sqrt(spacing * finer)):
             break
-        before, spacing = spacing, min(finer, _WIDEST * float(longest.max()))
-        if np.array_equal(rows, wanted := _rows(longest, spacing)):  # finer than points are dense: corners alone
+        last, before, spacing = found, spacing, min(finer, _WIDEST * float(longest.max()))
+        if np.array_equal(rows, wanted := rows_at(spacing)):  # finer than points are dense: corners alone
             nodes = nodes._replace(spacing=nodes.spacing * (spacing / before))
         else:
-            rows, (lattice, nodes) = wanted, _grids(geometry, normals, piece, is_open, wanted, spacing * coarse)
+            rows, (lattice, nodes) = wanted, _grids(surfaces, wanted, spacing)
     chosen = shared_points(nodes, alike)
-    vertices, vertex = find_vertices(nodes, chosen)
+    vertices, vertex = find_vertices(nodes, chosen, lattice)
     kept = nodes.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
     return Placed(lattice._replace(node=vertex), vertices, kept, nodes.material[chosen], spacing)
 
@@ -152,45 +125,46 @@ def pieces_of(geometry: Geometry) -> NDArray[np.int32]:
 
 def most_nodes(num_faces: int, num_points: int) -> int:
     """How many nodes a scene's lattice has at most: the corners of all sides, and what is between."""
-    return 6 * num_faces + _NODES_A_POINT * num_points
+    return 6 * num_faces + NODES_A_POINT * num_points
 
 
-def _rows(longest: F64, spacing: float) -> NDArray[np.int64]:
-    return np.clip(np.ceil(longest / spacing), 1, MOST_ROWS).astype(np.int64)
+def _rows(longest: F64, spacing: float, levels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Find how many rows grids have: of those whose points are 2^levels times as far apart somewhere, a multiple."""
+    rows = np.clip(np.ceil(longest / spacing), 1, MOST_ROWS).astype(np.int64)
+    step = 1 << np.minimum(levels, np.log2(rows).astype(np.int64))
+    return np.asarray(np.minimum(-(-rows // step), MOST_ROWS // step) * step)
 
 
-def _grids(
-    geometry: Geometry,
-    normals: F32,
-    piece: NDArray[np.int32],
-    is_open: NDArray[np.bool_],
-    rows: NDArray[np.int64],
-    spacing: F64,
-) -> tuple[Lattice, Nodes]:
-    """Place the nodes of all grids, which are not numbered as vertices yet.
+class _Surfaces(NamedTuple):
+    """Whose points are placed. normals, piece: of faces; see `place_points`."""
 
-    normals: of the faces. (faces, 3). piece: that each is of. spacing: of points on each. (faces,)
-    """
+    geometry: Geometry
+    normals: F32
+    piece: NDArray[np.int32]
+    is_open: NDArray[np.bool_]
+    density: Density
+
+
+def _grids(surfaces: _Surfaces, rows: NDArray[np.int64], spacing: float) -> tuple[Lattice, Nodes]:
+    """Place the nodes of all grids, which are not numbered as vertices yet."""
+    geometry, normals, piece, is_open, density = surfaces
     num_rows = np.where(is_open, rows[:, None], 0).astype(np.uint8)
-    counts = num_nodes(num_rows).ravel()
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]]).reshape(num_rows.shape)
-    at = _placement(num_rows, counts)
-    normal = normals[at.face] * np.where(at.side == 0, 1, -1)[:, None].astype(np.float32)
-    points = surface_at(geometry, Hits(at.face, at.uv, np.ones(len(at.face), np.float32)), -normal).points
-    material = geometry.face_material[at.face].astype(np.uint16)
-    lattice = Lattice(num_rows, first.astype(np.uint32), np.empty(0, np.uint32))
-    return lattice, Nodes(points, material, at.side, piece[at.face], spacing[at.face], *extent_of(points))
+    steps = steps_of(num_rows)
+    face, side = (steps.grid // 2).astype(np.int32), (steps.grid % 2).astype(np.uint8)
+    uv = np.column_stack([steps.i / steps.rows, steps.j / steps.rows]).astype(np.float32)
+    normal = normals[face] * np.where(side == 0, 1, -1)[:, None].astype(np.float32)
+    points = surface_at(geometry, Hits(face, uv, np.ones(len(face), np.float32)), -normal).points
+    power, least = density.at(steps), density.of_faces()[0][face]
+    step = 1 << (power - least).astype(np.int64)
+    step = np.minimum(step, steps.rows & -steps.rows)  # the most that divides the rows
+    is_point = (steps.i % step == 0) & (steps.j % step == 0)
+    apart = spacing * 2.0 ** (least + np.log2(step))
+    lattice = Lattice(num_rows, first_nodes(num_rows), np.empty(0, np.uint32))
+    of_faces = geometry.face_material[face].astype(np.uint16), side, piece[face]
+    return lattice, Nodes(points, *of_faces, apart, is_point, *extent_of(points))
 
 
-def _placement(num_rows: NDArray[np.uint8], counts: NDArray[np.int64]) -> _Placement:
-    """List the nodes of all grids, in the order of `node_of`."""
-    side_of = np.repeat(np.arange(len(counts)), counts)
-    uv = np.empty((int(counts.sum()), 2), np.float32)
-    ends = np.cumsum(counts)
-    flat = num_rows.ravel()
-    for rows in map(int, np.unique(flat[flat > 0])):
-        i, j = np.array([(i, j) for i in range(rows + 1) for j in range(rows + 1 - i)]).T
-        begin = (ends - counts)[flat == rows]
-        where = begin[:, None] + np.arange(len(i))
-        uv[where, 0], uv[where, 1] = (i / rows).astype(np.float32), (j / rows).astype(np.float32)
-    return _Placement((side_of // 2).astype(np.int32), (side_of % 2).astype(np.uint8), uv)
+def one_row(is_open: NDArray[np.bool_]) -> Lattice:
+    """Make a lattice of the corners alone. is_open: sides of faces that have them. (faces, 2)"""
+    rows = is_open.astype(np.uint8)
+    return Lattice(rows, first_nodes(rows), np.empty(0, np.uint32))

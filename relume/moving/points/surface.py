@@ -14,7 +14,7 @@ from relume.bake import StoreReader
 from relume.brdf.channels import TEXTURES
 from relume.errors import ChunkDamagedError, StoreError
 from relume.light.gather_rays import Pattern, make_pattern
-from relume.moving.points.lattice import Lattice, num_nodes
+from relume.moving.points.grids import Lattice, num_nodes
 from relume.moving.points.vertices import Vertices
 from relume.points import Points
 from relume.scene.model import WRAPS, Scene, Texture

@@ -1,8 +1,6 @@
 """Which nodes of a lattice are one, which of them are points, and how the others follow from points nearby.
 
-A mesh may be much finer than points are dense: its corners keep their own normals, and take what a few points about
-them send, by Shepard's weights ((R − d) / (R d))², where R is the distance of the first point that is left out. A
-corner that is a point itself takes its own.
+Corners of a mesh that is finer than points are dense keep their own normals (`relume.moving.points.following`).
 """
 
 from __future__ import annotations
@@ -13,15 +11,15 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from relume.moving.points.following import APART, from_ends, from_nearby
+from relume.moving.points.grids import Lattice
 from relume.parallel import for_shares
 from relume.points import Points
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-POINTS_A_VERTEX = 4
 _TOGETHER = 0.35  # of the spacing: nodes as near as this are one point
 _SAME = 1e-3  # of it: nodes as near as this are one vertex
 _SAME_WAY = 50  # steps of a unit normal's components, within which vertices look the same way
@@ -29,7 +27,6 @@ _TURN = 1.5  # spacings that a turn of the normal by a radian is worth
 _PLACE_BITS = 20  # of each coordinate: places finer than a millionth of the scene are one
 _U64 = np.uint64
 _MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F], np.uint64)  # odd
-_APART = 1e3  # spacings between materials, and between sides
 _ELSEWHERE = 4.0  # that a surface which does not hang together with another is farther away than it is
 
 
@@ -53,6 +50,7 @@ class Nodes(NamedTuple):
     Attributes:
         points: where they are. material, side: of each. (n,)
         spacing: of the points about each, metres; powers of two of one another. (n,)
+        is_point: whether it may be a point; others lie in the middle of nodes of coarser grids. (n,)
         corner, extent: of what holds all of them, from `extent_of`.
     """
 
@@ -61,8 +59,20 @@ class Nodes(NamedTuple):
     side: NDArray[np.uint8]
     piece: NDArray[np.int32]
     spacing: F64
+    is_point: NDArray[np.bool_]
     corner: F32
     extent: float
+
+    def rows(self, chosen: NDArray[np.intp]) -> Nodes:
+        """Choose some of them."""
+        return self._replace(
+            points=self.points.rows(chosen),
+            material=self.material[chosen],
+            side=self.side[chosen],
+            piece=self.piece[chosen],
+            spacing=self.spacing[chosen],
+            is_point=self.is_point[chosen],
+        )
 
 
 def shared_points(nodes: Nodes, alike: int) -> NDArray[np.intp]:
@@ -71,8 +81,9 @@ def shared_points(nodes: Nodes, alike: int) -> NDArray[np.intp]:
     Args:
         alike: steps of a unit normal's components, within which points look the same way.
     """
-    chosen, _ = _shared(nodes, _TOGETHER, alike)
-    return chosen
+    may_be = np.flatnonzero(nodes.is_point)
+    chosen, _ = _shared(nodes.rows(may_be), _TOGETHER, alike)
+    return may_be[chosen]
 
 
 def num_shared(nodes: Nodes, alike: int) -> int:
@@ -82,44 +93,31 @@ def num_shared(nodes: Nodes, alike: int) -> int:
         nodes: of all grids; their keys are mixed to one number each, which few that differ share by chance.
         alike: as of `shared_points`.
     """
-    where, what = _keys(nodes, _TOGETHER, alike)
+    where, what = _keys(nodes.rows(np.flatnonzero(nodes.is_point)), _TOGETHER, alike)
     mixed = (where ^ where >> _U64(31)) * _MIX[0] ^ (what ^ what >> _U64(29)) * _MIX[1]
     mixed.sort()
     return 1 + int(np.count_nonzero(mixed[1:] != mixed[:-1]))
 
 
-def find_vertices(nodes: Nodes, chosen: NDArray[np.intp]) -> tuple[Vertices, NDArray[np.uint32]]:
+def find_vertices(nodes: Nodes, chosen: NDArray[np.intp], lattice: Lattice) -> tuple[Vertices, NDArray[np.uint32]]:
     """Find the vertices that nodes are, and how they follow from points.
 
     Args:
-        nodes: of all grids. chosen: those that are points.
+        nodes: of all grids. chosen: those that are points. lattice: of the nodes.
     Returns:
         The vertices, and which of them each node is. (n,) uint32
     """
     first, vertex = _shared(nodes, _SAME, _SAME_WAY)
-    place = _features(nodes)
-    tree = cKDTree(place[chosen])
-    few = min(len(chosen), POINTS_A_VERTEX + 1)
-    distance, near = tree.query(place[first], few, workers=-1)
-    distance, near = distance.reshape(len(first), few), near.reshape(len(first), few)
-    reach = np.maximum(distance[:, -1:], 1e-12)
-    inside = np.clip(distance[:, :-1], 1e-6 * reach, None) if few > 1 else np.ones((len(first), 1))
-    raw = np.square((reach - inside) / (reach * inside)) if few > 1 else inside
-    raw[distance[:, : raw.shape[1]] > _APART / 2] = 0  # another material's, where there are so few
-    raw[:, 0] = np.maximum(raw[:, 0], 1e-12)
-    weight, point = (
-        np.zeros((len(first), POINTS_A_VERTEX), np.float32),
-        np.zeros((len(first), POINTS_A_VERTEX), np.uint32),
-    )
-    weight[:, : raw.shape[1]] = raw / raw.sum(axis=1, keepdims=True)
-    point[:, : raw.shape[1]] = near[:, : raw.shape[1]]
-    return Vertices(np.ascontiguousarray(nodes.points.normal[first]), point, weight), vertex.astype(np.uint32)
+    place, alone = _features(nodes), np.flatnonzero(nodes.is_point[first])
+    near = from_nearby(place[chosen], place[first[alone]], nodes.points.normal[first[alone]])
+    follows = near if len(alone) == len(first) else from_ends(near, alone, vertex, lattice)
+    return Vertices(np.ascontiguousarray(nodes.points.normal[first]), *follows), vertex.astype(np.uint32)
 
 
 def _features(nodes: Nodes) -> F64:
     """Where nodes are, in spacings, for what is near to be like. (n, 11)"""
     place = nodes.points.position.astype(np.float64) / nodes.spacing.min()
-    apart = _APART * np.column_stack([nodes.material, nodes.side])
+    apart = APART * np.column_stack([nodes.material, nodes.side])
     elsewhere = np.random.default_rng(1).normal(size=(int(nodes.piece.max()) + 1, 3))
     elsewhere *= _ELSEWHERE / np.sqrt(2) / np.linalg.norm(elsewhere, axis=1, keepdims=True)
     return np.column_stack([place, _TURN * nodes.points.normal, apart, elsewhere[nodes.piece]])
@@ -181,7 +179,7 @@ def _shared(nodes: Nodes, together: float, alike: int) -> tuple[NDArray[np.intp]
     """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
     points, corner, extent = nodes.points, nodes.corner, nodes.extent
     where, what = _keys(nodes, together, alike)
-    order = np.lexsort((what, where))  # stable: the first of equals is the one with the lowest number
+    order = np.lexsort((~nodes.is_point, what, where))  # stable: of equals a point, the one with the lowest number
     is_new = np.concatenate([[True], (where[order[1:]] != where[order[:-1]]) | (what[order[1:]] != what[order[:-1]])])
     first, group = order[is_new], np.cumsum(is_new) - 1
     finely = np.floor((points.position[first] - corner) / (extent / ((1 << _PLACE_BITS) - 1))).astype(np.uint64)

@@ -14,7 +14,7 @@ from relume.moving.basis.shapes import NUM_RINGS, NUM_SPOKES, WIDTHS
 from relume.moving.bumps import expansions
 from relume.moving.highlights.by_lights import LEAST_BITS
 from relume.moving.highlights.lobe_lights import LIGHTS_A_LAMP, NARROWEST, NUM_LISTED, NUM_WIDTHS, SIDE
-from relume.moving.points.lattice import Lattice, num_nodes
+from relume.moving.points.grids import Lattice, num_nodes
 from relume.moving.points.surface import Surface, Textures
 from relume.moving.transfer import MovingTransfer
 
