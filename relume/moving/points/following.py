@@ -8,7 +8,7 @@ whose points are farther apart than its nodes lie on the straight line between t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ F64 = NDArray[np.float64]
 POINTS_A_VERTEX = 4
 APART = 1e3  # spacings between materials, and between sides
 _BENDS = 0.05  # how far off what is linear may stay, beside how far weights change
+_LEAST_WEIGHT = 2e-3
 _AT_ONCE = 1 << 16  # vertices
 
 
@@ -83,8 +84,7 @@ def linear(weight: F64, towards: F64, normal: F64) -> F64:
     gram = np.einsum("vcp,vdp->vcd", weighed, ends) + np.diag([_BENDS] * 3 + [1e-9])
     missed = np.einsum("vcp,vp->vc", ends, weight) - [0, 0, 0, 1]
     found = weight - np.einsum("vcp,vc->vp", weighed, np.linalg.solve(gram, missed[..., None])[..., 0])
-    found = np.maximum(found, 0)
-    return np.asarray(found / found.sum(axis=1, keepdims=True))
+    return _in_sum_one(found)
 
 
 def from_ends(near: Follows, alone: NDArray[np.intp], vertex: NDArray[np.intp], lattice: Lattice) -> Follows:
@@ -96,6 +96,7 @@ def from_ends(near: Follows, alone: NDArray[np.intp], vertex: NDArray[np.intp], 
     num, num_points = int(vertex.max()) + 1, int(near.point.max()) + 1
     place = np.repeat(alone, POINTS_A_VERTEX), near.point.ravel().astype(np.intp)
     known = csr_array((near.weight.ravel(), place), shape=(num, num_points))
+    known.eliminate_zeros()
     is_known = np.zeros(num, np.bool_)
     is_known[alone] = True
     steps, step = steps_of(lattice.num_rows), 1 << int(np.log2(lattice.num_rows.max()))
@@ -120,7 +121,13 @@ def _heaviest(known: csr_array) -> Follows:
     found = _nothing(len(count))
     found.point[row[kept], rank[kept]] = known.indices[order[kept]]
     found.weight[row[kept], rank[kept]] = known.data[order[kept]]
-    return Follows(found.point, found.weight / found.weight.sum(axis=1, keepdims=True))
+    return Follows(found.point, _in_sum_one(found.weight))
+
+
+def _in_sum_one(weight: NDArray[Any]) -> NDArray[Any]:
+    """Leave out what is below nothing, and what cannot be seen: each point that is asked sums all its lights."""
+    kept = np.where(weight < _LEAST_WEIGHT, 0, weight)
+    return np.asarray(kept / kept.sum(axis=1, keepdims=True), weight.dtype)
 
 
 def _nothing(num: int) -> Follows:
