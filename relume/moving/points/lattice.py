@@ -86,7 +86,7 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Densit
 
     while is_too_fine(spacing) and spacing < longest.max():
         spacing *= _COARSER
-    surfaces = _Surfaces(geometry, geometry.face_normals, pieces_of(geometry), is_open, density)
+    surfaces = _Surfaces(geometry, geometry.face_normals, pieces_of(geometry), is_open, density, least)
     rows, alike = rows_at(spacing), _ALIKE
     lattice, nodes = _grids(surfaces, rows, spacing)
     power, last, before = -2.0, 0, spacing  # of the spacing, that points are as many as; how many there were
@@ -136,25 +136,26 @@ def _rows(longest: F64, spacing: float, levels: NDArray[np.int64]) -> NDArray[np
 
 
 class _Surfaces(NamedTuple):
-    """Whose points are placed. normals, piece: of faces; see `place_points`."""
+    """Whose points are placed. normals, piece, least: of faces, see `Density.of_faces`."""
 
     geometry: Geometry
     normals: F32
     piece: NDArray[np.int32]
     is_open: NDArray[np.bool_]
     density: Density
+    least: NDArray[np.int8]
 
 
 def _grids(surfaces: _Surfaces, rows: NDArray[np.int64], spacing: float) -> tuple[Lattice, Nodes]:
     """Place the nodes of all grids, which are not numbered as vertices yet."""
-    geometry, normals, piece, is_open, density = surfaces
+    geometry, normals, piece, is_open, density, least_of = surfaces
     num_rows = np.where(is_open, rows[:, None], 0).astype(np.uint8)
     steps = steps_of(num_rows)
     face, side = (steps.grid // 2).astype(np.int32), (steps.grid % 2).astype(np.uint8)
     uv = np.column_stack([steps.i / steps.rows, steps.j / steps.rows]).astype(np.float32)
     normal = normals[face] * np.where(side == 0, 1, -1)[:, None].astype(np.float32)
     points = surface_at(geometry, Hits(face, uv, np.ones(len(face), np.float32)), -normal).points
-    power, least = density.at(steps), density.of_faces()[0][face]
+    power, least = density.at(steps), least_of[face]
     step = 1 << (power - least).astype(np.int64)
     step = np.minimum(step, steps.rows & -steps.rows)  # the most that divides the rows
     is_point = (steps.i % step == 0) & (steps.j % step == 0)
