@@ -26,7 +26,7 @@ export const sentImages = computed(() => images.value.filter(({ metalness }) => 
 const NO_METAL = "This material cannot become metal: it needs a term that scatters light, and a highlight with f0, such as GGX.";
 
 /** Puts an image onto a material, in some place. */
-type Put = (material: string, image: ImageBody) => void | Promise<void>;
+export type Put = (material: string, image: ImageBody) => void | Promise<void>;
 
 /** What becomes of a material's terms; `own`: those of the scene. */
 type Make = (terms: readonly Term[], own: readonly Term[]) => Term[];
