@@ -52,10 +52,11 @@ export interface Look {
   display: DisplayLook;
 }
 
-/** A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is reflected onto it. */
+/** A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is reflected onto it. `normal_map` stands in the place of the scene's own. */
 export interface MaterialLook {
   terms: TermLook[];
   catcher?: boolean;
+  normal_map?: NormalMapLook | null;
 }
 
 /** All surfaces of a material shine, and are seen to; emission is radiance. */
@@ -66,6 +67,12 @@ export interface MeshLook {
   emission: [number, number, number];
   kind: "mesh";
   material: string;
+}
+
+/** An image in the place of a material's normal map: "image:<id>", and how strong its bumps are, as `scale` of glTF. */
+export interface NormalMapLook {
+  image: string;
+  scale?: number;
 }
 
 /** A view of a display of the server's OpenColorIO config, in the place of a tone map. */

@@ -41,7 +41,9 @@ test("terms that share a channel change their texture together; others stay", ()
 
 test("maps that are no colours are known by their names", () => {
   const named = ["oak_rough_2k.jpg", "Metal049A_1K-JPG_Metalness.jpg", "rust_arm_4k.png", "bricks-normalGL.png", "wall_AO.png"];
-  expect(named.map(mapNamed)).toEqual(["roughness", "metal", "roughness and metal", "bumps", "occlusion"]);
+  const others = ["oak_nor_dx_2k.jpg", "oak_nor_gl_2k.jpg", "tiles_height.png", "lamp_emissive.png"];
+  expect(named.map(mapNamed)).toEqual(["roughness", "metal", "roughness and metal", "normals", "occlusion"]);
+  expect(others.map(mapNamed)).toEqual(["normals for DirectX", "normals", "heights", "what shines"]);
   const colours = ["rough_plaster_diff_2k.jpg", "Metal049A_1K-JPG_Color.jpg", "armchair.webp", "rough.png", "IMG_1234.jpg"];
   expect(colours.map(mapNamed)).toEqual(colours.map(() => null));
 });

@@ -6,7 +6,7 @@ Terms of one channel share what multiplies them: finished pictures are summed by
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeGuard, cast
+from typing import Any, NamedTuple, TypeGuard, cast
 
 from relume.asset_store import AssetStore
 from relume.brdf.registry import TERMS
@@ -17,6 +17,18 @@ TEXTURES = ("diffuse", "specular")
 
 Images = tuple[str | None, str | None]
 """What a look names in the place of each of a material's `TEXTURES`; None where it names nothing."""
+
+
+class NormalMap(NamedTuple):
+    """An image in the place of a material's normal map.
+
+    Attributes:
+        image: "image:<id>", one that was sent. scale: times the x and y of its normals, as glTF has it.
+    """
+
+    image: str
+    scale: float = 1.0
+
 
 IMAGES = AssetStore("image", "image:", "image.json", SceneError, max_entries=1_000)
 """Where such images are kept, by `relume.images.shelf`."""
@@ -67,6 +79,17 @@ def check_map(pointer: Pointer, follows: Any) -> bool | str:
     if isinstance(follows, bool) or (isinstance(follows, str) and IMAGES.is_known(follows)):
         return follows
     raise fail(pointer, follows, "true, false, or an image that was sent to /api/images and is here")
+
+
+def check_image(pointer: Pointer, image: Any) -> str:
+    """An image that a look names. Raises ParameterError unless it is here.
+
+    Args:
+        pointer: where it stands in its look. image: what stands there.
+    """
+    if isinstance(image, str) and IMAGES.is_known(image):
+        return image
+    raise fail(pointer, image, "an image that was sent to /api/images and is here")
 
 
 def check_texture(pointer: Pointer, texture: Any) -> str | None:

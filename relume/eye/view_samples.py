@@ -41,7 +41,7 @@ _LEVELS = 256
 
 
 _POINTS = ("position", "normal", "tangent")
-_SURFACE = ("diffuse", "specular", "uv", "roughness", "normal_length", "emission")
+_SURFACE = ("diffuse", "specular", "uv", "roughness", "normal_length", "emission", "surface_normal")
 _CHAIN = ("mirror", "mirror_cosine", "mirror_tint")
 _OWN = ("pixel", "weight", "material", "level", "through", "eye", "is_mirrored")
 _COLUMNS = (*_OWN, *_POINTS, *_SURFACE, *_CHAIN)

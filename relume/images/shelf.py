@@ -1,7 +1,7 @@
 """Images that were sent for materials; `relume.asset_store` keeps them.
 
 An image in the place of a map of roughness says by its green how rough each texel is, as files of glTF do: the number
-itself, no display value.
+itself, no display value. One in the place of a normal map says x, y and z by its colours, from −1 to 1.
 
     <folder>/<id>/texels.npy       bytes of display values, or reflectances. (height, width, 3) uint8 or float16
                   thumbnail.png
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.brdf.channels import IMAGES, is_image
+from relume.brdf.channels import IMAGES, NormalMap, is_image
 from relume.color import srgb_encode
 from relume.imageio.files import png_bytes, to_bytes
 from relume.images.reading import MAX_SIDE, read_image
@@ -186,9 +186,20 @@ def roughness_of(name: str) -> Texture:
     return _load_roughness(IMAGES.found(name))
 
 
+def normals_of(map_: NormalMap) -> Texture:
+    """What a material's `normal_map` names, `map_`: normals of tangent space. Raises what `texture_of` raises."""
+    return _load_normals(IMAGES.found(map_.image), map_.scale)
+
+
 def mean_roughness(name: str) -> float:
     """The mean of it, before it was divided by that. Raises what `texture_of` raises."""
     return _load_mean(IMAGES.found(name))
+
+
+@lru_cache(maxsize=4)
+def _load_normals(path: Path, scale: float) -> Texture:
+    texture = _load(path)
+    return Texture(_bytes_of(texture), texture.wrap, Coding("normal", (scale, scale, 1.0)))
 
 
 @lru_cache(maxsize=4)
@@ -204,8 +215,13 @@ def _load_mean(path: Path) -> float:
 
 def _shares(texture: Texture) -> NDArray[np.uint8]:
     """Roughness as bytes. (height, width, 1)"""
-    green = texture.pixels[..., 1:2]
-    return np.ascontiguousarray(green if texture.coding else np.rint(255 * green.astype(np.float32)).astype(np.uint8))
+    return np.ascontiguousarray(_bytes_of(texture, slice(1, 2)))
+
+
+def _bytes_of(texture: Texture, channels: slice = slice(None)) -> NDArray[np.uint8]:
+    """The numbers of its file, no display values, as bytes. (height, width, channels)"""
+    values = texture.pixels[..., channels]
+    return values if texture.coding else np.rint(255 * values.astype(np.float32)).astype(np.uint8)
 
 
 def _mean(shares: NDArray[np.uint8]) -> float:

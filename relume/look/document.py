@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
 from relume import environments
-from relume.brdf.channels import check_shared
+from relume.brdf.channels import check_image, check_shared
 from relume.brdf.document import complete_term
 from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
 from relume.errors import ParameterError
@@ -17,6 +17,7 @@ from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
 MAX_BOUNCES = 24  # between white walls, which reflect 0.73, a thousandth of the light is left after 22
+NORMAL_SCALE = (0.0, 10.0)
 RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number of a field; degrees, stops
     "environment": {"scale": (0.0, MAX_SCALE), "color": (0.0, MAX_COLOR), "rotation": (-360.0, 360.0)},
     "background": {"color": (0.0, MAX_COLOR), "blur": (2.0, 60.0)},
@@ -104,10 +105,20 @@ def _complete_material(name: str, given: Any, default: Mapping[str, Any], known:
     if given is known[name] or given is default[name]:
         return given
     pointer: Pointer = ("materials", name)
-    merged = _merged(pointer, given, default[name])  # only a scene's ground may be a catcher
+    merged = _merged(pointer, given, {**default[name], "normal_map": None})  # only a scene's ground may be a catcher
     if not isinstance(merged.get("catcher", True), bool):
         raise fail((*pointer, "catcher"), merged["catcher"], "true or false")
-    return {**merged, "terms": _complete_terms((*pointer, "terms"), merged["terms"], known[name]["terms"])}
+    normals = _complete_normals((*pointer, "normal_map"), merged.pop("normal_map", None))
+    return {**merged, "terms": _complete_terms((*pointer, "terms"), merged["terms"], known[name]["terms"]), **normals}
+
+
+def _complete_normals(pointer: Pointer, given: Any) -> dict[str, Any]:
+    """The image in the place of a material's normal map, with its scale; left out where there is none."""
+    if given is None:
+        return {}
+    merged = _merged(pointer, given, {"image": None, "scale": 1.0})
+    check_number((*pointer, "scale"), merged["scale"], *NORMAL_SCALE)
+    return {"normal_map": {**merged, "image": check_image((*pointer, "image"), merged["image"])}}
 
 
 def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[Any]:

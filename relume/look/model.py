@@ -10,6 +10,7 @@ from typing import Annotated, Literal, NamedTuple, NotRequired
 from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
 
+from relume.brdf.channels import NormalMap
 from relume.imageio.ocio.view import OcioView
 
 Rgb = tuple[float, float, float]
@@ -53,12 +54,27 @@ class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+class NormalMapLook(_Frozen):
+    """An image in the place of a material's normal map: "image:<id>", and how strong its bumps are, as `scale` of
+    glTF."""
+
+    image: str
+    scale: float = 1.0
+
+
 class MaterialLook(_Frozen):
     """A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as
-    its shadows and as bright as what is reflected onto it."""
+    its shadows and as bright as what is reflected onto it. `normal_map` stands in the place of the scene's own."""
 
     terms: tuple[TermLook, ...]
     catcher: bool = False
+    normal_map: NormalMapLook | None = None
+
+    @property
+    def normals(self) -> NormalMap | None:
+        """The same as a value; none of a catcher, whose own surface is not seen."""
+        found = None if self.catcher else self.normal_map
+        return None if found is None else NormalMap(found.image, found.scale)
 
 
 class EnvironmentKey(NamedTuple):

@@ -61,9 +61,9 @@ def lights_bytes(scene: Scene, recipe: Recipe) -> int:
 
 
 def triangles_bytes(scene: Scene) -> int:
-    """Of the store: the triangles, their corners and the material of each, how brightly they shine where images say it;
-    where rays pass some, which and where."""
-    of_face = 8 if has_images(scene) else 4
+    """Of the store: the triangles, their corners, the material and the mesh of each, how brightly they shine where
+    images say it; where rays pass some, which and where."""
+    of_face = 12 if has_images(scene) else 8
     triangles = sum(mesh.positions.nbytes + mesh.faces.nbytes + of_face * len(mesh.faces) for mesh in scene.meshes)
     if not any(material.lets_pass for material in scene.materials):
         return triangles

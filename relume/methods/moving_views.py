@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.basis.zernike import NUM_FUNCTIONS, QUICK_DEGREE
-from relume.brdf.channels import Images
 from relume.estimated import Estimated
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
@@ -27,7 +26,7 @@ from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
 from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights
 from relume.moving.parted import find_parted
-from relume.moving.points.images import dressed
+from relume.moving.points.images import OWN, Wears, dressed
 from relume.moving.points.surface import Surface, pattern_of_points, read_surface
 from relume.moving.sky import Sky
 from relume.moving.solid import Solid
@@ -120,18 +119,18 @@ class MovingViews:
         """Radiance of an environment, None for the scene's own. (height, width, 3) float32"""
         return self.lit.radiance_of(name)
 
-    def surface_with(self, images: tuple[Images, ...]) -> Surface:
+    def surface_with(self, wears: tuple[Wears, ...]) -> Surface:
         """What the eye sees where a look names images in the place of the materials' own.
 
         Args:
-            images: of each material.
+            wears: what it names, of each material.
         Raises:
             NotFoundError, SceneError: an image cannot be had.
         """
-        if not any(map(any, images)):
+        if all(of == OWN for of in wears):
             return self.surface
-        key = self.key, "images on surfaces", images
-        found = self.memory.keep(key, lambda: dressed(self.surface, self.positions, images))
+        key = self.key, "images on surfaces", wears
+        found = self.memory.keep(key, lambda: dressed(self.surface, self.positions, wears))
         return replace(self.surface, **found._asdict())
 
     @property

@@ -3,7 +3,7 @@
 The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
 triangles, and each view's samples), then "visibility" (rows of each view).
 
-    scene/positions, faces, face_material                    triangles, for shadows of lights that looks add
+    scene/positions, faces, face_material, face_mesh         triangles, for rays of what looks add
     scene/uvs, cutouts/…                                     where some have holes: relume.trace.cutouts.Cutouts
     lights/environment                                       radiance, to weigh it again
     lights/tiles                                             relume.light.tiles.Tiles
@@ -12,7 +12,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     views/<k>/position, normal, tangent, diffuse, specular, uv
     scene/face_emission, views/<k>/emission                  where surfaces shine as images say: relume.scene.emission
     views/<k>/level                                          of roughness: relume.scene.roughness
-    views/<k>/normal_length                                  of scenes with bumps, relume.trace.surface.Surface
+    views/<k>/normal_length, surface_normal                  of scenes with bumps: relume.trace.surface.Surface
     views/<k>/through, eye, is_mirrored, mirror, mirror_cosine, mirror_tint
                                                              of scenes with glass or mirrors: relume.eye.view_samples
     views/<k>/visibility                                     samples on surfaces only
@@ -49,7 +49,7 @@ from relume.views.store_io import read_chance
 CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
-_EMISSION_BYTES, _BUMP_BYTES = 12, 4
+_EMISSION_BYTES, _BUMP_BYTES = 12, 4 + 12
 _LAYER_BYTES = 12 + 12 + 1 + MOST_MIRRORS * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
@@ -136,7 +136,7 @@ class SampledViews:
             "has_layers": has_layers(scene.materials),
             "has_emission_images": has_images(scene),
             "roughness_levels": [list(levels_of(material)) for material in scene.materials],
-            "shortest_normals": list(map(shortest_normal, scene.materials)),
+            "shortest_normals": [shortest_normal(material.normal_map) for material in scene.materials],
             "views": [_described(cameras[view]) for view in recipe.views],
         }
 
@@ -205,7 +205,7 @@ def _columns(scene: Scene) -> list[str]:
         names += ["through", "eye", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
     if has_images(scene):
         names.append("emission")
-    return names + ["normal_length"] * _has_bumps(scene)
+    return names + ["normal_length", "surface_normal"] * _has_bumps(scene)
 
 
 def _has_bumps(scene: Scene) -> bool:
@@ -238,7 +238,7 @@ def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
 
 def triangles_of(geometry: Geometry, scene: Scene) -> dict[str, NDArray[Any]]:
     """The triangles of a scene, merged, as arrays of a store."""
-    arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material")}
+    arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material", "face_mesh")}
     if has_images(scene):
         arrays["scene/face_emission"] = shares_of_faces(scene)
     holes = geometry.embree.holes

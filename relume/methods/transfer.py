@@ -28,8 +28,8 @@ from relume.methods.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.methods.local_lights import LocalLights, Shadows
 from relume.methods.on_cells import LightOnCells
 from relume.methods.reflected import Reflected
+from relume.methods.retracing import Retracing
 from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
-from relume.methods.thinned import ThinnedStore
 from relume.methods.thrown import MoreThrown, Thrown, ThrownLight
 from relume.operators.image_files import ImageFiles
 from relume.picture.light import Light
@@ -38,6 +38,7 @@ from relume.points import Points
 from relume.project.receivers import GatherRays, Rays, Receivers
 from relume.project.sent import Sent, evenly
 from relume.trace.cell_tree import NO_CELL
+from relume.views.thinned import ThinnedStore
 from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
@@ -88,6 +89,11 @@ class BakedViews:
     def local(self) -> LocalLights:
         """What local lights need."""
         return LocalLights(self.store, self.memory, self.key)
+
+    @cached_property
+    def tracer(self) -> Retracing:
+        """Rays for normals that the bake did not know."""
+        return Retracing(self.store, self.local, None)
 
     @cached_property
     def lights(self) -> TriangleLights:
@@ -217,8 +223,9 @@ class BakedViews:
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
-        whole = view.receivers(material)
-        return FewSamples(self, replace(whole.places(chosen), visible=whole.visible[chosen]))
+        few = view.receivers(material, is_lit=False).places(chosen)
+        visible = np.asarray(view.read_some("visibility", material, chosen), np.uint8)
+        return FewSamples(self, replace(few, visible=visible))
 
     def open_sky(self, light: Light, points: Points, *, is_preview: bool) -> Arriving:
         """What the environment brings to points, seen along their normals, if nothing hides it. See `Transfer`."""
@@ -325,6 +332,11 @@ class BouncedViews(BakedViews):
         return ThrownLight(self.thrown, self.cells, self.lights_in, self.memory, self.key)
 
     @cached_property
+    def tracer(self) -> Retracing:
+        """Rays for normals that the bake did not know."""
+        return Retracing(self.store, self.local, self.thrown)
+
+    @cached_property
     def harmonic(self) -> HarmonicLight | None:
         """How smooth light comes to points and cells, where that was baked."""
         return read_harmonic_light(self.store, self.cells)
@@ -364,9 +376,9 @@ class BouncedViews(BakedViews):
 
     def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
-        few, seen = super().some(view, material, chosen), self.thrown_to(view, material)
-        thrown = None if seen is None else seen[chosen]
-        return replace(few, gathered=view.gather_rays(material, _NOTHING).alone(chosen), thrown=thrown)
+        few = super().some(view, material, chosen)
+        thrown = None if self.thrown is None else np.asarray(view.read_some("thrown", material, chosen), np.uint8)
+        return replace(few, gathered=view.some_gather_rays(material, chosen, _NOTHING), thrown=thrown)
 
 
 def shown_of(lights: TriangleLights, light: Light) -> TriangleLights:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.channels import Images, images_of
+from relume.brdf.channels import NormalMap, images_of
 from relume.look import Look
 from relume.moving.again import Part, Shown, resolve_some
 from relume.moving.basis.lobes import Lobes, lobes_of
@@ -27,6 +27,8 @@ from relume.moving.highlights.looking import SkyLight
 from relume.moving.look_up import Seen, at_vertices
 from relume.moving.panes import hide_less, lay_over_glass
 from relume.moving.pixels import FromVertices, Mirrored, combine
+from relume.moving.points.images import Wears
+from relume.moving.points.surface import Surface
 from relume.moving.relief.light import ReliefLight
 from relume.moving.relief.show import Arrived, Sight, show_texels
 from relume.moving.relief.tables import Cover, covers_of
@@ -62,7 +64,7 @@ class Materials(NamedTuple):
         sends: whether a material sends anything of a group of terms. (materials, groups) bool
         covers: of materials whose every texel sends something else.
         each: the terms of each, projected.
-        images: that a look names in the place of each one's own.
+        wears: what a look names in the place of each one's images.
     """
 
     tables: Tables
@@ -70,19 +72,31 @@ class Materials(NamedTuple):
     sends: NDArray[np.bool_]
     covers: Sequence[Cover]
     each: Sequence[Projected]
-    images: tuple[Images, ...]
+    wears: tuple[Wears, ...]
 
     @classmethod
-    def of(cls, terms: Sequence[Sequence[Mapping[str, Any]]], before: Self | None = None) -> Self:
-        """Project the terms of each, of a complete look. before: those of another, which hold what has not changed."""
+    def of(
+        cls,
+        terms: Sequence[Sequence[Mapping[str, Any]]],
+        before: Self | None = None,
+        normals: Sequence[NormalMap | None] | None = None,
+    ) -> Self:
+        """Project the terms of each, of a complete look.
+
+        Args:
+            terms: of each. before: those of another, which hold what has not changed.
+            normals: in the place of the normal maps of each; None: all have their own.
+        """
+        of_normals = [None] * len(terms) if normals is None else normals
+        wears = tuple(Wears(images_of(these), one) for these, one in zip(terms, of_normals, strict=True))
         known = before.each if before is not None else [None] * len(terms)
         each = [_projected(these, one) for these, one in zip(terms, known, strict=True)]
         if before is not None and all(map(operator.is_, each, before.each)):
-            return before
+            return before if before.wears == wears else before._replace(wears=wears)
         tables, lobes = Tables.joined([one.tables for one in each]), Lobes.joined([one.lobes for one in each])
         sends, with_lobe = np.asarray((tables.of >= 0).any(axis=2)), lobes.of >= 0
         sends[with_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.of[with_lobe]]
-        return cls(tables, lobes, sends, covers_of(terms), each, tuple(map(images_of, terms)))
+        return cls(tables, lobes, sends, covers_of(terms), each, wears)
 
 
 class Wanted(NamedTuple):
@@ -197,6 +211,7 @@ def only_materials_differ(before: Wanted, after: Wanted) -> bool:
     catchers = (material.catcher for look in (one, other) for material in look.materials.values())
     return (
         before.arriving is after.arriving
+        and [one.normals for one in before.materials.wears] == [one.normals for one in after.materials.wears]
         and before.light._replace(reflectances=after.light.reflectances) == after.light
         and np.array_equal(before.gain, after.gain)
         and one.background == other.background
@@ -242,7 +257,7 @@ def _summed(
 ) -> Sums:
     """What surfaces send along the rays of a part, and on the way there. into: written there; None: new."""
     materials, arriving = wanted.materials, wanted.arriving
-    surface = transfer.surface_with(materials.images)
+    surface = transfer.surface_with(materials.wears)
     lobes, eye, (points, vertices, rays) = materials.lobes, camera.to_world[:3, 3].astype(np.float32), part
     glances, sent, (broad, along), towards, out = into or (None, None, (None, None), None, None)
     glances = _glanced(transfer, wanted, eye, points, glances)
@@ -251,7 +266,7 @@ def _summed(
     lit = _lit(transfer, wanted, eye, points)
     add_sky_in_highlights(surface, lobes, sky, eye, glances, lit, points, sent, is_fine=wanted.is_fine)
     broad, along = at_vertices(surface, vertices, sent.radiance, broad), at_vertices(surface, vertices, glances, along)
-    towards = _towards_light(transfer, arriving, seen) if towards is None else towards
+    towards = _towards_light(surface, arriving, seen) if towards is None else towards
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
     pixel_angle, from_vertices = camera.yfov / height, FromVertices(broad, materials.sends, towards)
     mirrored = Mirrored(lobes, sky, along, wanted.is_fine)
@@ -296,12 +311,11 @@ def _add_beams(
         return
     beams, sky = wanted.arriving.beams, _sky_in(transfer, wanted.light)
     of_eye = seen, camera, camera.yfov / height
-    add_beams(beams, shares, transfer.surface_with(wanted.materials.images), *of_eye, wanted.materials, sky, rays, out)
+    add_beams(beams, shares, transfer.surface_with(wanted.materials.wears), *of_eye, wanted.materials, sky, rays, out)
 
 
-def _towards_light(transfer: MovingTransfer, arriving: Arriving, seen: Seen) -> F32:
+def _towards_light(surface: Surface, arriving: Arriving, seen: Seen) -> F32:
     """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
-    surface = transfer.surface
     if not len(surface.tangents):
         return np.empty((0, 3), np.float32)
     return at_vertices(surface, seen.is_seen, towards_light(surface, arriving.total, seen.is_needed))

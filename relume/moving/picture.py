@@ -310,7 +310,9 @@ class MovingPicture:
     def _materials_of(self, shown: Look) -> Materials:
         before_of, before = self._materials
         if before is None or before_of is not shown:
-            found = Materials.of([documents_of(shown, name) for name in self._transfer.material_names], before)
+            names = self._transfer.material_names
+            normals = [shown.materials[name].normals for name in names]
+            found = Materials.of([documents_of(shown, name) for name in names], before, normals)
             self._num_materials += found is not before
             self._materials = shown, found
             return found

@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.channels import Images
 from relume.look import EnvironmentKey
 from relume.moving.beams.beam import Beam
 from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights
+from relume.moving.points.images import Wears
 from relume.moving.points.surface import Surface
 from relume.moving.sky import Sky
 from relume.moving.solid import Solid
@@ -31,8 +31,8 @@ class MovingTransfer(Opened, Protocol):
     def views(self) -> Mapping[str, FreeView]: ...
     @property
     def surface(self) -> Surface: ...
-    def surface_with(self, images: tuple[Images, ...]) -> Surface:
-        """What it is where a look names images in the place of the materials' own. images: of each material"""
+    def surface_with(self, wears: tuple[Wears, ...]) -> Surface:
+        """What it is where a look names images in the place of the materials' own. wears: of each material"""
         ...
 
     @property

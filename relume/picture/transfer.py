@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.scene.model import Camera
     from relume.trace.preview_light import PreviewLight
     from relume.views.view import View
+    from relume.views.worn_store import Tracer
 
 F32 = NDArray[np.float32]
 
@@ -176,6 +177,11 @@ class Transfer(Opened, Protocol):
     def reflected(self) -> Bounced | None: ...
     @property
     def local(self) -> Local: ...
+    @property
+    def tracer(self) -> Tracer:
+        """Rays for normals that the bake did not know."""
+        ...
+
     def has_image(self, key: Any) -> bool:
         """Whether the image of a term is kept beside the store, under the name of a job without the store's own."""
         ...

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.channels import roughness_image
 from relume.brdf.document import complete_term
+from relume.brdf.levels import follows_map
 from relume.errors import ParameterError
 from relume.light.triangles import TriangleLights
 from relume.look import Look, TermLook, validate
@@ -26,8 +27,8 @@ from relume.picture.mirrors import Mirrors
 from relume.picture.pointer import CurvePointer, ParameterPointer
 from relume.picture.transfer import Axis, Transfer
 from relume.project.receivers import Receivers
-from relume.views.rougher import rougher
 from relume.views.view import Tile
+from relume.views.worn import Maps, worn
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -68,15 +69,16 @@ class ViewImages:
         self.region: Tile | None = None
 
     def following(self, look: Look) -> ViewImages:
-        """The images of the view whose samples are as rough as the images say that a look names; the same where none
-        is named that was not before. Materials that are sorted anew go on showing what they do; others are shared.
+        """The images of the view whose samples wear the images that a look names in the place of maps of roughness and
+        of normals; the same where none is named that was not before. Materials whose images are others go on showing
+        what they do; others are shared.
 
-        Raises what `relume.views.rougher.rougher` raises; then nothing has changed.
+        Raises what `relume.views.worn.worn` raises; then nothing has changed.
         """
-        maps = tuple(roughness_image(documents_of(look, name)) for name in self.transfer.material_names)
+        maps = tuple(self._maps_of(look, name) for name in self.transfer.material_names)
         if maps == (self.view.maps or (None,) * len(maps)):
             return self
-        changed, view = copy(self), rougher(self.transfer.views[self.view.name], maps)
+        changed, view = copy(self), worn(self.transfer.views[self.view.name], maps, self.transfer.tracer)
         changed.view, changed.mirrors, changed.by_name = view, Mirrors(view), {}
         place = np.empty(view.num_surface_samples, np.int64)
         place[self.view.as_baked()] = np.arange(len(place))  # of the samples as they were baked, in this view
@@ -88,6 +90,19 @@ class ViewImages:
                 image.go_on_showing(before, place[view.as_baked()[rows]] - rows.start)
             changed.by_name[name] = image
         return changed
+
+    def _maps_of(self, look: Look, material: str) -> Maps | None:
+        """What a look names in the place of a material's maps; None for nothing."""
+        documents, normals = documents_of(look, material), look.materials[material].normals
+        roughness = roughness_image(documents)
+        if roughness is None and normals is None:
+            return None
+        return Maps(roughness, normals, self._widening_base(material) if any(map(follows_map, documents)) else None)
+
+    def _widening_base(self, material: str) -> float | None:
+        """The roughness of a material's terms in the scene, that bumps below a pixel widen."""
+        given = (term["params"].get("roughness") for term in documents_of(self.default, material))
+        return next((float(np.mean(value)) for value in given if value is not None), None)
 
     def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
         """All that this view sees anything of."""

@@ -23,7 +23,7 @@ from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.methods.direct import DirectMethod
-from relume.reference.images import roughness_at, textures_of
+from relume.reference.images import roughness_at, textures_of, wearing
 from relume.reference.indirect import reference_indirect
 from relume.reference.kinds import kinds_of
 from relume.reference.local import LocalLamp, emission_of, lamps_of
@@ -127,7 +127,7 @@ def _images(
 ) -> list[F32]:  # fmt: skip
     """One picture for each choice of paths."""
     DirectMethod().plan(scene, Recipe("direct", (view,), size, MIN_LIGHTS))  # refuses what a bake refuses
-    shot = _shoot(scene, view, look, size)
+    shot = _shoot(wearing(scene, look), view, look, size)
     is_direct = np.array([paths.direct for paths in wanted], np.float64)
     has_others = any(paths.reflect for paths in wanted) or (is_direct.any() and are_mirrors(scene.materials).any())
     direct = _DIRECT_SHARE if has_others else 1.0

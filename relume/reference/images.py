@@ -2,18 +2,54 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.channels import TEXTURES, images_of, roughness_image
-from relume.images.shelf import mean_roughness, roughness_of, texture_of
+from relume.brdf.levels import follows_map
+from relume.images.shelf import mean_roughness, normals_of, roughness_of, texture_of
 from relume.look import Look
-from relume.scene.model import Scene
+from relume.scene.gltf.uvs import made_tangents
+from relume.scene.model import Material, Scene
 from relume.scene.roughness import widened
 from relume.trace.surface import Surface
 from relume.trace.texture import sample_image
 
 F32 = NDArray[np.float32]
+
+
+def wearing(scene: Scene, look: Look) -> Scene:
+    """The scene whose materials have the normal maps that a look names, as if its file had them.
+
+    Args:
+        scene: any. look: that is shown.
+    """
+    normals = [look.materials[own.name].normals for own in scene.materials]
+    if not any(normals):
+        return scene
+    materials = tuple(
+        own if map_ is None else replace(own, normal_map=normals_of(map_), terms=_following(own, look))
+        for own, map_ in zip(scene.materials, normals, strict=True)
+    )
+    meshes = tuple(
+        replace(mesh, tangents=made_tangents(mesh.positions, mesh.normals, mesh.uvs, mesh.faces))
+        if normals[mesh.material] is not None and not mesh.tangents.any()
+        else mesh
+        for mesh in scene.meshes
+    )
+    return replace(scene, materials=materials, meshes=meshes)
+
+
+def _following(own: Material, look: Look) -> tuple[dict[str, Any], ...]:
+    """A material's own terms, which bumps widen where those of a look follow a map."""
+    shown = look.materials[own.name].terms
+    follows = [k < len(shown) and follows_map(shown[k]) for k in range(len(own.terms))]
+    return tuple(
+        {**term, "roughness_map": True} if f else dict(term) for term, f in zip(own.terms, follows, strict=True)
+    )
 
 
 def textures_of(scene: Scene, look: Look, surface: Surface, material: NDArray[np.integer]) -> dict[str, F32]:

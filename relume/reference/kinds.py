@@ -59,7 +59,7 @@ def _levels(material: Material, terms: Terms) -> tuple[float, ...]:
     name = roughness_image(terms)
     if name is None:
         return levels_of(material)
-    return levels_between(roughness_of(name), mean_roughness(name) or None, shortest_normal(material))
+    return levels_between(roughness_of(name), mean_roughness(name) or None, shortest_normal(material.normal_map))
 
 
 def kinds_of(scene: Scene, look: Look) -> Kinds:

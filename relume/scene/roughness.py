@@ -32,7 +32,7 @@ _LEAST_LENGTH = 0.2  # of a mean of normals: rougher than anything is
 def levels_of(material: Material) -> tuple[float, ...]:
     """The levels of a material: roughness over what its terms say, rising. None where it has no map, or a plain one."""
     texture, own = material.textures.get("roughness"), widening_base(material)
-    return levels_between(texture, own, 1.0 if own is None else shortest_normal(material))
+    return levels_between(texture, own, 1.0 if own is None else shortest_normal(material.normal_map))
 
 
 def levels_between(texture: Texture | None, own: float | None, shortest: float) -> tuple[float, ...]:
@@ -42,13 +42,27 @@ def levels_between(texture: Texture | None, own: float | None, shortest: float) 
         texture: roughness over its mean, of bytes; None: one everywhere. own: that mean, see `widened`; None: bumps
             widen nothing. shortest: from `shortest_normal`.
     """
-    low = high = 1.0
-    if texture is not None:
-        roots, count = _histogram(texture)
-        share = np.cumsum(count) / count.sum()
-        low, high = roots[np.searchsorted(share, _STRAYS)], roots[np.searchsorted(share, 1 - _STRAYS)]
+    return levels_over(*ends_of(texture), own, shortest)
+
+
+def ends_of(texture: Texture | None) -> tuple[float, float]:
+    """The ratios between which a map of roughness lies, but for strays. texture: it; None: one everywhere."""
+    if texture is None:
+        return 1.0, 1.0
+    roots, count = _histogram(texture)
+    share = np.cumsum(count) / count.sum()
+    low, high = roots[np.searchsorted(share, _STRAYS)], roots[np.searchsorted(share, 1 - _STRAYS)]
+    return float(low**2), float(high**2)
+
+
+def levels_over(lowest: float, highest: float, own: float | None, shortest: float) -> tuple[float, ...]:
+    """The levels between two ratios, `lowest` and `highest`, where bumps widen what they stand for.
+
+    own, shortest: see `levels_between`.
+    """
     if own is not None and shortest < 1:
-        high = float(np.sqrt(widened(np.array([high**2], np.float32), np.array([shortest], np.float32), own)[0]))
+        highest = float(widened(np.array([highest], np.float32), np.array([shortest], np.float32), own)[0])
+    low, high = np.sqrt(lowest), np.sqrt(highest)
     num = 1 + min(MAX_LEVELS - 1, int(np.ceil((high - low) / _STEP)))
     if num < 3:
         return ()
@@ -74,9 +88,21 @@ def widened(ratio: F32, length: F32, own: float) -> F32:
     Returns:
         (n,) float32
     """
+    return np.asarray(((own * ratio) ** 4 + 2 * _variance(length)) ** 0.25 / own, np.float32)
+
+
+def narrowed(ratio: F32, length: F32, own: float) -> F32:
+    """Roughness over `own` without the bumps that widened it: `widened` the other way.
+
+    ratio, length, own: as there. Returns (n,) float32
+    """
+    return np.asarray(np.maximum((own * ratio) ** 4 - 2 * _variance(length), 0) ** 0.25 / own, np.float32)
+
+
+def _variance(length: F32) -> F32:
+    """Of the slopes of normals whose mean is so long, σ². (n,)"""
     held = np.clip(length, _LEAST_LENGTH, 1)
-    variance = (1 - held) / held
-    return np.asarray(((own * ratio) ** 4 + 2 * variance) ** 0.25 / own, np.float32)
+    return np.asarray((1 - held) / held, np.float32)
 
 
 def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5) -> NDArray[np.uint8]:
@@ -94,14 +120,14 @@ def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5
     return np.asarray(place + 1 - threshold, np.uint8)
 
 
-def shortest_normal(material: Material) -> float:
+def shortest_normal(normals: Texture | None) -> float:
     """About the shortest mean of normals that a pixel covers: of blocks of some sizes, but for strays.
 
     Args:
-        material: any; one without bumps has 1.
+        normals: a normal map; without one it is 1.
     """
     lengths = [1.0]
-    for rows in () if material.normal_map is None else rows_of(material.normal_map):
+    for rows in () if normals is None else rows_of(normals):
         for side in _BLOCKS:
             height, width = (max(1, size // side) for size in rows.shape[:2])
             cut = rows[: height * side, : width * side]

@@ -37,6 +37,8 @@ class Surface:
         roughness: over what the material's terms say, 1 where it has no map. (n,) float32
         normal_length: of the mean of the normals that a pixel covers, 1 where there are no bumps. (n,) float32
         emission: over the mean of the material's surfaces, 1 where it has no image. (n, 3) float32
+        surface_normal: normals without bumps, which images of others lean; the points' own where there are none.
+            (n, 3) float32
     """
 
     points: Points
@@ -46,11 +48,15 @@ class Surface:
     roughness: F32
     normal_length: F32
     emission: F32
+    surface_normal: F32
 
     def rows(self, chosen: NDArray[np.integer]) -> Surface:
         """Choose some of them; their seeds are their new numbers."""
         points = self.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
-        of_surface = self.diffuse, self.specular, self.uv, self.roughness, self.normal_length, self.emission
+        of_surface = (
+            self.diffuse, self.specular, self.uv, self.roughness, self.normal_length, self.emission,
+            self.surface_normal,
+        )  # fmt: skip
         return Surface(points, *(each[chosen] for each in of_surface))
 
 
@@ -68,10 +74,10 @@ def any_tangent(normal: F32) -> F32:
     return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=-1).astype(np.float32)
 
 
-def _across(vector: F32, normal: F32) -> F32:
-    """Take the part of `vector` across `normal`, unit; any direction across it where there is none."""
-    across = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
-    return _unit(across, any_tangent(normal))
+def across(vector: F32, normal: F32) -> F32:
+    """Take the part of vectors (n, 3) across normals (n, 3), unit; any direction across where there is none."""
+    part = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
+    return _unit(part, any_tangent(normal))
 
 
 def surface_at(
@@ -145,7 +151,7 @@ def _surface_at(
     position = (p * b).sum(axis=1) + geometry.epsilon * face_normal
     channels = dict(zip(_IMAGES, np.ones((3, *position.shape), np.float32), strict=True))
     channels["roughness"] = np.ones((len(uv), 1), np.float32)
-    length = np.ones(len(uv), np.float32)
+    length, smooth = np.ones(len(uv), np.float32), normal
     footprint = np.zeros(len(uv), np.float32)
     if materials:
         (du_0, dv_0), (du_1, dv_1) = np.diff(geometry.uvs[corners], axis=1).transpose(1, 2, 0)
@@ -166,9 +172,10 @@ def _surface_at(
                 length[rows] = covered_length(mapped, pyramid.texels(footprint[rows]))
                 if (own := widening_base(m)) is not None:
                     channels["roughness"][rows, 0] = widened(channels["roughness"][rows, 0], length[rows], own)
-                normal[rows] = _mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
-    normal = _towards(normal, directions)
-    tangent = _across(tangents[:, :3], normal)
+                normal = normal.copy() if normal is smooth else normal
+                normal[rows] = mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
+    normal = towards_viewer(normal, directions)
+    tangent = across(tangents[:, :3], normal)
     place = _in_texture(p, geometry.uvs[corners], uv, normal, tangent)
     place[:, 2] = footprint
     is_flat = place[:, 4] == 0
@@ -185,6 +192,7 @@ def _surface_at(
         channels["roughness"][:, 0],
         length,
         channels["emission"],
+        smooth.astype(np.float32, copy=False),
     )
 
 
@@ -268,9 +276,14 @@ def covered_length(mapped: F32, texels: F32) -> F32:
     return np.asarray(1 - covers * (1 - np.minimum(np.linalg.norm(mapped, axis=1), 1)), np.float32)
 
 
-def _mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) -> F32:
-    """Turn tangent-space normals into world space, kept on the outer side of the face."""
-    tangent = _across(tangents[:, :3], normal)
+def mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) -> F32:
+    """Turn tangent-space normals into world space, kept on the outer side of the face.
+
+    Args:
+        mapped: means of normals of tangent space. (n, 3) normal: of the surface, unit. (n, 3)
+        tangents: not yet across these, with the sign of the bitangent. (n, 4) face_normal: unit. (n, 3)
+    """
+    tangent = across(tangents[:, :3], normal)
     bitangent = np.cross(normal, tangent) * np.where(tangents[:, 3:] < 0, -1, 1)
     world = mapped[:, :1] * tangent + mapped[:, 1:2] * bitangent + mapped[:, 2:] * normal
     world = _unit(world, normal)
@@ -278,8 +291,12 @@ def _mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) ->
     return np.where(below, normal, world).astype(np.float32)
 
 
-def _towards(normal: F32, directions: F32) -> F32:
-    """Bend shading normals that face away from the viewer just into view: interpolation must lose no sample."""
+def towards_viewer(normal: F32, directions: F32) -> F32:
+    """Bend shading normals that face away from the viewer just into view: interpolation must lose no sample.
+
+    Args:
+        normal: unit. (n, 3) directions: in which they are seen, unit. (n, 3)
+    """
     facing = -np.einsum("nc,nc->n", normal, directions)
     lacking = np.maximum(LEAST_FACING - facing, 0)[:, None]
     return _unit(normal - lacking * directions, -directions)

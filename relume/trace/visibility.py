@@ -17,11 +17,12 @@ from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_o
 F32 = NDArray[np.float32]
 
 _POINTS_A_RANGE = 512
+NONE_KNOWN = np.zeros((1, 3), np.float32)  # a normal that no light is above
 
 
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, origins, normals, chance, directions, start, stop, bits
+    occluded, scene, arguments, origins, normals, known, chance, directions, start, stop, bits
 ):
     """Trace points [start, stop) against all lights; returns the number of rays. start is a multiple of 16."""
     packet = new_packet(scene, arguments)
@@ -40,7 +41,9 @@ def _trace(  # type: ignore[no-untyped-def]
             for k in range(LANES):
                 p = first + min(k, width - 1)
                 above = normals[p, 0] * x + normals[p, 1] * y + normals[p, 2] * z > 0
-                facing[k] = above and k < width
+                q = min(p, known.shape[0] - 1)
+                is_known = known[q, 0] * x + known[q, 1] * y + known[q, 2] * z > 0
+                facing[k] = above and not is_known and k < width
                 ask(packet, k, facing[k])
                 active += 1 if facing[k] else 0
             if active == 0:
@@ -70,7 +73,9 @@ class Traced:
     trace_s: float
 
 
-def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions: F32, chance: F32 = ALIKE) -> Traced:
+def trace_visibility(
+    scene: EmbreeScene, origins: F32, normals: F32, directions: F32, chance: F32 = ALIKE, known: F32 = NONE_KNOWN
+) -> Traced:
     """Trace every point against every light above its horizon.
 
     Args:
@@ -79,6 +84,7 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
         directions: unit, towards the lights. (m, 3) float32
         chance: of the rays of each point, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
+        known: other normals; lights above their horizon are not traced and count as hidden, too. (n, 3) or (1, 3)
     Cost: O(n · m · log triangles) time.
     """
     bits = np.zeros((len(origins), (len(directions) + 7) // 8), np.uint8)
@@ -88,9 +94,10 @@ def trace_visibility(scene: EmbreeScene, origins: F32, normals: F32, directions:
     def kernel(start: int, stop: int) -> None:
         counts.append(
             _trace(
-                occluded, scene.handle, arguments.ctypes.data, origins, normals, chance, directions, start, stop, bits
+                occluded, scene.handle, arguments.ctypes.data, origins, normals, known, chance, directions,
+                start, stop, bits,
             )
-        )
+        )  # fmt: skip
 
     began = time.perf_counter()
     for_ranges(kernel, len(origins), _POINTS_A_RANGE)

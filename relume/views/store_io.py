@@ -133,6 +133,26 @@ def read_normal_length(store: StoreReader, k: int, start: int, stop: int) -> F32
         return np.ones(stop - start, np.float32)
 
 
+def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, material: int) -> F32 | None:
+    """Read the normals of a material's samples as they are without bumps; None in stores that do not say so.
+
+    Args:
+        store: an open store. k: number of the view. start, stop: rows of its arrays. material: index of it.
+    Returns:
+        (stop - start, 3) float32
+    """
+    shortest = store.attributes.get("shortest_normals")
+    if shortest is None:
+        return None
+    try:
+        return np.asarray(store.read(f"views/{k}/surface_normal", start, stop), np.float32)
+    except ChunkDamagedError:
+        raise
+    except StoreError:
+        has_bumps = shortest[material] < 1
+        return None if has_bumps else np.asarray(store.read(f"views/{k}/normal", start, stop), np.float32)
+
+
 def read_shortest_normals(store: StoreReader) -> list[float]:
     """Read about the shortest of them for each material, see `relume.scene.roughness.shortest_normal`.
 

@@ -6,6 +6,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any, Protocol, runtime_checkable
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -26,6 +27,7 @@ from relume.trace.texture import sample_image
 from relume.views.mirrored import Mirrored, read_mirrored
 from relume.views.sharing import sharing
 from relume.views.store_io import (
+    pattern_of_material,
     read_camera,
     read_eyes,
     read_gather_rays,
@@ -45,6 +47,15 @@ _IMAGES = ("diffuse", "specular")
 _ROWS_AT_ONCE = 1 << 18
 
 
+@runtime_checkable
+class SomeReader(Protocol):
+    """A store that is asked for rows that do not lie together."""
+
+    def read_some(self, path: str, rows: NDArray[np.int64]) -> NDArray[Any]:
+        """Some rows of an array. path: of the array. rows: in any order"""
+        ...
+
+
 @dataclass(frozen=True)
 class View:
     """One camera's samples, sorted by material.
@@ -62,10 +73,9 @@ class View:
         textures: of each material, the images of the scene in which it is not 1 all over, by their names. (n, 3)
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
         level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
-        maps: images that levels follow in the place of each material's own map, see `relume.views.rougher`; none where
-            nothing is named.
+        maps: images in the place of each material's own maps, see `relume.views.worn`; none where nothing is named.
         sorted: where each sample on surfaces is among those that were baked; None: in that order. (surface samples,)
-        rougher: views of the same samples that follow such images, by these, for as long as a picture has them.
+        worn: views of the same samples that wear such images, by these, for as long as a picture has them.
     """
 
     camera: Camera
@@ -87,12 +97,14 @@ class View:
     cos_theta_o: NDArray[np.float64]
     level: NDArray[np.uint8]
     ratios: tuple[tuple[float, ...], ...]
-    maps: tuple[str | None, ...] = ()
+    maps: tuple[Hashable | None, ...] = ()
     sorted: NDArray[np.int64] | None = field(default=None, repr=False)
-    rougher: WeakValueDictionary[tuple[str | None, ...], View] = field(default_factory=WeakValueDictionary, repr=False)
+    worn: WeakValueDictionary[tuple[Hashable | None, ...], View] = field(
+        default_factory=WeakValueDictionary, repr=False
+    )
 
     def place(self, material: int) -> tuple[Hashable, ...]:
-        """Name a material's samples among those of the bake: with the image that they are sorted by, if any."""
+        """Name a material's samples among those of the bake: with the images in the place of its maps, if any."""
         return self.name, material, *filter(None, self.maps[material : material + 1])
 
     def as_baked(self) -> NDArray[np.int64]:
@@ -204,6 +216,24 @@ class View:
 
         return self.memory.passing.keep((self.key, "visibility", *self.place(material)), read)
 
+    def read_some(self, name: str, material: int, chosen: NDArray[np.integer]) -> NDArray[Any]:
+        """Read an array of the view at some of a material's samples; where rays are traced for it, for these alone.
+
+        Args:
+            name: of the array. material: its index. chosen: counted from the material's first. (k,)
+        """
+        rows, path = self.rows(material), f"views/{self.index}/{name}"
+        if isinstance(self.store, SomeReader):
+            return np.asarray(self.store.read_some(path, rows.start + chosen))
+        if name == "visibility":
+            return np.asarray(self._visible(material)[chosen])
+        return np.asarray(self.store.read(path, rows.start, rows.stop)[chosen])
+
+    def some_gather_rays(self, material: int, chosen: NDArray[np.integer], reflected: Sent) -> GatherRays:
+        """Read the rays of some of a material's samples, which do not share them. See `read_some`, `gather_rays`."""
+        links = np.asarray(self.read_some("links", material, chosen), np.uint16)
+        return GatherRays(links, pattern_of_material(self.store, self.index, material), reflected)
+
     def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
         """Read from the store the rays of a material's samples that bring what gather cells send."""
         rows = self.rows(material)
@@ -275,7 +305,7 @@ def open_view(
     index: int,
     memory: Memory,
     key: str,
-    maps: tuple[str | None, ...] = (),
+    maps: tuple[Hashable | None, ...] = (),
     rows: NDArray[np.int64] | None = None,
 ) -> View:
     """Read what every frame of a view needs; visibility stays in the store until a material is frozen.

@@ -1,119 +1,115 @@
-"""Views whose materials follow other maps of roughness than they were baked with: their samples are sorted anew.
+"""Views whose materials wear other maps of roughness or of normals than they were baked with.
 
 Levels of roughness are coefficients of one operator (docs/adr/0052-roughness-in-levels.md), and bakes say where samples
-lie in textures. So an image in the place of a map is another level for each sample, nothing else; as samples of a level
-lie together, they come in another order (docs/adr/0102-images-of-roughness.md).
+lie in textures. So an image in the place of a map of roughness is another level for each sample, nothing else; as
+samples of a level lie together, they come in another order (docs/adr/0102-images-of-roughness.md). An image of normals
+is another normal for each, and another level where bumps below a pixel widen it (docs/adr/0107-images-of-normals.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import StoreReader
+from relume.brdf.channels import NormalMap
 from relume.brdf.levels import Levels
 from relume.errors import StoreError
 from relume.eye.view_samples import thresholds
 from relume.eye.windows import morton
-from relume.images.shelf import mean_roughness, roughness_of
-from relume.scene.roughness import level_of, levels_between, widened
+from relume.images.shelf import mean_roughness, normals_of, roughness_of
+from relume.scene.roughness import ends_of, level_of, levels_over, narrowed, shortest_normal, widened
 from relume.trace.texture import sample_image
+from relume.views.leaning import Leant, leant
 from relume.views.store_io import read_normal_length, read_shortest_normals, read_uv
 from relume.views.view import View, open_view
+from relume.views.worn_store import Tracer, WornStore
 
-Rows = NDArray[np.int64]
-Names = tuple[str | None, ...]
+F32 = NDArray[np.float32]
 
 
-class Reordered:
-    """Another store's samples of one view in another order, at other levels of roughness; a `StoreReader`.
+class Maps(NamedTuple):
+    """What a look names in the place of a material's maps.
 
-    Args:
-        store: the other. view: number of the view. rows: of it, the row of each sample here. (surface samples,)
-        level: of each sample here. (surface samples,) uint8 ratios: of each material's levels.
+    Attributes:
+        roughness: "image:<id>", None for its own. normals: None for its own.
+        own: the roughness of its terms, as the scene has it, that bumps widen; None where no term follows a map.
     """
 
-    def __init__(
-        self,
-        store: StoreReader,
-        view: int,
-        rows: Rows,
-        level: NDArray[np.uint8],
-        ratios: Sequence[tuple[float, ...]],
-    ) -> None:
-        self._store, self._prefix, self._rows, self._level = store, f"views/{view}/", rows, level
-        self._attributes = {**store.attributes, "roughness_levels": list(map(list, ratios))}
-
-    @property
-    def attributes(self) -> Mapping[str, Any]:
-        """Those of the store, with these levels."""
-        return self._attributes
-
-    def shape(self, path: str) -> tuple[int, ...]:
-        """Shape of an array."""
-        return self._level.shape if path == f"{self._prefix}level" else self._store.shape(path)
-
-    def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """Rows [start, stop) of the array at a path, those of the view's samples in their order here."""
-        if path == f"{self._prefix}level":
-            return self._level[start:stop]
-        if not path.startswith(self._prefix) or "/" in path.removeprefix(self._prefix):
-            return self._store.read(path, start, stop)
-        end = self._store.shape(path)[0] if stop is None else stop
-        rows = self._rows[start:end]
-        if len(rows) == 0:
-            return self._store.read(path, start, end)
-        first = int(rows.min())
-        found = self._store.read(path, first, int(rows.max()) + 1)[rows - first]
-        if end <= len(self._rows):
-            return found
-        return np.concatenate([found, self._store.read(path, len(self._rows), end)])  # behind all surfaces
+    roughness: str | None
+    normals: NormalMap | None
+    own: float | None
 
 
-def rougher(view: View, maps: Names) -> View:
-    """Let materials of a baked view follow images in the place of their maps of roughness.
+def worn(view: View, maps: tuple[Maps | None, ...], tracer: Tracer) -> View:
+    """Let materials of a baked view wear images in the place of their maps.
 
     Args:
-        view: as it was baked. maps: "image:<id>" for each material, None for its own.
+        view: as it was baked. maps: of each material, None where it wears its own.
+        tracer: of rays that the bake did not trace.
     Returns:
         The view; the same object for all who have it.
     Raises:
         StoreError: the store does not say where samples lie in textures. NotFoundError, SceneError: an image cannot be
             had.
     """
-    known = view.rougher.get(maps)
+    known = view.worn.get(maps)
     if known is not None or not any(maps):
         return known or view
     rows, level, ratios = view.as_baked(), view.level.copy(), list(view.ratios)
-    for material, name in enumerate(maps):
-        if name is None:
-            continue
+    under, materials = dict[int, Leant](), dict[int, int]()
+    for material, wears in enumerate(maps):
         of_material = view.rows(material)
-        ratios[material], of_samples = _levels_in(view, material, name)
+        if wears is None or of_material.start == of_material.stop:
+            continue
+        if wears.normals is not None:
+            tracer.check()
+        bumps = None if wears.normals is None else leant(view, material, wears.normals)
+        ratios[material], of_samples = _levels(view, material, wears, bumps)
         code = morton(view.pixel[of_material].astype(np.int64), view.width)
         order = np.lexsort((code, of_samples))
         level[of_material], rows[of_material] = of_samples[order], rows[of_material][order]
-    store = Reordered(view.store, view.index, rows, level, ratios)
-    view.rougher[maps] = found = open_view(store, view.index, view.memory, view.key, maps, rows)
+        if bumps is not None:
+            under[of_material.start], materials[of_material.start] = bumps.rows(order), material
+    rays = tracer, view.memory, (view.key, view.name, maps)
+    store = WornStore(view.store, view.index, rows, level, ratios, under, materials, *rays)
+    view.worn[maps] = found = open_view(store, view.index, view.memory, view.key, maps, rows)
     return found
 
 
-def _levels_in(view: View, material: int, name: str) -> Levels:
-    """How rough a material's samples are where an image says it: what a bake finds whose scene has the image."""
-    rows, store = view.rows(material), view.store
-    uv = read_uv(store, view.index, rows.start, rows.stop)
-    if uv is None:
-        raise StoreError("this bake is too old to show images; bake the scene again")
-    texture, own = roughness_of(name), mean_roughness(name)
+def _levels(view: View, material: int, wears: Maps, bumps: Leant | None) -> Levels:
+    """How rough a material's samples are where images say it: what a bake finds whose scene has the images."""
+    rows, store, own = view.rows(material), view.store, wears.own
     shortest = read_shortest_normals(store)[material]
-    ratios = levels_between(texture, own or None, shortest)
-    if not ratios or rows.start == rows.stop:
+    length = read_normal_length(store, view.index, rows.start, rows.stop)
+    if wears.roughness is None:
+        ratio, low, high = _unwidened(view, material, own, length, shortest)
+    else:
+        uv, texture = read_uv(store, view.index, rows.start, rows.stop), roughness_of(wears.roughness)
+        if uv is None:
+            raise StoreError("this bake is too old to show images; bake the scene again")
+        own = mean_roughness(wears.roughness) or None
+        ratio, (low, high) = sample_image(texture, uv)[:, 0], ends_of(texture)
+    if bumps is not None and wears.normals is not None:
+        length, shortest = bumps.normal_length, shortest_normal(normals_of(wears.normals))
+    ratios = levels_over(low, high, own, shortest)
+    if not ratios:
         return Levels(ratios, np.zeros(rows.stop - rows.start, np.uint8))
-    ratio = sample_image(texture, uv)[:, 0]
     if own and shortest < 1:
-        ratio = widened(ratio, read_normal_length(store, view.index, rows.start, rows.stop), own)
+        ratio = widened(ratio, length, own)
     pixel = view.pixel[rows].astype(np.int64)
     return Levels(ratios, level_of(ratios, ratio, thresholds(pixel, view.width)))
+
+
+def _unwidened(view: View, material: int, own: float | None, length: F32, shortest: float) -> tuple[F32, float, float]:
+    """The roughness of a material's samples over its own as the scene's map has it, without what bumps add; and the
+    ends of that map."""
+    ratios, level = view.ratios[material], view.level[view.rows(material)]
+    if not ratios or ratios[0] == 1:  # there is no map, or bumps alone widen it
+        return np.ones(len(level), np.float32), 1.0, 1.0
+    ratio, low, high = np.array(ratios, np.float32)[level], ratios[0], ratios[-1]
+    if own is None or shortest == 1:
+        return ratio, low, high
+    highest = narrowed(np.array([high], np.float32), np.array([shortest], np.float32), own)
+    return narrowed(ratio, length, own), low, max(low, float(highest[0]))

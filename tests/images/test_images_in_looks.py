@@ -13,7 +13,7 @@ from relume.errors import ParameterError
 from relume.images.shelf import texture_of
 from relume.look import default_look, validate
 from relume.moving.picture import MovingPicture
-from relume.moving.points.images import dressed
+from relume.moving.points.images import Wears, dressed
 from relume.reference.image import reference_image
 from relume.scene.coding import decode
 from relume.trace.geometry import merge
@@ -105,7 +105,7 @@ def test_where_there_is_no_place_in_textures_moving_views_project_as_fixed_ones_
     box = mesh("box", corners, faces, 0, normals=corners / np.sqrt(3))
     scene = scene_of(box, camera=corner.cameras[0], materials=corner.materials[:1])
     moving = opened(scene, "surface", tmp_path)
-    found = dressed(moving.surface, moving.positions, ((named, None),))
+    found = dressed(moving.surface, moving.positions, (Wears((named, None)),))
     eyes = np.random.default_rng(2).normal(size=(60, 3)).astype(np.float32)
     directions = -eyes / np.linalg.norm(eyes, axis=1, keepdims=True)
     geometry = merge(scene)

@@ -6,8 +6,8 @@ from sessions import look_of
 
 from relume.memory import Memory
 from relume.methods.registry import open_transfer
-from relume.methods.thinned import ThinnedStore
 from relume.render.image import render_image, render_small
+from relume.views.thinned import ThinnedStore
 
 
 @pytest.mark.parametrize("step", [2, 3, 7])

@@ -33,7 +33,7 @@ export function RoughnessImage({ material, index, value, hasOwn, onChange }: Pro
       }}
     >
       <option value="">None</option>
-      {hasOwn && <option value="map">As in the scene</option>}
+      {(hasOwn || value === true) && <option value="map">{hasOwn ? "As in the scene" : "By finer bumps"}</option>}
     </MapImage>
   );
 }

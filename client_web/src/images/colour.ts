@@ -54,7 +54,10 @@ const MAPS: readonly (readonly [RegExp, string])[] = [
   [/^gloss(iness)?$/, "gloss"],
   [/^(metal(lic|ness)?)$/, "metal"],
   [/^(arm|orm|rma|metallicroughness)$/, "roughness and metal"],
-  [/^(nor|nrm|normals?|bump|height|disp(lacement)?)(gl|dx)?$/, "bumps"],
+  [/^(nor|nrm|normals?)dx$/, "normals for DirectX"],
+  [/^(nor|nrm|normals?)(gl)?$/, "normals"],
+  [/^(bump|height|disp(lacement)?)$/, "heights"],
+  [/^(emission|emissive|emit|glow)$/, "what shines"],
   [/^(ao|ambientocclusion|occlusion)$/, "occlusion"],
 ];
 

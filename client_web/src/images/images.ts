@@ -6,13 +6,14 @@ import { edit } from "../edit/edit";
 import { history } from "../edit/history";
 import { deleteImage, listImages, withMetalness } from "../net/api";
 import { uploadImage } from "../net/upload";
-import type { ImageBody, Term } from "../protocol";
+import type { ImageBody, MaterialLook, Term } from "../protocol";
 import { defaultLook, look } from "../state/look";
 import { scene } from "../state/scene";
 import { select, selectedMaterial } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
 import { baseTexture, mapNamed, withBaseImage, withoutBaseImage } from "./colour";
 import { mayBeMetal, metalnessOf, withoutMetalness } from "./metalness";
+import { withNormals, withoutNormals } from "./normals";
 import { roughPlaces, withoutRoughnessImage, withRoughnessImage } from "./roughness";
 
 export const IMAGE_TYPES = ["image/png", "image/jpeg", "image/webp"];
@@ -116,6 +117,24 @@ export function putRoughness(material: string, image: ImageBody, index: number |
   select(material);
 }
 
+function replaceMaterial(label: string, material: string, make: (of: MaterialLook) => MaterialLook): void {
+  const of = look.value?.materials[material];
+  if (of === undefined) return;
+  history.seal();
+  edit(label, pointer("materials", material), make(of));
+}
+
+/** Let an image say how a material's surfaces lean. */
+export function putNormals(material: string, { texture, name }: ImageBody): void {
+  replaceMaterial(`Normals · ${name}`, material, (of) => withNormals(of, texture));
+  select(material);
+}
+
+/** The material has the bumps of the scene again. */
+export function takeNormalsOff(material: string): void {
+  replaceMaterial("Normal image off", material, (of) => withoutNormals(of, defaultLook.value?.materials[material]));
+}
+
 /** Show an image as both, as files of glTF pack them: green is roughness, blue is metalness. */
 function putBoth(material: string, image: ImageBody): void | Promise<void> {
   if (!mayBeMetal(termsOf(material) ?? [])) {
@@ -129,12 +148,25 @@ function putBoth(material: string, image: ImageBody): void | Promise<void> {
 const PLACES: Record<string, { put: Put; as: string }> = {
   roughness: { put: putRoughness, as: "as roughness" },
   metal: { put: putMetalness, as: "as metalness" },
+  normals: { put: putNormals, as: "as normals" },
   "roughness and metal": { put: putBoth, as: "as roughness by its green and as metalness by its blue" },
+};
+
+/** Why what an image is a map of has no place. */
+const NO_PLACE: Record<string, string> = {
+  gloss: "Turn it round into one of roughness, and drop that.",
+  heights: "Drop the normal map that was made of it.",
+  "normals for DirectX": "Its green points down: drop the one for OpenGL, as glTF has it.",
+  occlusion: "What hides light is traced here.",
+  "what shines": "Light is part of a bake: import the scene with it, and bake again.",
 };
 
 /** The material is as rough as the scene's own again. */
 export function takeRoughnessOff(material: string): void {
-  replaceTerms("Roughness image off", material, withoutRoughnessImage);
+  replaceMaterial("Roughness image off", material, (of) => {
+    const bare = { ...of, terms: withoutRoughnessImage(of.terms, ownTerms(material)) };
+    return of.normal_map == null ? bare : withNormals(bare, of.normal_map.image); // which bumps widen
+  });
 }
 
 /** The material shows its own colours again. */
@@ -173,8 +205,7 @@ export async function takeImages(files: readonly File[]): Promise<void> {
     note(`“${file.name}” is shown ${place.as}.`, asColour);
     return sendOnto(material, file, place.put);
   }
-  const told = `“${file.name}” looks like a map of ${map}. Those are part of a bake: import the scene with it, and bake again.`;
-  note(told, asColour);
+  note(`“${file.name}” looks like a map of ${map}. ${NO_PLACE[map] ?? ""}`, asColour);
 }
 
 /** Delete an image once that was confirmed; the material shows its own again. What saved looks show stays. */

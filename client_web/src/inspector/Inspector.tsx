@@ -4,6 +4,7 @@ import { edit } from "../edit/edit";
 import { history } from "../edit/history";
 import { BaseImage } from "../images/BaseImage";
 import { MetalImage } from "../images/MetalImage";
+import { NormalImage } from "../images/NormalImage";
 import { openLibrary } from "../library/library";
 import { LightInspector } from "../lights/LightInspector";
 import { openLight } from "../lights/lights";
@@ -15,7 +16,7 @@ import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, terms } f
 import { IconButton } from "../ui/Button";
 import { Energy } from "./Energy";
 import { TermCard } from "./TermCard";
-import { defaultTerm, modelsFor } from "./terms";
+import { defaultTerm, isMirror, modelsFor } from "./terms";
 
 function replaceTerms(label: string, material: string, next: unknown): void {
   history.seal();
@@ -102,7 +103,8 @@ function MaterialInspector() {
     );
   }
   const original = defaultLook.value?.materials[material];
-  const isCaught = look.value?.materials[material]?.catcher === true;
+  const shown = look.value?.materials[material];
+  const isCaught = shown?.catcher === true;
   return (
     <div class="panel inspector">
       <header class="panel-head">
@@ -113,7 +115,7 @@ function MaterialInspector() {
         <IconButton
           icon="reset"
           label="Reset this material"
-          disabled={original === undefined || original === look.value?.materials[material]}
+          disabled={original === undefined || original === shown}
           onClick={() => edit("Reset material", pointer("materials", material), original)}
         />
       </header>
@@ -121,6 +123,7 @@ function MaterialInspector() {
       <Glass material={material} />
       {!isCaught && <BaseImage key={material} material={material} terms={terms.value} />}
       {!isCaught && <MetalImage material={material} terms={terms.value} />}
+      {!isCaught && shown !== undefined && <NormalImage material={material} of={shown} mirrors={materialOf(material)?.terms.some(isMirror) === true} />}
       {!isCaught && terms.value.map((term, index) => (
         <TermCard
           key={index}

@@ -18,7 +18,7 @@ export function hasRoughnessMap(material: string): boolean {
 }
 
 /** Whether a term is so smooth that it is a mirror rather than a highlight, by `relume/brdf/mirror.py`. */
-function isMirror(term: Term): boolean {
+export function isMirror(term: Term): boolean {
   const { mirrors_below: below, width, curves } = modelOf(term) ?? {};
   if (below == null || width == null || (term.roughness_map ?? false) !== false) return false;
   if (term.texture === "diffuse" || isImage(term.texture)) return false;

@@ -1,7 +1,7 @@
 /** The look as the user wants it, and the scene's own. */
 import { computed, signal } from "@preact/signals";
 import { isImage } from "../document/texture";
-import type { Look, Term } from "../protocol";
+import type { Look, MaterialLook, Term } from "../protocol";
 import { materialOf } from "./scene";
 
 export const look = signal<Look | null>(null);
@@ -14,9 +14,9 @@ export const bakedLight = computed(() => (look.value?.environment.map ?? null) =
 /** A term whose every texel looks different from every side: this browser draws the mean of them. */
 export const isTexels = (term: Term): boolean => term.model === "measured_btf";
 /** Whether a material shows an image that is projected, for it has no places in textures: this browser knows no others. */
-const showsProjected = (name: string, terms: readonly Term[]) =>
-  materialOf(name)?.is_projected === true && terms.some(({ texture }) => isImage(texture));
+const showsProjected = (name: string, { terms, normal_map }: MaterialLook) =>
+  materialOf(name)?.is_projected === true && ((normal_map ?? null) !== null || terms.some(({ texture }) => isImage(texture)));
 /** Whether any material shows either. */
 export const hasTexels = computed(() =>
-  Object.entries(look.value?.materials ?? {}).some(([name, { terms }]) => terms.some(isTexels) || showsProjected(name, terms)),
+  Object.entries(look.value?.materials ?? {}).some(([name, of]) => of.terms.some(isTexels) || showsProjected(name, of)),
 );

@@ -138,14 +138,15 @@ def textures_with(baked: Surface, surface: Surface) -> dict[str, Texels]:
         baked: what is seen. surface: it with the images.
     """
     found = _of_textures(surface, surface.textures)
-    return {name: make() for name, make in found.items() if name != "uvs" or not len(baked.textures.wraps)}
+    has_frames = len(baked.textures.wraps) and surface.tangents is baked.tangents
+    return {name: make() for name, make in found.items() if name != "uvs" or not has_frames}
 
 
 def _corner_frames(surface: Surface) -> Texels:
     out = np.zeros((len(surface.uvs), 2, 4), np.float32)
     out[:, 0, :2] = surface.uvs
-    if len(surface.tangents):
-        out[:, 0, 2], out[:, 1, :3] = surface.tangents[:, 3], surface.tangents[:, :3]
+    num = len(surface.tangents)  # corners whose places are projected have none of their own
+    out[:num, 0, 2], out[:num, 1, :3] = surface.tangents[:, 3], surface.tangents[:, :3]
     return out.reshape(-1, 4)
 
 

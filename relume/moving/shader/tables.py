@@ -72,10 +72,10 @@ def parts_of(transfer: MovingTransfer, wanted: Wanted, versions: tuple[Hashable,
             (versions[0], light.local, light.paths.direct, catchers), lambda: _materials(transfer, wanted)
         ),
     }
-    if any(map(any, wanted.materials.images)):
-        surface = transfer.surface_with(wanted.materials.images)
-        parts["images"] = Part(wanted.materials.images, lambda: textures_with(transfer.surface, surface))
-    needs = needed_functions(wanted.materials, transfer.surface.textures.of_material[:, NORMAL_MAP] >= 0)
+    surface = transfer.surface_with(wanted.materials.wears)
+    if surface is not transfer.surface:
+        parts["images"] = Part(wanted.materials.wears, lambda: textures_with(transfer.surface, surface))
+    needs = needed_functions(wanted.materials, surface.textures.of_material[:, NORMAL_MAP] >= 0)
     of_all, first = (wanted.arriving.total, wanted.arriving.others), first_points(transfer)
     for name, vectors, needed in zip(("vectors", "others"), of_all, needs, strict=True):
         most = np.minimum(needed, _ROUGH) if wanted.is_rough else needed
@@ -133,9 +133,11 @@ def _materials(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Texels]:
 def _in_highlights(transfer: MovingTransfer, wanted: Wanted) -> dict[str, Part]:
     """The lights of the sky, and the shape of the highlight of each material that they are summed for."""
     environment, lobes, is_rough = wanted.light.environment, wanted.materials.lobes, wanted.is_rough
-    bumpiness, each = transfer.surface.bumpiness, wanted.materials.each
+    bumpiness, each = transfer.surface_with(wanted.materials.wears).bumpiness, wanted.materials.each
     shapes = {
-        f"shapes/{k}": Part(json.dumps(each[k].terms, sort_keys=True), partial(shape_of, lobes, k, bumpiness))
+        f"shapes/{k}": Part(
+            (json.dumps(each[k].terms, sort_keys=True), float(bumpiness[k])), partial(shape_of, lobes, k, bumpiness)
+        )
         for k in np.flatnonzero(lobes.of >= 0).tolist()
         if lobes.most[lobes.of[k]] == 1
     }
@@ -176,7 +178,7 @@ def _rows(transfer: MovingTransfer, wanted: Wanted, materials: Materials) -> NDA
     each group both tables of the sky in its highlights, and both of other light. −1 for none.
     (materials · (2 groups + 2), 4) int32"""
     tables, lobes, sends = materials.tables, materials.lobes, materials.sends
-    of_material = transfer.surface_with(materials.images).textures.of_material
+    of_material = transfer.surface_with(materials.wears).textures.of_material
     out = np.full((len(sends), 2 * NUM_GROUPS + 2, 4), -1, np.int32)
     out[:, :NUM_GROUPS, :2], out[:, NUM_GROUPS + 2 :] = tables.of[..., :2], tables.of[..., 2:]
     out[:, :NUM_GROUPS, 2] = sends

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from pathlib import Path
 
+import numpy as np
 import pytest
 from editor_page import Editor
 from PIL import Image
@@ -17,6 +18,17 @@ def stripes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     image = Image.new("RGB", (64, 64), (230, 60, 20))
     image.paste((20, 60, 230), (0, 0, 32, 64))
     image.save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def bumps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A normal map of waves."""
+    path = tmp_path_factory.mktemp("normals") / "bumps.png"
+    x = np.sin(np.arange(64) * np.pi / 4) * 0.5
+    normals = np.stack(np.broadcast_arrays(x, x[:, None], np.ones((64, 64))), axis=-1)
+    normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    Image.fromarray(np.round(127.5 * (normals + 1)).astype(np.uint8)).save(path)
     return path
 
 
@@ -58,6 +70,41 @@ def test_an_image_named_like_a_map_of_roughness_and_metal_becomes_both(editor: E
     metal.select_option("")
     expect(page.get_by_label("Delete the image stripes")).to_have_count(0)
     editor.wait_until_exact()
+
+
+def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> None:
+    """By a button, a list, a drop and keys; taken off and undone, all twice; a reload brings it back."""
+    page = editor.page
+    editor.choose("Ball", 0)
+    chosen, strength = page.get_by_label("Normal map", exact=True), editor.slider("Strength of the normal map")
+    plain = editor.pixels()
+    expect(strength).to_have_count(0)
+    page.get_by_label("File of a normal map").set_input_files(bumps)
+    expect(chosen.locator("option:checked")).to_have_text("bumps")
+    bumpy = editor.pixels()
+    assert np.abs(bumpy - plain).max() > 20
+    for _ in range(2):
+        chosen.select_option("")
+        expect(strength).to_have_count(0)
+        np.testing.assert_array_equal(editor.pixels(), plain)
+        page.get_by_role("button", name="Undo", exact=True).click()
+        expect(chosen.locator("option:checked")).to_have_text("bumps")
+        np.testing.assert_array_equal(editor.pixels(), bumpy)
+    for key, value in (("Home", "0"), ("End", "4")):
+        strength.press(key)
+        expect(strength).to_have_attribute("aria-valuenow", value)
+        assert np.abs(editor.pixels() - bumpy).max() > 20
+    strength.press("Delete")
+    np.testing.assert_array_equal(editor.pixels(), bumpy)
+    page.reload()
+    np.testing.assert_array_equal(editor.pixels(), bumpy)
+    editor.choose("Ball", 0)
+    expect(chosen.locator("option:checked")).to_have_text("bumps")
+    for name in ("tiles_nor_gl_1k.png", "tiles_Normal.png"):  # the same file, by its newest name
+        assert drop_on_the_middle(editor, bumps, name) == "Ball"
+        expect(chosen.locator("option:checked")).to_have_text(name.removesuffix(".png"))
+    drop_on_the_middle(editor, bumps, "tiles_nor_dx_1k.png")
+    expect(page.get_by_text("drop the one for OpenGL")).to_be_visible()
 
 
 def drop_on_the_middle(editor: Editor, file: Path, name: str) -> str:

@@ -1,0 +1,291 @@
+"""An image in the place of a normal map shows what a bake shows whose scene has that map."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from opened_bakes import opened, shown
+from PIL import Image
+from sessions import bake_corner, relative_rmse, settle
+from tiny_scenes import corner
+
+from relume.brdf.channels import IMAGES, NormalMap
+from relume.errors import ParameterError, StoreError
+from relume.images.shelf import keep, normals_of
+from relume.look import default_look, validate
+from relume.moving.points.images import OWN, Wears, dressed
+from relume.picture.picture import Picture
+from relume.reference.image import reference_image
+from relume.scene.coding import decode
+from relume.scene.gltf.uvs import made_tangents
+from relume.scene.model import Coding, Material, Texture
+
+SIDE = 64
+SCALE = 1.5
+
+
+def waves(side=SIDE, lean=0.4, seed=0):
+    """Normals that lean as a wavy ground does, and finer ones that pixels cover. (side, side, 3) uint8"""
+    y, x = 2 * np.pi * np.mgrid[0:side, 0:side] / side
+    fine = np.random.default_rng(seed).normal(0, 0.1, (side, side, 2))
+    slopes = np.stack([lean * np.sin(3 * x + y), lean * np.cos(2 * y - x)], axis=-1) + fine
+    normals = np.concatenate([slopes, np.ones((side, side, 1))], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.round(127.5 * (normals + 1)).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def named(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("normals")
+    Image.fromarray(waves()).save(folder / "waves.png")
+    with IMAGES.at(folder / "images") as shelf:
+        yield keep(shelf, folder / "waves.png", "Waves").texture
+
+
+def with_tangents(scene):
+    """Tangents along u, as imports of materials with a normal map have them."""
+    meshes = [replace(m, tangents=made_tangents(m.positions, m.normals, m.uvs, m.faces)) for m in scene.meshes]
+    return replace(scene, meshes=tuple(meshes))
+
+
+@pytest.fixture(scope="module", params=["flat", pytest.param("bumpy", marks=pytest.mark.slow)])
+def plain(request):
+    """A floor and a ball on it, and a wall, that shine; whether they have bumps of their own."""
+    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": True}
+    floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, shiny
+    wall = {**floor[0], "color": [0.8, 0.5, 0.2]}, shiny
+    own = Texture(waves(seed=1, lean=0.3)[::-1].copy(), coding=Coding("normal")) if request.param == "bumpy" else None
+    return with_tangents(corner([Material("Floor", floor, {}, own), Material("Wall", wall)]))
+
+
+def with_own(scene, name, scale=SCALE):
+    """The scene whose floor has the map in its file; of the same id, which seeds what is drawn."""
+    floor, *others = scene.materials
+    return replace(scene, materials=(replace(floor, normal_map=normals_of(NormalMap(name, scale))), *others))
+
+
+@pytest.fixture(scope="module", params=["direct", pytest.param("gather", marks=pytest.mark.slow)])
+def bakes(request, plain, named, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bakes")
+    scenes = plain, with_own(plain, named)
+    return [bake_corner(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)]
+
+
+def bumpy(scene, name, scale=SCALE, **others):
+    """The look whose floor has an image as its normal map; None: its own."""
+    document = copy.deepcopy(default_look(scene.materials))
+    if name is not None:
+        document["materials"]["Floor"]["normal_map"] = {"image": name, "scale": scale}
+    return validate(document | others, default_look(scene.materials))
+
+
+def test_pictures_are_those_of_a_scene_that_has_the_map(bakes, plain, named):
+    """In light that is turned, too. Triangles of the coarse ball have one axis of textures each, corners one between;
+    what surfaces send to each other is of the normals that were baked, at points of cells that are few here."""
+    bare, baked = bakes
+    most, usual = (0.015, 1e-6) if bare.method == "direct" else (0.12, 0.02)
+    for others in ({}, {"environment": {"map": None, "rotation": 40.0}}):
+        found = shown(bare, bumpy(plain, named, **others), bare.method)
+        expected = shown(baked, bumpy(plain, None, **others), bare.method)
+        assert relative_rmse(found, expected) < most
+        assert np.median(np.abs(found - expected) / expected) < usual
+        assert relative_rmse(shown(bare, bumpy(plain, None, **others), bare.method), expected) > 0.4
+
+
+def test_lights_that_come_up_are_traced(bakes, plain, named):
+    """And those that go down hidden: bits are those of the bake, on the floor, where frames are equal."""
+    bare, baked = bakes
+    picture = Picture(bare, "front", bare.memory)
+    picture.set_look(bumpy(plain, named))
+    view, expected, before = picture._images.view, baked.views["front"], bare.views["front"]
+    (rows, found), (their_rows, theirs), (_, old) = (_floor_of(each) for each in (view, expected, before))
+    np.testing.assert_array_equal(rows, their_rows)
+    assert np.count_nonzero(np.unpackbits(found ^ theirs)) < 2e-3 * np.count_nonzero(np.unpackbits(theirs))
+    assert np.count_nonzero(np.unpackbits(old ^ theirs)) > 0.03 * np.count_nonzero(np.unpackbits(theirs))
+
+
+def _floor_of(view):
+    """Places of the floor's samples, in an order that views share, and the bits of each. (n, 3), (n, bytes)"""
+    position = view.points(0).position
+    rows = np.flatnonzero(position[:, 1] < 1e-3)
+    rows = rows[np.lexsort(position[rows].T)]
+    return position[rows], view._visible(0)[rows]
+
+
+def test_normals_and_levels_are_those_of_the_bake(bakes, plain, named):
+    bare, baked = bakes
+    picture = Picture(bare, "front", bare.memory)
+    picture.set_look(bumpy(plain, named))
+    view, expected = picture._images.view, baked.views["front"]
+    np.testing.assert_allclose(view.ratios[0], expected.ratios[0], rtol=1e-5)
+    assert np.mean(view.level == expected.level) > 0.95
+    assert len(np.unique(view.level)) > 8
+    (rows, found), (their_rows, theirs) = (_normals_of(each) for each in (view, expected))
+    np.testing.assert_array_equal(rows, their_rows)
+    np.testing.assert_allclose(found[rows[:, 1] < 1e-3], theirs[rows[:, 1] < 1e-3], atol=1e-4)
+    np.testing.assert_allclose(found, theirs, atol=0.12)  # of the ball, see above
+
+
+def _normals_of(view):
+    points = view.points(0)
+    rows = np.lexsort(points.position.T)
+    return points.position[rows], points.normal[rows]
+
+
+def test_a_look_without_it_shows_again_what_it_did(bakes, plain, named):
+    bare, _ = bakes
+    picture = Picture(bare, "front", bare.memory)
+    found = []
+    for name in (None, named, None, named):
+        picture.set_look(bumpy(plain, name))
+        found.append(settle(picture).image())
+    np.testing.assert_array_equal(found[2], found[0])
+    np.testing.assert_array_equal(found[3], found[1])
+
+
+def test_no_strength_is_no_bumps(bakes, plain, named):
+    """A scale of 0 leaves the surface as it is without any, whatever it had."""
+    bare, _ = bakes
+    picture = Picture(bare, "front", bare.memory)
+    picture.set_look(bumpy(plain, named, 0.0))
+    positions, normals = _normals_of(picture._images.view)
+    on_floor = positions[:, 1] < 1e-3
+    np.testing.assert_allclose(normals[on_floor], np.broadcast_to([0, 1, 0], normals[on_floor].shape), atol=1e-6)
+
+
+def test_truths_show_it(plain, named):
+    found, expected = (
+        reference_image(scene, "front", bumpy(scene, name), (16, 16), 0)
+        for scene, name in ((plain, named), (with_own(plain, named), None))
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    assert relative_rmse(reference_image(plain, "front", bumpy(plain, None), (16, 16), 0), expected) > 0.3
+
+
+@pytest.mark.slow
+def test_moving_views_show_it(plain, named, tmp_path):
+    """Straight light: what surfaces send is of the normals that were baked."""
+    straight = {"transport": {"show": "direct"}}
+    bare, baked = (opened(s, "surface", tmp_path / str(k)) for k, s in enumerate((plain, with_own(plain, named))))
+    found, expected = (
+        shown(transfer, bumpy(plain, name, **straight), "surface") for transfer, name in ((bare, named), (baked, None))
+    )
+    assert relative_rmse(found, expected) < 2e-3
+    assert relative_rmse(shown(bare, bumpy(plain, None, **straight), "surface"), expected) > 0.3
+
+
+@pytest.mark.slow
+def test_meshes_without_tangents_get_those_of_imports(named, tmp_path):
+    scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
+    none = replace(scene, meshes=tuple(replace(m, tangents=0 * m.tangents) for m in scene.meshes))
+    moving = opened(none, "surface", tmp_path)
+    assert len(moving.surface.tangents) == 0
+    found = dressed(moving.surface, moving.positions, (Wears(normals=NormalMap(named)), OWN)).tangents
+    expected = np.concatenate([mesh.tangents for mesh in with_tangents(scene).meshes])
+    normals = np.concatenate([mesh.normals for mesh in scene.meshes])
+    across = found[:, :3] - normals * np.einsum("nc,nc->n", found[:, :3], normals)[:, None]
+    of_floor = slice(0, 4)
+    np.testing.assert_allclose(across[of_floor], expected[of_floor, :3], atol=1e-6)
+    assert not found[4:8].any()  # of the wall, which shows no image
+    of_ball = np.linalg.norm(expected[:, :3], axis=1) > 0
+    of_ball[:8] = False
+    length = np.linalg.norm(across[of_ball], axis=1, keepdims=True)
+    assert np.einsum("nc,nc->n", across[of_ball] / length, expected[of_ball, :3]).min() > 0.999
+    np.testing.assert_array_equal(found[of_ball, 3], expected[of_ball, 3])
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [
+        ({"image": "image:0000000000000000"}, "image"),
+        ({"image": "image:../x"}, "image"),
+        ({"image": "diffuse"}, "image"),
+        ({}, "image"),
+        ("NAME", "normal_map"),
+        ([1], "normal_map"),
+        ({"image": "NAME", "turn": 1}, "turn"),
+        ({"image": "NAME", "scale": -0.1}, "scale"),
+        ({"image": "NAME", "scale": 10.5}, "scale"),
+        ({"image": "NAME", "scale": float("nan")}, "scale"),
+        ({"image": "NAME", "scale": "1"}, "scale"),
+    ],
+)
+def test_what_is_no_normal_map_is_refused(given, where, named):
+    scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
+    document = copy.deepcopy(default_look(scene.materials))
+    named_here = (
+        {key: named if value == "NAME" else value for key, value in given.items()} if isinstance(given, dict) else given
+    )
+    document["materials"]["Floor"]["normal_map"] = named if given == "NAME" else named_here
+    with pytest.raises(ParameterError, match=rf"/materials/Floor.*{where}"):
+        validate(document, default_look(scene.materials))
+
+
+def test_none_is_none_and_its_strength_is_one(named):
+    scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
+    default = default_look(scene.materials)
+    assert validate({"materials": {"Floor": {"normal_map": None}}}, default) == validate({}, default)
+    look = validate({"materials": {"Floor": {"normal_map": {"image": named}}}}, default)
+    assert look.materials["Floor"].normals == NormalMap(named, 1.0)
+
+
+def test_it_says_the_numbers_of_its_file(named):
+    texture = normals_of(NormalMap(named, 2.0))
+    values, plain = decode(texture.pixels, texture.coding), waves() / 127.5 - 1
+    np.testing.assert_array_equal(texture.pixels, waves())
+    np.testing.assert_allclose(np.linalg.norm(values, axis=-1), 1, rtol=1e-5)
+    np.testing.assert_allclose(values[..., 0] / values[..., 2], 2 * plain[..., 0] / plain[..., 2], rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("pixel", [(0, 0, 0), (127, 127, 127), (128, 128, 255), (255, 255, 0)])
+def test_images_that_are_no_normals_leave_pictures_finite(pixel, tmp_path, named):
+    """Black, grey, and normals that look into the surface."""
+    scene = with_tangents(
+        corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
+    )
+    bare = bake_corner(scene, "direct", tmp_path)
+    Image.fromarray(np.full((1, 1, 3), pixel, np.uint8)).save(tmp_path / "x.png")
+    with IMAGES.at(tmp_path / "images") as shelf:
+        record = keep(shelf, tmp_path / "x.png", "x")
+        assert np.isfinite(shown(bare, bumpy(scene, record.texture, 10.0), "direct")).all()
+
+
+class Older:
+    """A store of before: some arrays and attributes are not there."""
+
+    def __init__(self, store, arrays=(), attributes=()):
+        self._store, self._arrays = store, arrays
+        self.attributes = {name: value for name, value in store.attributes.items() if name not in attributes}
+
+    def shape(self, path):
+        return self._store.shape(path)
+
+    def read(self, path, start=0, stop=None):
+        if path.endswith(self._arrays):
+            raise StoreError(f"there is no {path}")
+        return self._store.read(path, start, stop)
+
+
+def test_bakes_of_before_show_them_where_they_know_enough(bakes, plain, named):
+    """Without bumps of their own and without gather rays; else they say what to do, and the picture stays."""
+    bare, _ = bakes
+    older = Older(bare.store, ("scene/face_mesh", "surface_normal"))
+    view = replace(bare.views["front"], store=older, worn={})
+    transfer = replace(bare, store=older, views={"front": view})
+    picture = Picture(transfer, "front", bare.memory)
+    before = settle(picture).image()
+    if bare.method == "direct" and plain.materials[0].normal_map is None:
+        picture.set_look(bumpy(plain, named))
+        assert relative_rmse(settle(picture).image(), before) > 0.1
+        return
+    with pytest.raises(StoreError, match=r"too old.*bake the scene again"):
+        picture.set_look(bumpy(plain, named))
+    np.testing.assert_array_equal(settle(picture).image(), before)
+
+
+def test_bakes_that_do_not_tell_bumps_are_refused(bakes, plain, named):
+    bare, _ = bakes
+    view = replace(bare.views["front"], store=Older(bare.store, (), ("shortest_normals",)), worn={})
+    with pytest.raises(StoreError, match="bake the scene again"):
+        Picture(replace(bare, views={"front": view}), "front", bare.memory).set_look(bumpy(plain, named))
