@@ -18,16 +18,17 @@ _HALF_PI = np.float32(math.pi / 2)
 _ONE = np.float32(1)
 _LN2, _PER_LN2 = np.float32(math.log(2)), np.float32(1 / math.log(2))
 
-THETA_I = int(Angle.THETA_I)
-THETA_H = int(Angle.THETA_H)
-THETA_D = int(Angle.THETA_D)
-THETA_R = int(Angle.THETA_R)
-ALPHA = int(Angle.ALPHA)
-BETA = int(Angle.BETA)
-THETA_O = int(Angle.THETA_O)
-LOBE = int(Angle.LOBE)
-TILT_X = int(Angle.TILT_X)
-TILT_Y = int(Angle.TILT_Y)
+# of NumPy: for each int of Python a kernel that is called with it would be compiled anew
+THETA_I = np.int64(Angle.THETA_I)
+THETA_H = np.int64(Angle.THETA_H)
+THETA_D = np.int64(Angle.THETA_D)
+THETA_R = np.int64(Angle.THETA_R)
+ALPHA = np.int64(Angle.ALPHA)
+BETA = np.int64(Angle.BETA)
+THETA_O = np.int64(Angle.THETA_O)
+LOBE = np.int64(Angle.LOBE)
+TILT_X = np.int64(Angle.TILT_X)
+TILT_Y = np.int64(Angle.TILT_Y)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -59,7 +60,7 @@ def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
     return e * np.int32((k + np.int32(127)) << np.int32(23)).view(np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """γ of one pair of directions, in radians.
 

@@ -33,7 +33,7 @@ def slants(rings: Rings) -> F32:
     return np.asarray(w[:, :2] / w[:, 2:], np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def slant_of(rings, x, y, z):  # type: ignore[no-untyped-def]
     """s of a direction; beyond the last ring it is the last ring's.
 
@@ -46,7 +46,7 @@ def slant_of(rings, x, y, z):  # type: ignore[no-untyped-def]
     return x / steep, y / steep
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+@nb.njit(nogil=True, cache=True, forceinline=True)
 def _at(height, u, v):  # type: ignore[no-untyped-def]
     """Interpolate heights between texels, which repeat without end."""
     rows, columns = height.shape
@@ -61,7 +61,7 @@ def _at(height, u, v):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def height_seen(height, lowest, highest, u, v, slant):  # type: ignore[no-untyped-def]
     """Find how high the relief is where a ray meets it first, in steps of half a texel, linear on the last.
 

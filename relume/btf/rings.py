@@ -88,7 +88,7 @@ def polar(theta: F64, phi: F64) -> F64:
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def taps_at(rings, theta, turn, index, weight):  # type: ignore[no-untyped-def]
     """Do as `taps` of angles.
 
@@ -112,7 +112,7 @@ def taps_at(rings, theta, turn, index, weight):  # type: ignore[no-untyped-def]
         weight[2 * k], weight[2 * k + 1] = of_ring * (np.float32(1) - part), of_ring * part
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
     """Find the four directions about one, and their weights.
 

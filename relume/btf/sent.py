@@ -52,7 +52,7 @@ def sent_numpy(found: EigenBtf, seen: F64, wi: F64) -> F64:
     return np.asarray(np.einsum("mk,m,mkc->mc", of_light, left, seen[light]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _add_texels(size, u, v, share, cluster, weight, slot_of, slots, factors):  # type: ignore[no-untyped-def]
     """Add the four texels about a place to the factors of their clusters' means and components.
 

@@ -101,7 +101,7 @@ def unit(vector):  # type: ignore[no-untyped-def]
     return np.float32(scale * x), np.float32(scale * y), np.float32(scale * z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def leaning(textures, texture, place, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
     """Look up where a normal map turns a normal; see `relume.trace.surface`, which does so for fixed views.
 

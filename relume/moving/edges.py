@@ -23,7 +23,7 @@ _COS_CREASE = np.float32(np.cos(np.radians(20.0)))
 _DEPTH_EDGE = np.float32(0.02)  # of the distance, off the plane of the surface beside
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def differ(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
     """Tell whether two pixels see different things, or one thing turned or offset.
 

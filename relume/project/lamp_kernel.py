@@ -55,7 +55,7 @@ def _square(x, y, z, nx, ny, nz, half, corner):  # type: ignore[no-untyped-def]
         corner[k, 0], corner[k, 1], corner[k, 2] = x + s * ex + t * fx, y + s * ey + t * fy, z + s * ez + t * fz
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _unit(x, y, z):  # type: ignore[no-untyped-def]
     inverse = _ONE / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-30)))
     return x * inverse, y * inverse, z * inverse
@@ -218,7 +218,7 @@ def list_lamp(  # type: ignore[no-untyped-def]
     most = 2 * lamp[1].uv.shape[0]
     radius, reach, nearest = brings[:, 3], np.empty(most, np.float32), np.empty(most, np.float32)
     frame, scratch = np.empty((3, 3), np.float32), _scratch()
-    made = end = 0
+    made = end = np.int64(0)
     for p in range(start, stop):
         begin = end
         first[p - start] = begin

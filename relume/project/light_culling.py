@@ -16,7 +16,7 @@ _ZERO = np.float32(0)
 _SLACK = np.float32(1e-3)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Bound how far the half vector turns while wi turns by `radius`; and compute cos θd of the two directions.
 
@@ -32,7 +32,7 @@ def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untype
     return half / max(farthest, np.float32(1e-6)), cos_theta_d
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+@nb.njit(nogil=True, cache=True, forceinline=True)
 def has_bound(kind):  # type: ignore[no-untyped-def]
     """Whether `nearest_into` bounds an angle."""
     return kind in (THETA_I, THETA_R, THETA_D, THETA_H)
@@ -119,7 +119,7 @@ def list_lights(  # type: ignore[no-untyped-def]
     """
     num_lights = directions.shape[0]
     reach, nearest = np.empty(num_lights, np.float32), np.empty(num_lights, np.float32)
-    end = 0
+    end = np.int64(0)
     for p in range(start, stop):
         begin = end
         first[p - start] = begin

@@ -10,8 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.angles import ALPHA, BETA, THETA_H, TILT_X, TILT_Y
-from relume.brdf.term import Term
+from relume.brdf.term import Angle, Term
 from relume.light.merged import see_parts, weigh_by_parts
 from relume.light.triangles import Parts, TriangleLights
 from relume.project.contraction import Contraction
@@ -39,13 +38,13 @@ def with_half_angle(kinds: NDArray[np.int64], support: F32) -> tuple[NDArray[np.
         Both, with one more angle where there is such a bound. (C or C + 1,)
     """
     limit = {int(kind): float(angle) for kind, angle in zip(kinds, support, strict=True) if angle < _HALF_PI}
-    if ALPHA in limit and BETA in limit:
-        bound = np.arccos(np.cos(limit[ALPHA]) * np.cos(limit[BETA]))
-    elif TILT_X in limit and TILT_Y in limit:
-        bound = np.arctan(np.hypot(np.tan(limit[TILT_X]), np.tan(limit[TILT_Y])))
+    if Angle.ALPHA in limit and Angle.BETA in limit:
+        bound = np.arccos(np.cos(limit[Angle.ALPHA]) * np.cos(limit[Angle.BETA]))
+    elif Angle.TILT_X in limit and Angle.TILT_Y in limit:
+        bound = np.arctan(np.hypot(np.tan(limit[Angle.TILT_X]), np.tan(limit[Angle.TILT_Y])))
     else:
         return kinds, support
-    return np.append(kinds, THETA_H), np.append(support, np.float32(bound))
+    return np.append(kinds, Angle.THETA_H), np.append(support, np.float32(bound))
 
 
 def _support_of(contraction: Contraction) -> tuple[NDArray[np.int64], F32]:
@@ -95,7 +94,8 @@ class ListedLights:
         Args:
             visible: which of the lights, or of their parts, these points see, as in `Receivers`. (stop - start, bytes)
         Returns:
-            q cos θi of each entry (1 or 3, K), and the local wo (3, K) that it belongs to.
+            q cos θi of each entry (1 or 3, K), and the local wo (3, ≥ K) that it belongs to: all the room there is, for
+            kernels are compiled anew for what is cut off.
         """
         r, lights, some = self._receivers, self._lights, slice(start, stop)
         if lights.parts is not None:
@@ -104,11 +104,10 @@ class ListedLights:
             r.normal[some], r.tangent[some], r.wo[some], visible, lights.direction, lights.radius, self._kinds,
             self._support, 0, stop - start, self.first, self.light, self._wi, self._wo,
         )  # fmt: skip
-        wo = self._wo[:, :num]
-        shading = _weighed(self._term, self._wi[:, :num], wo)
+        shading = _weighed(self._term, self._wi[:, :num], self._wo[:, :num])
         if lights.parts is not None:
             weigh_by_parts(self.first[: stop - start + 1], self.light, self._seen, shading)
-        return shading, wo
+        return shading, self._wo
 
     def _see_parts(self, parts: Parts, visible: Bits) -> Bits:
         """Find which merged lights points see anything of, as bits; how much of each is in `_seen`."""
@@ -143,7 +142,7 @@ class ListedLamp:
         """List the triangles of points [start, stop), a block of them at most.
 
         Returns:
-            q cos θi of each entry (1 or 3, K), the local wo (3, K) that it belongs to, nodes of triangles (M, 6, 3),
+            q cos θi of each entry (1 or 3, K), the local wo (3, ≥ K) that it belongs to, nodes of triangles (M, 6, 3),
             and what they bring and how wide they are (M, 4).
         """
         r, rays = self._receivers, self._rays
@@ -151,10 +150,9 @@ class ListedLamp:
             r.points, r.wo, (rays.light, rays.strata, rays.parts, self._gain), rays.visible, self._kinds,
             self._support, start, stop, self.first, self.light, self._wi, self._wo, self._nodes, self._brings,
         )  # fmt: skip
-        wo = self._wo[:, :num]
         return (
-            _weighed(self._term, self._wi[:, :num], wo),
-            wo,
+            _weighed(self._term, self._wi[:, :num], self._wo[:, :num]),
+            self._wo,
             self._nodes[:num_triangles],
             self._brings[:num_triangles],
         )

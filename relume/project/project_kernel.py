@@ -29,6 +29,8 @@ FINE, ROUGH = (np.float32(1), _MAX_DEPTH - 1), (np.float32(8), 2)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)
+# of NumPy, and not written where kernels are called: for each int of Python these would be compiled anew
+_BEGIN, _MIDDLES, _WHOLE = np.int64(0), np.int64(3), (0, 1, 2)
 _BATCH = 16  # lights divided together
 # Loops run to a multiple of this many triangles: the compiler's vector code rounds otherwise than its code for the
 # rest, and what a triangle gives must not depend on which others are left out.
@@ -137,7 +139,7 @@ def _sort_out(gamma, bend, bow, num_triangles, level, fine, origin, leaves, shar
         num_divided += (not is_simple) & (not is_whole)
     share = _QUARTER**level
     _bows(gamma, num_triangles, bow)
-    num = _append(gamma, bow, lists[0], num_whole, (0, 1, 2), _THIRD, origin, share, leaves, shares, of_entry, num)
+    num = _append(gamma, bow, lists[0], num_whole, _WHOLE, _THIRD, origin, share, leaves, shares, of_entry, num)
     for child in range(4):
         nodes = (_CHILDREN[child, 0], _CHILDREN[child, 1], _CHILDREN[child, 2])
         part = _QUARTER * share
@@ -215,7 +217,7 @@ def _divide(  # type: ignore[no-untyped-def]
     for level in range(1, fine[1] + 1):
         to_local, to_gamma, to_origin = part_local[level & 1], part_gamma[level & 1], part_origin[level & 1]
         num_parts = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
-        _angles(kinds, scale, wo, to_local, 3, num_parts, to_gamma)
+        _angles(kinds, scale, wo, to_local, _MIDDLES, num_parts, to_gamma)
         _bends(to_gamma, support, num_parts, bend)
         num, count = _sort_out(
             to_gamma, bend, bow, num_parts, level, fine, to_origin, leaves, shares, of_entry, num, lists
@@ -298,9 +300,11 @@ def project_points(  # type: ignore[no-untyped-def]
                 scaled_wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
         if num_curves > 0:
             _turn_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
-        _angles(kinds, scale, scaled_wo, local, 0, num_entries, gamma)
+        _angles(kinds, scale, scaled_wo, local, _BEGIN, num_entries, gamma)
         _bends(gamma, support, num_entries, bend)
-        num, num_divided = _sort_out(gamma, bend, bow, num_entries, 0, fine, origin, leaves, shares, of_entry, 0, lists)
+        num, num_divided = _sort_out(
+            gamma, bend, bow, num_entries, _BEGIN, fine, origin, leaves, shares, of_entry, _BEGIN, lists
+        )
         divided[:num_divided] = lists[2, :num_divided]
         for batch in range(0, num_divided, _BATCH):
             if num + _MOST_LEAVES > capacity:

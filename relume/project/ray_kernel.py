@@ -16,6 +16,8 @@ from relume.light.gather_rays import shift_of
 from relume.light.local import light_sample
 from relume.project.gathered_kernel import in_frame
 
+_NONE = np.int64(-1)  # no curve is free
+
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def list_local(  # type: ignore[no-untyped-def]
@@ -150,13 +152,16 @@ def weigh_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands
         out: written. (3, K) float32
     """
     most = np.diff(first).max()
-    gamma, band = np.empty(most, np.float32), np.empty((kinds.shape[0], most), np.int64)
+    gamma, weight = np.empty(most, np.float32), np.empty((3, most), np.float32)
+    band = np.empty((kinds.shape[0], most), np.int64)
     for p in range(first.shape[0] - 1):
-        if first[p + 1] > first[p]:
+        begin, end = first[p], first[p + 1]
+        if end > begin:
             _contract(
-                first[p], first[p + 1], wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows,
-                setting_of, -1, gamma, band, out[:, first[p] : first[p + 1]],
+                begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, _NONE,
+                gamma, band, weight,
             )  # fmt: skip
+            out[:, begin:end] = weight[:, : end - begin]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")

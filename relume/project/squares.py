@@ -22,7 +22,7 @@ Squares = NDArray[np.uint8]
 _POINTS_A_RANGE = 1024
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _towards(n, t, pattern, ray, shifts):  # type: ignore[no-untyped-def]
     """Direct a ray of a point with normal n and tangent t, in world space."""
     x, y, z = cosine_ray(pattern.rays[ray], shifts)

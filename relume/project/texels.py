@@ -34,7 +34,7 @@ _APART = np.float32(1.5)  # texels, between them at most
 _LONGEST = np.float32(3)  # footprint, in widths: of longer ones coarser texels are summed
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _beside(place, count):  # type: ignore[no-untyped-def]
     """Find the two texels of a row beside a place within [0, 1], and the share of the second."""
     x: Any = place * np.float32(count) - np.float32(0.5)
@@ -44,7 +44,7 @@ def _beside(place, count):  # type: ignore[no-untyped-def]
     return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), share
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-untyped-def]
     """Find the texels about a place, of the two levels about a footprint.
 
@@ -59,13 +59,13 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
     return texels_at(levels, u, v, level, texel, share)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def level_of(footprint, finest):  # type: ignore[no-untyped-def]
     """Level of halvings for a footprint, however many there are. finest: side of the finest, in texels."""
     return log2_above_one(max(_TEXEL * footprint * finest, np.float32(1)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def texels_at(levels, u, v, level, texel, share):  # type: ignore[no-untyped-def]
     """Do as `texels_about`.
 
@@ -98,7 +98,7 @@ def texels_at(levels, u, v, level, texel, share):  # type: ignore[no-untyped-def
     return num
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def along_footprint(footprint, up, finest):  # type: ignore[no-untyped-def]
     """Find places whose texels, summed, are as long as a footprint, which a slant makes longer than wide.
 
@@ -121,7 +121,7 @@ def along_footprint(footprint, up, finest):  # type: ignore[no-untyped-def]
     return num, np.float32(math.sqrt(beyond / np.float32(num * num - 1))), width
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _add_weights(cluster, weight, view, texel, share, num, part, num_found, found, sums):  # type: ignore[no-untyped-def]
     """Add the weights of texels, seen from one side, by their clusters.
 
@@ -150,7 +150,7 @@ def _add_weights(cluster, weight, view, texel, share, num, part, num_found, foun
     return num_found
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _places_in(levels, relief, place, x, y, z, slant, out):  # type: ignore[no-untyped-def]
     """Find the places that stand for a footprint, and how high the relief is that is seen there.
 

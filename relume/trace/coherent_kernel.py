@@ -34,6 +34,7 @@ _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
 _CHECK_EVERY = 128
 # times eight bytes of one bit each: those bits in the highest byte, the first lowest; and the sum of eight bytes there
 _GATHERED, _EACH_BYTE = np.uint64(0x0102040810204080), np.uint64(0x0101010101010101)
+_BEGIN = np.int64(0)  # of NumPy: a kernel that is called with an int of Python is compiled anew for it
 _HASH = 2_654_435_761  # Knuth's multiplicative hash: 2^32 divided by the golden ratio
 
 
@@ -96,7 +97,7 @@ def _flush(occluded, packet, block, waiting):  # type: ignore[no-untyped-def]
 def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
     """Trace lights against the samples of a mask each, those above the horizon and not yet traced; counts the rays."""
     facing, known = block.facing, block.known
-    rays = lane = 0
+    rays, lane = 0, _BEGIN
     for at in range(lights.shape[0]):
         light = lights[at]
         wanted = samples[at] & facing[light] & ~known[light]
@@ -112,11 +113,11 @@ def _trace(occluded, packet, block, origins, directions, lights, samples):  # ty
             rays += 1
             lane += 1
             if lane == LANES:
-                _flush(occluded, packet, block, LANES)
-                lane = 0
+                _flush(occluded, packet, block, lane)
+                lane = _BEGIN
         if lane >= _ENOUGH:
             _flush(occluded, packet, block, lane)
-            lane = 0
+            lane = _BEGIN
     _flush(occluded, packet, block, lane)
     return rays
 
@@ -243,7 +244,7 @@ def _flood(occluded, packet, block, points, lights, region, samples, before, lev
     """
     origins, (directions, first, index, _) = points, lights
     level.samples[:] = samples
-    start, stop, rays = 0, _begin(block, region, before, level), 0
+    start, stop, rays = _BEGIN, _begin(block, region, before, level), 0
     while start < stop:
         lights_here, masks = level.queue[start:stop], level.samples[start:stop]
         rays += _trace(occluded, packet, block, origins, directions, lights_here, masks)
@@ -345,7 +346,7 @@ def trace_blocks(  # type: ignore[no-untyped-def]
         if chance.shape[0] > 1:
             block.chance[:width] = chance[here:there]
         counts[1] += _find_facing(normals[here:there], directions, block)
-        region, anchors = _mask(0, width), _ends(points, 0, width)
+        region, anchors = _mask(_BEGIN, width), _ends(points, _BEGIN, width)
         counts[0] += _flood(occluded, packet, block, points, lights, region, anchors, nothing, whole)
         _doubt(whole, lights)
         for begin in range(0, width, _QUARTER):

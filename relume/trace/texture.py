@@ -118,7 +118,7 @@ def _halve(image: F32) -> F32:
     )
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+@nb.njit(nogil=True, cache=True, forceinline=True)
 def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
     """Fold a texel's index into an image that is mirrored outside, or clamp it."""
     if wrap == _CLAMP:
@@ -127,7 +127,7 @@ def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
     return min(folded, 2 * size - 1 - folded)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def two_texels(wrap, place, size):  # type: ignore[no-untyped-def]
     """Find the two texels about a place along one side of an image, and the share of the second.
 

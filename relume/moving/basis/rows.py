@@ -13,7 +13,7 @@ from relume.moving.basis.out_factors import NUM_ROWS
 LEAST_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+@nb.njit(nogil=True, cache=True, forceinline=True)
 def row_of(cosine):  # type: ignore[no-untyped-def]
     """Find where cos θo lies in tables: a row, and the share of the next."""
     place = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
@@ -21,7 +21,7 @@ def row_of(cosine):  # type: ignore[no-untyped-def]
     return row, np.float32(place - row)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def seen_from(position, normal, tangent, eye):  # type: ignore[no-untyped-def]
     """Find where a point's wo lies in tables: a row, the share of the next, and cos φo, sin φo.
 

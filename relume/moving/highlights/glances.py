@@ -22,7 +22,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _middle(one, other, first, sigma, sigma_2):  # type: ignore[no-untyped-def]
     """Find the mean direction of two lobes, three numbers, and how wide both are together, σ²."""
     x = first * one[0] + (np.float32(1) - first) * other[0]

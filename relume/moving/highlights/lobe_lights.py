@@ -54,14 +54,14 @@ class LobeLights(NamedTuple):
     share: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def width_of(sigma):  # type: ignore[no-untyped-def]
     """Find which width's lists a lobe of σ takes: the nearest."""
     step = np.float32(2) * math.log2(max(sigma, np.float32(1e-6)) * np.float32(1 / NARROWEST))
     return min(max(np.int64(step + np.float32(0.5)), 0), NUM_WIDTHS - 1)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def square_of(x, y, z):  # type: ignore[no-untyped-def]
     """Find the square of a direction, whose parts are x, y, z."""
     per = np.float32(1) / (abs(x) + abs(y) + abs(z))
@@ -99,7 +99,7 @@ def _squares() -> tuple[F64, F64]:
 _SQUARES = _squares()
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def weight_of(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
     """Find w of a light.
 
@@ -110,7 +110,7 @@ def weight_of(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
     return _weight(off, lights[light, 3], lights[light, 4], variance)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _weight(off, spread, luminous, variance):  # type: ignore[no-untyped-def]
     """Find w from 1 − ω · ω_l, r² and E."""
     per = np.float32(1) / (variance + spread)

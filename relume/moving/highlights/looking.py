@@ -33,7 +33,7 @@ class SkyLight(NamedTuple):
     gain: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def along_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     """Find where a lobe looks.
 
@@ -48,7 +48,7 @@ def along_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     return row, share, _leaning(mean, aside, n), wide
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def along_both(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     """Find where the two lobes that a point has for one look.
 
@@ -67,7 +67,7 @@ def along_both(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     return row, share, _leaning(one, aside, n), _leaning(other, aside, n), first, sigma, sigma_2
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _aside(n, d):  # type: ignore[no-untyped-def]
     """Find where θo lies in tables, and the unit direction along the surface in which d goes on."""
     facing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
@@ -78,14 +78,14 @@ def _aside(n, d):  # type: ignore[no-untyped-def]
     return row, share, (per * x, per * y, per * z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _leaning(cosine, aside, n):  # type: ignore[no-untyped-def]
     """The direction between n and `aside`, by the cosine of its angle from n."""
     flat = math.sqrt(max(np.float32(1) - cosine * cosine, np.float32(0)))
     return flat * aside[0] + cosine * n[0], flat * aside[1] + cosine * n[1], flat * aside[2] + cosine * n[2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def add_sky_in_lobe(light, seen, direction, sigma, gain, out):  # type: ignore[no-untyped-def]
     """Add what a lobe shows of the sky, without the sky's gain.
 
@@ -108,7 +108,7 @@ def add_sky_in_lobe(light, seen, direction, sigma, gain, out):  # type: ignore[n
                 out[channel] += near * light.lamps[lamp, 3 + channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _decay(x):  # type: ignore[no-untyped-def]
     """e^−x, without a call where nothing is left."""
     return np.float32(math.exp(-x)) if x < _NOTHING_LEFT else np.float32(0)

@@ -12,7 +12,7 @@ from relume.trace.texture import two_texels
 
 
 # Inlined, as what it calls: calls count the references of arrays, which is two thirds of the time of a look-up.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _add_level(textures, texture, level, u, v, share, out):  # type: ignore[no-untyped-def]
     """Add a share of a bilinear lookup in one level of a texture. out: (3,)"""
     row = textures.first[texture] + level
@@ -34,7 +34,7 @@ def _add_level(textures, texture, level, u, v, share, out):  # type: ignore[no-u
         )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-untyped-def]
     """Look a texture up, trilinear.
 

@@ -42,7 +42,7 @@ class VertexLight(NamedTuple):
     vectors: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def turned_by(x, y):  # type: ignore[no-untyped-def]
     """Find cos δ and sin δ, of δ as a vector of any length; (0, 0) turns nothing."""
     square = x * x + y * y
@@ -52,7 +52,7 @@ def turned_by(x, y):  # type: ignore[no-untyped-def]
     return np.float32(1), np.float32(0)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _turn_by(x, y):  # type: ignore[no-untyped-def]
     """Find cos mδ and sin mδ for m of 1 to 4, of δ as `turned_by` has it."""
     c1, s1 = turned_by(x, y)
@@ -60,7 +60,7 @@ def _turn_by(x, y):  # type: ignore[no-untyped-def]
     return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def add_turned(lanes, turn, side, weight, is_added, out):  # type: ignore[no-untyped-def]
     """Add a light vector, turned.
 

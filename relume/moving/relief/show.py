@@ -128,7 +128,7 @@ def _join(owner, num_pixels, is_alike, out):  # type: ignore[no-untyped-def]
 
 # Helpers are inlined, and get arrays, not what holds them: a call, or an attribute, would count references to arrays,
 # which threads share; that was three quarters of the kernel.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _ask(levels, rings, weights, columns, num_rays, of_one, asked, counts):  # type: ignore[no-untyped-def]
     """Find the texels and the sides that rays show, and call for their numbers: they arrive while others are summed.
 
@@ -150,7 +150,7 @@ def _ask(levels, rings, weights, columns, num_rays, of_one, asked, counts):  # t
                 call_for(weights, (view[k], texel[first + 1], NUMBERS - 1))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _arriving(numbers, axes, few_axes, tangents, vectors, about, shares, x, y, side):  # type: ignore[no-untyped-def]
     """Sum numbers with the light between three vertices, of each channel.
 

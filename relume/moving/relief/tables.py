@@ -79,7 +79,7 @@ def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> list[Cover]:
     return found
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
 def _numbers_of(factors, cluster, weight, view, texel, out):  # type: ignore[no-untyped-def]
     """Sum the numbers of a texel from one side. factors: (K, 1 + C, 24) of that side. out: (24,)"""
     of = cluster[view, texel]

@@ -18,7 +18,6 @@ _ONE, _HALF, _QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _MAX_DEPTH = 6
-_ALONE = np.empty(0, np.float32)  # these are no groups
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -69,11 +68,12 @@ def _divide(local, weight, radius, which, parent, to_local, to_weight, to_radius
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_divided(curves, scale, wo, num, least, generations, scratch, total):  # type: ignore[no-untyped-def]
+def _add_divided(curves, scale, wo, alone, num, least, generations, scratch, total):  # type: ignore[no-untyped-def]
     """Add triangles that are divided: the first `num` of the first generation, and what comes of them.
 
     Args:
-        curves, scale, wo, scratch: as in `evaluate`. least: as in `set_aside`.
+        curves, scale, wo, scratch: as in `evaluate`. alone: its `between` of what is no group.
+        least: as in `set_aside`.
         generations: local, weight, radius, which, value and error of each, written but for the first's first three.
         total: added to. (3,)
     """
@@ -91,7 +91,7 @@ def _add_divided(curves, scale, wo, num, least, generations, scratch, total):  #
         done[level] += len(listed)
         to = level + 1
         parts = _divide(local[level], weight[level], radius[level], listed, parent, local[to], weight[to], radius[to])
-        evaluate(curves, scale, wo, local[to], radius[to], _ALONE, parts, scratch, value[to], error[to])
+        evaluate(curves, scale, wo, local[to], radius[to], alone, parts, scratch, value[to], error[to])
         done[to] = count[to] = 0
         if to < _MAX_DEPTH:
             count[to] = set_aside(value[to], weight[to], error[to], parts, least, which[to])
@@ -113,7 +113,9 @@ def shade_points(  # type: ignore[no-untyped-def]
         out: added to; what is there is part of what a point receives. (points, 3, ≥ 1) float32
     """
     num_curves, (scale, num_rows) = axes.shape[0], scales_of(curves)
-    wo, lights = np.empty((num_curves, 3), np.float32), (nodes, brings, _ALONE)
+    # made here: a constant could not be written, and what it is handed to would be compiled once more for that
+    wo, alone = np.empty((num_curves, 3), np.float32), np.empty(0, np.float32)
+    lights = (nodes, brings, alone)
     chunks = room(nodes.shape[0] // CHUNK + 1, num_rows)
     weight, reach, which, value, error = chunks
     local, scratch = np.empty((_MAX_DEPTH + 1, 3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
@@ -149,5 +151,5 @@ def shade_points(  # type: ignore[no-untyped-def]
             for node in range(6):
                 look_up(nodes, node, chosen, 0, divided, local[0, 0, node], local[0, 1, node], local[0, 2, node])
             turn(normal[p], tangent[p], 0, divided, local[0])
-            _add_divided(curves, scale, wo, divided, least, generations, scratch, total)
+            _add_divided(curves, scale, wo, alone, divided, least, generations, scratch, total)
         out[p - start, :, 0] += total
