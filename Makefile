@@ -15,6 +15,7 @@ CLIENT_STAMP := client_web/node_modules/.stamp-packages
 CLIENT_BUILD := client_web/dist/index.html
 KERNEL_STAMP := $(VENV)/.stamp-kernels
 KERNEL_SOURCES := $(shell grep -rlE '^(import|from) numba' relume --include='*.py' 2>/dev/null) relume/warm.py
+TESTS_STAMP := $(VENV)/.stamp-tests
 CLIENT_SOURCES := $(shell find client_web -type f -not -path '*/node_modules/*' -not -path '*/dist/*' 2>/dev/null)
 LOCK_TOOLS := build/lock-tools
 
@@ -28,6 +29,9 @@ SHARED_OUT := --numprocesses=logical --maxprocesses=4 --dist=loadscope --no-load
 # Of NumPy's linear algebra: its threads spin where they wait for a core that another process of tests has.
 ONE_THREAD := OPENBLAS_NUM_THREADS=1
 
+# Bytecode is kept, whatever the shell says: tests start hundreds of processes, each of which would compile all sources.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help setup demo test test-slow bench soak lint lock clean client-check
 
 help:  ## what each target does
@@ -39,7 +43,7 @@ demo: setup  ## bake the built-in scene, serve it, open the editor
 	$(BIN)/relume demo $(ARGS)
 
 test:  ## everything that must hold before a commit
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line setup lint client-check
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line setup lint client-check $(TESTS_STAMP)
 	$(if $(CHROMIUM),,@echo "No chromium on this machine: the browser tests (marker e2e) are left out.")
 	$(ONE_THREAD) $(BIN)/python -m pytest -m "$(MARKERS)" $(SHARED_OUT)
 
@@ -92,6 +96,11 @@ $(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml
 $(KERNEL_STAMP): $(PROJECT_STAMP) $(KERNEL_SOURCES)
 	@echo "Compiling kernels (once, a minute or two) …"
 	@$(ONE_THREAD) $(BIN)/python -m relume.warm
+	@touch $@
+
+# Processes that tests are shared out to begin at once: each would compile all sources and tests, and find no bytecode yet.
+$(TESTS_STAMP): $(PROJECT_STAMP) $(shell find relume worker server cli bench tests -name '*.py')
+	@$(BIN)/python -m pytest --collect-only -qq | { grep -v '^tests/.*: [0-9]*$$' || true; }
 	@touch $@
 
 $(CLIENT_STAMP): client_web/package-lock.json
