@@ -481,7 +481,7 @@ export interface HelloMessage {
   moving_error: MovingError | null;
 }
 
-/** An image that terms of looks may name as `texture` or `roughness_map`, in the place of their material's own. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says where it is metal; `base`: its base colour, an image, "diffuse" or "scene" of the scene's own textures, or null where that is the same everywhere. */
+/** An image that looks may name in the place of a material's own: `texture` or `roughness_map` of its terms, its `normal_map`. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says where it is metal; `base`: its base colour, an image, "diffuse" or "scene" of the scene's own textures, or null where that is the same everywhere. */
 export interface ImageBody {
   id: string;
   texture: string;

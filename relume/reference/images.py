@@ -13,9 +13,9 @@ from relume.brdf.levels import follows_map
 from relume.images.shelf import mean_roughness, normals_of, roughness_of, texture_of
 from relume.look import Look
 from relume.scene.gltf.uvs import made_tangents
-from relume.scene.model import Material, Scene
+from relume.scene.model import Material, Mesh, Scene
 from relume.scene.roughness import widened
-from relume.trace.surface import Surface
+from relume.trace.surface import Surface, projected_axes
 from relume.trace.texture import sample_image
 
 F32 = NDArray[np.float32]
@@ -35,12 +35,33 @@ def wearing(scene: Scene, look: Look) -> Scene:
         for own, map_ in zip(scene.materials, normals, strict=True)
     )
     meshes = tuple(
-        replace(mesh, tangents=made_tangents(mesh.positions, mesh.normals, mesh.uvs, mesh.faces))
-        if normals[mesh.material] is not None and not mesh.tangents.any()
-        else mesh
+        mesh if normals[mesh.material] is None or mesh.tangents.any() else _with_tangents(_with_places(mesh))
         for mesh in scene.meshes
     )
     return replace(scene, materials=materials, meshes=meshes)
+
+
+def _with_tangents(mesh: Mesh) -> Mesh:
+    """A mesh with tangents along u, as imports make them for normal maps."""
+    return replace(mesh, tangents=made_tangents(mesh.positions, mesh.normals, mesh.uvs, mesh.faces))
+
+
+def _with_places(mesh: Mesh) -> Mesh:
+    """A mesh with places in textures; where there are none, those of a projection, as `relume.trace.surface` has it."""
+    if mesh.uvs.any():
+        return mesh
+    corners = mesh.positions[mesh.faces]
+    across, up = projected_axes(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    u, v = np.einsum("fkc,fc->fk", corners, across), -np.einsum("fkc,fc->fk", corners, up)
+    order = mesh.faces.ravel()
+    return replace(
+        mesh,
+        positions=mesh.positions[order],
+        normals=mesh.normals[order],
+        tangents=mesh.tangents[order],
+        uvs=np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32),
+        faces=np.arange(len(order), dtype=np.uint32).reshape(-1, 3),
+    )
 
 
 def _following(own: Material, look: Look) -> tuple[dict[str, Any], ...]:

@@ -11,7 +11,8 @@ from server.wire.body import Body, Id, Name
 
 
 class ImageBody(Body):
-    """An image that terms of looks may name as `texture` or `roughness_map`, in the place of their material's own.
+    """An image that looks may name in the place of a material's own: `texture` or `roughness_map` of its terms, its
+    `normal_map`.
 
     `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green,
     how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says

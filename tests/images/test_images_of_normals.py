@@ -12,14 +12,17 @@ from tiny_scenes import corner
 
 from relume.brdf.channels import IMAGES, NormalMap
 from relume.errors import ParameterError, StoreError
+from relume.eye.view_samples import sample_view
 from relume.images.shelf import keep, normals_of
 from relume.look import default_look, validate
 from relume.moving.points.images import OWN, Wears, dressed
 from relume.picture.picture import Picture
 from relume.reference.image import reference_image
+from relume.reference.images import wearing
 from relume.scene.coding import decode
 from relume.scene.gltf.uvs import made_tangents
 from relume.scene.model import Coding, Material, Texture
+from relume.trace.geometry import merge
 
 SIDE = 64
 SCALE = 1.5
@@ -289,3 +292,28 @@ def test_bakes_that_do_not_tell_bumps_are_refused(bakes, plain, named):
     view = replace(bare.views["front"], store=Older(bare.store, (), ("shortest_normals",)), worn={})
     with pytest.raises(StoreError, match="bake the scene again"):
         Picture(replace(bare, views={"front": view}), "front", bare.memory).set_look(bumpy(plain, named))
+
+
+def test_what_has_no_place_in_textures_is_projected_on(tmp_path):
+    """In pictures and truths alike, where pixels are not as wide: an image that leans alike everywhere."""
+    Image.fromarray(np.full((4, 4, 3), (176, 100, 240), np.uint8)).save(tmp_path / "slope.png")
+    with IMAGES.at(tmp_path / "images") as shelf:
+        _project_on(keep(shelf, tmp_path / "slope.png", "Slope").texture, tmp_path)
+
+
+def _project_on(named, tmp_path):
+    scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
+    bare = replace(scene, meshes=tuple(replace(m, uvs=0 * m.uvs, tangents=0 * m.tangents) for m in scene.meshes[:2]))
+    transfer = bake_corner(replace(bare, id="0" * len(bare.id)), "direct", tmp_path)
+    look = bumpy(bare, named)
+    picture = Picture(transfer, "front", transfer.memory)
+    picture.set_look(look)
+    positions, normals = _normals_of(picture._images.view)
+    of_truth = wearing(bare, look)
+    samples = sample_view(of_truth, merge(of_truth), "front", (40, 30))
+    points, rows = samples.surface.points, np.flatnonzero(samples.material == 0)
+    rows = rows[np.lexsort(points.position[rows].T)]
+    np.testing.assert_allclose(positions, points.position[rows], atol=1e-6)
+    np.testing.assert_allclose(normals, points.normal[rows], atol=1e-4)
+    assert np.all(normals[:, 0] > 0.3)
+    assert np.all(normals[:, 2] > 0.1)  # green below a half leans down the image, towards the viewer here

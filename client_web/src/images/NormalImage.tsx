@@ -25,7 +25,7 @@ export function NormalImage({ material, of, mirrors }: Props) {
   const map = of.normal_map ?? null;
   const kept = keptWords(mirrors);
   return (
-    <section aria-label="Normals">
+    <section class="normal-image" aria-label="Normals">
       <MapImage
         label="Normal map"
         title="An image whose colours say how the surface leans, its green upwards, as in glTF."
