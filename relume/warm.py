@@ -39,7 +39,6 @@ from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.bumps import towards_light
 from relume.moving.picture import MovingPicture
-from relume.parallel import num_threads
 from relume.picture.picture import Picture
 from relume.picture.transfer import Transfer
 from relume.reference import Points, reference_radiance, texels_of
@@ -59,12 +58,12 @@ OF_RAYS = ("lambert", "ggx")  # has no angle; has one that listens to a paramete
 def warm() -> None:
     """Bake with every method, edit each analytic term by each curve and along parameters, add and move local lights.
 
-    Cost: a minute and a half of two cores, 15 s when everything is compiled.
+    Cost: a minute and a half of two cores, 20 s when everything is compiled.
     """
-    parts = (_warm_pictures, _warm_rays)
-    with ProcessPoolExecutor(min(len(parts), num_threads()), get_context("spawn")) as pool:
-        for done in [pool.submit(part) for part in parts]:
-            done.result()
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        pictures = pool.submit(_warm_pictures)
+        _warm_rays()
+        pictures.result()
 
 
 def _warm_pictures() -> None:
