@@ -11,6 +11,7 @@ from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.methods.cells.between import sent_between
+from relume.methods.cells.in_lobes import sent_in_lobes
 from relume.methods.on_cells import LightOnCells
 from relume.picture.light import light_of
 from relume.picture.transfer import Axis
@@ -184,9 +185,10 @@ def arriving(transfer, view: View, index, look):
         )
         every = light._replace(environment_gain=look.environment.gain)
         arrived = on_cells.arrived(every, reflecting, is_preview=False)
-        reflected = sent_between(transfer.cells, reflecting, arrived, light.paths.first, light.paths.last).sent(
-            transfer.cells
-        )
+        lobes = transfer.cells.lobes(light.reflectances, reflecting)
+        in_lobes = lobes, sent_in_lobes(transfer.cells, lobes, on_cells.straight(every, lobes.rows))
+        bounces = light.paths.first, light.paths.last
+        reflected = sent_between(transfer.cells, reflecting, arrived, *bounces, in_lobes).sent(transfer.cells)
     local = transfer.local.all_rays(light, view.points(index))
     straight = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.none()
     return straight, view.receivers(index, reflected, local, is_lit=light.paths.direct)

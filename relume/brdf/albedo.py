@@ -44,6 +44,8 @@ _SHARE_BYTES = 4 * (1 + len(TEXTURES)) * 3 * len(PAIRS)
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128  # of a highlight's numbers, from none to all
+_LEAST_SENT, _SHARP = 0.03, 0.03  # F_00 of a highlight that counts; F_66 of F_00 where functions miss some of it
+_LAST = PAIRS.index((SENT_DEGREE // 2, SENT_DEGREE // 2))  # both of the highest degree, of order 0
 
 
 def is_diffuse(term_document: Mapping[str, Any]) -> bool:
@@ -53,12 +55,12 @@ def is_diffuse(term_document: Mapping[str, Any]) -> bool:
 
 def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
     """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`; the
-    images that its look names in their place; and its mirrors.
+    images that its look names in their place; its mirrors; and what few functions do not tell of it.
 
     Args:
         terms: of a complete look.
     Returns:
-        What `shares_in`, `images_in` and `mirrors_in` read.
+        What `shares_in`, `images_in`, `mirrors_in` and `lobes_in` read.
     """
     return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True))
 
@@ -67,20 +69,61 @@ def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
 def _reflectances(terms_text: str) -> bytes:
     total = np.zeros((1 + len(TEXTURES), 3, len(PAIRS)))
     terms = json.loads(terms_text)
-    for term in terms:
-        found = shares(term)
-        if not is_diffuse(term):  # else all light would be made anew with each step of a hand on a highlight
-            found = np.round(found * _STEPS) / _STEPS
-        total[group_of(term)] += found
+    highlights = [term for term in terms if not is_diffuse(term)]
+    lobes = sharp_lobes(highlights)
+    for term in filter(is_diffuse, terms):
+        total[group_of(term)] += shares(term)
+    for term in lobes or highlights:
+        total[group_of(term)] += shares_in_steps(term)
     named = [name or "" for name in images_of(terms)]
-    mirrors = [_in_steps(term) for term in terms if mirrored_share(term).any()]
-    beside = [*named, json.dumps(mirrors, sort_keys=True)] if mirrors else named
+    mirrors = [_in_relative_steps(term) for term in highlights if mirrored_share(term).any()]
+    beside = [*named, json.dumps([mirrors, lobes], sort_keys=True)] if mirrors or lobes else named
     return total.astype(np.float32).tobytes() + " ".join(beside).encode()
 
 
-def _in_steps(term: Mapping[str, Any]) -> dict[str, Any]:
-    """A mirror whose colour has the steps that highlights have."""
-    return {**term, "color": (np.round(np.asarray(term["color"]) * _STEPS) / _STEPS).tolist()}
+def shares_in_steps(term: Mapping[str, Any]) -> F64:
+    """F of a highlight as it counts: else all light would be made anew with each step of a hand. (3, pairs)"""
+    return np.asarray(np.round(shares(term) * _STEPS) / _STEPS)
+
+
+def sharp_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """All highlights of a material, where few functions do not tell one of them that sends much.
+
+    Their numbers have steps of a relative size, the larger the less they send; curves that are drawn are as they are.
+
+    Args:
+        highlights: terms of a complete look.
+    Returns:
+        Their documents, for `relume.brdf.lobe_tables`; none where functions are enough.
+    """
+    if any(map(_is_textured, highlights)) or not any(map(_is_sharp, highlights)):
+        return []
+    return [_in_relative_steps(term) for term in highlights]
+
+
+def _is_textured(term: Mapping[str, Any]) -> bool:
+    """Whether texels cover a term: what it sends is their mean, which few functions tell."""
+    return TERMS[term["model"]].settled(term).texels is not None
+
+
+def _is_sharp(term: Mapping[str, Any]) -> bool:
+    """Whether a highlight sends much, and not as few functions do."""
+    share = shares(term).max(axis=0)
+    return bool(share[0] > _LEAST_SENT and share[_LAST] > _SHARP * share[0])
+
+
+def _in_relative_steps(term: Mapping[str, Any]) -> dict[str, Any]:
+    """A term whose numbers are powers of one that lies the nearer to 1 the more it sends: 2^(1/64) for all light."""
+    sent = max(shares(_white_of(term)).max(), _LEAST_SENT)
+    a_doubling = 2.0 ** round(float(np.clip(np.log2(_STEPS * sent / 2), 1, 6)))
+
+    def rounded(value: Any) -> Any:
+        if isinstance(value, list):
+            return [rounded(one) for one in value]
+        return float(2 ** (round(np.log2(value) * a_doubling) / a_doubling)) if value > 0 else value
+
+    params = {name: rounded(value) for name, value in (term.get("params") or {}).items()}
+    return {**term, "color": rounded(list(term["color"])), "params": params}
 
 
 def shares_in(of_material: bytes) -> F32:
@@ -96,8 +139,17 @@ def images_in(of_material: bytes) -> Images:
 
 def mirrors_in(of_material: bytes) -> list[dict[str, Any]]:
     """The terms of a material that are mirrors, in part at least. of_material: from `reflectances_of`"""
-    _, _, *mirrors = of_material[_SHARE_BYTES:].decode().split(" ", 2)
-    found: list[dict[str, Any]] = json.loads(mirrors[0]) if mirrors else []
+    return _beside(of_material)[0]
+
+
+def lobes_in(of_material: bytes) -> list[dict[str, Any]]:
+    """The highlights of a material that few functions do not tell; see `sharp_lobes`. of_material: likewise"""
+    return _beside(of_material)[1]
+
+
+def _beside(of_material: bytes) -> list[list[dict[str, Any]]]:
+    _, _, *beside = of_material[_SHARE_BYTES:].decode().split(" ", 2)
+    found: list[list[dict[str, Any]]] = json.loads(beside[0]) if beside else [[], []]
     return found
 
 
@@ -118,9 +170,13 @@ def shares(term_document: Mapping[str, Any]) -> F64:
     return known * np.asarray(term_document["color"], np.float64)[:, None]
 
 
+def _white_of(term_document: Mapping[str, Any]) -> dict[str, Any]:
+    return {**term_document, "color": [1.0, 1.0, 1.0]}
+
+
 def _white(term_document: Mapping[str, Any]) -> str:
     """The text of a term whose colour is white: the colour multiplies what is found of it."""
-    return json.dumps({**term_document, "color": [1.0, 1.0, 1.0]}, sort_keys=True)
+    return json.dumps(_white_of(term_document), sort_keys=True)
 
 
 @lru_cache(maxsize=1024)

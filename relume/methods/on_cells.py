@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
 from relume.memory import Memory
 from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.in_lobes import Coming
 from relume.methods.cells.reflecting import Arrived, Reflecting
 from relume.methods.harmonic_light import CELL_DEGREE, HarmonicLight
 from relume.methods.local_lights import LocalLights
@@ -67,6 +69,16 @@ class LightOnCells:
             out.irradiance[:] += gain * of_local(geometry)[:, None]
             out.vectors[:] += gain[:, None] * self._local_vectors(geometry, reflecting, is_preview)
         return out
+
+    def straight(self, light: Light, rows: NDArray[np.intp]) -> Coming:
+        """What comes to the points of some cells, exactly, source after source. rows: the cells. (G,)"""
+        of_local = ((self._local.rays_at_cells(geometry, rows), gain) for geometry, gain in light.local)
+        rays = [replace(rays, gain=np.array(gain, np.float32)) for rays, gain in of_local]
+        if not light.is_environment_lit:
+            return Coming(rays=rays)
+        lights = self._lights_in(light.environment)
+        gain = np.array(light.environment_gain, np.float32)
+        return Coming(replace(lights, irradiance=gain * lights.irradiance), self._cells.seen_by(rows), rays)
 
     def _irradiance(self, environment: EnvironmentKey, is_preview: bool) -> F32:
         key = self._key, "environment on cells", environment

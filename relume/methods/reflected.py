@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.memory import Memory
-from relume.methods.cells.between import Leaving, preview_between, quickly_between, sent_between
+from relume.methods.cells.between import preview_between, quickly_between, sent_between
 from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.in_lobes import sent_in_lobes
+from relume.methods.cells.leaving import Leaving
 from relume.methods.cells.reflecting import Reflecting
 from relume.methods.on_cells import LightOnCells
 from relume.picture.light import Light, is_same_but_for_surfaces
@@ -97,7 +99,9 @@ class Reflected:
     def _leaving(self, light: Light) -> Leaving:
         reflecting = self._reflecting(light, self._memory)
         arrived = self._on_cells.arrived(light, reflecting, is_preview=False)
-        return sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
+        lobes = self._cells.lobes(light.reflectances, reflecting)
+        in_lobes = lobes, sent_in_lobes(self._cells, lobes, self._on_cells.straight(light, lobes.rows))
+        return sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
 
     def _preview(self, light: Light) -> F32:
         if not light.paths.reflect:

@@ -29,9 +29,10 @@ from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey
 from relume.memory import Memory
-from relume.methods.cells.between import Leaving
 from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.reflecting import Arrived
+from relume.methods.cells.in_lobes import Coming, sent_in_lobes
+from relume.methods.cells.leaving import Leaving, sent_once
+from relume.methods.cells.reflecting import Arrived, Reflecting
 from relume.methods.store_io import read_lights, read_tiles
 from relume.picture.light import Light
 from relume.project.receivers import ThrownRays
@@ -196,7 +197,7 @@ class ThrownLight:
         change = np.asarray(there - here, np.float32)
         if not change.any():
             return None
-        taken = [self.taken(light).seen(self._cells) if self.is_in(light) else 0 for light in (before, after)]
+        taken = [self._taken_quickly(light).seen(self._cells) if self.is_in(light) else 0 for light in (before, after)]
         return MoreThrown(self._directions, change, np.asarray(taken[1] - taken[0], np.float32))
 
     def _sent(self, light: Light) -> F32:
@@ -214,25 +215,40 @@ class ThrownLight:
         return np.asarray((sent * arriving).reshape(-1, 3), np.float32)
 
     def taken(self, light: Light) -> Leaving:
-        """What cells in the planes send of the same lights, as functions have it."""
-        cells, lobes = self._cells, self._cells.reflecting(_mirrors_alone(light.reflectances))
-        is_among = self._thrown.plane[lobes.rows] != NO_PLANE
-        rows = lobes.rows[is_among]
+        """What cells in the planes send of the same lights, as exact pictures have it."""
+        alone, lights = _mirrors_alone(light.reflectances), self._bright_in(light.environment)
+        reflecting, arrived = self._taking(light, alone)
+        lobes = self._cells.lobes(alone, reflecting)
+        lights = replace(lights, irradiance=np.array(light.environment_gain, np.float32) * lights.irradiance)
+        coming = Coming(lights, self._cells.seen_by(lobes.rows, self._among))
+        return sent_once(reflecting, arrived, (lobes, sent_in_lobes(self._cells, lobes, coming)))
+
+    def _taken_quickly(self, light: Light) -> Leaving:
+        """The same as functions have it."""
+        return sent_once(*self._taking(light, _mirrors_alone(light.reflectances)))
+
+    def _taking(self, light: Light, alone: Reflectances) -> tuple[Reflecting, Arrived]:
+        """What cells in the planes make of light, and what comes to them. alone: what mirrors reflect"""
+        whole = self._cells.reflecting(alone)
+        is_among = self._thrown.plane[whole.rows] != NO_PLANE
+        rows = whole.rows[is_among]
         arrived, gain = self._arrived(light.environment, rows), np.array(light.environment_gain, np.float32)
-        some = replace(
-            lobes,
-            reflectance=lobes.reflectance * (self._thrown.plane != NO_PLANE)[:, None],
-            rows=rows,
-            shares=lobes.shares[:, is_among],
-        )
-        even, vectors = some.sent(Arrived(gain * arrived.irradiance, gain[:, None] * arrived.vectors))
-        return Leaving(even[: cells.num_cells], rows, vectors, some.widening)
+        reflectance = whole.reflectance * (self._thrown.plane != NO_PLANE)[:, None]
+        some = replace(whole, reflectance=reflectance, rows=rows, shares=whole.shares[:, is_among])
+        return some, Arrived(gain * arrived.irradiance, gain[:, None] * arrived.vectors)
+
+    @property
+    def _among(self) -> NDArray[np.intp]:
+        return self._thrown.lights.astype(np.intp)
+
+    def _bright_in(self, environment: EnvironmentKey) -> TriangleLights:
+        """The lights that were traced, in an environment."""
+        whole = self._lights_in(environment)
+        return whole.some(self._among, whole.irradiance[self._among])
 
     def _arrived(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> Arrived:
         def found() -> Arrived:
-            among, cells = self._thrown.lights.astype(np.intp), self._cells
-            whole = self._lights_in(environment)
-            some = whole.some(among, whole.irradiance[among])
+            among, cells, some = self._among, self._cells, self._bright_in(environment)
             return Arrived(cells.irradiance(some, among), cells.vectors(rows, some, SENT_DEGREE, among))
 
         return self._memory.keep((self._key, "thrown light on cells", environment, rows.tobytes()), found)

@@ -22,6 +22,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.lobe_grid import SIDE, directions_at
 from relume.basis.zernike import DEGREES, FALL, SENT_DEGREE, in_basis, num_functions
 from relume.parallel import for_ranges
 from relume.trace.cell_tree import NO_CELL
@@ -31,9 +32,8 @@ F32 = NDArray[np.float32]
 NUM_SENT = num_functions(SENT_DEGREE)
 """J, functions by which cells send."""
 
-SIDE = 16  # squares across the disc of all places
 _FINER = 8
-_RIM, _LITTLE = 0.999, 1e-9
+_LITTLE = 1e-9
 _NARROWEST = 1 / (2 * 4.9**2)  # of a highlight and the window together: a metal's of roughness 0.3
 _STEPS = 32_767  # of 16-bit radiance
 _ROWS_A_RANGE = 256  # their values stay in the cache
@@ -66,7 +66,14 @@ def evenly(radiance: F32) -> Sent:
     )
 
 
-def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, falls: F32 | None = None) -> Sent:
+def sent_by(
+    even: F32,
+    rows: NDArray[np.intp],
+    frame: F32,
+    vectors: F32,
+    falls: F32 | None = None,
+    beside: tuple[NDArray[np.intp], F32] | None = None,
+) -> Sent:
     """Put together what cells send.
 
     Args:
@@ -74,6 +81,7 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, falls: 
         frame: their tangents and bitangents. (G, 2, 3) float32. vectors: L_j of each. (G, 3, J) float32
         falls: how fast what narrow lobes see of each falls with the degree, see `falls_of`. (G,) float32; None where
             only cells look it up, which see widely: `smooth` is `table` then.
+        beside: what some of them send besides by squares: which of the G, rising, (F,), and radiance, (F, 3, SIDE²).
     """
     lobe = np.full(NO_CELL + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
@@ -85,6 +93,9 @@ def sent_by(even: F32, rows: NDArray[np.intp], frame: F32, vectors: F32, falls: 
         some = vectors[start:stop]
         several = [some] if falls is None else [some, some * np.exp(-np.outer(falls[start:stop], degrees))[:, None]]
         values = np.stack(several).astype(np.float32) @ means  # (tables, cells, 3, squares)
+        if beside is not None:
+            among = slice(*np.searchsorted(beside[0], [start, stop]))
+            values[:, beside[0][among] - start] += beside[1][among]
         largest = np.maximum(values.max(axis=(0, 3)), -values.min(axis=(0, 3)))
         scale[start:stop] = np.maximum(largest, np.float32(1e-30)) / np.float32(_STEPS)
         values /= scale[start:stop, :, None]
@@ -111,12 +122,9 @@ def grid_means() -> F32:
     """The mean of each function over each square, by the cosine. (J, SIDE²) float32"""
     place = (np.arange(SIDE * _FINER) + 0.5) * (2 / (SIDE * _FINER)) - 1
     x, y = np.meshgrid(place, place, indexing="ij")
-    r2 = x * x + y * y
-    inward = np.minimum(1, _RIM / np.maximum(np.sqrt(r2), _RIM))  # a square off the disc is as the rim beside it
-    near = 1 + r2 * inward**2
-    wi = np.stack([2 * x * inward / near, 2 * y * inward / near, 2 / near - 1], axis=-1)
+    wi = directions_at(x, y)  # a square off the disc is as the rim beside it
     squares = SIDE, _FINER, SIDE, _FINER
-    weight = np.where(r2 < 1, wi[..., 2] / near**2, _LITTLE).reshape(squares)
+    weight = np.where(x * x + y * y < 1, wi[..., 2] * (1 + wi[..., 2]) ** 2, _LITTLE).reshape(squares)
     functions = in_basis(wi)[..., :NUM_SENT].reshape(*squares, NUM_SENT)
     means = np.einsum("xaybj,xayb->xyj", functions, weight) / np.einsum("xayb->xy", weight)[..., None]
     return np.ascontiguousarray(means.reshape(SIDE * SIDE, NUM_SENT).T, np.float32)

@@ -156,6 +156,8 @@ BOUNDED = {
     "imageio/ocio/config.py",
     "images/shelf.py",
     "kernel_cache.py",
+    "basis/lobe_grid.py",
+    "brdf/lobe_tables.py",
     "look/library/materials.py",
     "look/library/navigation.py",
     "measured/asset_store.py",

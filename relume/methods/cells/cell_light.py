@@ -14,6 +14,7 @@ from relume.images.shelf import texture_of
 from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.methods.cells.bounces import irradiance
+from relume.methods.cells.lobes import Lobes
 from relume.methods.cells.reflecting import Arrived, Reflecting
 from relume.methods.cells.seen_from import seen_from
 from relume.points import Points
@@ -85,6 +86,11 @@ class CellLight:
         """What the cells make of light in a look."""
         return Reflecting.of(reflectances, self.material, self._textures_in(reflectances))
 
+    def lobes(self, reflectances: Reflectances, reflecting: Reflecting) -> Lobes:
+        """The highlights of cells in a look that few functions do not tell. reflecting: what cells make of light"""
+        found = Lobes.of(reflectances, self.material, self._textures_in(reflectances), reflecting.held)
+        return found.some(np.isin(found.rows, reflecting.rows))
+
     def _textures_in(self, reflectances: Reflectances) -> F32:
         """Multipliers of cells, those of images that a look names in their place. (2, C, 3) float32"""
         named = [images_in(of_material) for of_material in reflectances]
@@ -114,6 +120,17 @@ class CellLight:
         of_points = self._seen(self.visible.reshape(-1, self.visible.shape[2]), among)
         arriving = irradiance(self.points.normal, of_points, lights).reshape(*self.visible.shape[:2], 3)
         return np.asarray(arriving.mean(axis=1, dtype=np.float64), np.float32)
+
+    def seen_by(self, rows: NDArray[np.intp], among: NDArray[np.intp] | None = None) -> NDArray[np.uint8]:
+        """What the points of some cells see. rows: the cells. (G,)
+
+        Args:
+            among: which of the bake's lights, (M,); None: all.
+        Returns:
+            (G, points a cell, bytes) uint8
+        """
+        seen = self._seen(self.visible[rows].reshape(-1, self.visible.shape[2]), among)
+        return np.ascontiguousarray(seen.reshape(len(rows), self.points_a_cell, seen.shape[1]))
 
     @staticmethod
     def _seen(visible: NDArray[np.uint8], among: NDArray[np.intp] | None) -> NDArray[np.uint8]:

@@ -11,10 +11,11 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.basis.lobe_grid import SIDE
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.reflecting import Arrived
 from relume.parallel import for_shares
-from relume.project.sent import SIDE, Sent, grid_means, light_along
+from relume.project.sent import Sent, grid_means, light_along
 
 F32 = NDArray[np.float32]
 

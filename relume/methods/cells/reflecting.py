@@ -39,12 +39,14 @@ class Reflecting:
         has_lobe: tells which materials send more one way than another; as bytes, a part of keys.
         rows: cells of these. (G,) intp
         shares: all of F of those. (pairs, G, 3) float32
+        held: what all that cells send is multiplied by, so that none sends more than it gets. (C, 3) float32
     """
 
     reflectance: F32
     has_lobe: bytes
     rows: NDArray[np.intp]
     shares: F32
+    held: F32
 
     @cached_property
     def widening(self) -> F32:
@@ -67,9 +69,10 @@ class Reflecting:
         has_lobe = np.abs(known[:, :, :, 1:]).max(axis=(1, 2, 3)) > 0
         rows = np.flatnonzero(has_lobe[material])
         shares = np.einsum("tnc,ntcp->pnc", plain[:, rows], known[material[rows]])
-        held = np.clip(whole, 0, 1)
-        shares *= held[rows] / np.maximum(whole[rows], 1e-30)
-        return cls(held.astype(np.float32), has_lobe.tobytes(), rows, shares.astype(np.float32))
+        held = (np.clip(whole, 0, 1) / np.maximum(whole, 1e-30)).astype(np.float32)
+        shares *= held[rows]
+        reflectance = np.clip(whole, 0, 1).astype(np.float32)
+        return cls(reflectance, has_lobe.tobytes(), rows, shares.astype(np.float32), held)
 
     def sent(self, arrived: Arrived) -> tuple[F32, F32]:
         """What cells send of what arrives.

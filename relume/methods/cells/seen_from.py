@@ -6,7 +6,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.project.sent import SIDE, grid_means
+from relume.basis.lobe_grid import SIDE
+from relume.project.sent import grid_means
 from relume.project.squares import Squares
 from relume.trace.cell_tree import NO_CELL
 

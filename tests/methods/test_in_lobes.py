@@ -1,0 +1,198 @@
+"""Light that comes straight to cells with sharp highlights, by tables, against the BRDF itself."""
+
+import json
+
+import numpy as np
+import pytest
+import twins
+
+from relume.basis.lobe_grid import (
+    NUM_BINS,
+    SIDE,
+    bin_middles,
+    directions_at,
+    mirrored_squares,
+    square_areas,
+    squares_of,
+)
+from relume.brdf.albedo import lobes_in, reflectances_of, shares, sharp_lobes
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.lobe_tables import lobe_table
+from relume.light.gather_rays import make_pattern
+from relume.light.triangles import subdivide
+from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.in_lobes import Coming, sent_in_lobes
+from relume.methods.cells.leaving import InSquares, sent_once
+from relume.methods.cells.reflecting import Arrived
+from relume.trace.cells import gather_samples_of
+
+PLAIN = {"texture": None, "curves": {}}
+NUM_CELLS = 12
+
+
+def metal(roughness, color=(1.0, 1.0, 1.0)):
+    return {**PLAIN, "model": "ggx", "color": list(color), "params": {"roughness": roughness, "f0": 0.9}}
+
+
+MATT = {**PLAIN, "model": "lambert", "color": [0.3, 0.2, 0.1], "params": {}}
+
+
+def cells_of(normal):
+    rng = np.random.default_rng(4)
+    visible = rng.integers(0, 256, (NUM_CELLS, 4, 6)).astype(np.uint8)
+    links = np.zeros((NUM_CELLS, 4 * 5), np.uint16)
+    material, white = np.zeros(NUM_CELLS, np.uint16), np.ones((2, NUM_CELLS, 3), np.float32)
+    points = gather_samples_of(normal, normal)
+    return CellLight(points, visible, links, make_pattern(5, 0, 9), material, white)
+
+
+def flat(spread=0.0):
+    rng = np.random.default_rng(7)
+    one = np.repeat(twins.unit(rng.normal(size=(NUM_CELLS, 1, 3))), 4, axis=1)
+    return twins.unit(one + spread * rng.normal(size=one.shape)).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def lights():
+    return subdivide(np.random.default_rng(3).random((16, 32, 3), np.float32), 48)
+
+
+def mean_over_squares(document, wi):
+    """A term seen in each square by light from one direction, its mean over 64 places, by the cosine. (3, squares)"""
+    place = (np.arange(SIDE * 8) + 0.5) * (2 / (SIDE * 8)) - 1
+    x, y = np.meshgrid(place, place, indexing="ij")
+    wo = directions_at(x, y)
+    weight = np.where(x * x + y * y < 1, wo[..., 2] * (1 + wo[..., 2]) ** 2, 1e-12)
+    value = eval_brdf(document, wi, wo) * weight[..., None]
+    squares = SIDE, 8, SIDE, 8
+    return (
+        (value.reshape(*squares, 3).sum(axis=(1, 3)) / weight.reshape(squares).sum(axis=(1, 3))[..., None])
+        .reshape(SIDE * SIDE, 3)
+        .T
+    )
+
+
+@pytest.mark.parametrize("roughness", [0.3, 0.5])
+def test_tables_are_means_over_squares(roughness):
+    table, document, area = lobe_table(json.dumps(metal(roughness))), metal(roughness), square_areas()
+    for b in (0, 60, 200):
+        exact = mean_over_squares(document, bin_middles()[b])
+        missed = np.sqrt(np.sum(area * (table[b] - exact) ** 2) / np.sum(area * exact**2))
+        assert missed < 0.03
+
+
+@pytest.mark.parametrize("roughness", [0.03, 0.1])
+def test_tables_of_lobes_narrower_than_squares_send_all_of_them(roughness):
+    """A mirror head-on sends what it does, 0.9 of it, wherever in a square the lobe lies."""
+    sent = lobe_table(json.dumps(metal(roughness)))[:60] @ square_areas()
+    np.testing.assert_allclose(sent, 0.9, rtol=0.02)
+
+
+def test_mirrorings_take_squares_where_they_take_directions():
+    rng = np.random.default_rng(1)
+    wo = twins.unit(rng.normal(size=(500, 3))) * [1, 1, np.sign(1)]
+    wo[:, 2] = np.abs(wo[:, 2])
+    for mirroring, squares in enumerate(mirrored_squares()):
+        moved = wo * [-1 if mirroring & 1 else 1, -1 if mirroring & 2 else 1, 1]
+        moved = moved[:, [1, 0, 2]] if mirroring & 4 else moved
+        np.testing.assert_array_equal(squares[squares_of(wo)], squares_of(moved))
+
+
+def expected(cells, lights, documents, cell):
+    """What a cell sends by squares, light by light and point by point. (3, squares)"""
+    t, b = cells.frames[cell].astype(float)
+    n, out = np.cross(t, b), np.zeros((3, SIDE * SIDE))
+    for p, normal in enumerate(cells.points.normal.reshape(-1, 4, 3)[cell].astype(float)):
+        seen = np.unpackbits(cells.visible[cell, p], bitorder="little")[: lights.num_lights]
+        for m in np.flatnonzero(seen):
+            d = lights.direction[m].astype(float)
+            if (cosine := d @ normal) <= 0:
+                continue
+            away = 2 * cosine * normal - d  # mirrored as the point does, and back as the cell does
+            like = 2 * (n @ away) * n - away
+            wi = np.array([t @ like, b @ like, max(n @ like, 1e-3)])
+            values = sum(mean_over_squares(document, wi / np.linalg.norm(wi)) for document in documents)
+            out += cosine / 4 * lights.irradiance[m].astype(float)[:, None] * values
+    return out
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.1])
+def test_cells_send_lights_as_their_highlights_do(lights, spread):
+    cells, documents = cells_of(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
+    reflectances = (reflectances_of([MATT, *documents]),)
+    lobes = cells.lobes(reflectances, cells.reflecting(reflectances))
+    found = sent_in_lobes(cells, lobes, Coming(lights, cells.seen_by(lobes.rows)))
+    area = square_areas()
+    exact = expected(cells, lights, lobes_in(reflectances[0]), 3)
+    assert np.sqrt(np.sum(area * (found[3] - exact) ** 2) / np.sum(area * exact**2)) < 0.06
+    np.testing.assert_allclose(found[3] @ area, exact @ area, rtol=0.04)
+
+
+_LOCAL = bin_middles()[60]
+
+
+class _OneRay:
+    """A light that comes to every point from one side, as one ray."""
+
+    rays_a_point = 1
+
+    def list_into(self, listed, receivers, start, stop):
+        num = stop - start
+        listed.first[: num + 1] = np.arange(num + 1)
+        listed.wi[:, :num], listed.irradiance[:, :num] = _LOCAL[:, None], [[1], [2], [3]]
+        return num
+
+
+def test_rays_of_lamps_are_sent_as_lights_are():
+    cells, reflectances = cells_of(flat()), (reflectances_of([metal(0.3)]),)
+    lobes = cells.lobes(reflectances, cells.reflecting(reflectances))
+    found = sent_in_lobes(cells, lobes, Coming(rays=[_OneRay()]))
+    exact = mean_over_squares(lobes_in(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
+    for cell in range(NUM_CELLS):
+        assert np.linalg.norm(found[cell] - exact) < 0.03 * np.linalg.norm(exact)
+
+
+def test_nothing_of_a_highlight_is_sent_twice(lights):
+    """With its table, functions and the even part say what is matt alone."""
+    cells = cells_of(flat())
+    both, matt = ((reflectances_of(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
+    reflecting, plain = cells.reflecting(both), cells.reflecting(matt)
+    rows = reflecting.rows
+    arrived = Arrived(cells.irradiance(lights), cells.vectors(rows, lights, 6))
+    lobes = cells.lobes(both, reflecting)
+    found = sent_once(reflecting, arrived, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
+    held = plain.reflectance * reflecting.held
+    np.testing.assert_allclose(found.even, held / np.pi * arrived.irradiance, atol=1e-5)
+    assert not found.vectors.any()
+
+
+def test_only_highlights_that_functions_miss_have_tables():
+    assert sharp_lobes([metal(0.8)]) == []
+    assert sharp_lobes([{**metal(0.2), "params": {"roughness": 0.2, "f0": 0.0}, "color": [0.1, 0.1, 0.1]}]) == []
+    assert len(sharp_lobes([metal(0.2), metal(0.8)])) == 2  # all or none of a material
+    cells = cells_of(flat())
+    reflectances = (reflectances_of([metal(0.8)]),)
+    lobes = cells.lobes(reflectances, cells.reflecting(reflectances))
+    assert len(lobes.rows) == 0
+    assert sent_in_lobes(cells, lobes, Coming()).shape == (0, 3, SIDE * SIDE)
+
+
+def test_small_steps_of_a_hand_make_no_other_light():
+    assert reflectances_of([metal(0.3)]) == reflectances_of([metal(0.3001)])
+    assert reflectances_of([metal(0.3)]) != reflectances_of([metal(0.31)])
+    one, other = lobes_in(reflectances_of([metal(0.3)])), lobes_in(reflectances_of([metal(0.31)]))
+    assert abs(one[0]["params"]["roughness"] - 0.3) < 0.003
+    assert abs(other[0]["params"]["roughness"] - 0.31) < 0.003
+    assert abs(shares(one[0])[0, 0] - shares(metal(0.3))[0, 0]) < 0.01
+
+
+def test_squares_of_different_cells_are_subtracted_by_cell():
+    ones = np.ones((2, 3, SIDE * SIDE), np.float32)
+    found = InSquares(np.array([1, 4]), 3 * ones).less(InSquares(np.array([4, 7]), ones))
+    np.testing.assert_array_equal(found.rows, [1, 4, 7])
+    np.testing.assert_array_equal(found.radiance[:, 0, 0], [3, 2, -1])
+
+
+def test_every_bin_has_one_number():
+    assert len(bin_middles()) == NUM_BINS
+    assert (bin_middles()[:, 0] >= bin_middles()[:, 1] - 1e-12).all()
