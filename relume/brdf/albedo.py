@@ -44,7 +44,8 @@ _SHARE_BYTES = 4 * (1 + len(TEXTURES)) * 3 * len(PAIRS)
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128  # of a highlight's numbers, from none to all
-_LEAST_SENT, _SHARP = 0.03, 0.03  # F_00 of a highlight that counts; F_66 of F_00 where functions miss some of it
+_A_DOUBLING = 64  # steps of a sharp highlight's numbers
+_LEAST_SENT, _SHARP = 0.15, 0.03  # F_00 of a highlight that counts; F_66 of F_00 where functions miss some of it
 _LAST = PAIRS.index((SENT_DEGREE // 2, SENT_DEGREE // 2))  # both of the highest degree, of order 0
 
 
@@ -89,7 +90,7 @@ def shares_in_steps(term: Mapping[str, Any]) -> F64:
 def sharp_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """All highlights of a material, where few functions do not tell one of them that sends much.
 
-    Their numbers have steps of a relative size, the larger the less they send; curves that are drawn are as they are.
+    Their numbers have steps of 1 %; curves that are drawn are as they are.
 
     Args:
         highlights: terms of a complete look.
@@ -113,14 +114,12 @@ def _is_sharp(term: Mapping[str, Any]) -> bool:
 
 
 def _in_relative_steps(term: Mapping[str, Any]) -> dict[str, Any]:
-    """A term whose numbers are powers of one that lies the nearer to 1 the more it sends: 2^(1/64) for all light."""
-    sent = max(shares(_white_of(term)).max(), _LEAST_SENT)
-    a_doubling = 2.0 ** round(float(np.clip(np.log2(_STEPS * sent / 2), 1, 6)))
+    """A term whose numbers are whole powers of 2^(1/64): a hand that hardly moves makes no light anew."""
 
     def rounded(value: Any) -> Any:
         if isinstance(value, list):
             return [rounded(one) for one in value]
-        return float(2 ** (round(np.log2(value) * a_doubling) / a_doubling)) if value > 0 else value
+        return float(2 ** (round(np.log2(value) * _A_DOUBLING) / _A_DOUBLING)) if value > 0 else value
 
     params = {name: rounded(value) for name, value in (term.get("params") or {}).items()}
     return {**term, "color": rounded(list(term["color"])), "params": params}
