@@ -11,7 +11,7 @@ from relume.memory import Memory
 from relume.methods.cells.between import preview_between, quickly_between, sent_between
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.in_lobes import sent_in_lobes
-from relume.methods.cells.leaving import Leaving
+from relume.methods.cells.leaving import InLobes, Leaving
 from relume.methods.cells.reflecting import Reflecting
 from relume.methods.on_cells import LightOnCells
 from relume.picture.light import Light, is_same_but_for_surfaces
@@ -76,19 +76,24 @@ class Reflected:
         Args:
             before, after: of equal sources.
         """
-        return self._change(before, after).sent(self._cells)
+        return self._change(before, after, is_sharp=True).sent(self._cells)
 
-    def _change(self, before: Light, after: Light) -> Leaving:
-        here, there = (self._quickly(_between_surfaces(light), is_preview=False) for light in (before, after))
+    def _change(self, before: Light, after: Light, *, is_sharp: bool = False) -> Leaving:
+        here, there = (
+            self._quickly(_between_surfaces(light), is_preview=False, is_sharp=is_sharp) for light in (before, after)
+        )
         return there.less(here)
 
-    def _quickly(self, light: Light, *, is_preview: bool) -> Leaving:
+    def _quickly(self, light: Light, *, is_preview: bool, is_sharp: bool = False) -> Leaving:
+        """What cells send. is_preview: lights are found quickly. is_sharp: sharp highlights go by tables all the same"""
+
         def found() -> Leaving:
             reflecting = self._reflecting(light, self._memory.passing)
             arrived = self._on_cells.arrived(light, reflecting, is_preview=is_preview)
-            return quickly_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
+            in_lobes = self._in_lobes(light, reflecting) if is_sharp else None
+            return quickly_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
 
-        key = self._key, "reflected light, quickly", light, is_preview
+        key = self._key, "reflected light, quickly", light, is_preview, is_sharp
         return self._memory.passing.keep(key, found)
 
     def _sent(self, light: Light) -> Sent:
@@ -99,9 +104,13 @@ class Reflected:
     def _leaving(self, light: Light) -> Leaving:
         reflecting = self._reflecting(light, self._memory)
         arrived = self._on_cells.arrived(light, reflecting, is_preview=False)
-        lobes = self._cells.lobes(light.reflectances, reflecting)
-        in_lobes = lobes, sent_in_lobes(self._cells, lobes, self._on_cells.straight(light, lobes.rows))
+        in_lobes = self._in_lobes(light, reflecting)
         return sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
+
+    def _in_lobes(self, light: Light, reflecting: Reflecting) -> InLobes:
+        """What sharp highlights send of light that comes straight to them."""
+        lobes = self._cells.lobes(light.reflectances, reflecting)
+        return lobes, sent_in_lobes(self._cells, lobes, self._on_cells.straight(light, lobes.rows))
 
     def _preview(self, light: Light) -> F32:
         if not light.paths.reflect:

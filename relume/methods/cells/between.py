@@ -52,11 +52,13 @@ def _num_directed(reflecting: Reflecting) -> int:
     return int(np.clip(np.ceil(np.log(_LITTLE) / np.log(np.clip(share, 1e-6, 0.999))), _DIRECTED, _MOST_DIRECTED))
 
 
-def quickly_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> Leaving:
+def quickly_between(
+    cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int, in_lobes: InLobes | None = None
+) -> Leaving:
     """The same for a moving hand: by squares in place of directions, and few rays where light is even.
 
     Args:
-        cells, reflecting, arrived, first, last: as of `sent_between`.
+        cells, reflecting, arrived, first, last, in_lobes: as of `sent_between`.
     """
     links, few, rho = cells.links, cells.few_links, reflecting.reflectance
 
@@ -64,7 +66,7 @@ def quickly_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, 
         return sent_once(reflecting, arriving_quickly(cells, now.sent(cells, to_narrow_lobes=False), now.rows))
 
     return _between(
-        cells, reflecting, sent_once(reflecting, arrived), first, last, again,
+        cells, reflecting, sent_once(reflecting, arrived, in_lobes), first, last, again,
         lambda even, num: preview_bounced(links, few, rho, even, num),
     )  # fmt: skip
 

@@ -110,6 +110,7 @@ def test_a_curve_point_moves_by_hand_and_by_keys_and_can_be_undone(editor: Edito
     points = plot.locator("[role=slider]")
     points.first.wait_for(timeout=WAIT_MS)
     point = points.nth(points.count() // 2)  # about where the highlight falls off
+    point.scroll_into_view_if_needed()  # and stands still
     before = editor.pixels()
     box = point.locator(".mark").bounding_box()
     assert box is not None
