@@ -85,7 +85,7 @@ class Reflected:
         return there.less(here)
 
     def _quickly(self, light: Light, *, is_preview: bool, is_sharp: bool = False) -> Leaving:
-        """What cells send. is_preview: lights are found quickly. is_sharp: sharp highlights go by tables all the same"""
+        """What cells send. is_preview: lights are found quickly. is_sharp: sharp highlights go by tables."""
 
         def found() -> Leaving:
             reflecting = self._reflecting(light, self._memory.passing)
