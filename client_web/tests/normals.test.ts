@@ -6,7 +6,7 @@ import { models } from "../src/state/scene";
 const IMAGE = "image:0123456789abcdef";
 models.value = [
   { model: "lambert", width: null, parameters: [] },
-  { model: "ggx", width: "roughness", parameters: [] },
+  { model: "ggx", width: "roughness", mirrors_below: 0.06, parameters: [] },
   { model: "ward", width: "alpha", parameters: [] },
 ] as unknown as ModelBody[];
 

@@ -20,7 +20,14 @@ NUM_SQUARES = SIDE * SIDE
 HALF_BINS = 24  # from the middle of the disc to its rim
 NUM_BINS = HALF_BINS * (HALF_BINS + 1) // 2
 NUM_MIRRORINGS = 8  # x negated, 1; y negated, 2; then both exchanged, 4
-_RIM, _FINER = 0.999, 8
+_RIM, _LITTLE, _FINER = 0.999, 1e-9, 8
+
+
+def _places(side: int) -> tuple[F64, F64]:
+    """Middles of `side` × `side` squares of the disc. (side, side) each"""
+    place = (np.arange(side) + 0.5) * (2 / side) - 1
+    x, y = np.meshgrid(place, place, indexing="ij")
+    return x, y
 
 
 def directions_at(x: F64, y: F64) -> F64:
@@ -40,18 +47,25 @@ def squares_of(directions: F64) -> NDArray[np.intp]:
 
 def square_middles() -> F64:
     """Middles of all squares. (`NUM_SQUARES`, 3)"""
-    place = (np.arange(SIDE) + 0.5) * (2 / SIDE) - 1
-    x, y = np.meshgrid(place, place, indexing="ij")
-    return directions_at(x, y).reshape(-1, 3)
+    return directions_at(*_places(SIDE)).reshape(-1, 3)
+
+
+def within_squares() -> tuple[F64, F64]:
+    """Directions all over each square, by the rows and columns of squares, and cos θ dω of each.
+
+    Returns:
+        (SIDE, n, SIDE, n, 3), where there are none on the rim beside; (SIDE, n, SIDE, n), next to nothing there
+    """
+    x, y = _places(SIDE * _FINER)
+    directions, shape = directions_at(x, y), (SIDE, _FINER, SIDE, _FINER)
+    up = directions[..., 2]
+    projected = np.where(x * x + y * y < 1, up * (1 + up) ** 2, _LITTLE) * (2 / (SIDE * _FINER)) ** 2
+    return directions.reshape(*shape, 3), projected.reshape(shape)
 
 
 def square_areas() -> F64:
     """∫ cos θ dω over each square. (`NUM_SQUARES`,)"""
-    place = (np.arange(SIDE * _FINER) + 0.5) * (2 / (SIDE * _FINER)) - 1
-    x, y = np.meshgrid(place, place, indexing="ij")
-    near = 1 + x * x + y * y
-    projected = np.where(near < 2, (2 / near - 1) * 4 / near**2, 1e-9) * (2 / (SIDE * _FINER)) ** 2
-    return np.asarray(projected.reshape(SIDE, _FINER, SIDE, _FINER).sum(axis=(1, 3)).ravel())
+    return np.asarray(within_squares()[1].sum(axis=(1, 3)).ravel())
 
 
 def bin_middles() -> F64:

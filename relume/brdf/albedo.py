@@ -165,17 +165,13 @@ def shares(term_document: Mapping[str, Any]) -> F64:
     Returns:
         (channels, pairs)
     """
-    known = (_of_even if is_diffuse(term_document) else _of_lobe)(_white(term_document))
+    known = (_of_even if is_diffuse(term_document) else _of_lobe)(white_text(term_document))
     return known * np.asarray(term_document["color"], np.float64)[:, None]
 
 
-def _white_of(term_document: Mapping[str, Any]) -> dict[str, Any]:
-    return {**term_document, "color": [1.0, 1.0, 1.0]}
-
-
-def _white(term_document: Mapping[str, Any]) -> str:
+def white_text(term_document: Mapping[str, Any]) -> str:
     """The text of a term whose colour is white: the colour multiplies what is found of it."""
-    return json.dumps(_white_of(term_document), sort_keys=True)
+    return json.dumps({**term_document, "color": [1.0, 1.0, 1.0]}, sort_keys=True)
 
 
 @lru_cache(maxsize=1024)
@@ -218,7 +214,7 @@ def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[F64, F64]:
     places, total = _about_mirrors(), np.zeros((_NUM_OUT, 3))
     for term in terms:
         # the first function is the constant 1 / √π
-        even = np.sqrt(np.pi) * _arriving(_white(term))[..., 0]
+        even = np.sqrt(np.pi) * _arriving(white_text(term))[..., 0]
         total += even / places.weight_o[:, None] * np.asarray(term["color"], np.float64)
     return np.arccos(places.wo[::-1, 0, 2]), total[::-1]
 

@@ -32,14 +32,14 @@ _TURNS = [about_normal(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term th
 
 @lru_cache(maxsize=64)
 def lobe_table(term_text: str) -> F32:
-    """T of a term, its colour left out: the mean over turns about the normal where it looks different from there.
+    """T of a term: the mean over turns about the normal where it looks different from there.
 
     Args:
-        term_text: one term of a complete look, as JSON.
+        term_text: one term of a complete look, as JSON, its colour white (`relume.brdf.albedo.white_text`).
     Returns:
         1/sr. (bins, 3 channels, `NUM_SQUARES`) float32
     """
-    document, pairs = {**json.loads(term_text), "color": [1.0, 1.0, 1.0]}, _pairs()
+    document, pairs = json.loads(term_text), _pairs()
     value = _values(document, pairs.quadrature)
     found = np.empty((len(value[0]), 3, NUM_SQUARES), np.float32)
     for channel in range(3):

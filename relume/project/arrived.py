@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from relume.brdf.terms.btf import Texels
 from relume.btf.rings import Rings, taps
 from relume.light.triangles import TriangleLights
-from relume.project.receivers import Listed, Rays, Receivers
+from relume.project.receivers import Rays, Receivers, listed
 
 F32 = NDArray[np.float32]
 
@@ -104,10 +104,8 @@ def arrived_rows(texels: Texels, lights: TriangleLights | None, receivers: Recei
 
 
 def _add_rays(rings: Rings, rays: Rays, receivers: Receivers, axes: F32, start: int, stop: int, out: F32) -> None:
-    most = (stop - start) * rays.rays_a_point
-    listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
-    rays.list_into(listed, receivers, start, stop)
-    _from_listed(rings, axes, listed.first, listed.wi, listed.irradiance, out)
+    found = listed(rays, receivers, start, stop)
+    _from_listed(rings, axes, found.first, found.wi, found.irradiance, out)
 
 
 def turned_tables(rings: Rings, tables: F32, angle: float) -> F32:

@@ -18,7 +18,7 @@ from relume.basis.zernike import AT_ONCE, DEGREE, LIGHT, NUM_COLUMNS, WI, add_li
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
-from relume.project.receivers import Listed, Rays, Receivers
+from relume.project.receivers import Rays, Receivers, listed
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -114,10 +114,8 @@ def _add_rays(points: Points, rays: Sequence[Rays], degree: int, out: F32) -> No
 
 def _list_and_add(rays: Rays, receivers: Receivers, degree: int, start: int, stop: int, out: F32) -> None:
     """Add rays of points [start, stop)."""
-    most = (stop - start) * rays.rays_a_point
-    listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
-    rays.list_into(listed, receivers, start, stop)
-    _from_listed(ladder(degree), stop - start, listed.first, listed.wi, listed.irradiance, out[start:stop])
+    found = listed(rays, receivers, start, stop)
+    _from_listed(ladder(degree), stop - start, found.first, found.wi, found.irradiance, out[start:stop])
 
 
 def light_vectors_numpy(points: Points, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:

@@ -53,6 +53,18 @@ class Rays(Protocol):
         ...
 
 
+def listed(rays: Rays, receivers: Receivers, start: int, stop: int) -> Listed:
+    """List rays in memory of their own.
+
+    Args:
+        rays: that are listed. receivers, start, stop: as of `Rays.list_into`.
+    """
+    most = (stop - start) * rays.rays_a_point
+    into = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
+    rays.list_into(into, receivers, start, stop)
+    return into
+
+
 @dataclass(frozen=True)
 class GatherRays:
     """Rays that bring the light of cells.

@@ -22,7 +22,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.lobe_grid import SIDE, directions_at
+from relume.basis.lobe_grid import SIDE, within_squares
 from relume.basis.zernike import DEGREES, FALL, SENT_DEGREE, in_basis, num_functions
 from relume.parallel import for_ranges
 from relume.trace.cell_tree import NO_CELL
@@ -32,8 +32,6 @@ F32 = NDArray[np.float32]
 NUM_SENT = num_functions(SENT_DEGREE)
 """J, functions by which cells send."""
 
-_FINER = 8
-_LITTLE = 1e-9
 _NARROWEST = 1 / (2 * 4.9**2)  # of a highlight and the window together: a metal's of roughness 0.3
 _STEPS = 32_767  # of 16-bit radiance
 _ROWS_A_RANGE = 256  # their values stay in the cache
@@ -120,12 +118,8 @@ def falls_of(widening: F32) -> F32:
 @lru_cache(maxsize=1)
 def grid_means() -> F32:
     """The mean of each function over each square, by the cosine. (J, SIDE²) float32"""
-    place = (np.arange(SIDE * _FINER) + 0.5) * (2 / (SIDE * _FINER)) - 1
-    x, y = np.meshgrid(place, place, indexing="ij")
-    wi = directions_at(x, y)  # a square off the disc is as the rim beside it
-    squares = SIDE, _FINER, SIDE, _FINER
-    weight = np.where(x * x + y * y < 1, wi[..., 2] * (1 + wi[..., 2]) ** 2, _LITTLE).reshape(squares)
-    functions = in_basis(wi)[..., :NUM_SENT].reshape(*squares, NUM_SENT)
+    wi, weight = within_squares()  # a square off the disc is as the rim beside it
+    functions = in_basis(wi)[..., :NUM_SENT]
     means = np.einsum("xaybj,xayb->xyj", functions, weight) / np.einsum("xayb->xy", weight)[..., None]
     return np.ascontiguousarray(means.reshape(SIDE * SIDE, NUM_SENT).T, np.float32)
 

@@ -4,7 +4,7 @@ import { isImage } from "../document/texture";
 import type { Term } from "../protocol";
 import { baseTexture } from "./colour";
 import { ImageChoice } from "./ImageChoice";
-import { baseOf, imageOf, loadImages, offerToDelete, putImage, sending, sendOnto, takeOff } from "./images";
+import { baseOf, loadImages, putImage, sending, takeOff } from "./images";
 
 export function BaseImage({ material, terms }: { material: string; terms: readonly Term[] }) {
   const named = baseTexture(terms);
@@ -17,16 +17,11 @@ export function BaseImage({ material, terms }: { material: string; terms: readon
         label="Image of the base colour"
         title="An image in the place of the base colour. An image file can be dropped on the object, too."
         file="File of an image"
-        value={shown ?? ""}
+        material={material}
         shown={shown}
-        image={shown === null ? undefined : imageOf(shown)}
-        onChoose={(name) => {
-          const chosen = imageOf(name);
-          if (chosen === undefined) void takeOff(material);
-          else void putImage(material, chosen);
-        }}
-        onFile={(file) => void sendOnto(material, file)}
-        onDelete={(image) => offerToDelete(material, image)}
+        put={putImage}
+        off={takeOff}
+        onOther={() => void takeOff(material)}
       >
         <option value="">{shown === null && texture !== null ? "The scene’s own image" : "No image"}</option>
       </ImageChoice>

@@ -209,7 +209,7 @@ export async function takeImages(files: readonly File[]): Promise<void> {
 }
 
 /** Delete an image once that was confirmed; the material shows its own again. What saved looks show stays. */
-export function offerToDelete(material: string, { id, name }: ImageBody, off: (material: string) => void | Promise<void> = takeOff): void {
+export function offerToDelete(material: string, { id, name }: ImageBody, off: (material: string) => void | Promise<void>): void {
   note(`Delete the image “${name}”? It can be sent again.`, {
     label: "Delete",
     run: () =>

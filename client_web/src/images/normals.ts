@@ -1,14 +1,12 @@
 /** What a material becomes with an image in the place of its normal map, and without it. */
 import type { MaterialLook, Term } from "../protocol";
-import { modelOf } from "../state/scene";
+import { modelOf, models } from "../state/scene";
 
-/** Below that a highlight is a mirror's, which bumps do not widen, as `relume.brdf.mirror.SOFT` has it. */
-const SOFT = 0.06;
-
-/** Whether bumps that are finer than a pixel make a term rougher: as of files that have a normal map. */
+/** Whether bumps that are finer than a pixel make a term rougher, as of files that have a normal map: no mirror. */
 function isWidened(term: Term): boolean {
   const roughness = modelOf(term)?.width === "roughness" ? term.params?.roughness : undefined;
-  return roughness !== undefined && Math.min(...[roughness].flat()) >= SOFT;
+  const mirrorsBelow = Math.max(0, ...models.value.map(({ mirrors_below }) => mirrors_below ?? 0));
+  return roughness !== undefined && Math.min(...[roughness].flat()) >= mirrorsBelow;
 }
 
 /** The material with the image, as strong as it was, or as it is. */

@@ -8,7 +8,7 @@ a cell count. Where their normals differ, light comes from where the cell's own 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numba as nb
@@ -20,7 +20,7 @@ from relume.light.triangles import TriangleLights
 from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.lobes import Lobes
 from relume.parallel import for_ranges
-from relume.project.receivers import Listed, Rays, Receivers
+from relume.project.receivers import Rays, Receivers, listed
 
 F32 = NDArray[np.float32]
 
@@ -62,24 +62,15 @@ def sent_in_lobes(cells: CellLight, lobes: Lobes, coming: Coming) -> F32:
         if coming.lights is not None and coming.visible is not None:
             of_lights = coming.visible[start:stop], coming.lights.direction, coming.lights.irradiance
             _add_triangles(frames[start:stop], normals, *of_lights, bins)
-        for listed in _listed(coming.rays, receivers, num * start, num * stop):
-            _add_listed(frames[start:stop], points.rows(slice(num * start, num * stop)), *listed, bins)
+        some = points.rows(slice(num * start, num * stop))
+        for rays in coming.rays:
+            found = listed(rays, receivers, num * start, num * stop)
+            _add_listed(frames[start:stop], some, found.first, found.wi, found.irradiance, bins)
         of_cells = lobes.which[start:stop], lobes.gain[start:stop]
         _spread(bins, *of_cells, lobes.tables, mirrored_squares(), out[start:stop])
 
     for_ranges(fill, len(lobes.rows), _CELLS_A_RANGE)
     return out
-
-
-def _listed(
-    several: Sequence[Rays], receivers: Receivers, start: int, stop: int
-) -> Iterator[tuple[NDArray[np.int64], F32, F32]]:
-    """Where the rays of each point begin, their local directions and their light, of one source after another."""
-    for rays in several:
-        most = (stop - start) * rays.rays_a_point
-        listed = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
-        rays.list_into(listed, receivers, start, stop)
-        yield listed.first, listed.wi, listed.irradiance
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")

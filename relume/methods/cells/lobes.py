@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.lobe_grid import NUM_BINS, NUM_SQUARES
-from relume.brdf.albedo import Reflectances, lobes_in, shares_in_steps
+from relume.brdf.albedo import Reflectances, lobes_in, shares_in_steps, white_text
 from relume.brdf.channels import group_of
 from relume.brdf.lobe_tables import lobe_table
 
@@ -51,12 +50,11 @@ class Lobes(NamedTuple):
         documents = [lobes_in(of_material) for of_material in reflectances]
         most, numbers = max(map(len, documents), default=0), dict[str, int]()
         which = np.full((len(documents), most), -1, np.int16)
-        color, group = np.zeros((2, len(documents), most, 3)), np.zeros((len(documents), most), np.intp)
-        share = color[1]
+        group, color, share = np.zeros_like(which, np.intp), np.zeros((*which.shape, 3)), np.zeros((*which.shape, 3))
         for m, of_material in enumerate(documents):
             for k, document in enumerate(of_material):
-                which[m, k] = numbers.setdefault(_white(document), len(numbers))
-                color[0, m, k], group[m, k] = document["color"], group_of(document)
+                which[m, k] = numbers.setdefault(white_text({**document, "texture": None}), len(numbers))
+                color[m, k], group[m, k] = document["color"], group_of(document)
                 share[m, k] = shares_in_steps(document)[:, 0]
         has_any = np.array([len(of_material) > 0 for of_material in documents])
         rows = np.flatnonzero(has_any[material])
@@ -66,14 +64,10 @@ class Lobes(NamedTuple):
         return cls(
             rows,
             which[material[rows]],
-            (factor * color[0, material[rows]]).astype(np.float32),
+            (factor * color[material[rows]]).astype(np.float32),
             _stacked([lobe_table(text) for text in numbers]),
             (factor * share[material[rows]]).sum(axis=1).astype(np.float32),
         )
-
-
-def _white(document: dict[str, Any]) -> str:
-    return json.dumps({**document, "color": [1.0, 1.0, 1.0], "texture": None}, sort_keys=True)
 
 
 def _stacked(tables: list[F32]) -> F32:
