@@ -24,27 +24,52 @@ def proxied(folder: Path, ports: Sequence[int]) -> Iterator[int]:
     Args:
         folder: for its files.
     """
-    if _NGINX is None:
-        pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
+    with _running(folder, port, [f"127.0.0.1:{each}" for each in ports]):
+        yield port
+
+
+@contextmanager
+def proxied_by_one_name(folder: Path, addresses: Sequence[str], server_port: int) -> Iterator[int]:
+    """As `proxied`, before servers at addresses of this machine that the name `server` means together, as in compose."""
+    (folder / "hosts").write_text("".join(f"{address} server\n" for address in addresses))
+    alone = ["unshare", "--map-root-user", "--mount"]  # the name means them to this nginx, and to nobody else
+    if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False).returncode != 0:
+        pytest.skip("unshare may not give a process mounts of its own here")
+    as_named = 'mount --bind "$0" /etc/hosts && exec "$@"'
+    before = [*alone, "sh", "-c", as_named, str(folder / "hosts")]
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with _running(folder, port, [f"server:{server_port}"], before):
+        yield port
+
+
+@contextmanager
+def _running(folder: Path, port: int, servers: Sequence[str], before: Sequence[str] = ()) -> Iterator[None]:
+    """nginx at that port until the end, started by what stands before its command."""
+    if _NGINX is None:
+        pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
     text = _CONFIGURATION.read_text().replace("/tmp/", f"{folder}/")
     text = text.replace("listen 8420", f"listen 127.0.0.1:{port}")
     (line,) = re.findall(r"server server:8420[^;]*;", text)
-    lines = "".join(line.replace("server:8420", f"127.0.0.1:{each}") for each in ports)
+    lines = "".join(line.replace("server:8420", each) for each in servers)
     (folder / "nginx.conf").write_text(text.replace(line, lines))
-    process = subprocess.Popen([_NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", "daemon off;"])
+    own = "daemon off;" + (" user root;" if before else "")  # root there is who runs this, and can be nobody else
+    command = [*before, _NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", own]
+    process = subprocess.Popen(command)
     try:
-        _wait_for(port)
-        yield port
+        _wait_for(port, process)
+        yield
     finally:
         process.terminate()
         process.wait()
 
 
-def _wait_for(port: int) -> None:
-    while True:
+def _wait_for(port: int, process: subprocess.Popen[bytes]) -> None:
+    while process.poll() is None:
         try:
             return socket.create_connection(("127.0.0.1", port), timeout=1).close()
         except OSError:
             time.sleep(0.02)
+    raise RuntimeError("nginx does not start; its words are above")

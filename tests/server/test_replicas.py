@@ -6,10 +6,11 @@ import secrets
 import urllib.request
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from threading import Thread
 
 import pytest
-from replicas_proxy import proxied
+from replicas_proxy import proxied, proxied_by_one_name
 from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
@@ -30,8 +31,8 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
 class _server:  # noqa: N801  (a context)
     """A stand-in for relume: answers with its number, as HTTP and as WebSocket."""
 
-    def __init__(self, number: int) -> None:
-        self._number = str(number)
+    def __init__(self, number: int, address: str = "127.0.0.1", port: int = 0) -> None:
+        self._number, self._at = str(number), (address, port)
 
     def __enter__(self) -> int:
         def answer(connection: ServerConnection, request: object) -> object:
@@ -41,7 +42,7 @@ class _server:  # noqa: N801  (a context)
             told = " ".join((self._number, headers["Host"], headers["X-Request-ID"], headers["X-Forwarded-For"]))
             return connection.respond(200, told)
 
-        self._server = serve(lambda each: each.send(self._number), "127.0.0.1", 0, process_request=answer)  # type: ignore[arg-type]
+        self._server = serve(lambda each: each.send(self._number), *self._at, process_request=answer)  # type: ignore[arg-type]
         Thread(target=self._server.serve_forever, daemon=True).start()
         return int(self._server.socket.getsockname()[1])
 
@@ -63,6 +64,19 @@ def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> No
         assert len(found) == 1, room
         servers[room] = found.pop()
     assert len(set(servers.values())) > 1
+
+
+def test_all_of_a_room_come_to_one_server_where_one_name_means_all_of_them(tmp_path: Path) -> None:
+    addresses = [f"127.0.0.{2 + number}" for number in range(NUM_SERVERS)]
+    with ExitStack() as stack:
+        port = stack.enter_context(_server(0, addresses[0]))
+        for number, address in enumerate(addresses[1:], start=1):
+            stack.enter_context(_server(number, address, port))
+        named = stack.enter_context(proxied_by_one_name(tmp_path, addresses, port))
+        rooms = [secrets.token_hex(16) for _ in range(12)]
+        found = [{session(named, f"{k:016x}", f"?room={room}") for _ in range(3)} for k, room in enumerate(rooms)]
+    assert all(len(servers) == 1 for servers in found)
+    assert len(set.union(*found)) > 1
 
 
 def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
