@@ -32,7 +32,7 @@ def proxied(folder: Path, ports: Sequence[int]) -> Iterator[int]:
 
 @contextmanager
 def proxied_by_one_name(folder: Path, addresses: Sequence[str], server_port: int) -> Iterator[int]:
-    """As `proxied`, before servers at addresses of this machine that the name `server` means together, as in compose."""
+    """As `proxied`, before servers at addresses that the name `server` means together, as in compose."""
     (folder / "hosts").write_text("".join(f"{address} server\n" for address in addresses))
     alone = ["unshare", "--map-root-user", "--mount"]  # the name means them to this nginx, and to nobody else
     if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False).returncode != 0:
