@@ -134,6 +134,7 @@ class DatabaseDamagedError(RelumeError):
             " relume.db, relume.db-wal and relume.db-shm away: lists of scenes, bakes and looks then begin empty, their"
             " files stay"
         )
+        self.detail = detail
 
 
 class LedgerVersionError(RelumeError):

@@ -1,11 +1,14 @@
 """Imports an uploaded file in a process of its own, with limits: a hostile file can end that process, not the server.
 
 `python -m server.files.importing` reads one `ImportRequest` as JSON from stdin and writes one line of JSON to stdout:
-{"id": id}, {"problem": sentence}, or {"full": sentence} where the disk is. `server.files.importers` starts it.
+{"id": id}; {"problem": sentence} of the file; or what failed of the service: {"full": sentence} of the disk,
+{"storage": sentence}, {"away": sentence} and {"damaged": sentence} of the database, {"failure": sentence} of all else that
+is known. A defect is a trace on stderr. `server.files.importers` starts it.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import resource
@@ -19,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from relume.errors import DiskFullError, RelumeError, is_no_room
+from relume.errors import DatabaseDamagedError, DiskFullError, LedgerVersionError, RelumeError, StorageError, is_no_room
 from relume.replacing import UNFINISHED
 
 if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
@@ -28,6 +31,7 @@ if TYPE_CHECKING:  # the import process itself has no use for them, or not at on
 
 MAX_OUTPUT_BYTES = 64 * 1024
 DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
+_NO_MEMORY = (os.strerror(errno.ENOMEM), "can't start new thread")
 UPLOAD_PREFIX = "upload-"
 Kind = Literal["scene", "environment", "built_in", "grounded", "image", "tile"]
 
@@ -119,19 +123,36 @@ def _load() -> None:
 
 
 def answer_of(request: ImportRequest) -> dict[str, str]:
-    """What the process says: the id of what it imported, a problem with the file, or that the disk is full."""
+    """What the process says: the id of what it imported, a problem with the file, or what of the service failed."""
+    from sqlalchemy.exc import OperationalError
+
+    from worker.database.faults import told
+
     try:
         return {"id": _import(request)}
     except DiskFullError as error:
         return {"full": str(error)}
+    except StorageError as error:
+        return {"storage": str(error)}
+    except DatabaseDamagedError as error:
+        return {"damaged": error.detail}
+    except OperationalError as error:
+        return {"away": told(error)}
+    except LedgerVersionError as error:
+        return {"failure": str(error)}
     except RelumeError as error:
         return {"problem": str(error)}
-    except OSError as error:
-        if not is_no_room(error):
+    except Exception as error:
+        if isinstance(error, OSError) and is_no_room(error):
+            return {"full": str(error)}
+        if not _is_out_of_memory(error):
             raise
-        return {"full": str(error)}
-    except MemoryError:
         return {"problem": f"the import needs more than {request.max_bytes / 1e9:.1f} GB; simplify the file"}
+
+
+def _is_out_of_memory(error: Exception) -> bool:
+    """Whether the limit of address space was met: the system's calls say so in their own words."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY)
 
 
 def _import(request: ImportRequest) -> str:

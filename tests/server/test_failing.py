@@ -8,9 +8,12 @@ from typing import NamedTuple
 import pytest
 from fastapi.testclient import TestClient
 
+from relume.errors import DatabaseDamagedError, LedgerVersionError, SceneError, StorageError
+from server.errors import problem_of
 from server.files import importing
 from server.files.importing import ImportRequest, answer_of
 from server.settings import Settings
+from worker.database.faults import away_elsewhere
 
 
 class Usage(NamedTuple):
@@ -58,3 +61,31 @@ def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
     request = ImportRequest.of(settings, "built_in", None, "cornell_box")
     monkeypatch.setattr(importing, "_import", full)
     assert answer_of(request).keys() == {"full"}
+
+
+@pytest.mark.parametrize(
+    ("failure", "key"),
+    [
+        (StorageError("away"), "storage"),
+        (away_elsewhere("refused"), "away"),
+        (DatabaseDamagedError("malformed"), "damaged"),
+        (LedgerVersionError("of a later relume"), "failure"),
+        (SceneError("empty"), "problem"),
+        (OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)), "problem"),
+    ],
+)
+def test_the_process_of_an_import_tells_faults_of_the_service_from_those_of_the_file(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch, failure: Exception, key: str
+) -> None:
+    def fail(_: object) -> str:
+        raise failure
+
+    monkeypatch.setattr(importing, "_import", fail)
+    assert answer_of(ImportRequest.of(settings, "built_in", None, "cornell_box")).keys() == {key}
+
+
+def test_an_import_without_its_database_is_no_fault_of_the_file(settings: Settings) -> None:
+    settings.database = "postgresql://relume@127.0.0.1:9/relume"
+    answer = answer_of(ImportRequest.of(settings, "built_in", None, "cornell_box"))
+    assert answer.keys() == {"away"}
+    assert problem_of(away_elsewhere(answer["away"])).status == 503

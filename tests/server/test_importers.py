@@ -1,13 +1,16 @@
 """Processes that wait for imports: taken, replaced, ended; what they answer."""
 
+import logging
 import sys
 from collections.abc import Iterator
 from contextlib import closing
 
 import pytest
+from sqlalchemy.exc import OperationalError
 
-from relume.errors import DiskFullError, SceneError
+from relume.errors import DatabaseDamagedError, DiskFullError, RelumeError, SceneError, StorageError
 from relume.resident import resident_bytes
+from server.errors import problem_of
 from server.files import importers
 from server.files.importers import Importers
 from server.files.importing import ImportRequest
@@ -20,7 +23,9 @@ if name == "damage":
     os.kill(os.getpid(), signal.SIGSEGV)
 if name == "hang":
     time.sleep(600)
-if name in ("problem", "full"):
+if name == "defect":
+    raise ValueError("of nobody's file")
+if name in ("problem", "full", "storage", "away", "damaged", "failure"):
     print(json.dumps({name: "no."}))
 elif name:
     print(json.dumps({"id": str(os.getpid())}))
@@ -74,6 +79,10 @@ def test_one_without_a_server_ends(waiting: Importers) -> None:
     [
         ("problem", 60, SceneError, "^no"),
         ("full", 60, DiskFullError, "free some space"),
+        ("storage", 60, StorageError, "^no"),
+        ("away", 60, OperationalError, "no"),
+        ("damaged", 60, DatabaseDamagedError, "put a backup"),
+        ("failure", 60, RelumeError, "^no"),
         ("damage", 60, SceneError, "damaged"),
         ("hang", 1, SceneError, "more than 1 s or"),
     ],
@@ -82,6 +91,18 @@ def test_what_it_answers_is_why_it_failed(
     waiting: Importers, name: str, seconds: int, kind: type[Exception], said: str
 ) -> None:
     (first,) = waiting._waiting
-    with pytest.raises(kind, match=said):
+    with pytest.raises(kind, match=said) as failure:
         waiting.run(asked(name, seconds))
+    assert type(failure.value) is kind
     assert resident_bytes(first.pid) == 0
+
+
+def test_a_defect_is_no_fault_of_the_file_and_leaves_one_line(
+    waiting: Importers, caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(RelumeError, match="not because of the file") as failure:
+        waiting.run(asked("defect"))
+    assert problem_of(failure.value).status == 500
+    (line,) = [record.getMessage() for record in caplog.records if record.levelno == logging.ERROR]
+    assert "ValueError: of nobody's file" in line
+    assert "\n" not in line

@@ -48,6 +48,11 @@ def is_away(error: Exception) -> bool:
     return isinstance(error, DBAPIError) and _is_silent(error.orig)
 
 
+def away_elsewhere(line: str) -> OperationalError:
+    """What another process met, as it would have been met here. line: as `told` puts it."""
+    return OperationalError(None, None, pg8000.InterfaceError(line))
+
+
 def told(error: Exception) -> str:
     """A failure in one line."""
     cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
