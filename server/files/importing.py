@@ -2,8 +2,8 @@
 
 `python -m server.files.importing` reads one `ImportRequest` as JSON from stdin and writes one line of JSON to stdout:
 {"id": id}; {"problem": sentence} of the file; or what failed of the service: {"full": sentence} of the disk,
-{"storage": sentence}, {"away": sentence} and {"damaged": sentence} of the database, {"failure": sentence} of all else that
-is known. A defect is a trace on stderr. `server.files.importers` starts it.
+{"storage": sentence}, {"away": sentence} and {"damaged": sentence} of the database, {"failure": sentence} of all else
+that is known. A defect is a trace on stderr. `server.files.importers` starts it.
 """
 
 from __future__ import annotations
