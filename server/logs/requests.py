@@ -38,7 +38,7 @@ class RequestIds:
         async def told(message: Message) -> None:
             nonlocal status
             status = message.get("status", message.get("code", status or 101))
-            if message["type"] in ("http.response.start", "websocket.accept"):
+            if message["type"] in ("http.response.start", "websocket.accept", "websocket.http.response.start"):
                 MutableHeaders(scope=message)[HEADER] = identity
             await send(message)
 

@@ -13,7 +13,7 @@ from relume.errors import NotFoundError, RelumeError, VersionMismatchError
 from relume.look import complete
 from relume.picture.transfer import Opened
 from server.access.roles import caller_of
-from server.errors import CLOSE_PROTOCOL, close_code_of, problem_of, row_of
+from server.errors import CLOSE_PROTOCOL, LeavingError, close_code_of, problem_of, problem_response, row_of
 from server.live.rooms.door import door_of
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
@@ -21,6 +21,7 @@ from server.live.visit import Visit
 from server.records.looks import check_name
 from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
+from server.running.leave import LEAVING
 from server.services import Services
 from server.wire.protocol import SUBPROTOCOL
 
@@ -29,8 +30,14 @@ router = APIRouter()
 
 @router.websocket("/api/bakes/{bake}/session")
 async def session(websocket: WebSocket, bake: str) -> None:
-    """A live session; foreign pages were refused before. Refusals are said with a close code, so it accepts first."""
+    """A live session; foreign pages were refused before. Refusals are said with a close code, so it accepts first.
+
+    But a server that takes leave answers 503: a balancer then asks another one, and the client hears of nothing.
+    """
     services: Services = websocket.app.state.services
+    if services.leave.is_taken:
+        await _send_elsewhere(services, websocket, LeavingError(LEAVING))
+        return
     is_ours = SUBPROTOCOL in websocket.scope["subprotocols"]
     await websocket.accept(subprotocol=SUBPROTOCOL if is_ours else None)
     socket = ClientSocket(websocket, services.settings.ack_seconds)
@@ -45,8 +52,13 @@ async def session(websocket: WebSocket, bake: str) -> None:
         await socket.close(close_code_of(error), problem_of(error).detail)
 
 
+async def _send_elsewhere(services: Services, websocket: WebSocket, error: RelumeError) -> None:
+    """Refuse without accepting."""
+    services.metrics.refused_sessions.labels(row_of(error).slug).inc()
+    await websocket.send_denial_response(problem_response(problem_of(error)))
+
+
 async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
-    services.leave.check()
     caller = caller_of(websocket)
     with services.access.quotas.session(caller.name):
         status = await run_in_threadpool(ready_bake, services, bake)

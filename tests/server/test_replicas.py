@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from threading import Thread
+from urllib.error import HTTPError
 
 import pytest
 from replicas_proxy import proxied, proxied_by_one_name
@@ -29,14 +30,16 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
 
 
 class _server:  # noqa: N801  (a context)
-    """A stand-in for relume: answers with its number, as HTTP and as WebSocket."""
+    """A stand-in for relume: answers with its number, as HTTP and as WebSocket, or refuses with a status."""
 
-    def __init__(self, number: int, address: str = "127.0.0.1", port: int = 0) -> None:
-        self._number, self._at = str(number), (address, port)
+    def __init__(self, number: int, address: str = "127.0.0.1", port: int = 0, refusal: int | None = None) -> None:
+        self._number, self._at, self._refusal = str(number), (address, port), refusal
 
     def __enter__(self) -> int:
         def answer(connection: ServerConnection, request: object) -> object:
             headers = request.headers  # type: ignore[attr-defined]
+            if self._refusal is not None:
+                return connection.respond(self._refusal, self._number)
             if "Upgrade" in headers:
                 return None
             told = " ".join((self._number, headers["Host"], headers["X-Request-ID"], headers["X-Forwarded-For"]))
@@ -88,6 +91,26 @@ def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
         assert first == again == told.split()[0]
         found[bake] = first
     assert len(set(found.values())) > 1
+
+
+def test_whom_a_leaving_server_refuses_another_has_at_once(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
+        port = stack.enter_context(proxied(tmp_path, ports))
+        assert {session(port, "b", f"?room={secrets.token_hex(16)}") for _ in range(12)} == {"0"}
+
+
+def test_a_call_that_is_refused_is_not_made_again_elsewhere(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
+        port = stack.enter_context(proxied(tmp_path, ports))
+        found = set()
+        for _ in range(40):  # each goes to any
+            try:
+                found.add(_get(f"http://127.0.0.1:{port}/api/scenes").split()[0])
+            except HTTPError as refused:
+                found.add(str(refused.code))
+        assert found == {"0", "503"}
 
 
 def test_other_calls_go_to_any_server_and_say_where_they_come_from(proxy: int) -> None:
