@@ -122,8 +122,9 @@ async def open_services(
     _watch_memory(metrics, library, transfers)
     _watch_work(metrics, settings, service, batch, leave)
     await asyncio.to_thread(service.start)
-    importers = Importers(settings.waiting_importers)
-    importers.start()
+    importers = Importers()
+    if settings.importer_at_start:
+        importers.start()
     for queue in queues:
         queue.start()
     rounds = asyncio.create_task(caretaker.run())

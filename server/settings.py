@@ -79,7 +79,7 @@ class Settings(BaseSettings):
     )
     import_seconds: int = Field(default=300, ge=1, description="time a scene import may take")
     import_bytes: int = Field(default=8 * GIB, gt=0, description="address space a scene import may use")
-    waiting_importers: int = Field(default=1, ge=0, le=8, description="processes that wait for files to import")
+    importer_at_start: bool = Field(default=True, description="whether what imports need is loaded before the first")
     ack_seconds: float = Field(default=30.0, gt=0, description="how long a client may leave frames unacknowledged")
     resume_seconds: float = Field(default=600.0, gt=0, description="how long a lost session can be resumed")
     login: bool = Field(default=False, description="whether people log in; without it, whoever reaches the port is in")

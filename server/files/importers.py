@@ -1,10 +1,12 @@
-"""Processes that import, each for one file; some have begun before anybody asks, for that takes seconds."""
+"""Imports files, each in a process of its own, forked from one that has loaded what that takes."""
 
 from __future__ import annotations
 
 import json
 import logging
 import os
+import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -12,11 +14,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 from relume.errors import DatabaseDamagedError, DiskFullError, RelumeError, SceneError, StorageError
-from server.files.importing import DAMAGED, MAX_OUTPUT_BYTES, ImportRequest
+from server.files.forking import End
+from server.files.importing import ImportRequest
 from worker.database.faults import away_elsewhere
 
 log = logging.getLogger(__name__)
-MAX_SAID_BYTES = 2_000
+START_S = 120.0  # that a busy machine may take to load what imports need
+_DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
 _FAULTS: Mapping[str, Callable[[str], Exception]] = {
     "problem": SceneError,
     "full": lambda _: DiskFullError("what was imported"),
@@ -25,27 +29,20 @@ _FAULTS: Mapping[str, Callable[[str], Exception]] = {
     "damaged": DatabaseDamagedError,
     "failure": RelumeError,
 }
-_COMMAND = [sys.executable, "-m", "server.files.importing"]
+_COMMAND = [sys.executable, "-m", "server.files.forking"]
 
 
 class Importers:
-    """Imports files, each in a process of its own, which has its limits from the first byte of the file on.
+    """Imports files, each in a process of its own, which has its limits from the first byte of the file on."""
 
-    Args:
-        num_waiting: processes that wait for files, beside those that read some.
-    """
-
-    def __init__(self, num_waiting: int) -> None:
-        self._num_waiting, self._lock = num_waiting, threading.Lock()
-        self._waiting: list[subprocess.Popen[bytes]] = []
-        self._is_closed = False
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._parent: tuple[subprocess.Popen[bytes], socket.socket] | None = None
 
     def start(self) -> None:
-        """Have as many wait as shall, in the place of those that were taken or have ended."""
+        """Have the process run that others are forked from, unless it does; the first import else waits for it."""
         with self._lock:
-            self._waiting = [process for process in self._waiting if process.poll() is None]
-            while len(self._waiting) < self._num_waiting and not self._is_closed:
-                self._waiting.append(_begin())
+            self._running()
 
     def run(self, request: ImportRequest) -> str:
         """Import and register; returns the id. Blocks.
@@ -54,67 +51,71 @@ class Importers:
             SceneError: the file cannot be used, or reading it took too much. DiskFullError: there is no room for it.
             StorageError, OperationalError, DatabaseDamagedError: of the service. RelumeError: a defect; it is logged.
         """
-        self.start()
-        with self._lock:
-            process = self._waiting.pop(0) if self._waiting else _begin()
-        self.start()
-        return _ask(process, request)
+        asker, theirs = socket.socketpair()
+        with asker:
+            with theirs, self._lock:
+                socket.send_fds(self._running(), [b"."], [theirs.fileno()])
+            return _result(request, _ask(asker, request))
 
     def close(self) -> None:
-        """End those that wait."""
+        """End the process that others are forked from; they end with who asked."""
         with self._lock:
-            self._is_closed = True
-            waiting, self._waiting = self._waiting, []
-        for process in waiting:
+            parent, self._parent = self._parent, None
+        if parent is not None:
+            process, asking = parent
+            asking.close()
             process.kill()
-            process.communicate()
+            process.wait()
+
+    def _running(self) -> socket.socket:
+        """Where it is asked; it is begun where it does not run."""
+        if self._parent is None or self._parent[0].poll() is not None:
+            if self._parent is not None:
+                self._parent[1].close()
+            self._parent = _begin()
+        return self._parent[1]
 
 
-def _begin() -> subprocess.Popen[bytes]:
-    # No thread pools in a short-lived process: each thread would reserve address space that counts against the limit.
+def _begin() -> tuple[subprocess.Popen[bytes], socket.socket]:
+    # No thread pools: what is forked would lack them, and each reserves address space, which counts against the limit.
     environ = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    return subprocess.Popen(  # noqa: S603
-        _COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environ
-    )
+    asking, theirs = socket.socketpair()
+    with theirs:
+        process = subprocess.Popen(_COMMAND, stdin=theirs.fileno(), stdout=subprocess.DEVNULL, env=environ)  # noqa: S603
+    return process, asking
 
 
-def _ask(process: subprocess.Popen[bytes], request: ImportRequest) -> str:
-    told, said, is_late = b"", b"", False
+def _ask(asker: socket.socket, request: ImportRequest) -> End:
+    """How the process ended that was forked for this."""
+    asker.settimeout(START_S + request.seconds)
     try:
-        told, said = process.communicate(json.dumps(asdict(request)).encode(), request.seconds)
-    except subprocess.TimeoutExpired:
-        is_late = True
-        process.kill()
-        process.communicate()
-    return _result(request, process.returncode, told, said, is_late)
+        asker.sendall(json.dumps(asdict(request)).encode() + b"\n")
+        with asker.makefile("rb") as answer:
+            return End(**json.loads(answer.read()))
+    except TimeoutError:
+        return End(0, "", "", is_late=True)
+    except (OSError, ValueError):
+        return End(0, "", "it has gone before it could tell how it ended", is_late=False)
 
 
-def _result(request: ImportRequest, code: int, told: bytes, said: bytes, is_late: bool) -> str:
-    """The id; or raise what a process's end means.
-
-    Args:
-        code: that it ended with, or minus the signal. told, said: what it wrote to stdout and to stderr.
-        is_late: whether it was ended for taking too long.
-    """
-    if -code in DAMAGED:
-        _log_end(code, said)
+def _result(request: ImportRequest, end: End) -> str:
+    """The id; or raise what a process's end means."""
+    if -end.code in _DAMAGED:
+        _log(end)
         raise SceneError("the file made its reader fail, it is damaged; export it again")
-    try:
-        answer = json.loads(told[-MAX_OUTPUT_BYTES:].splitlines()[-1])
-    except (ValueError, IndexError):
-        answer = {}
+    answer = json.loads(end.told) if end.told else {}
     if "id" in answer:
         return str(answer["id"])
     for key, fault in _FAULTS.items():
         if key in answer:
             raise fault(answer[key])
-    if is_late or code < 0 or said.rstrip().endswith(b"MemoryError"):
+    if end.is_late or end.code < 0:
         limits = f"{request.seconds} s or {request.max_bytes / 1e9:.1f} GB"
         raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file")
-    _log_end(code, said)
+    _log(end)
     raise RelumeError("the import failed, and not because of the file; the server's log says why, report it")
 
 
-def _log_end(code: int, said: bytes) -> None:
-    line = " ".join(said[-MAX_SAID_BYTES:].decode(errors="replace").split())
-    log.error("the process of an import ended with %d and said: %s", code, line or "nothing")
+def _log(end: End) -> None:
+    line = " ".join(end.said.split())
+    log.error("the process of an import ended with %d and said: %s", end.code, line or "nothing")

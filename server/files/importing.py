@@ -1,20 +1,14 @@
-"""Imports an uploaded file in a process of its own, with limits: a hostile file can end that process, not the server.
+"""Imports an uploaded file, and says what it is or why it failed.
 
-`python -m server.files.importing` reads one `ImportRequest` as JSON from stdin and writes one line of JSON to stdout:
-{"id": id}; {"problem": sentence} of the file; or what failed of the service: {"full": sentence} of the disk,
-{"storage": sentence}, {"away": sentence} and {"damaged": sentence} of the database, {"failure": sentence} of all else
-that is known. A defect is a trace on stderr. `server.files.importers` starts it.
+That is done in a process of its own, with limits: a hostile file can end that process, not the server.
+`server.files.forking` makes it, `server.files.importers` asks for it.
 """
 
 from __future__ import annotations
 
 import errno
-import json
 import os
-import resource
 import shutil
-import signal
-import sys
 import time
 from collections.abc import Mapping
 from contextlib import closing, suppress
@@ -29,8 +23,6 @@ if TYPE_CHECKING:  # the import process itself has no use for them, or not at on
     from relume.scene.model import Scene
     from server.settings import Settings
 
-MAX_OUTPUT_BYTES = 64 * 1024
-DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
 _NO_MEMORY = (os.strerror(errno.ENOMEM), "can't start new thread")
 UPLOAD_PREFIX = "upload-"
 Kind = Literal["scene", "environment", "built_in", "grounded", "image", "tile"]
@@ -98,32 +90,12 @@ def remove_strays(data: Path, older_than_s: float) -> None:
                 shutil.rmtree(folder)
 
 
-def main() -> int:
-    """The process itself."""
-    _load()
-    told = sys.stdin.buffer.read()
-    if not told:  # nobody is left who could ask
-        return 0
-    request = ImportRequest(**json.loads(told))
-    resource.setrlimit(resource.RLIMIT_AS, (request.max_bytes, request.max_bytes))
-    resource.setrlimit(resource.RLIMIT_CPU, (request.seconds, request.seconds))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    sys.stdout.write("\n" + json.dumps(answer_of(request)) + "\n")
-    return 0
-
-
-def _load() -> None:
-    """Load what imports need, readers of scenes as well, while nobody waits for it."""
-    import relume.environments.reading
-    import relume.scene.companions
-    import relume.scene.importer  # noqa: F401
-    import worker.database
-    import worker.ledger
-    import worker.scenes  # noqa: F401
-
-
 def answer_of(request: ImportRequest) -> dict[str, str]:
-    """What the process says: the id of what it imported, a problem with the file, or what of the service failed."""
+    """What the process says: {"id": id}, {"problem": sentence} of the file, or what of the service failed.
+
+    That is {"full": sentence} of the disk, {"storage": sentence}, {"away": sentence} and {"damaged": sentence} of the
+    database, and {"failure": sentence} of all else that is known. What nobody foresaw passes.
+    """
     from sqlalchemy.exc import OperationalError
 
     from worker.database.faults import told
@@ -138,10 +110,9 @@ def answer_of(request: ImportRequest) -> dict[str, str]:
         return {"damaged": error.detail}
     except OperationalError as error:
         return {"away": told(error)}
-    except LedgerVersionError as error:
-        return {"failure": str(error)}
     except RelumeError as error:
-        return {"problem": str(error)}
+        is_of_file = type(error) is not RelumeError and not isinstance(error, LedgerVersionError)
+        return {"problem" if is_of_file else "failure": str(error)}
     except Exception as error:
         if isinstance(error, OSError) and is_no_room(error):
             return {"full": str(error)}
@@ -226,9 +197,3 @@ def _read_scene(request: ImportRequest) -> Scene:
     sent = Sent({name: Path(path) for name, path in request.companions.items()}, request.scene)
     # bytes: what lies beside the file on this disk is not its own
     return import_scene(read_file(request.file), request.name, environment, sent)
-
-
-if __name__ == "__main__":
-    code = main()
-    sys.stdout.flush()
-    os._exit(code)  # who asked waits for the end, and to take all modules apart takes a second on a busy machine

@@ -29,7 +29,7 @@ LABELS = {"format", "instance", "kind", "outcome", "reason", "state", "status"}
 @pytest.fixture(scope="module")
 def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CollectorRegistry]:
     """The metrics of a server that runs."""
-    settings = Settings(data=tmp_path_factory.mktemp("metrics"), allowed_hosts=["testserver"], waiting_importers=0)
+    settings = Settings(data=tmp_path_factory.mktemp("metrics"), allowed_hosts=["testserver"], importer_at_start=False)
     library = Control().open_library
     app = create_app(settings, open_library=library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
     with TestClient(app):

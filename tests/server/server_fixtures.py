@@ -51,7 +51,7 @@ def settings(tmp_path: Path, ack_seconds: float, empty_ledger: Path) -> Settings
         max_body_bytes=2 * 1024**2,
         max_upload_bytes=4 * 1024**2,
         max_sessions=3,
-        waiting_importers=0,
+        importer_at_start=False,
         ack_seconds=ack_seconds,
     )
 

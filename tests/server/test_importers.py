@@ -1,9 +1,16 @@
 """Processes that wait for imports: taken, replaced, ended; what they answer."""
 
+import json
 import logging
+import os
+import signal
+import socket
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import pytest
 from sqlalchemy.exc import OperationalError
@@ -16,62 +23,102 @@ from server.files.importers import Importers
 from server.files.importing import ImportRequest
 
 STAND_IN = """
-import json, os, signal, sys, time
-told = sys.stdin.read()
-name = json.loads(told)["name"] if told else ""
-if name == "damage":
-    os.kill(os.getpid(), signal.SIGSEGV)
-if name == "hang":
-    time.sleep(600)
-if name == "defect":
-    raise ValueError("of nobody's file")
-if name in ("problem", "full", "storage", "away", "damaged", "failure"):
-    print(json.dumps({name: "no."}))
-elif name:
-    print(json.dumps({"id": str(os.getpid())}))
+import os, signal, time
+from server.files import forking
+
+def answer_of(request):
+    name = request.name
+    if name == "damage":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if name == "hang":
+        time.sleep(600)
+    if name == "turn":
+        while True:
+            pass
+    if name == "swell":
+        bytearray(request.max_bytes)
+    if name == "defect":
+        raise ValueError("of nobody's file")
+    return {"id": f"{os.getpid()} {os.getppid()}"} if name == "it" else {name: "no."}
+
+forking._load, forking.answer_of = lambda: None, answer_of
+forking.main()
 """
 
 
 def asked(name: str, seconds: int = 60) -> ImportRequest:
-    return ImportRequest("", "", "scene", "", None, name, seconds, 1 << 30)
+    return ImportRequest("", "", "scene", "", None, name, seconds, 1 << 32)
 
 
 @pytest.fixture
 def waiting(monkeypatch: pytest.MonkeyPatch) -> Iterator[Importers]:
     monkeypatch.setattr(importers, "_COMMAND", [sys.executable, "-c", STAND_IN])
-    with closing(Importers(1)) as found:
-        found.start()
+    with closing(Importers()) as found:
         yield found
 
 
-def test_who_waits_is_asked_and_another_waits_then(waiting: Importers) -> None:
-    (first,) = waiting._waiting
-    assert waiting.run(asked("it")) == str(first.pid)
-    (second,) = waiting._waiting
-    assert waiting.run(asked("it")) == str(second.pid) != str(first.pid)
+def parent_of(waiting: Importers) -> int:
+    assert waiting._parent is not None
+    return waiting._parent[0].pid
 
 
-def test_one_that_has_ended_is_not_asked(waiting: Importers) -> None:
-    (first,) = waiting._waiting
-    first.kill()
-    first.wait()
-    assert waiting.run(asked("it")) != str(first.pid)
-    first.communicate()
+def test_each_file_has_a_process_of_its_own_and_all_have_one_parent(waiting: Importers) -> None:
+    waiting.start()
+    parent = parent_of(waiting)
+    first, second = (waiting.run(asked("it")).split()[0] for _ in range(2))
+    assert len({first, second, str(parent), str(os.getpid())}) == 4
+    assert parent_of(waiting) == parent
+    assert resident_bytes(int(first)) == resident_bytes(int(second)) == 0
+
+
+def test_files_that_come_together_do_not_wait_for_each_other(waiting: Importers) -> None:
+    with ThreadPoolExecutor(1) as thread:
+        hanging = thread.submit(waiting.run, asked("hang", 1))
+        waiting.run(asked("it"))
+        assert not hanging.done()
+        assert isinstance(hanging.exception(), SceneError)
+
+
+def test_a_parent_that_has_ended_is_followed_by_another(waiting: Importers) -> None:
+    waiting.start()
+    parent = parent_of(waiting)
+    os.kill(parent, signal.SIGKILL)
+    os.waitid(os.P_PID, parent, os.WEXITED | os.WNOWAIT)
+    assert waiting.run(asked("it"))
+    assert parent_of(waiting) != parent
 
 
 def test_nobody_waits_when_it_is_closed(waiting: Importers) -> None:
-    (first,) = waiting._waiting
-    waiting.close()
     waiting.start()
-    assert waiting._waiting == []
-    assert resident_bytes(first.pid) == 0
+    parent = parent_of(waiting)
+    waiting.close()
+    assert resident_bytes(parent) == 0
 
 
-def test_one_without_a_server_ends(waiting: Importers) -> None:
-    (first,) = waiting._waiting
-    first.communicate()
-    assert first.returncode == 0
-    waiting._waiting.clear()
+def test_the_parent_ends_with_the_server(waiting: Importers) -> None:
+    waiting.run(asked("it"))
+    assert waiting._parent is not None
+    process, asking = waiting._parent
+    asking.close()
+    assert process.wait(60) == 0
+
+
+def test_who_imports_ends_with_who_asked(waiting: Importers) -> None:
+    asker, theirs = socket.socketpair()
+    with theirs, waiting._lock:
+        socket.send_fds(waiting._running(), [b"."], [theirs.fileno()])
+    with asker:
+        asker.sendall(json.dumps(asdict(asked("hang"))).encode() + b"\n")
+        asker.shutdown(socket.SHUT_WR)
+        assert json.loads(asker.recv(1 << 16))["code"] == -signal.SIGKILL
+
+
+@pytest.mark.slow
+def test_what_is_forked_from_has_one_thread(tmp_path: Path) -> None:
+    with closing(Importers()) as importers:
+        with pytest.raises(SceneError, match="cannot be read"):
+            importers.run(replace(asked("it"), data=str(tmp_path), file=str(tmp_path / "none")))
+        assert len(list(Path(f"/proc/{parent_of(importers)}/task").iterdir())) == 1
 
 
 @pytest.mark.parametrize(
@@ -85,16 +132,16 @@ def test_one_without_a_server_ends(waiting: Importers) -> None:
         ("failure", 60, RelumeError, "^no"),
         ("damage", 60, SceneError, "damaged"),
         ("hang", 1, SceneError, "more than 1 s or"),
+        ("turn", 1, SceneError, "more than 1 s or"),
+        ("swell", 60, SceneError, "or 4.3 GB"),
     ],
 )
 def test_what_it_answers_is_why_it_failed(
     waiting: Importers, name: str, seconds: int, kind: type[Exception], said: str
 ) -> None:
-    (first,) = waiting._waiting
     with pytest.raises(kind, match=said) as failure:
         waiting.run(asked(name, seconds))
     assert type(failure.value) is kind
-    assert resident_bytes(first.pid) == 0
 
 
 def test_a_defect_is_no_fault_of_the_file_and_leaves_one_line(
