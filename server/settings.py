@@ -70,7 +70,9 @@ class Settings(BaseSettings):
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest upload of a scene or of a BTF's images")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
-    least_free_bytes: int = Field(default=256 * 1024**2, ge=0, description="room on the disk for /readyz")
+    least_free_bytes: int = Field(
+        default=256 * 1024**2, ge=0, description="room on the disk below which nothing is begun"
+    )
     max_sessions: int = Field(default=32, ge=1, description="live sessions at once")
     max_rooms: int = Field(default=32, ge=1, description="looks that several people share at once")
     max_people: int = Field(default=8, ge=1, le=64, description="people who share one")

@@ -26,6 +26,7 @@ from relume.folders import folder_bytes
 from relume.replacing import remove_folder
 from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
+from worker.budget import check_room
 from worker.database.patience import Given, Result, patiently
 from worker.lease import HEARTBEAT_S, LeaseKeeper
 from worker.ledger import Ledger
@@ -154,6 +155,7 @@ class BakeRunner:
                 waiting.append((task, 1))
         self._beat(progress, self._phase(stage, progress))
         while waiting or self._flying:
+            check_room(job.data_dir)
             room = self._room(len(waiting))
             while waiting and room > 0:
                 room -= 1

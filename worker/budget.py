@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from relume.bake import Plan
-from relume.errors import DiskBudgetError, MemoryBudgetError
+from relume.errors import DiskBudgetError, DiskFullError, MemoryBudgetError
 
 REMEDY = "take fewer lights, a smaller size or fewer views at once"
 
@@ -36,6 +36,12 @@ def _system_available_bytes() -> int:
     except OSError:  # not Linux
         pass
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def check_room(data_dir: Path) -> None:
+    """Raise DiskFullError where a bake is to stop: without the rest of the disk the ledger could not even delete."""
+    if shutil.disk_usage(data_dir).free < DISK_RESERVE_BYTES:
+        raise DiskFullError("the store of a bake")
 
 
 def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:

@@ -170,13 +170,11 @@ class Ledger:
         """Give up the lease and leave the state as it is: whoever comes next may claim the bake at once."""
         self._change(identity, None, BakeRow.owner == owner, owner=None)
 
-    def delete_bakes(self, scene_id: str) -> list[str]:
-        """Forget all bakes of a scene and return their ids."""
-        ids = [status.id for status in self.bakes(scene_id)]
+    def delete_bakes(self, ids: Sequence[str]) -> None:
+        """Forget bakes, in whatever states they are."""
         with self.sessions.begin() as session:
             session.execute(delete(TaskRow).where(TaskRow.bake_id.in_(ids)))
             session.execute(delete(BakeRow).where(BakeRow.id.in_(ids)))
-        return ids
 
     def finished_tasks(self, identity: str) -> dict[tuple[int, int], TaskCost]:
         """What the finished tasks of a bake took, by (stage, index)."""
@@ -200,6 +198,7 @@ class Ledger:
         """Start a bake from nothing: its unfinished store is gone or damaged."""
         with self.sessions.begin() as session:
             session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
+            session.execute(update(BakeRow).where(BakeRow.id == identity).values(progress=0.0))
 
     def run(self, identity: str) -> str | None:
         """The name of a bake's beginning."""

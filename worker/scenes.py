@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from relume.scene.projected import are_projected
 from worker.database.models import CameraRow, SceneRow
 from worker.ledger import Ledger
 from worker.paths import bake_path, scene_path, staging_path
+from worker.runs import forget_run
 from worker.storage import forget, push
 
 
@@ -113,18 +115,30 @@ def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
         NotFoundError: there is no such scene.
     """
     get_scene(ledger, scene_id)
-    for status in ledger.bakes(scene_id):
-        ledger.cancel(status.id)
-    for identity in ledger.delete_bakes(scene_id):
-        forget(bake_path(data_dir, identity))
-        _remove(bake_path(data_dir, identity))
-        shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
+    delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
     with ledger.sessions.begin() as session:
         session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
         if (row := session.get(SceneRow, scene_id)) is not None:
             session.delete(row)
     forget(scene_path(data_dir, scene_id))
     _remove(scene_path(data_dir, scene_id))
+
+
+def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
+    """Delete bakes with their stores, finished or not.
+
+    Args:
+        data_dir: where stores are kept. ledger: where they are listed.
+        ids: of bakes; those that run are cancelled.
+    """
+    for identity in ids:
+        ledger.cancel(identity)
+    ledger.delete_bakes(ids)
+    for identity in ids:
+        forget(bake_path(data_dir, identity))
+        _remove(bake_path(data_dir, identity))
+        shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
+        forget_run(staging_path(data_dir, identity))
 
 
 def _remove(store: Path) -> None:

@@ -30,7 +30,7 @@ from worker.ledger import Ledger
 from worker.notes import forget_note
 from worker.paths import bake_path, scene_path
 from worker.progress import Expected
-from worker.runs import forget_run
+from worker.runs import forget_run, run_of
 from worker.status import BakeStatus, bake_id
 from worker.storage import configured, is_elsewhere, push
 from worker.tasks import Job, idle_timer, scene_of
@@ -40,6 +40,7 @@ log = logging.getLogger(__name__)
 
 POLL_S = 1.0
 CLOSE_S = 10.0
+KEPT_S = 7 * 86_400.0  # what a failed or cancelled bake has finished, for whoever asks for it again
 NUM_JUDGED_BY = 8  # finished bakes that an estimate looks at
 
 
@@ -156,10 +157,19 @@ class BakeService:
         """Follow a bake, whichever process runs it. Raises NotFoundError."""
         return self._board.subscribe(bake_id)
 
-    def cancel(self, bake_id: str) -> None:
-        """Cancel a bake; finished tasks are kept for a resume. One that is not under way stays as it is."""
+    def cancel(self, bake_id: str) -> bool:
+        """Cancel a bake; finished tasks are kept for a resume. False where it is not under way: it stays as it is."""
         self.get(bake_id)
-        self.ledger.cancel(bake_id)
+        is_cancelled = self.ledger.cancel(bake_id)
+        self._changed()
+        return is_cancelled
+
+    def forget(self, bake_id: str) -> None:
+        """Delete a bake in whatever state it is, with its store. Raises NotFoundError, StorageError."""
+        from worker.scenes import delete_bakes
+
+        self.get(bake_id)
+        delete_bakes(self.data_dir, self.ledger, [bake_id])
         self._changed()
 
     def store_path(self, bake_id: str) -> Path:
@@ -300,14 +310,24 @@ class BakeService:
             Complaint(log, "what is in the data directory cannot be put into the object storage").meet(error)
 
     def _remove_strays(self) -> None:
-        """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again."""
+        """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again, and those
+        of bakes that were stopped and not asked for again for long."""
         found = list((self.data_dir / "bakes" / "staging").glob("*.zarr"))
         # asked after the folders: of a bake that another process begins meanwhile the row comes first
         states = {status.id: status.state for status in self.ledger.bakes()}
         for folder in found:
-            state = states.get(folder.name.removesuffix(".zarr"), "ready")
+            identity = folder.name.removesuffix(".zarr")
+            state = states.get(identity, "ready")
             is_stopped = state in ("failed", "cancelled")
-            if state == "ready" or (is_stopped and code_of(folder) != bake_code()):
+            if state == "ready" or (is_stopped and (code_of(folder) != bake_code() or _age_s(folder) > KEPT_S)):
+                if is_stopped and run_of(folder) == self.ledger.run(identity):  # else its tasks are another machine's
+                    self.ledger.forget_tasks(identity)
                 shutil.rmtree(folder, ignore_errors=True)
                 forget_note(folder)
                 forget_run(folder)
+
+
+def _age_s(folder: Path) -> float:
+    """How long ago anything was written in a folder."""
+    latest = max((path.stat().st_mtime for path in (folder, *folder.rglob("*")) if path.exists()), default=0.0)
+    return time.time() - latest

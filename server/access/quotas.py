@@ -12,7 +12,8 @@ from sqlalchemy import delete, func, select, update
 from sqlalchemy.orm import Session, sessionmaker
 
 from server.access.tables import OwnedRow
-from server.errors import BusyError, QuotaError
+from server.errors import BusyError, NearlyFullError, QuotaError
+from server.library.disk import free_bytes
 from worker.database.models import BakeRow
 
 if TYPE_CHECKING:
@@ -64,8 +65,15 @@ class Quotas:
         """Whether there is a limit on them."""
         return self._settings.max_bytes_each is not None
 
+    def check_room(self) -> None:
+        """Raises NearlyFullError where the disk lacks the room that the ledger needs, to delete, too."""
+        free = free_bytes(self._settings.data)
+        if free < self._settings.least_free_bytes:
+            raise NearlyFullError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
+
     def check_bytes(self, who: str, more: int) -> None:
-        """Raises QuotaError where somebody would have too much with so many bytes more."""
+        """Raises QuotaError where somebody would have too much with so many bytes more; and as `check_room` does."""
+        self.check_room()
         most = self._settings.max_bytes_each
         if most is None:
             return
@@ -73,7 +81,7 @@ class Quotas:
         if used + more > most:
             raise QuotaError(
                 f"you have {used / 1e6:,.1f} MB of at most {most / 1e6:,.1f} MB, and this takes {more / 1e6:,.1f} MB; "
-                "delete a scene, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
+                "delete a scene, a bake, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
             )
 
     def check_bakes(self, who: str) -> None:
@@ -95,19 +103,20 @@ class Quotas:
             )
 
     def used_bytes(self, who: str) -> int:
-        """What somebody's uploads had, finished bakes and renders have, and others are planned to take."""
+        """What somebody's uploads had, finished bakes and renders have, and others are planned to take; of bakes that
+        were stopped the share that is done, which is kept for a resume."""
         others = select(func.coalesce(func.sum(OwnedRow.bytes), 0)).where(
             OwnedRow.owner == who, OwnedRow.kind != "bake"
         )
         bakes = (
-            select(OwnedRow.bytes, BakeRow.bytes, BakeRow.state)
+            select(OwnedRow.bytes, BakeRow.bytes, BakeRow.state, BakeRow.progress)
             .join(BakeRow, BakeRow.id == OwnedRow.object)
             .where(OwnedRow.kind == "bake", OwnedRow.owner == who)
         )
         with self._sessions() as session:
             total = int(session.scalar(others) or 0)
-            for planned, written, state in session.execute(bakes):
-                total += planned if state in _ACTIVE else written
+            for planned, written, state, progress in session.execute(bakes):
+                total += planned if state in _ACTIVE else written if state == "ready" else int(planned * progress)
         return total
 
     def own(self, who: str, kind: Kind, thing: str, num_bytes: int) -> None:

@@ -55,11 +55,13 @@ def submit_bake(request: BakeRequest, services: Shared, caller: Who) -> JSONResp
 
 
 def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services) -> None:
-    """Whether somebody may queue one more; what is here or under way takes nothing. Raises QuotaError."""
+    """Whether somebody may queue one more; what is here or under way takes nothing. Raises QuotaError,
+    NearlyFullError."""
     with suppress(NotFoundError):
         if services.bakes.get(bake_id(scene, recipe)).state in ("queued", "running", "ready"):
             return
     quotas = services.access.quotas
+    quotas.check_room()
     quotas.check_bakes(caller.name)
     if quotas.counts_bytes:
         quotas.check_bytes(caller.name, services.bakes.plan(scene, recipe).store_bytes)
@@ -99,9 +101,13 @@ async def _events(bake: str, services: Services) -> AsyncIterator[ServerSentEven
 
 
 @router.delete("/{bake}", status_code=204)
-def cancel_bake(bake: Id, services: Shared) -> Response:
-    """Cancel; what was finished is kept for a resume."""
-    services.bakes.cancel(bake)
+def cancel_bake(bake: Id, services: Shared, forget: bool = False) -> Response:
+    """Cancel; what was finished is kept for a resume. With `forget` the bake is deleted, finished or not."""
+    if forget:
+        services.bakes.forget(bake)
+        services.access.quotas.disown("bake", bake)
+    elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "cancelled":
+        raise NotReadyError(f"the bake is {state}, there is nothing to cancel; ?forget=true deletes it")
     return Response(status_code=204)
 
 

@@ -6,8 +6,6 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from sqlalchemy import select
 
-from server.errors import NearlyFullError
-from server.library.disk import free_bytes
 from server.services import Shared
 from worker.database.models import BakeRow
 
@@ -26,9 +24,7 @@ def readyz(services: Shared) -> dict[str, str]:
     services.leave.check()
     with services.bakes.ledger.sessions() as session:
         session.execute(select(BakeRow.id).limit(1))
-    free = free_bytes(services.settings.data)
-    if free < services.settings.least_free_bytes:
-        raise NearlyFullError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
+    services.access.quotas.check_room()
     return {"status": "ready"}
 
 

@@ -12,6 +12,7 @@ from btf_zips import zipped
 from fastapi.testclient import TestClient
 from server_fakes import SIZE, FakeMethod, tiny_scene
 from session_client import Baked
+from sqlalchemy import update
 
 from relume.bake import Recipe
 from server.access.access import Access
@@ -19,6 +20,7 @@ from server.access.audit import Audit, Change
 from server.access.buckets import Buckets
 from server.errors import BusyError
 from server.settings import Settings
+from worker.database.models import BakeRow
 from worker.scenes import register_scene
 from worker.service import BakeService
 
@@ -101,6 +103,16 @@ class TestBytes:
         assert client.post("/api/bakes", json={**bake, "dry_run": True}, headers=ann).status_code == 200
         assert client.delete(f"/api/scenes/{scene}", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
+
+    def test_of_stopped_bakes_the_share_that_is_done_counts(
+        self, client: TestClient, access: Access, baked: Baked
+    ) -> None:
+        access.quotas.own("Ann", "bake", baked.bake, 1_000)
+        for state, used in (("cancelled", 250), ("failed", 250), ("queued", 1_000), ("ready", 77)):
+            with client.app.state.services.bakes.ledger.sessions.begin() as session:  # type: ignore[attr-defined]
+                changed = {"state": state, "progress": 0.25, "bytes": 77}
+                session.execute(update(BakeRow).where(BakeRow.id == baked.bake).values(changed))
+            assert access.quotas.used_bytes("Ann") == used
 
     def test_renders_count_by_what_they_may_take_until_they_are_there(
         self, client: TestClient, bearer: Bearer, access: Access, settings: Settings, baked: Baked

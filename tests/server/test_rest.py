@@ -19,6 +19,7 @@ from session_client import Baked
 from relume.look import Look
 from server.app import create_app
 from server.settings import Settings
+from worker.paths import bake_path
 
 WIDTH, HEIGHT = SIZE
 
@@ -123,9 +124,37 @@ def test_bake_events_end_with_the_bake(client: TestClient, baked: Baked) -> None
     assert len(lines) == 2
 
 
-def test_cancelling_a_finished_bake_leaves_it(client: TestClient, baked: Baked) -> None:
-    assert client.delete(f"/api/bakes/{baked.bake}").status_code == 204
+def test_a_finished_bake_cannot_be_cancelled_and_is_forgotten_where_that_is_said(
+    client: TestClient, settings: Settings, baked: Baked
+) -> None:
+    refused = client.delete(f"/api/bakes/{baked.bake}")
+    assert (refused.status_code, "?forget=true" in refused.json()["detail"]) == (409, True)
     assert client.get(f"/api/bakes/{baked.bake}").json()["state"] == "ready"
+    store = bake_path(settings.data, baked.bake)
+    assert store.exists()
+    assert client.delete(f"/api/bakes/{baked.bake}?forget=true").status_code == 204
+    assert client.get(f"/api/bakes/{baked.bake}").status_code == 404
+    assert client.delete(f"/api/bakes/{baked.bake}?forget=true").status_code == 404
+    assert client.get("/api/bakes").json() == []
+    assert not store.exists()
+    assert len(client.get("/api/scenes").json()) == 1
+
+
+def test_a_disk_that_is_nearly_full_takes_nothing_new_and_lets_go(
+    client: TestClient, settings: Settings, baked: Baked
+) -> None:
+    settings.least_free_bytes = 1 << 60
+    bake = {"scene": baked.scene, "size": [24, 16], "lights": 11}
+    image = {"files": {"image": ("a.png", b"")}}
+    for refused in (
+        client.post("/api/built-ins/cornell_box"),
+        client.post("/api/scenes", files={"scene": ("a.glb", b"")}),
+        client.post("/api/images", **image),
+        client.post("/api/bakes", json=bake),
+        client.get("/readyz"),
+    ):
+        assert (refused.status_code, refused.json()["type"]) == (507, "urn:relume:problem:disk")
+    assert client.delete(f"/api/scenes/{baked.scene}").status_code == 204
 
 
 def test_material_ids_are_16_bit_png(client: TestClient, baked: Baked) -> None:

@@ -90,6 +90,50 @@ def test_cancelled_bake_resumes_without_repeating_finished_tasks(tmp_path: Path,
     assert len(log.read_text().split()) == NUM_TASKS
 
 
+def stop_half_way(service: BakeService) -> str:
+    identity = service.submit(SCENE.id, RECIPE)
+    with service.subscribe(identity) as changes:
+        for status in changes:
+            if status.progress > 0.3:
+                service.cancel(identity)
+    return identity
+
+
+def test_what_a_stopped_bake_has_is_kept_for_a_week(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_service(tmp_path, delay_s=0.02) as service:
+        identity = stop_half_way(service)
+    service = open_service(tmp_path)
+    service._remove_strays()
+    assert staging_path(tmp_path, identity).exists()
+    assert service.ledger.finished_tasks(identity)
+    monkeypatch.setattr("worker.service.KEPT_S", -1.0)
+    service._remove_strays()
+    assert not list((tmp_path / "bakes" / "staging").iterdir())
+    assert service.ledger.finished_tasks(identity) == {}
+    assert service.get(identity).progress == 0.0
+    service.close()
+
+
+def test_a_stopped_bake_is_forgotten_with_what_it_has(tmp_path: Path) -> None:
+    with open_service(tmp_path, delay_s=0.02) as service:
+        identity = stop_half_way(service)
+    service = open_service(tmp_path)  # no task of it runs any more
+    service.forget(identity)
+    assert service.bakes() == []
+    assert not list((tmp_path / "bakes" / "staging").iterdir())
+    service.close()
+
+
+def test_a_bake_leaves_the_rest_of_the_disk_to_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_service(tmp_path) as service:
+        with monkeypatch.context() as patch:
+            patch.setattr("worker.budget.DISK_RESERVE_BYTES", 1 << 60)
+            patch.setattr("worker.service.check_budget", lambda *_: None)
+            status = follow(service, service.submit(SCENE.id, RECIPE))
+            assert (status.state, (status.problem or "")[:9]) == ("failed", "disk full")
+        assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
+
+
 def test_closed_service_leaves_the_bake_for_the_next_start(tmp_path: Path, expected: str) -> None:
     with open_service(tmp_path, delay_s=0.05) as service:
         identity = service.submit(SCENE.id, RECIPE)
