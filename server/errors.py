@@ -89,6 +89,10 @@ class LeavingError(RelumeError):
     """The server is being stopped; another, or it itself in a while, serves what was asked."""
 
 
+class ElsewhereError(RelumeError):
+    """Another server has the room; a balancer finds it by trying one after the other."""
+
+
 class RateError(RelumeError):
     """Who calls calls too often; `wait_s` from now there is room."""
 
@@ -118,6 +122,7 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
     (InUseError, Row(409, "in-use", "In use", CLOSE_NOT_READY)),
     (LeavingError, Row(503, "leaving", "Being stopped", CLOSE_RESTART)),
+    (ElsewhereError, Row(404, "elsewhere", "On another server", CLOSE_RESTART)),
     (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
     (NearlyFullError, Row(507, "disk", "Disk is nearly full", CLOSE_INTERNAL)),
     (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),

@@ -27,6 +27,7 @@ from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
 from server.live.rooms.comment_news import CommentNews
+from server.live.rooms.keeper import Keeper
 from server.live.rooms.rooms import Rooms
 from server.live.sending.bake_news import BakeNews
 from server.live.session import SessionServices
@@ -39,6 +40,7 @@ from server.queues.renders import RenderQueue
 from server.queues.work_queue import Quota
 from server.records.comments import CommentStore
 from server.records.looks import LookStore
+from server.records.room_leases import RoomLeases
 from server.records.shares import ShareStore
 from server.running.leave import Leave
 from server.settings import Settings
@@ -131,6 +133,8 @@ async def open_services(
     traces = open_traces() if settings.traces else None
     rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
     news = asyncio.create_task(CommentNews(rooms, comments.marks).run())
+    keeper = Keeper(rooms, RoomLeases(sessions), leave)
+    keeping = asyncio.create_task(keeper.run())
     try:
         yield Services(
             settings=settings,
@@ -146,14 +150,16 @@ async def open_services(
             transfers=transfers,
             caretaker=caretaker,
             thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
-            live=_live(settings, metrics, traces, library, threads, service, access, leave, rooms),
+            live=_live(settings, metrics, traces, library, threads, service, access, leave, rooms, keeper),
             importers=importers,
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
     finally:
         rounds.cancel()
         news.cancel()
+        keeping.cancel()
         rooms.close()
+        await keeper.close()
         ends = importers.close, *(queue.close for queue in reversed(queues)), batch.close, service.close, threads.close
         for end in (*ends, *([] if traces is None else [traces.close])):
             await asyncio.to_thread(end)
@@ -188,7 +194,7 @@ def _queues(settings: Settings, service: BakeService, batch: Batches, access: Ac
 
 def _live(
     settings: Settings, metrics: Metrics, traces: Traces | None, library: Library, threads: Threads,
-    service: BakeService, access: Access, leave: Leave, rooms: Rooms,
+    service: BakeService, access: Access, leave: Leave, rooms: Rooms, keeper: Keeper,
 ) -> SessionServices:  # fmt: skip
     """What live sessions need of all this."""
     return SessionServices(
@@ -198,6 +204,7 @@ def _live(
         traces=traces,
         resumes=ResumeStore(settings.resume_seconds),
         rooms=rooms,
+        keeper=keeper,
         bake_news=BakeNews(service.bakes),
         access=access,
         leave=leave,

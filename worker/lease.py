@@ -37,8 +37,11 @@ def is_alive(owner: str, heartbeat: float, now: float) -> bool:
     Args:
         heartbeat, now: seconds since 1970, of one clock: the database's.
     """
-    if now - heartbeat > LEASE_S:
-        return False
+    return now - heartbeat <= LEASE_S and may_run(owner)
+
+
+def may_run(owner: str) -> bool:
+    """Whether an owner is there, as far as can be known from here: of other machines nothing can."""
     host, pid, nonce, _ = owner.split("/")
     if host != socket.gethostname():
         return True

@@ -18,11 +18,12 @@ from relume.picture.transfer import AnyView, Eyes, Opened
 from server.access.access import Access
 from server.access.audit import Audit, Change
 from server.access.roles import Caller
-from server.errors import CLOSE_NORMAL, close_code_of, problem_of, row_of
+from server.errors import CLOSE_NORMAL, ElsewhereError, close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.reception import Reception
 from server.live.rooms.guest import Guest, Place
+from server.live.rooms.keeper import Keeper
 from server.live.rooms.rooms import Rooms
 from server.live.sending.bake_news import BakeNews
 from server.live.sending.frame_loop import FrameLoop
@@ -58,6 +59,7 @@ class SessionServices:
     traces: Traces | None
     resumes: ResumeStore
     rooms: Rooms
+    keeper: Keeper
     bake_news: BakeNews
     access: Access
     leave: Leave
@@ -182,6 +184,7 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
     ]
     if state.guest is not None:
         tasks.append(asyncio.create_task(state.guest.tell(state.socket)))
+        tasks.append(asyncio.create_task(_send_after(services, state.guest, state.socket)))
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in done:
@@ -195,6 +198,14 @@ async def _say_goodbye(services: SessionServices, socket: ClientSocket) -> None:
     await services.leave.taken()
     await socket.send(LeavingMessage(seconds=services.drain_seconds))
     await asyncio.Event().wait()
+
+
+async def _send_after(services: SessionServices, guest: Guest, socket: ClientSocket) -> None:
+    """Send the client after its room when another server has it. Raises ElsewhereError where it does not go."""
+    await guest.lost()
+    await socket.send(LeavingMessage(seconds=services.drain_seconds))
+    await asyncio.sleep(services.drain_seconds)
+    raise ElsewhereError("another server has this room; open the session again")
 
 
 async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:

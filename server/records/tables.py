@@ -69,6 +69,20 @@ class ComparisonRow(WorkRow):
     __tablename__ = "truths"
 
 
+class RoomRow(Base):
+    """Which server has the rooms of a name, see `server.records.room_leases`; gone when nobody is in them.
+
+    Attributes:
+        watch: what opens them to watch. owner, heartbeat: as of a work's lease.
+    """
+
+    __tablename__ = "rooms"
+
+    watch: Mapped[str] = mapped_column(primary_key=True)
+    owner: Mapped[str]
+    heartbeat: Mapped[float]
+
+
 class CommentRow(Base):
     """Words pinned to a pixel, see `server.records.comments`.
 

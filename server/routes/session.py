@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 from fastapi import APIRouter
 from fastapi.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from relume.errors import NotFoundError, RelumeError, VersionMismatchError
+from relume.errors import NotFoundError, ParameterError, RelumeError, VersionMismatchError
 from relume.look import complete
 from relume.picture.transfer import Opened
 from server.access.roles import caller_of
-from server.errors import CLOSE_PROTOCOL, LeavingError, close_code_of, problem_of, problem_response, row_of
+from server.errors import (
+    CLOSE_PROTOCOL,
+    ElsewhereError,
+    LeavingError,
+    close_code_of,
+    problem_of,
+    problem_response,
+    row_of,
+)
 from server.live.rooms.door import door_of
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
@@ -21,7 +31,6 @@ from server.live.visit import Visit
 from server.records.looks import check_name
 from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
-from server.running.leave import LEAVING
 from server.services import Services
 from server.wire.protocol import SUBPROTOCOL
 
@@ -30,14 +39,35 @@ router = APIRouter()
 
 @router.websocket("/api/bakes/{bake}/session")
 async def session(websocket: WebSocket, bake: str) -> None:
-    """A live session; foreign pages were refused before. Refusals are said with a close code, so it accepts first.
+    """A live session; foreign pages were refused before.
 
-    But a server that takes leave answers 503: a balancer then asks another one, and the client hears of nothing.
+    A server that takes leave answers 503, and one whose room another has 404: a balancer then asks the next one, and
+    the client hears of nothing. All other refusals are said with a close code, so it accepts first.
     """
     services: Services = websocket.app.state.services
-    if services.leave.is_taken:
-        await _send_elsewhere(services, websocket, LeavingError(LEAVING))
+    try:
+        services.leave.check()
+        async with _having_room(services, websocket):
+            await _accept(services, websocket, bake)
+    except (LeavingError, ElsewhereError) as error:
+        services.metrics.refused_sessions.labels(row_of(error).slug).inc()
+        await websocket.send_denial_response(problem_response(problem_of(error)))
+
+
+@asynccontextmanager
+async def _having_room(services: Services, websocket: WebSocket) -> AsyncIterator[None]:
+    """With the room that the session is to come into, if any, on this server."""
+    door = None
+    with suppress(ParameterError):  # that is said once it is accepted
+        door = door_of(websocket.query_params)
+    if door is None:
+        yield
         return
+    async with services.live.keeper.having(door.watch):
+        yield
+
+
+async def _accept(services: Services, websocket: WebSocket, bake: str) -> None:
     is_ours = SUBPROTOCOL in websocket.scope["subprotocols"]
     await websocket.accept(subprotocol=SUBPROTOCOL if is_ours else None)
     socket = ClientSocket(websocket, services.settings.ack_seconds)
@@ -50,12 +80,6 @@ async def session(websocket: WebSocket, bake: str) -> None:
     except (RelumeError, OSError) as error:
         services.metrics.refused_sessions.labels(row_of(error).slug).inc()
         await socket.close(close_code_of(error), problem_of(error).detail)
-
-
-async def _send_elsewhere(services: Services, websocket: WebSocket, error: RelumeError) -> None:
-    """Refuse without accepting."""
-    services.metrics.refused_sessions.labels(row_of(error).slug).inc()
-    await websocket.send_denial_response(problem_response(problem_of(error)))
 
 
 async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:

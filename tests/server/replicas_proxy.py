@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-_CONFIGURATION = Path(__file__).parents[2] / "docker" / "replicas" / "nginx.conf"
+CONFIGURATION = Path(__file__).parents[2] / "docker" / "replicas" / "nginx.conf"
 _NGINX = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
 
 
@@ -50,7 +50,7 @@ def _running(folder: Path, port: int, servers: Sequence[str], before: Sequence[s
     """nginx at that port until the end, started by what stands before its command."""
     if _NGINX is None:
         pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
-    text = _CONFIGURATION.read_text().replace("/tmp/", f"{folder}/")
+    text = CONFIGURATION.read_text().replace("/tmp/", f"{folder}/")
     text = text.replace("listen 8420", f"listen 127.0.0.1:{port}")
     (line,) = re.findall(r"server server:8420[^;]*;", text)
     lines = "".join(line.replace("server:8420", each) for each in servers)

@@ -100,17 +100,20 @@ def test_whom_a_leaving_server_refuses_another_has_at_once(tmp_path: Path) -> No
         assert {session(port, "b", f"?room={secrets.token_hex(16)}") for _ in range(12)} == {"0"}
 
 
+def test_a_room_is_found_on_the_server_that_has_it_and_the_others_are_none_the_worse(tmp_path: Path) -> None:
+    """They answer 404 whatever is asked: calls that are none of sessions still come to them."""
+    with ExitStack() as stack:
+        ports = [stack.enter_context(_server(number, refusal=404 if number else None)) for number in range(NUM_SERVERS)]
+        port = stack.enter_context(proxied(tmp_path, ports))
+        assert {session(port, "b", f"?room={secrets.token_hex(16)}") for _ in range(12)} == {"0"}
+        assert _answers(port) == {"0", "404"}
+
+
 def test_a_call_that_is_refused_is_not_made_again_elsewhere(tmp_path: Path) -> None:
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
         port = stack.enter_context(proxied(tmp_path, ports))
-        found = set()
-        for _ in range(40):  # each goes to any
-            try:
-                found.add(_get(f"http://127.0.0.1:{port}/api/scenes").split()[0])
-            except HTTPError as refused:
-                found.add(str(refused.code))
-        assert found == {"0", "503"}
+        assert _answers(port) == {"0", "503"}
 
 
 def test_other_calls_go_to_any_server_and_say_where_they_come_from(proxy: int) -> None:
@@ -118,6 +121,17 @@ def test_other_calls_go_to_any_server_and_say_where_they_come_from(proxy: int) -
     assert len({number for number, *_ in told}) > 1
     assert len({request for _, _, request, _ in told}) == 12
     assert {(host, address) for _, host, _, address in told} == {(f"127.0.0.1:{proxy}", "127.0.0.1")}
+
+
+def _answers(port: int) -> set[str]:
+    """Of many calls that go to any server: its number, or the status that it refuses them with."""
+    found = set()
+    for _ in range(40):
+        try:
+            found.add(_get(f"http://127.0.0.1:{port}/api/scenes").split()[0])
+        except HTTPError as refused:
+            found.add(str(refused.code))
+    return found
 
 
 def _get(url: str) -> str:

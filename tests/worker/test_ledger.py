@@ -3,6 +3,7 @@
 import os
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from sqlalchemy import text
 
 from relume.bake import Recipe, Task
 from relume.errors import NotFoundError
+from server.records.room_leases import ROOM_LEASE_S, RoomLeases
 from worker import lease
 from worker.database import open_database
 from worker.ledger import Ledger
@@ -163,3 +165,30 @@ def test_open_files_are_bounded_by_the_most_connections_at_once(tmp_path: Path) 
     engine.dispose()
     assert counts[1:] == [counts[1]] * 4
     assert counts[1] <= counts[0] + 10
+
+
+def test_a_room_is_of_one_server_until_that_gives_it_up_or_is_dead(ledger: Ledger) -> None:
+    first, second = RoomLeases(ledger.sessions), RoomLeases(ledger.sessions)
+    assert first.take("a")
+    assert not second.take("a")
+    assert first.take("a")
+    assert first.keep({"a", "b"}) == set()
+    assert [second.take(each) for each in "abc"] == [False, False, True]
+    assert first.keep({"b"}) == set()
+    assert [second.take(each) for each in "abc"] == [True, False, True]
+    with ledger.sessions.begin() as session:
+        session.execute(text("UPDATE rooms SET heartbeat = heartbeat - :s"), {"s": 2 * ROOM_LEASE_S})
+    assert second.take("b")
+    assert first.keep({"b"}) == {"b"}
+    assert second.keep(()) == set()
+    assert first.keep({"b"}) == set()
+    assert not second.take("b")
+
+
+def test_of_many_servers_that_open_a_room_one_has_it(ledger: Ledger) -> None:
+    servers = [RoomLeases(ledger.sessions) for _ in range(4)]
+    with ThreadPoolExecutor(4) as threads:
+        assert sum(threads.map(lambda each: each.take("a"), servers)) == 1
+        with ledger.sessions.begin() as session:
+            session.execute(text("UPDATE rooms SET heartbeat = 0"))
+        assert sum(threads.map(lambda each: each.take("a"), servers)) == 1

@@ -20,7 +20,7 @@ from relume.errors import LedgerVersionError, ParameterError
 from server.access.tables import AuditRow, OwnedRow, TokenRow
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
-from server.records.tables import BtfRow, CommentRow, ComparisonRow, LookRow, RenderRow, ShareRow, WorkRow
+from server.records.tables import BtfRow, CommentRow, ComparisonRow, LookRow, RenderRow, RoomRow, ShareRow, WorkRow
 from worker.cameras import kept_cameras
 from worker.database import open_database, upgrading
 from worker.database.models import Base
@@ -30,7 +30,7 @@ from worker.ledger import Ledger
 from worker.scenes import list_scenes
 
 BEFORE = Path(__file__).with_name("before_revisions.sql").read_text(encoding="utf-8")
-TABLES = (LookRow, ShareRow, CommentRow, RenderRow, BtfRow, ComparisonRow, TokenRow, OwnedRow, AuditRow)
+TABLES = (LookRow, ShareRow, CommentRow, RoomRow, RenderRow, BtfRow, ComparisonRow, TokenRow, OwnedRow, AuditRow)
 
 
 @pytest.fixture

@@ -58,6 +58,10 @@ class Guest:
         self._has_others = False
         self._room.guests.append(self)
 
+    async def lost(self) -> None:
+        """Wait until another server has the room."""
+        await self._room.is_lost.wait()
+
     def info(self) -> RoomInfo:
         """What hello says of the room."""
         return RoomInfo(

@@ -42,14 +42,15 @@ class Room:
 
     Attributes:
         document: the complete look, seen as whoever edited last sees it. num_changes: that it has seen.
-        guests: sessions that are in it.
+        guests: sessions that are in it. is_lost: another server has it.
     """
 
     def __init__(
-        self, document: dict[str, Any], max_people: int, away_seconds: float, emptied: Callable[[], None]
+        self, document: dict[str, Any], max_people: int, away_seconds: float, emptied: Callable[[Room], None]
     ) -> None:
         self.document, self.num_changes = document, 0
         self.guests: list[Listener] = []
+        self.is_lost = asyncio.Event()
         self._seats: dict[str, Seat] = {}
         self._max_people, self._away_seconds, self._emptied = max_people, away_seconds, emptied
         self._num_come = 0
@@ -95,7 +96,7 @@ class Room:
         del self._seats[seat.token]
         self.tell_people()
         if not self._seats:
-            self._emptied()
+            self._emptied(self)
 
     def tell_people(self) -> None:
         """Something about who is here has changed."""

@@ -48,14 +48,24 @@ class Rooms:
         """Ids of the scenes that people work on together."""
         return {scene for scene, _ in self._rooms}
 
+    def watches(self) -> set[str]:
+        """What opens the rooms to watch."""
+        return {watch for _, watch in self._rooms}
+
+    def lose(self, watch: str) -> None:
+        """Another server has the rooms that this opens: who is in them hears of it, and nobody comes in any more."""
+        for key in [key for key in self._rooms if key[1] == watch]:
+            self._rooms.pop(key).is_lost.set()
+
     def commented(self, scene: str) -> None:
         """Tell everybody who works on a scene together that its comments have changed."""
         for (of, _), room in self._rooms.items():
             if of == scene:
                 room.tell_comments()
 
-    def _forget(self, key: Key) -> None:
-        del self._rooms[key]
+    def _forget(self, key: Key, room: Room) -> None:
+        if self._rooms.get(key) is room:
+            del self._rooms[key]
 
     def close(self) -> None:
         """Forget all of them."""

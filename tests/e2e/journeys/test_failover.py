@@ -1,8 +1,10 @@
-"""A room whose server is killed goes on on the other one behind nginx, with all that anybody has edited."""
+"""A room whose server is killed goes on on the other one behind nginx, with all that was edited, and stays there."""
 
 from __future__ import annotations
 
+import re
 import secrets
+import time
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +13,7 @@ import pytest
 from editor_page import Editor, changed, opened_page
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
-from replicas_proxy import proxied
+from replicas_proxy import CONFIGURATION, proxied
 
 ROOM = secrets.token_hex(16)
 
@@ -57,7 +59,7 @@ def set_floor(editor: Editor, value: str) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_a_room_goes_on_when_its_server_is_killed(
-    servers: tuple[Server, Server], people: tuple[Page, Page], tmp_path: Path
+    servers: tuple[Server, Server], people: tuple[Page, Page], browser: Browser, tmp_path: Path
 ) -> None:
     (scene,) = servers[0].call("/api/scenes")
     with proxied(tmp_path, [server.port for server in servers]) as port:
@@ -90,3 +92,21 @@ def test_a_room_goes_on_when_its_server_is_killed(
         assert changed(before, after) > 0.01
         assert changed(ann.pixels(), after) == 0
         assert sessions_of(heir) == 2
+
+        holder.start()
+        time.sleep(_away_s() + 1.0)  # from now on nginx would send who names the room to its first server
+        with opened_page(browser) as page:
+            cleo = Editor(page)
+            cleo.page.goto(f"http://127.0.0.1:{port}/?scene={scene['id']}&room={ROOM}")
+            cleo.wait_until_exact()
+            expect(cleo.page.locator(".together .chip")).to_have_count(2)
+            floor_is(cleo, "0.350")
+            set_floor(cleo, "0.25")
+            floor_is(ann, "0.250")
+            assert (sessions_of(heir), sessions_of(holder)) == (3, 0)
+
+
+def _away_s() -> float:
+    """How long nginx sends nobody to a server that it could not reach."""
+    (found,) = re.findall(r"fail_timeout=(\d+)s", CONFIGURATION.read_text())
+    return float(found)

@@ -1,0 +1,83 @@
+"""Keeps a room on one server: whoever comes to another is refused there, for a balancer to try the next one."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+
+from server.errors import ElsewhereError
+from server.live.rooms.rooms import Rooms
+from server.records.room_leases import RoomLeases
+from server.running.leave import Leave
+from worker.database.faults import AWAY, Complaint
+
+log = logging.getLogger(__name__)
+
+EVERY_S = 2.0
+
+
+class Keeper:
+    """Holds the leases of this server's rooms. Used from the event loop only.
+
+    Args:
+        leave: when the server takes leave its rooms are anybody's.
+    """
+
+    def __init__(self, rooms: Rooms, leases: RoomLeases, leave: Leave) -> None:
+        self._rooms, self._leases, self._leave = rooms, leases, leave
+        self._sessions, self._has_leases = Counter[str](), False
+        self._alone = asyncio.Lock()  # what is taken is not given up by a round that has not heard of it
+        self._complaint = Complaint(log, "which server has a room cannot be told")
+
+    @asynccontextmanager
+    async def having(self, watch: str) -> AsyncIterator[None]:
+        """For as long as a session is in a room, or tries to be. Raises ElsewhereError where another server has it."""
+        self._sessions[watch] += 1
+        try:
+            if not await self._take(watch):
+                raise ElsewhereError("another server has this room; come to it by way of the balancer, or try again")
+            yield
+        finally:
+            self._sessions[watch] -= 1
+            if not self._sessions[watch]:
+                del self._sessions[watch]
+
+    async def _take(self, watch: str) -> bool:
+        async with self._alone:
+            self._has_leases = True
+            try:
+                return await asyncio.to_thread(self._leases.take, watch)
+            except AWAY as error:  # the next round tries again
+                self._complaint.meet(error)
+                return True
+
+    async def run(self) -> None:
+        """Keep what there is until the server takes leave."""
+        while not self._leave.is_taken:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._leave.taken(), EVERY_S)
+            await self.look()
+
+    async def look(self) -> None:
+        """Keep what there is, if anything; who is in a room that another server has meanwhile has to go there."""
+        async with self._alone:
+            held = set() if self._leave.is_taken else {*self._sessions, *self._rooms.watches()}
+            if not held and not self._has_leases:
+                return
+            try:
+                lost = await asyncio.to_thread(self._leases.keep, held)
+                self._has_leases = bool(held)
+                self._complaint.well()
+            except Exception as error:  # the database may be away for a while; the next look must come
+                self._complaint.meet(error)
+                return
+        for watch in lost:
+            self._rooms.lose(watch)
+
+    async def close(self) -> None:
+        """Give up all."""
+        with suppress(*AWAY):  # then the leases run out
+            await asyncio.to_thread(self._leases.keep, ())

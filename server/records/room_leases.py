@@ -1,0 +1,57 @@
+"""Which server has the rooms of a name: a lease in the ledger, so that of several servers one has them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any, cast
+
+from sqlalchemy import CursorResult, delete, select, update
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session, sessionmaker
+
+from server.records.tables import RoomRow
+from worker.database.clock import epoch_s
+from worker.lease import may_run, new_owner
+
+ROOM_LEASE_S = 6.0
+"""People of a room whose server's machine has died wait so long: three rounds of `server.live.rooms.keeper`."""
+
+
+class RoomLeases:
+    """The leases of one server; may be used from any thread. Rooms are named by what opens them to watch."""
+
+    def __init__(self, sessions: sessionmaker[Session]) -> None:
+        self._sessions, self._owner = sessions, new_owner()
+
+    def take(self, watch: str) -> bool:
+        """Take or renew one. False where another server that is alive has it."""
+        row = RoomRow
+        asked = select(row.owner, row.heartbeat, epoch_s().label("now")).where(row.watch == watch)
+        with self._sessions() as session:
+            found = session.execute(asked).one_or_none()
+        if found is None:
+            return self._add(watch)
+        is_fresh = found.now - found.heartbeat <= ROOM_LEASE_S
+        if found.owner != self._owner and is_fresh and may_run(found.owner):
+            return False
+        unchanged = row.watch == watch, row.owner == found.owner, row.heartbeat == found.heartbeat
+        statement = update(row).where(*unchanged).values(owner=self._owner, heartbeat=epoch_s())
+        with self._sessions.begin() as session:  # of two servers that come upon a dead one's lease one changes the row
+            return cast("CursorResult[Any]", session.execute(statement)).rowcount > 0
+
+    def _add(self, watch: str) -> bool:
+        try:
+            with self._sessions.begin() as session:
+                session.add(RoomRow(watch=watch, owner=self._owner, heartbeat=epoch_s()))
+        except IntegrityError:  # another server has added it in this moment
+            return False
+        return True
+
+    def keep(self, watches: Collection[str]) -> set[str]:
+        """Renew these and give up all others. Returns those of them that another server has."""
+        row, own = RoomRow, RoomRow.owner == self._owner
+        with self._sessions.begin() as session:
+            session.execute(delete(row).where(own, row.watch.not_in(watches)))
+            session.execute(update(row).where(own).values(heartbeat=epoch_s()))
+            kept = set(session.scalars(select(row.watch).where(own)))
+        return {watch for watch in watches if watch not in kept and not self.take(watch)}

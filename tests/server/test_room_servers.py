@@ -1,0 +1,142 @@
+"""Two servers on one ledger: a room is on one of them, whoever comes to the other, and goes over with its people."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import BatchesHere, Control
+from server_fixtures import open_fake_bakes
+from session_client import SIGMA, Baked, Session, open_session
+from sqlalchemy import select, update
+from starlette.testclient import WebSocketDenialResponse
+
+from server.app import create_app
+from server.live.rooms.door import watch_of
+from server.records.room_leases import ROOM_LEASE_S
+from server.records.tables import RoomRow
+from server.settings import Settings
+
+ROOM, WATCH = "?room=together", f"?watch={watch_of('together')}"
+RESTART = 1012
+
+
+@pytest.fixture
+def settings(settings: Settings) -> Settings:
+    settings.away_seconds, settings.drain_seconds = 0.05, 0.2
+    return settings
+
+
+@pytest.fixture
+def other(settings: Settings, client: TestClient) -> Iterator[TestClient]:
+    """A second server beside `client`."""
+    app = create_app(
+        settings, open_library=Control().open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes
+    )
+    with TestClient(app) as opened:
+        yield opened
+
+
+def services(server: TestClient) -> Any:
+    return server.app.state.services  # type: ignore[attr-defined]
+
+
+def look_around(server: TestClient) -> None:
+    """A round of what keeps rooms, at once."""
+    assert server.portal is not None
+    server.portal.call(services(server).live.keeper.look)
+
+
+def refusal(server: TestClient, baked: Baked, query: str) -> tuple[int, str]:
+    with pytest.raises(WebSocketDenialResponse) as refused, open_session(server, baked.bake, query=query):
+        pass
+    return refused.value.status_code, refused.value.json()["type"].rpartition(":")[2]
+
+
+def created(session: Session) -> bool:
+    return bool(session.text("hello")["room"]["created"])
+
+
+def expire(server: TestClient) -> None:
+    """The database has not heard of who has rooms for too long."""
+    with services(server).bakes.ledger.sessions.begin() as session:
+        session.execute(update(RoomRow).values(heartbeat=RoomRow.heartbeat - 2 * ROOM_LEASE_S))
+
+
+def rooms(server: TestClient) -> list[str]:
+    with services(server).bakes.ledger.sessions() as session:
+        return list(session.scalars(select(RoomRow.watch)))
+
+
+def emptied(*servers: TestClient) -> None:
+    """Wait until no server has a room."""
+    until = time.monotonic() + 30
+    while rooms(servers[0]) and time.monotonic() < until:
+        time.sleep(0.01)
+        for server in servers:
+            look_around(server)
+    assert rooms(servers[0]) == []
+
+
+def test_a_room_of_one_server_is_nowhere_else_until_nobody_is_in_it(
+    client: TestClient, other: TestClient, baked: Baked
+) -> None:
+    with open_session(client, baked.bake, query=ROOM) as ann:
+        assert created(ann)
+        look_around(client)
+        assert refusal(other, baked, ROOM) == refusal(other, baked, WATCH) == (404, "elsewhere")
+        with open_session(other, baked.bake, query="?room=apart") as cleo, open_session(other, baked.bake) as dan:
+            assert created(cleo)
+            assert dan.text("hello")["room"] is None
+        with open_session(client, baked.bake, query=WATCH) as bob:
+            assert not created(bob)
+    emptied(client, other)
+    with open_session(other, baked.bake, query=ROOM) as bob:
+        assert created(bob)
+        assert rooms(client) == [watch_of("together")]
+
+
+def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
+    client: TestClient, other: TestClient, baked: Baked
+) -> None:
+    with open_session(client, baked.bake, query=ROOM) as ann:
+        assert created(ann)
+        expire(client)
+        with open_session(other, baked.bake, query=ROOM) as bob:
+            assert created(bob)
+            bob.edit(1, SIGMA, 0.31)
+            bob.exact(1)
+            for server in (other, client):
+                look_around(server)
+            assert ann.text("leaving")["seconds"] == 0.2
+            assert refusal(client, baked, ROOM) == (404, "elsewhere")
+            with open_session(other, baked.bake, query=ROOM) as again:
+                hello = again.text("hello")
+                assert not hello["room"]["created"]
+                assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
+            with pytest.raises(ConnectionError) as ended:  # who does not go is sent away
+                ann.text("never")
+            assert ended.value.args[0] == RESTART
+
+
+def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
+    client: TestClient, other: TestClient, baked: Baked
+) -> None:
+    with open_session(client, baked.bake, query=ROOM) as ann:
+        ann.text("hello")
+        assert client.portal is not None
+        client.portal.call(services(client).leave.take)
+        ann.text("leaving")
+        assert refusal(client, baked, ROOM) == (503, "leaving")
+        emptied(other)
+        with open_session(other, baked.bake, query=ROOM) as again:
+            assert created(again)
+
+
+def test_a_name_that_is_none_is_refused_as_ever(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake, query="?room=%21") as session, pytest.raises(ConnectionError) as ended:
+        session.receive()
+    assert ended.value.args[0] == 1008
