@@ -30,7 +30,7 @@ from server.errors import (
 )
 from server.logs.context import USER
 from server.wire.protocol import SUBPROTOCOL
-from worker.database.faults import AWAY, told
+from worker.database.faults import AWAY, database_away, is_away, told
 
 if TYPE_CHECKING:
     from server.settings import Settings
@@ -73,7 +73,10 @@ class Gate:
             await self._refuse(error, scope, receive, send)
             return
         except AWAY as error:
-            log.error("who calls cannot be told (%s)", told(error))
+            if is_away(error):
+                database_away.meet(error)
+            else:
+                log.error("who calls cannot be told (%s)", told(error))
             await self._refuse(error, scope, receive, send)
             return
         if is_change(method, scope["path"]):

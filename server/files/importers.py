@@ -108,6 +108,8 @@ def _result(request: ImportRequest, end: End) -> str:
         return str(answer["id"])
     for key, fault in _FAULTS.items():
         if key in answer:
+            if key != "problem" and end.said:  # it has no log of its own
+                _log(end)
             raise fault(answer[key])
     if end.is_late or end.code < 0:
         limits = f"{request.seconds} s or {request.max_bytes / 1e9:.1f} GB"

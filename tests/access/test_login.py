@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import time
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from server.access.access import Access
 from server.access.roles import Role
 from server.access.rules import RULES, SOCKET
 from server.settings import Settings
+from worker.database.faults import Absence, away_elsewhere
 
 Bearer = Callable[..., dict[str, str]]
 
@@ -217,6 +219,24 @@ def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
     (line,) = [record for record in caplog.records if record.name.startswith("server.access")]
     assert "who calls cannot be told" in line.getMessage()
     assert not line.exc_info
+
+
+def test_a_database_that_is_away_is_said_once_however_many_call(
+    client: TestClient, bearer: Bearer, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    headers = bearer("edit")
+
+    def away(*_: object) -> None:
+        raise away_elsewhere("connection refused")
+
+    monkeypatch.setattr("server.access.tokens.TokenStore._known", away)
+    monkeypatch.setattr("worker.database.faults.Absence.well", lambda _: None)  # loops do reach it
+    monkeypatch.setattr("server.access.gate.database_away", Absence(logging.getLogger("away"), "the database"))
+    for _ in range(3):
+        assert client.get("/api/scenes", headers=headers).status_code == 503
+    assert [record.getMessage() for record in caplog.records if record.levelno == logging.ERROR] == [
+        "the database does not answer (connection refused); trying again"
+    ]
 
 
 def test_open_sessions_go_on_while_the_database_is_away(access: Access, monkeypatch: pytest.MonkeyPatch) -> None:

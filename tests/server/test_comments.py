@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import io
+import logging
 from typing import Any
 
 import numpy as np
 import pytest
+from alone import run_alone
 from fastapi.testclient import TestClient
 from PIL import Image
 from problems import problem_of
@@ -15,7 +18,9 @@ from server_fakes import SIZE
 from session_client import Baked, open_session
 
 from server.live.rooms.comment_news import CommentNews
+from server.live.rooms.rooms import Rooms
 from server.records import comments
+from worker.database.faults import Absence, away_elsewhere
 
 
 def image(size: tuple[int, int] = (640, 384), form: str = "JPEG") -> str:
@@ -116,6 +121,23 @@ def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path
         assert ann.text("comments") == {"type": "comments"}
         client.delete(f"{path}/{made['id']}")
         ann.text("comments")
+
+
+def test_where_nothing_is_asked_nothing_is_said_of_the_database(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.live.rooms.comment_news.EVERY_S", 0.001)
+    away = Absence(logging.getLogger("away"), "the database")
+    monkeypatch.setattr("worker.database.faults.database_away", away)
+    away.meet(away_elsewhere("connection refused"))
+    caplog.clear()
+
+    async def look_for_a_while() -> None:
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(CommentNews(Rooms(1, 1, 1.0), lambda _: {}).run(), 0.1)
+
+    run_alone(look_for_a_while())
+    assert caplog.records == []
 
 
 def test_rooms_are_told_of_what_another_server_took(

@@ -10,7 +10,7 @@ from sqlalchemy.exc import OperationalError
 
 from relume.errors import DatabaseDamagedError, DiskFullError
 from worker.database import open_database
-from worker.database.faults import Complaint
+from worker.database.faults import Complaint, database_away
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 
@@ -49,6 +49,16 @@ def test_a_database_without_room_says_so_and_goes_on_when_there_is_some(tmp_path
         connection.exec_driver_sql("CREATE TABLE large AS SELECT randomblob(1000000)")
     is_full[0] = False
     register_scene(tmp_path, ledger, scene)
+
+
+def test_a_loop_that_asks_no_database_says_nothing_of_it(caplog: pytest.LogCaptureFixture) -> None:
+    database_away.meet(OperationalError("SELECT 1", {}, Exception("away")))
+    caplog.clear()
+    with caplog.at_level(logging.WARNING):
+        Complaint(log := logging.getLogger("loop"), "it cannot be stored", asks_database=False).well()
+        assert caplog.records == []
+        Complaint(log, "it cannot be read").well()
+    assert [record.getMessage() for record in caplog.records] == ["the database does not answer: that is over"]
 
 
 def test_a_loop_says_each_fault_once_and_that_it_is_over(caplog: pytest.LogCaptureFixture) -> None:

@@ -213,7 +213,7 @@ def test_what_is_half_stored_or_damaged_is_not_opened(tmp_path: Path, storage: R
 
 
 def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
-    tmp_path: Path, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.setenv(name, "key")
@@ -225,13 +225,17 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
         with service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
             failed = list(changes)[-1]
         assert failed.state == "failed"
-        assert "the object storage cannot be used now" in str(failed.problem)
+        assert failed.problem == "the object storage cannot be used now; try again in a while"
         with pytest.raises(StorageError) as failure:
             fetched(service.store_path("0" * 16))
         assert problem_of(failure.value).status == 503
         monkeypatch.setenv("RELUME_STORAGE", f"file://{tmp_path / 'shared'}")
         path = bake(service)
     assert (tmp_path / "shared" / "whole" / "bakes" / f"{path.name}.json").exists()
+    said = [record.getMessage() for record in caplog.records if "127.0.0.1:9" in record.getMessage()]
+    assert len(said) == 1
+    assert said[0].startswith("the object storage does not answer (")
+    assert "that is over" in caplog.text
 
 
 def test_a_scene_that_is_deleted_is_deleted_there_too(tmp_path: Path, storage: Remote, ledger_of_all: str) -> None:

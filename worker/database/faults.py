@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 AWAY = (SQLAlchemyError, DatabaseDamagedError, DiskFullError)
 """What reading or writing the database raises while it is away, damaged, or without room."""
 
+MAX_TOLD = 300  # characters
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _NO_ROOM = "53100"  # of PostgreSQL, as are these: connections that fail, ends by an operator, too many clients
 _NO_ANSWER = ("08", "57P", "53300")
@@ -82,10 +83,12 @@ class Complaint:
 
     Args:
         log: where. what: cannot be done, as a sentence begins.
+        asks_database: whether the loop does, so that all is well with that where all is well here.
     """
 
-    def __init__(self, log: logging.Logger, what: str) -> None:
-        self._log, self._what, self._lock = log, what, threading.Lock()
+    def __init__(self, log: logging.Logger, what: str, asks_database: bool = True) -> None:
+        self._log, self._what, self._asks_database = log, what, asks_database
+        self._lock = threading.Lock()
         self._said = ""
 
     def meet(self, error: Exception) -> None:
@@ -102,30 +105,38 @@ class Complaint:
 
     def well(self) -> None:
         """It works."""
-        database_away.well()
+        if self._asks_database:
+            database_away.well()
         with self._lock:
             was_said, self._said = self._said, ""
         if was_said:
             self._log.warning("%s: that is over", self._what)
 
 
-class _DatabaseAway:
-    """Says that the database server does not answer, and that it does again: whatever the reasons are meanwhile."""
+class Absence:
+    """Says that a server does not answer, and that it does again: whatever the reasons are meanwhile.
 
-    def __init__(self) -> None:
+    Args:
+        log: where. what: does not answer.
+    """
+
+    def __init__(self, log: logging.Logger, what: str) -> None:
+        self._log, self._what = log, what
         self._is_said, self._lock = False, threading.Lock()
 
     def meet(self, error: Exception) -> None:
+        """It did not."""
         with self._lock:
             was_said, self._is_said = self._is_said, True
         if not was_said:
-            log.error("the database does not answer (%s); trying again", told(error))
+            self._log.error("%s does not answer (%s); trying again", self._what, told(error)[:MAX_TOLD])
 
     def well(self) -> None:
+        """It did."""
         with self._lock:
             was_said, self._is_said = self._is_said, False
         if was_said:
-            log.warning("the database does not answer: that is over")
+            self._log.warning("%s does not answer: that is over", self._what)
 
 
-database_away = _DatabaseAway()
+database_away = Absence(log, "the database")

@@ -34,7 +34,7 @@ class Parts:
     def __init__(self, staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> None:
         self._staging, self._there, self._name = staging, configured(), _name(bake_id, run)
         self._tasks, self._stored = set(tasks), dict[str, tuple[int, int]]()
-        self._complaint = Complaint(log, f"parts of bake {bake_id} cannot be stored")
+        self._complaint = Complaint(log, f"parts of bake {bake_id} cannot be stored", asks_database=False)
 
     def store(self, task: TaskName) -> None:
         """Store what has appeared since the last time, that of a finished task among it."""

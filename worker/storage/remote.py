@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -25,12 +26,16 @@ from obstore.store import from_url
 
 from relume.errors import ParameterError, StorageError
 from relume.replacing import replacing
+from worker.database.faults import Absence
 
 SCHEMES = ("s3://", "file://")
 AT_ONCE = 4
 MAX_RETRIES, RETRY_S = 6, 20
 PIECE_BYTES = 8 << 20
 MAX_INDEX_BYTES = 64 << 20
+
+log = logging.getLogger(__name__)
+storage_away = Absence(log, "the object storage")
 
 
 class Remote:
@@ -199,11 +204,13 @@ def _index(name: str) -> str:
 
 @contextmanager
 def _named_faults() -> Iterator[None]:
+    """Say what fails in words for everybody, and once in the log in those of the storage, which name addresses."""
     try:
         yield
     except (BaseError, FileNotFoundError) as error:  # what is on the list, and is not there
-        line = str(error).split("\n")[0][:200]
-        raise StorageError(f"the object storage cannot be used now ({line}); try again in a while") from error
+        storage_away.meet(error)
+        raise StorageError("the object storage cannot be used now; try again in a while") from error
+    storage_away.well()
 
 
 @lru_cache(maxsize=4)

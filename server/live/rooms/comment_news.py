@@ -34,7 +34,8 @@ class CommentNews:
             await asyncio.sleep(EVERY_S)
             try:
                 await self.look()
-                self._complaint.well()
+                if self._known:  # else nothing was asked
+                    self._complaint.well()
             except Exception as error:  # the database may be away for a while; the next look must come
                 self._complaint.meet(error)
 
