@@ -82,8 +82,9 @@ def has_layers(materials: Sequence[Material]) -> bool:
 
 
 def most_layers(materials: Sequence[Material]) -> int:
-    """The most layers that a ray is in."""
-    return (MAX_GLASS if has_glass(materials) else 1) + (MOST_MIRRORS if are_mirrors(materials).any() else 0)
+    """The most layers that there are: what mirrors show is behind glass as well."""
+    glass, mirrors = has_glass(materials), bool(are_mirrors(materials).any())
+    return 2 * MAX_GLASS if glass and mirrors else MAX_GLASS if glass else 1 + MOST_MIRRORS if mirrors else 1
 
 
 def most_shown(materials: Sequence[Material]) -> int:
@@ -135,7 +136,7 @@ def layers_of(
             if way.num_passed + 1 < MAX_GLASS and has_room():
                 ways.append(behind)
         facing = np.flatnonzero(is_hit & mirrors[material] & is_shown)
-        if len(facing) and not way.num_passed and way.num_mirrors < MOST_MIRRORS and has_room():
+        if len(facing) and way.num_mirrors < MOST_MIRRORS and has_room():
             ways.append(sent_back(geometry, materials, way, hits, facing, pixel_angle, num_keys))
             is_mirrored[facing] = True
         whole = replace(hits, distance=hits.distance + way.length)

@@ -57,7 +57,8 @@ def sent_back(
     )
     chain = last if ways.chain is None else ways.chain.rows(rows).then(last)
     via = ways.via[rows] * num_keys + geometry.face_mesh[own.face] + 1
-    return Ways(ways.ray[rows], there.points.position, turned, ways.through[rows], length, 0, chain, via)
+    through, passed = ways.through[rows], ways.num_passed
+    return Ways(ways.ray[rows], there.points.position, turned, through, length, passed, chain, via)
 
 
 def _about(normal: NDArray[np.float32], directions: NDArray[np.float32]) -> NDArray[np.float32]:

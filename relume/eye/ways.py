@@ -63,7 +63,7 @@ class Ways(NamedTuple):
         origins: where they begin, one for all or one each. (1 or m, 3) float32. directions: unit. (m, 3) float32
         through: share of what they meet that comes to the eye. (m, 3) float32
         length: of the way to where they begin. (m,) float32
-        num_passed: surfaces of glass since the eye, or the last mirror.
+        num_passed: surfaces of glass since the eye.
         chain: mirrors on the way; None where there were none. via: tells ways over other mirrors apart. (m,) int64
     """
 

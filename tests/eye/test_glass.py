@@ -147,6 +147,27 @@ def test_glass_that_neither_bends_nor_reflects_is_not_there():
     assert np.abs(seen - 1).max() < 0.26  # two layers' rays are merged apart
 
 
+@pytest.mark.parametrize("before", [[quad("pane", [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], 1)], slab(0.5)])
+def test_mirrors_behind_glass_show_what_they_would_without_it(before):
+    """Of glass that neither bends nor reflects: rays pass it on the way to the mirror, and on the way back."""
+    chrome = Material("Chrome", ({"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.02, "f0": [0.9] * 3}},))
+    clear = glass(ior=1.0, thickness=0.5 if len(before) == 2 else 0.0)
+    beyond = quad("beyond", [[9, -9, 5], [-9, -9, 5], [-9, 9, 5], [9, 9, 5]], 2)
+    eye, directions, found = np.array([0, 0, 3], np.float32), slanted(), []
+    for meshes in ([], before):
+        camera = looking("front", eye, (0, 0, 0), 0.6)
+        scene = scene_of(wall(), *meshes, beyond, camera=camera, environment=studio(), materials=[chrome, clear, WHITE])
+        geometry = merge(scene)
+        layers = layers_of(geometry, scene.materials, eye, directions, EVEN)
+        (last,) = (of for of in layers if of.chain is not None and (geometry.face_material[of.hits.face] == 2).all())
+        assert last.is_shown.all()
+        found.append(last)
+    np.testing.assert_array_equal(found[0].ray, found[1].ray)
+    np.testing.assert_allclose(found[0].hits.distance, found[1].hits.distance, atol=3e-3)  # rays begin off surfaces
+    np.testing.assert_allclose(found[0].hits.uv, found[1].hits.uv, atol=3e-4)
+    np.testing.assert_allclose(found[1].through, 1, atol=1e-5)
+
+
 def test_light_passes_in_its_share():
     tint = (0.8, 0.8, 0.8)
     pane = quad("pane", [[-90, 1, 90], [90, 1, 90], [90, 1, -90], [-90, 1, -90]], 1)

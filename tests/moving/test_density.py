@@ -55,6 +55,23 @@ def test_far_from_the_eye_points_are_farther_apart(scene):
     assert set(power) <= set(range(-2, 3))
 
 
+def test_both_halves_of_narrow_strips_have_grids_alike():
+    """Their middles are unlike far from the eye; what lies between points is not."""
+    x = np.arange(8) * 0.02
+    corners = [[[w, 0, -4], [w, 0, 4], [w + 0.02, 0, 4], [w + 0.02, 0, -4]] for w in x]
+    strips = [quad(f"strip {k}", corners[k], 0) for k in range(len(x))]
+    grey = [Material("Strips", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))]
+    scene = scene_of(*strips, camera=looking("front", EYE[0], [0, 0, 0], 0.5), materials=grey)
+    geometry = merge(scene)
+    is_open = open_sides(geometry, scene.cameras, 1)
+    density = by_distance(geometry, np.array([[0.0, 1.0, 3.0]]), one_row(is_open))
+    power, _ = density.of_faces()
+    assert (power[::2] != power[1::2]).all()
+    rows = place_points(geometry, is_open, density, 300).lattice.num_rows.max(axis=1)
+    assert rows.max() > 1
+    np.testing.assert_array_equal(rows[::2], rows[1::2])
+
+
 def test_they_are_dense_where_shadows_end(scene):
     geometry, is_open, before = first_placed(scene)
     after = place_points(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ _TRIALS, _MOST_TRIALS = 6, 40  # after the first, fewer points than asked for ar
 _COARSER = 1.25
 _WIDEST = 16.0  # spacing, beside the longest edge: then all that may be shared is
 NODES_A_POINT = 8  # more where faces are thin
+_ENDS: tuple[tuple[Literal["left", "right"], int], ...] = (("left", 0), ("right", 1))  # of equals in order
 _CLOSE_ENOUGH = 0.05  # of the number of points asked for
 
 
@@ -75,6 +76,8 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Densit
     if total <= 0:
         raise PlanError("no surface of the scene has any area; there is nothing to put points on")
     least, most_apart = density.of_faces()
+    across = across_longest(geometry)
+    least, most_apart = np.minimum(least, least[across]), np.maximum(most_apart, most_apart[across])
     longest, count = edges.max(axis=1) / 2.0**least, is_open.sum(axis=1)
     spacing, most = math.sqrt(total / num_points), most_nodes(len(geometry.faces), num_points)
 
@@ -112,15 +115,37 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Densit
     return Placed(lattice._replace(node=vertex), vertices, kept, nodes.material[chosen], spacing)
 
 
+def across_longest(geometry: Geometry) -> NDArray[np.intp]:
+    """Find the face on the other side of each one's longest edge; where there is none, the face itself. (faces,)
+
+    Both halves of a long narrow strip lie in the same place and shall have grids alike: where one knew a shadow that
+    the other had no nodes for, strips beside each other looked like a net.
+    """
+    place = _places_of(geometry)[geometry.faces].astype(np.int64)
+    ends = np.sort(np.stack([place, np.roll(place, -1, axis=1)]), axis=0)
+    edge = ends[0] * (int(place.max()) + 1) + ends[1]
+    corners = geometry.positions[geometry.faces]
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).argmax(axis=1)
+    wanted, every = np.take_along_axis(edge, longest[:, None], axis=1)[:, 0], edge.ravel()
+    order = np.argsort(every, kind="stable")
+    first, last = (order[np.searchsorted(every, wanted, side, order) - less] // 3 for side, less in _ENDS)
+    return np.asarray(np.where(first == np.arange(len(place)), last, first))
+
+
 def pieces_of(geometry: Geometry) -> NDArray[np.int32]:
     """Find which faces hang together by corners in the same place. (faces,) int32"""
-    as_bytes = np.ascontiguousarray(geometry.positions, np.float32).view("V12").ravel()
-    _, place = np.unique(as_bytes, return_inverse=True)
+    place = _places_of(geometry)
     a, b, c = place[geometry.faces].T
     pairs = np.concatenate([a, b]), np.concatenate([b, c])
     num = int(place.max()) + 1
     _, piece = connected_components(coo_array((np.ones(len(pairs[0]), np.bool_), pairs), (num, num)), directed=False)
     return np.asarray(piece[a], np.int32)
+
+
+def _places_of(geometry: Geometry) -> NDArray[np.intp]:
+    """Number vertices so that those in the same place have one number. (vertices,)"""
+    as_bytes = np.ascontiguousarray(geometry.positions, np.float32).view("V12").ravel()
+    return np.asarray(np.unique(as_bytes, return_inverse=True)[1])
 
 
 def most_nodes(num_faces: int, num_points: int) -> int:
