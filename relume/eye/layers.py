@@ -89,8 +89,8 @@ def most_layers(materials: Sequence[Material]) -> int:
 
 def most_shown(materials: Sequence[Material]) -> int:
     """The most layers of a ray in which there is something to be seen."""
-    own = 1 + MOST_SHOWN if has_glass(materials) else 1
-    return min(most_layers(materials), own * (1 + MOST_MIRRORS if are_mirrors(materials).any() else 1))
+    has_both = has_glass(materials) and bool(are_mirrors(materials).any())
+    return 1 + MOST_SHOWN if has_glass(materials) and not has_both else most_layers(materials)
 
 
 def layers_of(
