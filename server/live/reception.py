@@ -32,7 +32,7 @@ class Reception:
         self._websocket, self._socket, self._pending, self._shown = websocket, state.socket, state.pending, state.shown
         self._window, self._look, self._transfer = state.window, state.look, state.transfer
         self._metrics, self._traces = state.metrics, state.traces
-        self._caller, self._guest = state.caller, state.guest
+        self._caller, self._guest, self._notes = state.caller, state.guest, state.notes
         self._num_bad = 0
 
     async def run(self) -> None:
@@ -122,6 +122,8 @@ class Reception:
                 self._traces.refused(received_s, str(error), {"revision": message.revision})
             raise
         self._pending.target = target if self._guest is None else self._guest.edited(target)
+        if self._notes is not None:
+            self._notes.note(operation.path for operation in message.patch)
         self._metrics.edits.labels("applied").inc()
 
     def _see_from(self, message: protocol.EyeMessage, received_s: float) -> None:

@@ -10,18 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from anyio.to_thread import run_sync
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import RelumeError
 from relume.picture.transfer import AnyView, Eyes, Opened
 from server.access.access import Access
-from server.access.audit import Audit, Change
-from server.access.roles import Caller
+from server.access.audit import Audit
 from server.errors import CLOSE_NORMAL, ElsewhereError, close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
+from server.live.edit_notes import EditNotes
 from server.live.reception import Reception
+from server.live.rooms.door import PLACE
 from server.live.rooms.guest import Guest, Place
 from server.live.rooms.keeper import Keeper
 from server.live.rooms.rooms import Rooms
@@ -72,9 +72,10 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
     kept = services.resumes.take(visit.resume, bake, time.monotonic()) if visit.resume else None
     begun = kept.document if kept else visit.look or transfer.default_look
     place = _enter(services, transfer.scene_id, visit, begun, has_own=kept is not None)
-    state = _state(services, websocket, transfer, visit, kept, begun if place is None else place.document, place)
-    look, shown = state.look, state.shown
-    token, session = services.resumes.open(bake, look, shown), secrets.token_hex(8)
+    session = secrets.token_hex(8)
+    notes = _notes(services.access.audit, visit, bake, session)
+    state = _state(services, websocket, transfer, visit, kept, begun if place is None else place.document, place, notes)
+    token = services.resumes.open(bake, state.look, state.shown)
     SESSION.set(session)
     BAKE.set(bake)
     services.metrics.sessions.inc()
@@ -97,7 +98,8 @@ async def serve(services: SessionServices, websocket: WebSocket, bake: str, tran
         if state.guest is not None:
             state.guest.leave(is_for_good=is_for_good)
         services.resumes.close(token, time.monotonic())
-        await _write_down(services.access.audit, visit.caller, bake, look.num_edits)
+        if notes is not None:
+            await notes.write()
 
 
 def _enter(
@@ -111,7 +113,7 @@ def _enter(
 
 def _state(
     services: SessionServices, websocket: WebSocket, transfer: Opened, visit: Visit, kept: Kept | None,
-    document: dict[str, Any], place: Place | None,
+    document: dict[str, Any], place: Place | None, notes: EditNotes | None,
 ) -> SessionState:  # fmt: skip
     """What the halves of the session begin with: what was kept of a lost one, and this look."""
     default = transfer.default_look
@@ -122,14 +124,14 @@ def _state(
     guest = None if place is None else Guest(place, look, pending, may_edit=visit.caller.may_edit)
     socket, window = ClientSocket(websocket, services.ack_seconds), FrameWindow(services.ack_seconds)
     of_all = services.metrics, services.traces
-    return SessionState(socket, pending, shown, window, look, transfer, *of_all, visit.caller, guest)
+    return SessionState(socket, pending, shown, window, look, transfer, *of_all, visit.caller, guest, notes)
 
 
-async def _write_down(audit: Audit, caller: Caller, bake: str, num_edits: int) -> None:
-    """A line of the audit where anything was edited."""
-    if num_edits and caller.may_edit:  # of who may not, they are ways of looking
-        change = Change.by(caller, f"{num_edits} edits in a session", f"/api/bakes/{bake}/session", 101)
-        await asyncio.shield(run_sync(audit.add, change))
+def _notes(audit: Audit, visit: Visit, bake: str, session: str) -> EditNotes | None:
+    if not visit.caller.may_edit:
+        return None
+    room = "" if visit.door is None else f", room {visit.door.watch[:PLACE]}…"  # enough to know it by, not to open it
+    return EditNotes(audit, visit.caller, f"/api/bakes/{bake}/session, {session}{room}")
 
 
 def _hello(session: str, bake: str, state: SessionState, token: str, resumed: bool) -> HelloMessage:
@@ -182,6 +184,8 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
         asyncio.create_task(services.access.until_revoked(state.caller)),
         asyncio.create_task(_say_goodbye(services, state.socket)),
     ]
+    if state.notes is not None:
+        tasks.append(asyncio.create_task(state.notes.run()))
     if state.guest is not None:
         tasks.append(asyncio.create_task(state.guest.tell(state.socket)))
         tasks.append(asyncio.create_task(_send_after(services, state.guest, state.socket)))

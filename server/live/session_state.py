@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from relume.picture.transfer import Opened
 from server.access.roles import Caller
+from server.live.edit_notes import EditNotes
 from server.live.rooms.guest import Guest
 from server.live.state.client_socket import ClientSocket
 from server.live.state.frame_window import FrameWindow
@@ -22,7 +23,7 @@ class SessionState:
 
     Attributes:
         traces: None where nobody wants any. caller: who is at the other end. guest: the session in its room; None where
-            nobody shares it.
+            nobody shares it. notes: for the audit; None of who may not edit: theirs are ways of looking.
     """
 
     socket: ClientSocket
@@ -35,3 +36,4 @@ class SessionState:
     traces: Traces | None
     caller: Caller
     guest: Guest | None
+    notes: EditNotes | None

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 from fastapi.testclient import TestClient
 from session_client import SIGMA, THETA_H, Baked, open_session
 
 from server.access.access import Access
+from server.access.audit import Entry
+from server.access.roles import Caller, Role
+from server.live.edit_notes import EditNotes
 from server.settings import Settings
 
 SEEN = {"op": "replace", "path": "/display/exposure", "value": 2.0}
@@ -29,15 +33,57 @@ def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
     assert "log in first" in ended.value.args[1]
 
 
-def test_editors_edit(client: TestClient, baked: Baked, bearer: Bearer, access: Access) -> None:
-    with open_session(client, baked.bake, headers=bearer("edit", "Ann")) as session:
-        assert session.text("hello")["role"] == "edit"
+def test_editors_edit_and_the_audit_says_what(client: TestClient, baked: Baked, bearer: Bearer, access: Access) -> None:
+    query = "?room=" + "abcdefgh" * 4
+    with open_session(client, baked.bake, query=query, headers=bearer("edit", "Ann")) as session:
+        hello = session.text("hello")
+        assert hello["role"] == "edit"
         session.edit(1, SIGMA, 0.3)
-        session.exact(1)
-    while not (lines := access.audit.list()):  # it is written when the session has ended
+        session.edit(2, SEEN["path"], 2.0)
+        session.exact(2)
+        assert access.audit.list() == []
+    (line,) = lines_of(access, 1)  # it is written when the session has ended
+    assert (line.who, line.what) == ("Ann", "2 edits in a session: /materials/Paper, /display/exposure")
+    assert line.object == f"/api/bakes/{baked.bake}/session, {hello['session']}, room abcdefgh…"
+
+
+def test_what_is_edited_is_in_the_audit_before_the_session_ends(
+    client: TestClient, baked: Baked, bearer: Bearer, access: Access, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.live.edit_notes.EVERY_S", 0.05)
+    with open_session(client, baked.bake, headers=bearer("edit", "Ann")) as session:
+        session.text("hello")
+        for k in (1, 2):
+            session.edit(k, SIGMA, 0.3 + k / 10)
+            assert [line.what for line in lines_of(access, k)] == ["1 edits in a session: /materials/Paper"] * k
+        time.sleep(0.2)  # nothing is said of nothing
+    assert len(lines_of(access, 2)) == 2
+
+
+def lines_of(access: Access, least: int) -> Sequence[Entry]:
+    """The audit's lines, when there are so many."""
+    while len(lines := access.audit.list()) < least:
         time.sleep(0.01)
-    (line,) = lines
-    assert (line.who, line.what, line.object) == ("Ann", "1 edits in a session", f"/api/bakes/{baked.bake}/session")
+    return lines
+
+
+def test_a_line_of_edits_is_bounded_and_can_be_read(access: Access) -> None:
+    async def edit(places: Sequence[str]) -> str:
+        notes = EditNotes(access.audit, Caller("Ann", Role.EDIT, "", "token"), "here")
+        notes.note(places)
+        await notes.write()
+        await notes.write()
+        return access.audit.list()[0].what
+
+    assert asyncio.run(edit(["/materials/a\x1b\n"])) == "1 edits in a session: /materials/a??"
+    assert asyncio.run(edit([])) == "1 edits in a session"
+    many = asyncio.run(edit([f"/materials/{k:020d}" for k in range(1000)]))
+    assert many.startswith(f"1 edits in a session: /materials/{0:020d}, ")
+    assert many.endswith(" and 96 more")
+    assert len(many) < 200
+    long = asyncio.run(edit(["/materials/" + "x" * 1000]))
+    assert 100 < len(long) < 200
+    assert len(access.audit.list()) == 4
 
 
 def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, baked: Baked, bearer: Bearer) -> None:

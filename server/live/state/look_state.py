@@ -14,17 +14,12 @@ from server.wire.protocol import EditMessage
 
 
 class LookState:
-    """The newest accepted look, its revision, and which sources of light alone are shown (None: all).
-
-    Attributes:
-        num_edits: accepted so far.
-    """
+    """The newest accepted look, its revision, and which sources of light alone are shown (None: all)."""
 
     def __init__(
         self, default: dict[str, Any], document: dict[str, Any], revision: int, solo: frozenset[str] | None = None
     ) -> None:
         self.default, self.document, self.revision, self.solo = default, document, revision, solo
-        self.num_edits = 0
         self._materials: dict[str, tuple[Any, MaterialLook]] = {}
 
     def target(self, shared: int = 0) -> Target:
@@ -45,7 +40,6 @@ class LookState:
             check_hand(message.hand, document)
         look = self._read(document)
         self.document, self.revision = document, message.revision
-        self.num_edits += 1
         if message.says_solo:
             self.solo = None if message.solo is None else frozenset(message.solo)
         taken_s = time.perf_counter()
