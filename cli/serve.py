@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +11,7 @@ import typer
 
 from cli.options import Scheduler
 
+log = logging.getLogger(__name__)
 DataOrUrl = Annotated[
     str | None,
     typer.Option(
@@ -36,7 +38,15 @@ def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, schedule
     open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
     current()  # likewise
     where = address(settings.host, settings.port)
-    run_server(settings, tell_started=lambda: typer.echo(f"relume listens on {where}", err=True))
+    run_server(settings, tell_started=lambda: tell(f"relume listens on {where}", settings.log_format))
+
+
+def tell(line: str, log_format: str) -> None:
+    """Say something that is to be seen whatever is logged; where machines read the log, as a line of it."""
+    if log_format == "json":
+        log.warning(line)
+    else:
+        typer.echo(line, err=True)
 
 
 def check_port(host: str, port: int) -> None:

@@ -155,6 +155,8 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (PoolTimeoutError, Row(503, "database", "Database too slow", CLOSE_BUSY)),
     (OSError, Row(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
 )
+SAID = (LeavingError, NearlyFullError)
+"""What the log says once, when it begins, however often somebody asks meanwhile."""
 DEFECT = Row(500, "defect", "Defect in the server", CLOSE_INTERNAL)
 
 
@@ -228,7 +230,7 @@ def install(app: FastAPI) -> None:
     async def on_known(_: Request, error: Exception) -> JSONResponse:
         if is_away(error):
             database_away.meet(error)
-        elif row_of(error).status >= 500:
+        elif row_of(error).status >= 500 and not isinstance(error, SAID):
             log.error("%s: %s", type(error).__name__, told(error))
         return problem_response(problem_of(error), headers_of(error))
 

@@ -59,6 +59,7 @@ class Metrics:
         self.refused_sessions = Counter(
             "relume_refused_sessions", "Sessions that were not opened", ["reason"], registry=registry
         )
+        self.refused_sessions.labels("busy")  # an increase is one of what was there before
         self.request_seconds = self._histogram("relume_http_request_seconds", "Request received to answer begun")
         self._leaving = Gauge("relume_leaving", "Whether the server is being stopped, 0 or 1", registry=registry)
         self._free = Gauge("relume_disk_free_bytes", "Room on the disk of the data directory", registry=registry)

@@ -129,6 +129,7 @@ class Executors:
         import dask
         from distributed import Client
 
+        logging.getLogger("distributed").setLevel(logging.WARNING)  # which sets its own when it is imported
         with dask.config.set(DASK_CONFIG):
             address = self.scheduler or self._start_cluster()
             try:

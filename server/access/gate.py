@@ -97,7 +97,7 @@ class Gate:
     def _count(self, name: str) -> None:
         wait_s = 0.0 if self._buckets is None else self._buckets.take(name)
         if wait_s > 0.0:
-            raise RateError(f"too many calls; wait {wait_s:.1f} s, and make them less often", wait_s)
+            raise RateError(f"too many calls; wait {max(wait_s, 0.1):.1f} s, and make them less often", wait_s)
 
     def _needed(self, method: str, path: str) -> Role:
         return Role.VIEW if self._viewers_comment and is_comment(method, path) else needed(method, path)

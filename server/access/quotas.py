@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections import Counter
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from worker.database.models import BakeRow
 if TYPE_CHECKING:
     from server.settings import Settings
 
+log = logging.getLogger(__name__)
 Kind = Literal["scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
 _ACTIVE = ("queued", "running")
 
@@ -35,6 +37,7 @@ class Quotas:
     def __init__(self, sessions: sessionmaker[Session], settings: Settings) -> None:
         self._sessions, self._settings = sessions, settings
         self._lock, self._open = threading.Lock(), Counter[str]()
+        self._is_full = False
         self.deciding = threading.Lock()
 
     @property
@@ -68,7 +71,14 @@ class Quotas:
     def check_room(self) -> None:
         """Raises NearlyFullError where the disk lacks the room that the ledger needs, to delete, too."""
         free = free_bytes(self._settings.data)
-        if free < self._settings.least_free_bytes:
+        is_full = free < self._settings.least_free_bytes
+        with self._lock:
+            was_full, self._is_full = self._is_full, is_full
+        if is_full and not was_full:
+            log.error("the disk of the data directory has %s MB left: nothing new is taken", f"{free / 1e6:,.0f}")
+        elif was_full and not is_full:
+            log.warning("the disk of the data directory has room again")
+        if is_full:
             raise NearlyFullError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
 
     def check_bytes(self, who: str, more: int) -> None:

@@ -19,8 +19,8 @@ SOCKET = "WEBSOCKET"
 """Stands for a method where a live session is opened."""
 
 RULES: Mapping[str, Mapping[str, Role]] = {
-    "/livez": {"GET": ANYONE},
-    "/readyz": {"GET": ANYONE},
+    "/livez": {"GET": ANYONE, "HEAD": ANYONE},
+    "/readyz": {"GET": ANYONE, "HEAD": ANYONE},
     "/metrics": {"GET": VIEW},
     "/api/openapi.json": {"GET": ANYONE, "HEAD": ANYONE},
     "/api/me": {"GET": ANYONE},

@@ -48,11 +48,17 @@ def _note(record: logging.LogRecord) -> bool:
     return True
 
 
+def _is_news(record: logging.LogRecord) -> bool:
+    """Not what uvicorn says of each WebSocket that is answered by a refusal: it takes that for no answer."""
+    return record.name != "uvicorn.error" or "without completing handshake" not in record.getMessage()
+
+
 def set_up(form: Format, level: str) -> None:
     """Log this process's lines in a form, from a level on, or from a lower one where --verbose asked for that."""
     root = logging.getLogger()
     handler = logging.StreamHandler()
     handler.setFormatter(JsonFormatter() if form == "json" else PlainFormatter())
+    handler.addFilter(_is_news)
     handler.addFilter(_note)
     verbose = [logging.INFO] if any(each.level == logging.INFO for each in root.handlers) else []
     handler.setLevel(min([logging.getLevelNamesMapping()[level.upper()], *verbose]))

@@ -63,12 +63,17 @@ class TestRates:
         settings.requests_per_second, settings.requests_at_once = 0.001, 3
         return settings
 
-    def test_each_user_has_a_bucket_and_each_address(self, client: TestClient, bearer: Bearer) -> None:
+    def test_each_user_has_a_bucket_and_each_address(
+        self, client: TestClient, bearer: Bearer, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         assert [client.get("/api/me", headers=ann).status_code for _ in range(4)] == [200, 200, 200, 429]
         refused = client.get("/api/me", headers=ann)
         assert int(refused.headers["retry-after"]) > 100
         assert "too many calls; wait" in refused.json()["detail"]
+        with monkeypatch.context() as patch:
+            patch.setattr(Buckets, "take", lambda *_: 0.001)
+            assert "wait 0.1 s" in client.get("/api/me", headers=ann).json()["detail"]
         assert client.get("/api/me", headers=bob).status_code == 200
         wrong = {"Authorization": "Bearer relume_000000000000_x"}
         assert [client.get("/api/me", headers=wrong).status_code for _ in range(4)] == [401, 401, 401, 429]

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MONITORING = ROOT / "docker" / "monitoring"
 SUFFIXES = {"counter": ("_total",), "histogram": ("_bucket", "_sum", "_count"), "gauge": ("",)}
 OF_PROMETHEUS = {"up"}
-WORDS = {"and", "by", "histogram_quantile", "increase", "label_values", "le", "rate", "sum"}
+WORDS = {"and", "by", "histogram_quantile", "increase", "label_values", "le", "max", "rate", "sum"}
 LABELS = {"format", "instance", "kind", "outcome", "reason", "state", "status"}
 
 
@@ -72,6 +72,16 @@ def test_labels_that_rules_match_are_there(registry: CollectorRegistry) -> None:
         matched = {label for group in re.findall(r"\{([^}]*)\}", text) for label in re.findall(r"(\w+)\s*[!=]", group)}
         grouped = {label for group in re.findall(r"by \(([^)]*)\)", text) for label in re.findall(r"\w+", group)}
         assert matched | grouped <= known, text
+
+
+def test_of_the_ledger_that_servers_share_none_is_counted_twice() -> None:
+    asked = [text for text in expressions().values() if "relume_work{" in text]
+    assert len(asked) > 1
+    assert all("instance" in text.partition("(")[2].partition(")")[0] or text.startswith("max by") for text in asked)
+
+
+def test_what_an_alert_sees_grow_is_there_before_it_does(registry: CollectorRegistry) -> None:
+    assert registry.get_sample_value("relume_refused_sessions_total", {"reason": "busy"}) == 0.0
 
 
 def test_names_follow_the_rules(registry: CollectorRegistry) -> None:

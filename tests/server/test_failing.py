@@ -43,13 +43,27 @@ def test_a_damaged_database_is_said_in_one_sentence_and_one_line(
     assert not any(record.exc_info or "\n" in record.getMessage() for record in caplog.records)
 
 
-def test_a_disk_that_is_nearly_full_is_not_ready(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
     answer = client.get("/readyz")
     assert (answer.status_code, answer.json()["title"]) == (507, "Disk is nearly full")
     assert "12 MB left" in answer.json()["detail"]
+    assert client.head("/readyz").status_code == 507
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, 1 << 40))
     assert client.get("/readyz").status_code == 200
+    assert client.head("/readyz").status_code == client.head("/livez").status_code == 200
+    said = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    assert len(said) == 2
+    assert "12 MB left" in said[0]
+    assert "room again" in said[1]
+
+
+def test_probes_of_a_server_that_is_stopped_are_no_lines(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:
+    client.app.state.leave.take()  # type: ignore[attr-defined]
+    assert [client.get("/readyz").status_code for _ in range(2)] == [503, 503]
+    assert [record for record in caplog.records if record.levelno >= logging.WARNING] == []
 
 
 def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(

@@ -13,6 +13,7 @@ from alone import run_alone
 from fastapi.testclient import TestClient
 from session_client import Baked, open_session
 
+from cli.serve import tell
 from server.logs.context import BAKE, REQUEST, USER
 from server.logs.setting_up import Format, set_up
 
@@ -48,6 +49,13 @@ def test_json_lines_say_what_they_are_about(capsys: pytest.CaptureFixture[str]) 
     assert "ValueError: why" in line.pop("trace")
     assert (line.pop("level"), line.pop("logger")) == ("error", "server.somewhere")
     assert line == {"message": "it “failed”\nfor Ann", "request": "r1", "bake": "b1"}
+
+
+def test_where_a_server_listens_is_a_line_of_the_log_where_machines_read_it(capsys: pytest.CaptureFixture[str]) -> None:
+    said = logged(capsys, "json", lambda: tell("relume listens on http://127.0.0.1:8420/", "json"))
+    assert json.loads(said)["message"] == "relume listens on http://127.0.0.1:8420/"
+    said = logged(capsys, "plain", lambda: tell("relume listens on http://127.0.0.1:8420/", "plain"))
+    assert said == "relume listens on http://127.0.0.1:8420/\n"
 
 
 def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,7 @@
 """The server as uvicorn runs it, over a real socket."""
 
 import json
+import logging
 import struct
 from collections.abc import Iterator
 
@@ -10,6 +11,7 @@ from server_fakes import Control
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from server.logs.setting_up import set_up
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
 
@@ -45,6 +47,14 @@ def test_message_beyond_the_limit_closes_1009(url: str) -> None:
         assert closed.value.rcvd.code == 1009
 
 
-def test_page_of_another_site_is_refused_in_the_handshake(url: str) -> None:
+def test_page_of_another_site_is_refused_in_the_handshake(
+    url: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("handlers", "level"):
+        monkeypatch.setattr(root := logging.getLogger(), name, getattr(root, name))  # as it is until now
+    set_up("plain", "warning")
     with pytest.raises(InvalidStatus, match="403"):
         connect(url, subprotocols=["relume.v1"], origin="https://evil.example")
+    with pytest.raises(InvalidStatus, match="403"):  # then all of the first has been said
+        connect(url, subprotocols=["relume.v1"], origin="https://evil.example")
+    assert capsys.readouterr().err == ""

@@ -3,6 +3,7 @@
 import asyncio
 import concurrent.futures
 import errno
+import logging
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -111,6 +112,7 @@ def test_cluster_that_does_not_close_in_order_loses_its_processes_and_stops_nobo
     executors = Executors(num_workers=2)
     executors.cluster()
     executors.close()
+    assert not logging.getLogger("distributed.batched").isEnabledFor(logging.INFO)
     assert clusters[0].log == ["no restart", "kill"] * 2 + ["close"]
     assert "can only join a started process" in caplog.text
     executors.close()  # nothing is left to stop
