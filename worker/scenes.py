@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
-from relume.errors import NotFoundError
+from relume.errors import DiskFullError, NotFoundError
 from relume.remarks import Remark, remark_of
 from relume.replacing import remove_folder
 from relume.scene.archive import save_scene
@@ -131,11 +131,24 @@ def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
         data_dir: where stores are kept. ledger: where they are listed.
         ids: of bakes; those that run are cancelled.
     """
+    try:
+        _strike(ledger, ids)
+    except DiskFullError:  # to delete takes room, too: theirs
+        _remove_stores(data_dir, ids)
+        _strike(ledger, ids)
+    for identity in ids:
+        forget(bake_path(data_dir, identity))
+    _remove_stores(data_dir, ids)
+
+
+def _strike(ledger: Ledger, ids: Sequence[str]) -> None:
     for identity in ids:
         ledger.cancel(identity)
     ledger.delete_bakes(ids)
+
+
+def _remove_stores(data_dir: Path, ids: Sequence[str]) -> None:
     for identity in ids:
-        forget(bake_path(data_dir, identity))
         _remove(bake_path(data_dir, identity))
         shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
         forget_run(staging_path(data_dir, identity))

@@ -124,6 +124,24 @@ def test_a_stopped_bake_is_forgotten_with_what_it_has(tmp_path: Path) -> None:
     service.close()
 
 
+def test_where_the_ledger_has_no_room_to_delete_stores_make_some(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_service(tmp_path) as service:
+        identity = follow(service, service.submit(SCENE.id, RECIPE)).id
+        store, cancel = service.store_path(identity), service.ledger.cancel
+
+        def cancel_where_there_is_room(of: str) -> bool:
+            if store.exists():
+                raise DiskFullError("the database")
+            return cancel(of)
+
+        monkeypatch.setattr(service.ledger, "cancel", cancel_where_there_is_room)
+        delete_scene(service.data_dir, service.ledger, SCENE.id)
+        assert service.bakes() == []
+        assert not store.exists()
+
+
 def test_a_bake_leaves_the_rest_of_the_disk_to_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path) as service:
         with monkeypatch.context() as patch:

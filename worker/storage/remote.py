@@ -208,7 +208,7 @@ def _named_faults() -> Iterator[None]:
     try:
         yield
     except (BaseError, FileNotFoundError) as error:  # what is on the list, and is not there
-        storage_away.meet(error)
+        storage_away.meet(StorageError(str(error).split("\n")[0]))  # what follows is for those who debug it
         raise StorageError("the object storage cannot be used now; try again in a while") from error
     storage_away.well()
 
