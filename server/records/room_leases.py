@@ -13,7 +13,7 @@ from server.records.tables import RoomRow
 from worker.database.clock import epoch_s
 from worker.lease import may_run, new_owner
 
-ROOM_LEASE_S = 6.0
+ROOM_LEASE_S = 3.0
 """People of a room whose server's machine has died wait so long: three rounds of `server.live.rooms.keeper`."""
 
 

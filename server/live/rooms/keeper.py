@@ -16,7 +16,7 @@ from worker.database.faults import AWAY, Complaint
 
 log = logging.getLogger(__name__)
 
-EVERY_S = 2.0
+EVERY_S = 1.0
 
 
 class Keeper:
