@@ -153,6 +153,10 @@ class EditError(RelumeError):
     """An edit cannot be applied; the look stays as it was."""
 
 
+class NotFrozenError(NotMadeError):
+    """Something was asked of a curve that is not frozen yet."""
+
+
 class EditNotSupportedError(EditError):
     """The transfer method of this bake cannot follow such an edit."""
 

@@ -10,6 +10,9 @@ from relume.bake import Plan
 from worker.executor import is_tiny, num_cores
 
 
+_FAR = 8.0  # times as much work as any that was measured
+
+
 @dataclass(frozen=True)
 class Finished:
     """What a finished bake took.
@@ -43,7 +46,8 @@ def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crow
     A plan counts rays that are never traced: edges that are not there, lights behind the surface, shadows that are
     predicted. So the rate is that of planned work. Plans of before tell rays alone and judge where there is no other.
     Tiny bakes run one task at a time, others `num_workers`; the others' rate includes their own overhead, so a bake is
-    judged by its like where there is one.
+    judged by its like where there is one. Of what is far smaller most was overhead: what a bake has more of than they
+    had takes as long as its plan says, where they were not faster than that.
 
     Args:
         plan: of the bake.
@@ -56,7 +60,13 @@ def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crow
     alike = [each for each in finished if is_tiny(each.plan) == is_tiny(plan)] or finished
     planned = sum(work_of(each.plan) for each in alike)
     wall_s = sum(each.task_s / each.crowding / (1 if is_tiny(each.plan) else num_workers) for each in alike)
-    return crowded * work_of(plan) * wall_s / planned if planned and wall_s else None
+    if not planned or not wall_s:
+        return None
+    work, most = work_of(plan), max(map(work_of, (each.plan for each in alike)))
+    if work_of is _num_rays or work <= _FAR * most:
+        return crowded * work * wall_s / planned
+    beyond = min(wall_s / planned, 1 / (1 if is_tiny(plan) else num_workers))
+    return crowded * (wall_s / len(alike) + (work - planned / len(alike)) * beyond)
 
 
 def _work_s(plan: Plan) -> float:

@@ -149,7 +149,7 @@ describe("cameras that are kept", () => {
   const frame = frameOf(orbit);
   vi.stubGlobal("fetch", async (path: string, { method = "GET" } = {}) => {
     calls.push(`${method} ${path.split("/").at(-1)}`);
-    return new Response(method === "DELETE" ? null : JSON.stringify([{ name: "A", is_placed: true }, { name: "B", is_placed: true }]), { status: method === "DELETE" ? 204 : 200 });
+    return new Response(method === "DELETE" ? null : JSON.stringify([{ name: "A", is_placed: true }, { name: "B", is_placed: true }, { name: "Own", is_placed: false }]), { status: method === "DELETE" ? 204 : 200 });
   });
 
   it("leave their old name behind, and take nobody else's", async () => {
@@ -159,5 +159,9 @@ describe("cameras that are kept", () => {
     expect(calls.splice(0)).toEqual(["PUT A"]);
     await expect(keepAs("s", "B", frame, "A")).rejects.toThrow("There is a camera “B” already");
     expect(calls.splice(0)).toEqual(["GET cameras"]);
+    await expect(keepAs("s", "Own", frame, "A")).rejects.toThrow("a camera of the scene itself");
+    expect(calls.splice(0)).toEqual(["GET cameras"]);
+    await expect(keepAs("s", "a/b", frame, "A")).rejects.toThrow("no slashes");
+    expect(calls.splice(0)).toEqual([]);
   });
 });

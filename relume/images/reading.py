@@ -6,6 +6,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 
 from relume.errors import SceneError
 from relume.imageio.decoding import Decoder
@@ -35,11 +37,20 @@ def read_image(path: Path, name: str) -> tuple[Texture, tuple[Remark, ...]]:
     if data.startswith(EXR_MAGIC):
         return _of_exr(data, what)
     pixels = Decoder().decode(data, what)
-    _check_size(what, pixels.shape[1], pixels.shape[0])
-    texture = Texture(np.ascontiguousarray(pixels[..., :3]), coding=Coding("srgb"))
-    if pixels[..., 3].min() == 255:
-        return texture, ()
-    return texture, (simplified(f"{what} is transparent somewhere; its colours are taken as they are there"),)
+    kept, said = _held(pixels[..., :3], what)
+    if pixels[..., 3].min() < 255:
+        said = (*said, simplified(f"{what} is transparent somewhere; its colours are taken as they are there"))
+    return Texture(np.ascontiguousarray(kept), coding=Coding("srgb")), said
+
+
+def _held(texels: NDArray[np.uint8], what: str) -> tuple[NDArray[np.uint8], tuple[Remark, ...]]:
+    """Hold texels to `MAX_SIDE`, each the mean of its own; at most two by two of them, since no larger file is read."""
+    height, width = texels.shape[:2]
+    if max(width, height) <= MAX_SIDE:
+        return texels, ()
+    kept = np.asarray(Image.fromarray(texels).reduce(-(-max(width, height) // MAX_SIDE)))
+    size = f"{kept.shape[1]}×{kept.shape[0]}"
+    return kept, (simplified(f"{what} is {width}×{height}; it is kept as {size}, each texel the mean of its own"),)
 
 
 def _check_size(what: str, width: int, height: int) -> None:

@@ -39,8 +39,16 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
         except RecursionError as error:  # jsonpatch copies values recursively
             raise EditError(f"operation {k} has a value nested too deep; no look is nested like that") from error
         except (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError) as error:
-            raise EditError(f"operation {k} cannot be applied: {str(error)[:200] or 'no such path'}") from error
+            path = str(operation.get("path"))[:MAX_PATH]
+            raise EditError(f"operation {k} ({operation.get('op')}) cannot be applied at {path!r}: {_why(error)}") from error
     return complete_changes(changed, default, document)
+
+
+def _why(error: Exception) -> str:
+    """Say what went wrong without the piece of a look that the libraries quote."""
+    if isinstance(error, jsonpatch.JsonPatchTestFailed):
+        return "the test failed"
+    return "there is nothing like that in this look"
 
 
 def _checked(operation: Any, k: int) -> dict[str, Any]:

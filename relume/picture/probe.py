@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from relume.basis.daubechies import analysis, synthesis
 from relume.color import luminance
-from relume.errors import EditNotSupportedError, ParameterError
+from relume.errors import NotFrozenError, ParameterError
 from relume.operators.edit_basis import CurveBasis
 from relume.picture.live_term import LiveTerm
 from relume.picture.pointer import CurvePointer, ParameterPointer
@@ -95,12 +95,12 @@ def brush(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: fl
     Args:
         images, radiance: as in `probe`. pointer: to the curve. from_deg, to_deg: ends of the stretch, degrees.
     Raises:
-        EditNotSupportedError: the curve is not frozen yet; touch it and freeze first.
+        NotFrozenError: the curve is not frozen yet; touch it and freeze first.
     """
     material, term = images.find(pointer)
     frozen = images.operator(material, term)
     if frozen is None or term.ready.basis != images.basis(pointer) or term.ready.coefficients is None:
-        raise EditNotSupportedError(images.transfer.method, "a brush over a curve that is not open; open it first")
+        raise NotFrozenError("this curve is not frozen yet; take it in hand, and brush over it once it is")
     bands = synthesis(term.ready.coefficients)
     edges = np.linspace(0, 90, bands.shape[-1] + 1)
     overlap = np.clip(np.minimum(edges[1:], to_deg) - np.maximum(edges[:-1], from_deg), 0, None) / np.diff(edges)

@@ -64,7 +64,7 @@ def png(width, height):
         (b"\x89PNG\r\n\x1a\n" + 40 * b"x", "save it as PNG"),
         (b"\x76\x2f\x31\x01" + 40 * b"x", "damaged"),
         (b"GIF89a" + 40 * b"\0", "save it as PNG"),
-        (png(MAX_SIDE + 1, 1), f"at most {MAX_SIDE}×{MAX_SIDE}"),
+        (png(2 * MAX_SIDE + 1, 1), f"at most {2 * MAX_SIDE}×{2 * MAX_SIDE}"),
     ],
 )
 def test_what_is_no_image_or_too_large_leaves_nothing(content, says, tmp_path):
@@ -72,6 +72,18 @@ def test_what_is_no_image_or_too_large_leaves_nothing(content, says, tmp_path):
     with pytest.raises(SceneError, match=says):
         keep(tmp_path / "shelf", tmp_path / "x.png", "x")
     assert not (tmp_path / "shelf").exists()
+
+
+def test_a_large_one_is_kept_smaller_and_says_so(tmp_path):
+    texels = np.zeros((4, MAX_SIDE + 2, 3), np.uint8)
+    texels[:, 1::2] = 100
+    Image.fromarray(texels).save(tmp_path / "wide.png")
+    with IMAGES.at(tmp_path / "shelf") as shelf:
+        record = keep(shelf, tmp_path / "wide.png", "wide")
+        found = texture_of(record.texture).pixels
+    assert record.size == (MAX_SIDE // 2 + 1, 2) == found.shape[1::-1]
+    assert (found == 50).all()
+    assert "4098×4" in record.warnings[0]
 
 
 def test_the_same_file_again_takes_the_new_name(image_file, tmp_path):

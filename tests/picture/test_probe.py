@@ -9,7 +9,7 @@ import pytest
 from pictures import BALL, ball_alone, opened, pixels_of_ball_alone
 from sessions import look_of
 
-from relume.errors import EditNotSupportedError, ParameterError
+from relume.errors import NotFrozenError, ParameterError
 
 
 def test_probe_shares_sum_to_the_terms_radiance(transfer):
@@ -123,7 +123,7 @@ def test_brush_agrees_with_the_probe(transfer):
 
 
 def test_brush_needs_an_open_curve(transfer):
-    with pytest.raises(EditNotSupportedError, match="open it first"):
+    with pytest.raises(NotFrozenError, match="take it in hand"):
         opened(transfer).brush(BALL + "theta_h", 0, 10)
 
 

@@ -73,9 +73,17 @@ def ball(fineness):
 def test_bakes_of_other_methods_judge_by_what_a_ray_takes_in_each():
     recipe = Recipe("direct", ("front",), (640, 480), 500)
     direct, surface = (METHODS[name].plan(ball(4), replace(recipe, method=name)) for name in ("direct", "surface"))
-    found = seconds_for(surface, [Finished(direct, 10.0)], 1)
-    assert found == pytest.approx(10.0 * surface.work_s / direct.work_s)
-    assert found > 5 * 10.0 * surface.num_rays / direct.num_rays
+    found = seconds_for(surface, [Finished(direct, 5.0)], 1)
+    assert found == pytest.approx(5.0 * surface.work_s / direct.work_s)
+    assert found > 5 * 5.0 * surface.num_rays / direct.num_rays
+
+
+def test_what_small_bakes_took_for_themselves_is_no_rate_of_large_ones():
+    small, large = replace(LARGE, work_s=0.1), replace(LARGE, work_s=40.0)
+    assert seconds_for(large, [Finished(small, 10.0)], 1) == pytest.approx(10.0 + 39.9)
+    assert seconds_for(large, [Finished(small, 10.0)], 2) == pytest.approx(5.0 + 39.9 / 2)
+    assert seconds_for(large, [Finished(small, 0.05)], 1) == pytest.approx(20.0)
+    assert seconds_for(replace(LARGE, work_s=0.8), [Finished(small, 10.0)], 1) == pytest.approx(80.0)
 
 
 def test_plans_that_tell_rays_alone_judge_where_there_are_no_others():

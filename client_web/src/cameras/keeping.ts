@@ -5,10 +5,17 @@ import { deleteCamera, keepCamera, listCameras } from "./calls";
 import type { Frame } from "./orbit";
 
 /** Keep one under a name. `was`: the name of the one that it takes the place of; null: it is new. Raises where the name is
- * another's. */
+ * another's, or none. */
 export async function keepAs(scene: string, name: string, frame: Frame, was: string | null): Promise<void> {
-  if (name !== was && (await listCameras(scene)).some((other) => other.is_placed && other.name === name)) {
-    throw new Error(`There is a camera “${name}” already. Choose another name.`);
+  if (name.includes("/")) throw new Error("Names of cameras have no slashes. Choose another name.");
+  const others = name === was ? [] : await listCameras(scene);
+  const other = others.find((one) => one.name === name);
+  if (other !== undefined) {
+    throw new Error(
+      other.is_placed
+        ? `There is a camera “${name}” already. Choose another name.`
+        : `“${name}” is a camera of the scene itself, which stays as it is. Choose another name.`,
+    );
   }
   await keepCamera(scene, name, frame);
   if (was !== null && was !== name) await deleteCamera(scene, was);
