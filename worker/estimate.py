@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from relume.bake import Plan
 from worker.executor import is_tiny, num_cores
 
-
 _FAR = 8.0  # times as much work as any that was measured
 
 

@@ -39,8 +39,8 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
         except RecursionError as error:  # jsonpatch copies values recursively
             raise EditError(f"operation {k} has a value nested too deep; no look is nested like that") from error
         except (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError) as error:
-            path = str(operation.get("path"))[:MAX_PATH]
-            raise EditError(f"operation {k} ({operation.get('op')}) cannot be applied at {path!r}: {_why(error)}") from error
+            where = f"{operation['op']} at {operation['path']!r}"
+            raise EditError(f"operation {k} cannot be applied, {where}: {_why(error)}") from error
     return complete_changes(changed, default, document)
 
 
