@@ -8,13 +8,14 @@ import shutil
 import threading
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from relume.bake import BakeMethod, Plan, Recipe
 from relume.code_version import bake_code
-from relume.errors import NotFoundError, ParameterError
+from relume.errors import NotFoundError, ParameterError, StorageError
 from relume.store import code_of
 from worker.backup.restore import refuse_unfinished
 from worker.bake import BakeRunner, check_published
@@ -33,6 +34,7 @@ from worker.progress import Expected
 from worker.runs import forget_run, run_of
 from worker.status import BakeStatus, bake_id
 from worker.storage import configured, is_elsewhere, push
+from worker.storage.parts import forget_parts
 from worker.tasks import Job, idle_timer, scene_of
 from worker.turns import Turns
 
@@ -322,6 +324,8 @@ class BakeService:
             if state == "ready" or (is_stopped and (code_of(folder) != bake_code() or _age_s(folder) > KEPT_S)):
                 if is_stopped and run_of(folder) == self.ledger.run(identity):  # else its tasks are another machine's
                     self.ledger.forget_tasks(identity)
+                    with suppress(StorageError):  # what is left over is deleted with the bake
+                        forget_parts(identity)
                 shutil.rmtree(folder, ignore_errors=True)
                 forget_note(folder)
                 forget_run(folder)

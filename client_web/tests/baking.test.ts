@@ -1,4 +1,5 @@
-import { describe, expect, test } from "vitest";
+import { describe, expect, test, vi } from "vitest";
+import { cancelBake } from "../src/net/api";
 import { bakingWords, hasProgress, phaseWords } from "../src/scene/baking";
 import type { Baking } from "../src/state/bakes";
 
@@ -24,4 +25,12 @@ describe("words of a bake", () => {
     expect(bakingWords(queued, 0)).toBe("waits for its turn");
     expect(bakingWords({ ...queued, state: "failed" }, 0)).toBe("bake failed");
   });
+});
+
+test("a bake that has ended a moment before needs no cancelling; what else fails is said", async () => {
+  const answers = [409, 503].map((status) => new Response(JSON.stringify({ detail: "no" }), { status }));
+  vi.stubGlobal("fetch", async () => answers.shift());
+  await expect(cancelBake("b")).resolves.toBeUndefined();
+  await expect(cancelBake("b")).rejects.toThrow("no");
+  vi.unstubAllGlobals();
 });

@@ -48,8 +48,8 @@ class End:
 def main() -> None:
     """The process itself: until nobody is left who could ask."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to a whole terminal; the server ends this one
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # keepers are waited for by who asked
     _load()
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # keepers are waited for by who asked
     asking = socket.socket(fileno=sys.stdin.fileno())
     while True:
         message, brought, *_ = socket.recv_fds(asking, 1, 1)

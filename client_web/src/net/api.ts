@@ -168,8 +168,11 @@ export async function startBake(body: BakeRequest): Promise<BakeBody> {
   return (await (await request("/api/bakes", json("POST", body))).json()) as BakeBody;
 }
 
+/** Cancel a bake; one that has ended a moment before needs it no more. */
 export async function cancelBake(id: string): Promise<void> {
-  await request(`/api/bakes/${encodeURIComponent(id)}`, { method: "DELETE" });
+  await request(`/api/bakes/${encodeURIComponent(id)}`, { method: "DELETE" }).catch((error: unknown) => {
+    if (!(error instanceof ApiError && error.status === 409)) throw error;
+  });
 }
 
 /** What share of light a material of these terms sends back. */
