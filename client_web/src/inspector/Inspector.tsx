@@ -14,6 +14,7 @@ import { shownPanels } from "../state/room";
 import { materialOf, models } from "../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, terms } from "../state/selection";
 import { IconButton } from "../ui/Button";
+import { Section } from "../ui/Section";
 import { Energy } from "./Energy";
 import { TermCard } from "./TermCard";
 import { defaultTerm, isMirror, modelsFor } from "./terms";
@@ -122,8 +123,6 @@ function MaterialInspector() {
       <Catcher material={material} />
       <Glass material={material} />
       {!isCaught && <BaseImage key={material} material={material} terms={terms.value} />}
-      {!isCaught && <MetalImage material={material} terms={terms.value} />}
-      {!isCaught && shown !== undefined && <NormalImage material={material} of={shown} mirrors={materialOf(material)?.terms.some(isMirror) === true} />}
       {!isCaught && terms.value.map((term, index) => (
         <TermCard
           key={index}
@@ -147,6 +146,12 @@ function MaterialInspector() {
       ))}
       {!isCaught && <Energy key={material} terms={terms.value} />}
       {!isCaught && <AddTerm material={material} />}
+      {!isCaught && shown !== undefined && (
+        <Section title="Metal and normal maps">
+          <MetalImage material={material} terms={terms.value} />
+          <NormalImage material={material} of={shown} mirrors={materialOf(material)?.terms.some(isMirror) === true} />
+        </Section>
+      )}
     </div>
   );
 }

@@ -15,7 +15,7 @@ export const histogramOpen = signal(false);
 /** Spots and panels go on aiming at the same point while they are moved. */
 export const aimLocked = signal(false);
 export const helpOpen = signal(false);
-/** Titles of the outline's sections that are folded away. */
+/** Titles of the panels' sections that are folded away. */
 export const folded = signal<readonly string[]>([]);
 
 export function toggleFolded(title: string): void {
