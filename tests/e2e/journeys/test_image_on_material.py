@@ -45,7 +45,7 @@ def test_an_image_is_put_on_by_a_button_and_by_a_drop(editor: Editor, stripes: P
     expect(chosen.locator("option:checked")).to_have_text("stripes")
     page.get_by_role("button", name="Undo", exact=True).click()
     material = drop_on_the_middle(editor, stripes, "dropped.png")
-    expect(page.locator(".inspector h2")).to_have_text(material)
+    expect(page.locator(".inspector > header h2")).to_have_text(material)
     expect(chosen.locator("option:checked")).to_have_text("dropped")
     editor.wait_until_exact()
 
