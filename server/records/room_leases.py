@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any, cast
 
-from sqlalchemy import CursorResult, delete, select, update
+from sqlalchemy import CursorResult, and_, delete, or_, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
@@ -15,6 +15,9 @@ from worker.lease import may_run, new_owner
 
 ROOM_LEASE_S = 3.0
 """People of a room whose server's machine has died wait so long: three rounds of `server.live.rooms.keeper`."""
+
+_FORGOTTEN_S = 3600.0
+"""What a server that died has left is deleted after so long, if nobody wants it."""
 
 
 class RoomLeases:
@@ -50,8 +53,9 @@ class RoomLeases:
     def keep(self, watches: Collection[str]) -> set[str]:
         """Renew these and give up all others. Returns those of them that another server has."""
         row, own = RoomRow, RoomRow.owner == self._owner
+        given_up, is_old = and_(own, row.watch.not_in(watches)), row.heartbeat < epoch_s() - _FORGOTTEN_S
         with self._sessions.begin() as session:
-            session.execute(delete(row).where(own, row.watch.not_in(watches)))
+            session.execute(delete(row).where(or_(given_up, is_old)))
             session.execute(update(row).where(own).values(heartbeat=epoch_s()))
             kept = set(session.scalars(select(row.watch).where(own)))
         return {watch for watch in watches if watch not in kept and not self.take(watch)}

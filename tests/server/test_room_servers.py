@@ -16,12 +16,18 @@ from starlette.testclient import WebSocketDenialResponse
 
 from server.app import create_app
 from server.live.rooms.door import watch_of
-from server.records.room_leases import ROOM_LEASE_S
 from server.records.tables import RoomRow
 from server.settings import Settings
 
 ROOM, WATCH = "?room=together", f"?watch={watch_of('together')}"
 RESTART = 1012
+LEASE_S = 600.0  # rounds are made by tests, however long those take
+
+
+@pytest.fixture(autouse=True)
+def _no_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.live.rooms.keeper.EVERY_S", LEASE_S)
+    monkeypatch.setattr("server.records.room_leases.ROOM_LEASE_S", LEASE_S)
 
 
 @pytest.fixture
@@ -63,7 +69,7 @@ def created(session: Session) -> bool:
 def expire(server: TestClient) -> None:
     """The database has not heard of who has rooms for too long."""
     with services(server).bakes.ledger.sessions.begin() as session:
-        session.execute(update(RoomRow).values(heartbeat=RoomRow.heartbeat - 2 * ROOM_LEASE_S))
+        session.execute(update(RoomRow).values(heartbeat=RoomRow.heartbeat - 2 * LEASE_S))
 
 
 def rooms(server: TestClient) -> list[str]:

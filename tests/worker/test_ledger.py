@@ -13,7 +13,7 @@ from sqlalchemy import text
 
 from relume.bake import Recipe, Task
 from relume.errors import NotFoundError
-from server.records.room_leases import ROOM_LEASE_S, RoomLeases
+from server.records.room_leases import RoomLeases
 from worker import lease
 from worker.database import open_database
 from worker.ledger import Ledger
@@ -167,6 +167,12 @@ def test_open_files_are_bounded_by_the_most_connections_at_once(tmp_path: Path) 
     assert counts[1] <= counts[0] + 10
 
 
+@pytest.fixture
+def _long_leases(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.records.room_leases.ROOM_LEASE_S", 600.0)
+
+
+@pytest.mark.usefixtures("_long_leases")
 def test_a_room_is_of_one_server_until_that_gives_it_up_or_is_dead(ledger: Ledger) -> None:
     first, second = RoomLeases(ledger.sessions), RoomLeases(ledger.sessions)
     assert first.take("a")
@@ -177,14 +183,20 @@ def test_a_room_is_of_one_server_until_that_gives_it_up_or_is_dead(ledger: Ledge
     assert first.keep({"b"}) == set()
     assert [second.take(each) for each in "abc"] == [True, False, True]
     with ledger.sessions.begin() as session:
-        session.execute(text("UPDATE rooms SET heartbeat = heartbeat - :s"), {"s": 2 * ROOM_LEASE_S})
+        session.execute(text("UPDATE rooms SET heartbeat = heartbeat - 700"))
     assert second.take("b")
     assert first.keep({"b"}) == {"b"}
     assert second.keep(()) == set()
     assert first.keep({"b"}) == set()
     assert not second.take("b")
+    with ledger.sessions.begin() as session:
+        session.execute(text("UPDATE rooms SET heartbeat = heartbeat - 86400"))
+    second.keep(())
+    with ledger.sessions.begin() as session:
+        assert session.scalar(text("SELECT count(*) FROM rooms")) == 0
 
 
+@pytest.mark.usefixtures("_long_leases")
 def test_of_many_servers_that_open_a_room_one_has_it(ledger: Ledger) -> None:
     servers = [RoomLeases(ledger.sessions) for _ in range(4)]
     with ThreadPoolExecutor(4) as threads:
