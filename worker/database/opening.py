@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from worker.database.postgresql import TLS_MODES, connect_postgresql
 from worker.database.upgrading import upgrade
 
 BUSY_TIMEOUT_MS = 30_000
+_AGAIN_S = 0.01
 POOL_TIMEOUT_S = 10.0
 MAX_WAITING = 30  # connections beside the five that are kept: threads of the server that may ask at once
 
@@ -71,10 +74,21 @@ def _parse(url: str) -> URL:
 
 def _set_up_sqlite(connection: Any, _: object) -> None:
     """Write-ahead log: readers never wait for a writer. Writers wait for each other instead of failing."""
-    for pragma in (
-        f"busy_timeout = {BUSY_TIMEOUT_MS}",
-        "journal_mode = WAL",
-        "synchronous = NORMAL",
-        "foreign_keys = ON",
-    ):
+    connection.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
+    _begin_log(connection)
+    for pragma in ("synchronous = NORMAL", "foreign_keys = ON"):
         connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin_log(connection: Any) -> None:
+    """Switch a file that has none to a write-ahead log; SQLite itself does not wait where two begin it at once."""
+    until = time.monotonic() + BUSY_TIMEOUT_MS / 1e3
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until:
+                raise
+            time.sleep(_AGAIN_S)
+        else:
+            return
