@@ -19,6 +19,7 @@ from relume.look import Look, complete, validate
 from relume.memory import Memory
 from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.moving.fine_job import FineJob
 from relume.moving.look_up import look as look_around
 from relume.moving.picture import MovingPicture
 from relume.picture.picture import Picture
@@ -62,8 +63,8 @@ def follow(picture: MovingPicture) -> None:
 
 
 def rest(picture: MovingPicture | Picture) -> None:
-    """What follows when a hand rests: all its light is found."""
-    while (job := picture.next_job()) is not None:
+    """What follows when a hand rests: all its light is found; not the finer frame, which is no matter of light."""
+    while (job := picture.next_job()) is not None and not isinstance(job, FineJob):
         _make(picture, job)
 
 
