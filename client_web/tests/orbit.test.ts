@@ -159,7 +159,7 @@ describe("cameras that are kept", () => {
     expect(calls.splice(0)).toEqual(["PUT A"]);
     await expect(keepAs("s", "B", frame, "A")).rejects.toThrow("There is a camera “B” already");
     expect(calls.splice(0)).toEqual(["GET cameras"]);
-    await expect(keepAs("s", "Own", frame, "A")).rejects.toThrow("a camera of the scene itself");
+    await expect(keepAs("s", "Own", frame, "A")).rejects.toThrow("the scene’s own cameras");
     expect(calls.splice(0)).toEqual(["GET cameras"]);
     await expect(keepAs("s", "a/b", frame, "A")).rejects.toThrow("no slashes");
     expect(calls.splice(0)).toEqual([]);

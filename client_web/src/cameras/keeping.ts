@@ -14,7 +14,7 @@ export async function keepAs(scene: string, name: string, frame: Frame, was: str
     throw new Error(
       other.is_placed
         ? `There is a camera “${name}” already. Choose another name.`
-        : `“${name}” is a camera of the scene itself, which stays as it is. Choose another name.`,
+        : `“${name}” is one of the scene’s own cameras, which stay as they are. Choose another name.`,
     );
   }
   await keepCamera(scene, name, frame);

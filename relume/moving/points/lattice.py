@@ -37,6 +37,7 @@ _COARSER = 1.25
 _WIDEST = 16.0  # spacing, beside the longest edge: then all that may be shared is
 NODES_A_POINT = 8  # more where faces are thin
 _ENDS: tuple[tuple[Literal["left", "right"], int], ...] = (("left", 0), ("right", 1))  # of equals in order
+_NARROW = 8.0  # times as long as wide
 _CLOSE_ENOUGH = 0.05  # of the number of points asked for
 
 
@@ -76,7 +77,7 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Densit
     if total <= 0:
         raise PlanError("no surface of the scene has any area; there is nothing to put points on")
     least, most_apart = density.of_faces()
-    across = across_longest(geometry)
+    across = other_halves(geometry)
     least, most_apart = np.minimum(least, least[across]), np.maximum(most_apart, most_apart[across])
     longest, count = edges.max(axis=1) / 2.0**least, is_open.sum(axis=1)
     spacing, most = math.sqrt(total / num_points), most_nodes(len(geometry.faces), num_points)
@@ -115,21 +116,24 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Densit
     return Placed(lattice._replace(node=vertex), vertices, kept, nodes.material[chosen], spacing)
 
 
-def across_longest(geometry: Geometry) -> NDArray[np.intp]:
-    """Find the face on the other side of each one's longest edge; where there is none, the face itself. (faces,)
+def other_halves(geometry: Geometry) -> NDArray[np.intp]:
+    """Find the other half of the strip that each narrow face is of; else, and of all others, the face itself.
 
     Both halves of a long narrow strip lie in the same place and shall have grids alike: where one knew a shadow that
-    the other had no nodes for, strips beside each other looked like a net.
+    the other had no nodes for, strips beside each other looked like a net. (faces,)
     """
     place = _places_of(geometry)[geometry.faces].astype(np.int64)
     ends = np.sort(np.stack([place, np.roll(place, -1, axis=1)]), axis=0)
     edge = ends[0] * (int(place.max()) + 1) + ends[1]
     corners = geometry.positions[geometry.faces]
-    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).argmax(axis=1)
-    wanted, every = np.take_along_axis(edge, longest[:, None], axis=1)[:, 0], edge.ravel()
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    longest, every = lengths.argmax(axis=1), edge.ravel()
+    wanted = np.take_along_axis(edge, longest[:, None], axis=1)[:, 0]
     order = np.argsort(every, kind="stable")
     first, last = (order[np.searchsorted(every, wanted, side, order) - less] // 3 for side, less in _ENDS)
-    return np.asarray(np.where(first == np.arange(len(place)), last, first))
+    itself = np.arange(len(place))
+    is_narrow = lengths.max(axis=1) ** 2 > _NARROW * 2 * geometry.face_areas
+    return np.asarray(np.where(is_narrow, np.where(first == itself, last, first), itself))
 
 
 def pieces_of(geometry: Geometry) -> NDArray[np.int32]:
