@@ -13,13 +13,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from PIL import Image
 
 from relume.brdf.channels import is_image
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.errors import ParameterError
-from relume.images.reading import MAX_SIDE
+from relume.images.reading import held
 from relume.images.shelf import MadeOf, made_of, texture_of
 from relume.scene.coding import F32, F64, SRGB_TO_LINEAR, U8
 from relume.scene.coding import made_of as coded
@@ -148,8 +147,7 @@ def _bytes_of(texture: Texture) -> tuple[U8, F64]:
         pixels = coded(lambda rows: values[rows].astype(np.float32), values.shape[:2], scale, texture.wrap).pixels
     else:
         scale = np.array(texture.coding.scale)
-    if max(pixels.shape[:2]) > MAX_SIDE:
-        pixels = np.asarray(Image.fromarray(pixels).reduce(-(-max(pixels.shape[:2]) // MAX_SIDE)))
+    pixels = held(pixels)
     opaque = np.full((*pixels.shape[:2], 1), 255, np.uint8)
     return np.concatenate([pixels, opaque], axis=-1), scale
 

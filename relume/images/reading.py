@@ -37,20 +37,21 @@ def read_image(path: Path, name: str) -> tuple[Texture, tuple[Remark, ...]]:
     if data.startswith(EXR_MAGIC):
         return _of_exr(data, what)
     pixels = Decoder().decode(data, what)
-    kept, said = _held(pixels[..., :3], what)
+    kept, said = held(pixels[..., :3]), tuple[Remark, ...]()
+    if kept.shape != pixels[..., :3].shape:
+        sizes = [f"{of.shape[1]}×{of.shape[0]}" for of in (pixels, kept)]
+        said = (simplified(f"{what} is {sizes[0]}; it is kept as {sizes[1]}, each texel the mean of its own"),)
     if pixels[..., 3].min() < 255:
         said = (*said, simplified(f"{what} is transparent somewhere; its colours are taken as they are there"))
     return Texture(np.ascontiguousarray(kept), coding=Coding("srgb")), said
 
 
-def _held(texels: NDArray[np.uint8], what: str) -> tuple[NDArray[np.uint8], tuple[Remark, ...]]:
-    """Hold texels to `MAX_SIDE`, each the mean of its own; at most two by two of them, since no larger file is read."""
-    height, width = texels.shape[:2]
-    if max(width, height) <= MAX_SIDE:
-        return texels, ()
-    kept = np.asarray(Image.fromarray(texels).reduce(-(-max(width, height) // MAX_SIDE)))
-    size = f"{kept.shape[1]}×{kept.shape[0]}"
-    return kept, (simplified(f"{what} is {width}×{height}; it is kept as {size}, each texel the mean of its own"),)
+def held(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Hold an image to `MAX_SIDE`, each texel the mean of its own. texels: (height, width, channels)"""
+    most = max(texels.shape[:2])
+    if most <= MAX_SIDE:
+        return texels
+    return np.asarray(Image.fromarray(texels).reduce(-(-most // MAX_SIDE)))
 
 
 def _check_size(what: str, width: int, height: int) -> None:

@@ -55,6 +55,12 @@ class Geometry:
         a, b, c = self.positions[self.faces].astype(np.float64).transpose(1, 0, 2)
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Numbers of the vertices' places: those in the same place have one. (num_vertices,)"""
+        as_bytes = np.ascontiguousarray(self.positions, np.float32).view("V12").ravel()
+        return np.asarray(np.unique(as_bytes, return_inverse=True)[1])
+
     def is_front(self, eye: F32, points: F32) -> NDArray[np.bool_]:
         """Tell which points on surfaces (n, 3) are seen from places, (3,) or (n, 3), on their outer side."""
         return is_front(self.embree, self.positions, self.faces, eye, points)

@@ -70,14 +70,14 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Densit
         PlanError: no surface has any area.
     """
     corners = geometry.positions[geometry.faces].astype(np.float64)
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     area = geometry.face_areas
     is_open = is_open & (area > 0)[:, None]
     total = float((is_open * area[:, None]).sum())
     if total <= 0:
         raise PlanError("no surface of the scene has any area; there is nothing to put points on")
     least, most_apart = density.of_faces()
-    across = other_halves(geometry)
+    across = other_halves(geometry, edges)
     least, most_apart = np.minimum(least, least[across]), np.maximum(most_apart, most_apart[across])
     longest, count = edges.max(axis=1) / 2.0**least, is_open.sum(axis=1)
     spacing, most = math.sqrt(total / num_points), most_nodes(len(geometry.faces), num_points)
@@ -116,40 +116,37 @@ def place_points(geometry: Geometry, is_open: NDArray[np.bool_], density: Densit
     return Placed(lattice._replace(node=vertex), vertices, kept, nodes.material[chosen], spacing)
 
 
-def other_halves(geometry: Geometry) -> NDArray[np.intp]:
+def other_halves(geometry: Geometry, edges: F64) -> NDArray[np.intp]:
     """Find the other half of the strip that each narrow face is of; else, and of all others, the face itself.
 
     Both halves of a long narrow strip lie in the same place and shall have grids alike: where one knew a shadow that
-    the other had no nodes for, strips beside each other looked like a net. (faces,)
+    the other had no nodes for, strips beside each other looked like a net.
+
+    Args:
+        edges: how long each is that begins at a face's corners. (faces, 3)
+    Returns:
+        (faces,)
     """
-    place = _places_of(geometry)[geometry.faces].astype(np.int64)
+    place = geometry.places[geometry.faces].astype(np.int64)
     ends = np.sort(np.stack([place, np.roll(place, -1, axis=1)]), axis=0)
     edge = ends[0] * (int(place.max()) + 1) + ends[1]
-    corners = geometry.positions[geometry.faces]
-    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    longest, every = lengths.argmax(axis=1), edge.ravel()
+    longest, every = edges.argmax(axis=1), edge.ravel()
     wanted = np.take_along_axis(edge, longest[:, None], axis=1)[:, 0]
     order = np.argsort(every, kind="stable")
     first, last = (order[np.searchsorted(every, wanted, side, order) - less] // 3 for side, less in _ENDS)
     itself = np.arange(len(place))
-    is_narrow = lengths.max(axis=1) ** 2 > _NARROW * 2 * geometry.face_areas
+    is_narrow = edges.max(axis=1) ** 2 > _NARROW * 2 * geometry.face_areas
     return np.asarray(np.where(is_narrow, np.where(first == itself, last, first), itself))
 
 
 def pieces_of(geometry: Geometry) -> NDArray[np.int32]:
     """Find which faces hang together by corners in the same place. (faces,) int32"""
-    place = _places_of(geometry)
+    place = geometry.places
     a, b, c = place[geometry.faces].T
     pairs = np.concatenate([a, b]), np.concatenate([b, c])
     num = int(place.max()) + 1
     _, piece = connected_components(coo_array((np.ones(len(pairs[0]), np.bool_), pairs), (num, num)), directed=False)
     return np.asarray(piece[a], np.int32)
-
-
-def _places_of(geometry: Geometry) -> NDArray[np.intp]:
-    """Number vertices so that those in the same place have one number. (vertices,)"""
-    as_bytes = np.ascontiguousarray(geometry.positions, np.float32).view("V12").ravel()
-    return np.asarray(np.unique(as_bytes, return_inverse=True)[1])
 
 
 def most_nodes(num_faces: int, num_points: int) -> int:
