@@ -65,6 +65,37 @@ def find_scene(ledger: Ledger, name: str) -> SceneRecord:
     raise NotFoundError(f"there is no scene {name[:80]!r}; known are: {known}; relume import adds one")
 
 
+def find_shown(
+    service: BakeService, name: str, view: str | None, *, moves: bool = False
+) -> tuple[SceneRecord, BakeStatus, str]:
+    """What a bake's id, the start of one, or a scene's name stands for: the scene, a finished bake of it, and the view.
+
+    Args:
+        service: where to look. name: of the bake, or of a scene: then the finest one. view, moves: as of `find_bake`.
+    Raises:
+        NotFoundError: there is none, it is not finished, or it does not have the view.
+    """
+    called = [bake for bake in service.bakes() if len(name) >= 8 and bake.id.startswith(name)]
+    if len(called) != 1:
+        scene = find_scene(service.ledger, name)
+        return scene, *find_bake(service, scene, view, moves=moves)
+    bake = called[0]
+    _check_shown(bake, view, moves)
+    return find_scene(service.ledger, bake.scene), bake, view or bake.recipe.views[0]
+
+
+def _check_shown(bake: BakeStatus, view: str | None, moves: bool) -> None:
+    """Raise NotFoundError where a bake that was asked for by its id is not finished, or lacks what is to be shown."""
+    from worker.status import MOVING
+
+    if bake.state != "ready":
+        raise NotFoundError(f"bake {bake.id} is {bake.state}, not ready; go on with it: relume bake {bake.scene}")
+    if view is not None and view not in bake.recipe.views:
+        raise NotFoundError(f"bake {bake.id} has no view {view[:80]!r}; its views are {', '.join(bake.recipe.views)}")
+    if moves and bake.recipe.method not in MOVING:
+        raise NotFoundError(f"bake {bake.id} is of fixed views; run: relume bake {bake.scene} --method surface")
+
+
 def find_bake(
     service: BakeService, scene: SceneRecord, view: str | None, *, moves: bool = False
 ) -> tuple[BakeStatus, str]:

@@ -18,6 +18,10 @@ Data = Annotated[
     Path | None, typer.Option("--data", metavar="DIR", help="Data folder. [default: RELUME_DATA or user data]")
 ]
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Id of a scene, the start of one, or its name.")]
+BakeName = Annotated[
+    str,
+    typer.Argument(metavar="BAKE", help="Id of a bake, the start of one, or a scene, of which the finest is meant."),
+]
 View = Annotated[str | None, typer.Option("--view", metavar="NAME", help="View; the first one where not given.")]
 Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Width and height in pixels.")]
 LookFile = Annotated[

@@ -1,4 +1,4 @@
-"""`relume render`: one exact frame without a server."""
+"""`relume render`: exact frames of a bake without a server."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cli.options import Data, LookFile, SceneName, View, read_look
+from cli.options import BakeName, Data, LookFile, View, read_look
 
 if TYPE_CHECKING:
     from relume.exr.layers import Layering
@@ -17,7 +17,7 @@ Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp|DIR", help="W
 
 
 def render(
-    scene: SceneName,
+    bake: BakeName,
     output: Output,
     look: LookFile = None,
     view: View = None,
@@ -42,8 +42,8 @@ def render(
     quick: Annotated[bool, typer.Option("--quick", help="Moving bakes: as it looks while the eye moves.")] = False,
     data: Data = None,
 ) -> None:
-    """Render one exact frame of a baked scene, or a turntable."""
-    from cli.data_folder import complete_look, find_bake, find_scene, open_bakes, open_settings
+    """Render one exact frame of a bake, or a turntable."""
+    from cli.data_folder import complete_look, find_shown, open_bakes, open_settings
     from cli.picture import check_output, check_shown, save, save_exr
     from cli.turntable import check_frames, render_turntable
     from relume.errors import ParameterError
@@ -70,14 +70,14 @@ def render(
     partial = read_look(look)
     service = open_bakes(open_settings(data))
     try:
-        record = find_scene(service.ledger, scene)
-        bake, view_name = find_bake(service, record, view, moves=turntable is not None and turns != "environment")
-        transfer = open_kept(service.store_path(bake.id), lambda store: open_bake(store, Memory(4 << 30)))
-        if not bake.is_current:
-            typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene}", err=True)
+        is_moved = turntable is not None and turns != "environment"
+        scene, shown, view_name = find_shown(service, bake, view, moves=is_moved)
+        transfer = open_kept(service.store_path(shown.id), lambda store: open_bake(store, Memory(4 << 30)))
+        if not shown.is_current:
+            typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene.id}", err=True)
         stills = None
         if isinstance(transfer, MovingViews) and not quick:
-            stills = Stills(transfer.lit, scene_of(service.data_dir, record.id))
+            stills = Stills(transfer.lit, scene_of(service.data_dir, scene.id))
         if isinstance(transfer, MovingViews) and quick:
             typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
         document = complete_look(partial, transfer.default_look)
@@ -86,9 +86,9 @@ def render(
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
         if turntable is not None:
             way = Turntable(turntable=turntable, turns=turns)
-            render_turntable(transfer, view_name, Animation(bake=bake.id, looks=[partial], path=way), output, stills)
+            render_turntable(transfer, view_name, Animation(bake=shown.id, looks=[partial], path=way), output, stills)
         elif is_exr:
-            origin = Origin(record.id, record.name, bake.id)
+            origin = Origin(scene.id, scene.name, shown.id)
             precision: Literal["half", "float"] = "float" if full_float else "half"
             save_exr(output, transfer, view_name, document, origin, layering, precision, stills, color_space)
         else:

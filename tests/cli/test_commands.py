@@ -178,6 +178,22 @@ def test_render_writes_the_picture_that_the_light_says(data: Path, tmp_path: Pat
     np.testing.assert_allclose(pixels[12, 16, :3], [0.5, 0.25, 1.0], rtol=0.02)
 
 
+def test_render_takes_a_bake_by_its_id(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for size in ("32x24", "16x16"):
+        assert main(["bake", "quad", "--view", "front", "--size", size, "--lights", "10"]) == 0
+    fine, coarse = capsys.readouterr().out.split()
+    for name, width in ((coarse, 16), (coarse[:12], 16), (fine, 32), ("quad", 32)):
+        assert main(["render", name, "--output", str(tmp_path / "x.png")]) == 0
+        assert Image.open(tmp_path / "x.png").width == width
+    for more, words in (
+        ([coarse, "--view", "top"], "its views are front"),
+        ([coarse, "--turntable", "2"], "--method surface"),
+        (["0123456789ab"], "no scene"),
+    ):
+        assert main(["render", *more, "--output", str(tmp_path / "y")]) == 1
+        assert words in capsys.readouterr().err
+
+
 def test_render_writes_layers_and_says_what_cannot_have_them(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
