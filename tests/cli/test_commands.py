@@ -185,12 +185,12 @@ def test_render_takes_a_bake_by_its_id(data: Path, tmp_path: Path, capsys: pytes
     for name, width in ((coarse, 16), (coarse[:12], 16), (fine, 32), ("quad", 32)):
         assert main(["render", name, "--output", str(tmp_path / "x.png")]) == 0
         assert Image.open(tmp_path / "x.png").width == width
-    for more, words in (
-        ([coarse, "--view", "top"], "its views are front"),
-        ([coarse, "--turntable", "2"], "--method surface"),
-        (["0123456789ab"], "no scene"),
+    for more, output, words in (
+        ([coarse, "--view", "top"], "y.png", "its views are front"),
+        ([coarse, "--turntable", "2"], "round", "--method surface"),
+        (["0123456789ab"], "y.png", "no scene"),
     ):
-        assert main(["render", *more, "--output", str(tmp_path / "y")]) == 1
+        assert main(["render", *more, "--output", str(tmp_path / output)]) == 1
         assert words in capsys.readouterr().err
 
 
