@@ -184,7 +184,7 @@ def test_render_takes_a_bake_by_its_id(data: Path, tmp_path: Path, capsys: pytes
     fine, coarse = capsys.readouterr().out.split()
     for name, width in ((coarse, 16), (coarse[:12], 16), (fine, 32), ("quad", 32)):
         assert main(["render", name, "--output", str(tmp_path / "x.png")]) == 0
-        assert Image.open(tmp_path / "x.png").width == width
+        assert np.asarray(Image.open(tmp_path / "x.png")).shape[1] == width
     for more, output, words in (
         ([coarse, "--view", "top"], "y.png", "its views are front"),
         ([coarse, "--turntable", "2"], "round", "--method surface"),
