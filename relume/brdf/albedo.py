@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.zernike import SENT_DEGREE, in_basis, ladder
-from relume.brdf.channels import TEXTURES, Images, group_of, images_of
+from relume.brdf.channels import TEXTURES, Images, NormalMap, group_of, images_of
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.mirror import mirrored_share
 from relume.brdf.quadrature import Quadrature
@@ -54,20 +54,20 @@ def is_diffuse(term_document: Mapping[str, Any]) -> bool:
     return TERMS[term_document["model"]].scatters_evenly
 
 
-def reflectances_of(terms: Sequence[Mapping[str, Any]]) -> bytes:
+def reflectances_of(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None = None) -> bytes:
     """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`; the
-    images that its look names in their place; its mirrors; and what few functions do not tell of it.
+    images that its look names in their place; its mirrors; what few functions do not tell of it; and how it leans.
 
     Args:
-        terms: of a complete look.
+        terms: of a complete look. normals: the image that it names in the place of the material's normal map.
     Returns:
-        What `shares_in`, `images_in`, `mirrors_in` and `lobes_in` read.
+        What `shares_in`, `images_in`, `mirrors_in`, `lobes_in` and `normals_in` read.
     """
-    return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True))
+    return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True), normals)
 
 
 @lru_cache(maxsize=256)
-def _reflectances(terms_text: str) -> bytes:
+def _reflectances(terms_text: str, normals: NormalMap | None) -> bytes:
     total = np.zeros((1 + len(TEXTURES), 3, len(PAIRS)))
     terms = json.loads(terms_text)
     highlights = [term for term in terms if not is_diffuse(term)]
@@ -78,8 +78,13 @@ def _reflectances(terms_text: str) -> bytes:
         total[group_of(term)] += shares_in_steps(term)
     named = [name or "" for name in images_of(terms)]
     mirrors = [_in_relative_steps(term) for term in highlights if mirrored_share(term).any()]
-    beside = [*named, json.dumps([mirrors, lobes], sort_keys=True)] if mirrors or lobes else named
-    return total.astype(np.float32).tobytes() + " ".join(beside).encode()
+    return total.astype(np.float32).tobytes() + _text(named, mirrors, lobes, list(normals or ()))
+
+
+def _text(*parts: Sequence[Any]) -> bytes:
+    """What is known beside numbers: names of images, then all else, where there is anything."""
+    named, *beside = parts
+    return " ".join([*named, json.dumps(beside, sort_keys=True)] if any(beside) else named).encode()
 
 
 def shares_in_steps(term: Mapping[str, Any]) -> F64:
@@ -132,24 +137,38 @@ def shares_in(of_material: bytes) -> F32:
 
 def images_in(of_material: bytes) -> Images:
     """What a look names in the place of each of a material's `TEXTURES`. of_material: from `reflectances_of`"""
-    diffuse, specular, *_ = of_material[_SHARE_BYTES:].decode().split(" ", 2)
+    (diffuse, specular), *_ = _parts(of_material)
     return diffuse or None, specular or None
 
 
 def mirrors_in(of_material: bytes) -> list[dict[str, Any]]:
-    """The terms of a material that are mirrors, in part at least. of_material: from `reflectances_of`"""
-    return _beside(of_material)[0]
+    """The terms of a material that are mirrors, in part at least, and flat. of_material: from `reflectances_of`"""
+    _, mirrors, _, normals = _parts(of_material)
+    return [] if normals else mirrors
 
 
 def lobes_in(of_material: bytes) -> list[dict[str, Any]]:
     """The highlights of a material that few functions do not tell; see `sharp_lobes`. of_material: likewise"""
-    return _beside(of_material)[1]
+    return _parts(of_material)[2]
 
 
-def _beside(of_material: bytes) -> list[list[dict[str, Any]]]:
-    _, _, *beside = of_material[_SHARE_BYTES:].decode().split(" ", 2)
-    found: list[list[dict[str, Any]]] = json.loads(beside[0]) if beside else [[], []]
-    return found
+def normals_in(of_material: bytes) -> NormalMap | None:
+    """What a look names in the place of a material's normal map. of_material: likewise"""
+    found = _parts(of_material)[3]
+    return NormalMap(*found) if found else None
+
+
+def without_normals(of_material: bytes) -> bytes:
+    """The same of a material that leans as it was baked. of_material: likewise"""
+    named, mirrors, lobes, normals = _parts(of_material)
+    return of_material[:_SHARE_BYTES] + _text(named, mirrors, lobes, []) if normals else of_material
+
+
+def _parts(of_material: bytes) -> tuple[list[str], list[dict[str, Any]], list[dict[str, Any]], list[Any]]:
+    """What `_text` wrote."""
+    diffuse, specular, *beside = of_material[_SHARE_BYTES:].decode().split(" ", 2)
+    mirrors, lobes, normals = json.loads(beside[0]) if beside else ([], [], [])
+    return [diffuse, specular], mirrors, lobes, normals
 
 
 def reflectance(term_document: Mapping[str, Any]) -> F64:

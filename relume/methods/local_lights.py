@@ -14,11 +14,10 @@ from relume.light.local import LocalLight, Triangles, make_local, shadow_geometr
 from relume.light.strata import Strata
 from relume.look import LightGeometry
 from relume.memory import Memory
-from relume.methods.store_io import has_holes, read_gather_samples, read_holes
+from relume.methods.store_io import has_holes, read_holes
 from relume.picture.light import Light, Source
 from relume.points import Points
 from relume.project.receivers import LocalRays
-from relume.trace.cells import POINTS_A_CELL
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import is_front, off_surface
 from relume.trace.local_shadows import arriving, trace_local
@@ -26,9 +25,9 @@ from relume.trace.preview_light import PreviewLight, preview_light
 
 F32 = NDArray[np.float32]
 
-SAMPLES, SAMPLES_OF_CELLS = 64, 16  # of a rectangle: for each view sample, for each point of a cell
+SAMPLES = 64  # of a rectangle, for each view sample
 FINER_OF_FEW, FEW = 4, 4  # times as many of a mesh, where no more materials of the scene shine
-PREVIEW_SAMPLES = 4  # for each of both while a hand moves it
+PREVIEW_SAMPLES = 4  # while a hand moves it
 _ONES = np.ones(3, np.float32)
 
 
@@ -105,21 +104,21 @@ class LocalLights:
         found = []
         for geometry, gain in light.local:
             num, shadow = SAMPLES if is_coarse else self.samples_of(geometry), shadow_geometry(geometry)
-            seen = self._trace(shadow, points, num) if shadows_of is None else shadows_of(shadow, points).visible
-            found.append(LocalRays(*self._sampled(geometry, num), np.array(gain, np.float32), seen))
+            seen = self.trace(shadow, points, num) if shadows_of is None else shadows_of(shadow, points).visible
+            found.append(LocalRays(*self.sampled(geometry, num), np.array(gain, np.float32), seen))
         return found
 
     def preview(self, geometry: LightGeometry, points: Points) -> PreviewLight:
         """Preview what points get of a light of unit emission, by few samples of it where it has an extent."""
-        return preview_light(self.embree, self._off_surface, *self._sampled(geometry, PREVIEW_SAMPLES), points)
+        return preview_light(self.embree, self._off_surface, *self.sampled(geometry, PREVIEW_SAMPLES), points)
 
     def preview_rays(self, source: Source, seen: NDArray[np.uint8]) -> LocalRays:
         """Make rays of a previewed light, for terms that ask where light comes from. seen: `PreviewLight.visible`"""
-        return LocalRays(*self._sampled(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), seen)
+        return LocalRays(*self.sampled(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), seen)
 
     def unhidden_rays(self, geometry: LightGeometry, points: Points) -> LocalRays:
         """What would come to points from a light of unit emission if nothing were in its way, as rays."""
-        light, strata = self._sampled(geometry, SAMPLES)
+        light, strata = self.sampled(geometry, SAMPLES)
         seen = np.full((points.num_points, -(-len(strata.uv) // 8)), 255, np.uint8)
         return LocalRays(light, strata, _ONES, seen)
 
@@ -130,53 +129,7 @@ class LocalLights:
 
     def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
         """What points see of a light."""
-        return Shadows(self._trace(geometry, points, self.samples_of(geometry)))
-
-    @cached_property
-    def _gather_samples(self) -> Points:
-        return read_gather_samples(self._store)
-
-    @cached_property
-    def _few_gather_samples(self) -> Points:
-        """One of the points of each cell."""
-        return self._gather_samples.rows(slice(None, None, POINTS_A_CELL))
-
-    def irradiance(self, geometry: LightGeometry) -> F32:
-        """What comes to every gather cell from a light of unit emission, the mean over its points. (C,) float32"""
-        return self._memory.keep((self._key, "light on cells", geometry), lambda: self._irradiance(geometry))
-
-    def _irradiance(self, geometry: LightGeometry) -> F32:
-        points, sampled = self._gather_samples, self._sampled_at_cells(geometry)
-        of_points = arriving(*sampled, points, self._seen_by_cells(geometry))
-        return np.asarray(of_points.reshape(-1, POINTS_A_CELL).mean(axis=1, dtype=np.float64), np.float32)
-
-    def _seen_by_cells(self, geometry: LightGeometry) -> NDArray[np.uint8]:
-        def traced() -> NDArray[np.uint8]:
-            return self._trace(geometry, self._gather_samples, self.samples_of(geometry, SAMPLES_OF_CELLS))
-
-        return self._memory.keep((self._key, "shadows on cells", shadow_geometry(geometry)), traced)
-
-    def rays_at_cells(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
-        """What comes to the points of some gather cells from a light of unit emission, as rays.
-
-        Args:
-            geometry: of the light. rows: the cells. (G,)
-        """
-        seen = self._seen_by_cells(geometry)
-        bits = seen.reshape(-1, POINTS_A_CELL, seen.shape[1])[rows].reshape(-1, seen.shape[1])
-        return LocalRays(*self._sampled_at_cells(geometry), _ONES, bits)
-
-    def preview_irradiance(self, geometry: LightGeometry) -> F32:
-        """Preview what comes to every gather cell from a light of unit emission, at one of its points. (C,) float32"""
-        return self._preview_on_cells(geometry).arriving
-
-    def preview_rays_at_cells(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
-        """The same of some cells as rays, at the first of their points. rows: the cells. (G,)"""
-        return self.preview_rays(Source(geometry, (1.0, 1.0, 1.0)), self._preview_on_cells(geometry).visible[rows])
-
-    def _preview_on_cells(self, geometry: LightGeometry) -> PreviewLight:
-        key = self._key, "preview light on cells", geometry
-        return self._memory.passing.keep(key, lambda: self.preview(geometry, self._few_gather_samples))
+        return Shadows(self.trace(geometry, points, self.samples_of(geometry)))
 
     def shines_at(self, material: int, eye: F32, position: F32) -> NDArray[np.bool_]:
         """Whether points of a material that shines are seen from a side that does.
@@ -189,13 +142,17 @@ class LocalLights:
             return np.ones(len(position), np.bool_)
         return is_front(self.embree, self.positions, self.faces, eye, position)
 
-    def _trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
-        return trace_local(self.embree, self._off_surface, *self._sampled(geometry, num_samples), points)
+    def trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
+        """Find which samples of a light points see.
 
-    def _sampled_at_cells(self, geometry: LightGeometry) -> tuple[LocalLight, Strata]:
-        return self._sampled(geometry, self.samples_of(geometry, SAMPLES_OF_CELLS))
+        Args:
+            geometry: of the light. points: that see it. num_samples: from `samples_of`.
+        Returns:
+            As in `LocalRays.visible`. (n, bytes) uint8
+        """
+        return trace_local(self.embree, self._off_surface, *self.sampled(geometry, num_samples), points)
 
-    def _sampled(self, geometry: LightGeometry, of_rectangle: int) -> tuple[LocalLight, Strata]:
+    def sampled(self, geometry: LightGeometry, of_rectangle: int) -> tuple[LocalLight, Strata]:
         """Make a light, and its samples. of_rectangle: see `strata_of`"""
         light = self._light(geometry)
         return light, strata_of(light, of_rectangle)

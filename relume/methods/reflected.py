@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.albedo import normals_in
+from relume.brdf.channels import NormalMap
 from relume.memory import Memory
 from relume.methods.cells.between import preview_between, quickly_between, sent_between
-from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.in_lobes import sent_in_lobes
 from relume.methods.cells.leaving import InLobes, Leaving
 from relume.methods.cells.reflecting import Reflecting
@@ -24,15 +25,23 @@ F32 = NDArray[np.float32]
 class Reflected:
     """Light that cells send; safe to use from several threads.
 
+    What follows a hand is of the normals that were baked: it is made of both ends of an edit alike.
+
     Args:
-        cells: that send it.
         on_cells: what comes to them from the lights themselves.
+        leaning: finds the same where images lean materials, by the image of each.
         key: of the bake in `memory`.
     """
 
-    def __init__(self, cells: CellLight, on_cells: LightOnCells, memory: Memory, key: str) -> None:
-        self.num_cells = cells.num_cells
-        self._cells, self._on_cells = cells, on_cells
+    def __init__(
+        self,
+        on_cells: LightOnCells,
+        leaning: Callable[[tuple[NormalMap | None, ...]], LightOnCells],
+        memory: Memory,
+        key: str,
+    ) -> None:
+        self._on_cells, self._leaning, self._cells = on_cells, leaning, on_cells.cells
+        self.num_cells = self._cells.num_cells
         self._memory, self._key = memory, key
 
     def under(self, light: Light) -> Sent:
@@ -45,7 +54,7 @@ class Reflected:
         between = _between_surfaces(light)
 
         def found() -> Sent:
-            return self._leaving(between).less(taken(between)).sent(self._cells)
+            return self._leaving(between).less(taken(between)).sent(self._exactly_on(between).cells)
 
         return self._memory.keep((self._key, "reflected light beside what is thrown", between), found)
 
@@ -90,7 +99,7 @@ class Reflected:
         def found() -> Leaving:
             reflecting = self._reflecting(light, self._memory.passing)
             arrived = self._on_cells.arrived(light, reflecting, is_preview=is_preview)
-            in_lobes = self._in_lobes(light, reflecting) if is_sharp else None
+            in_lobes = self._in_lobes(light, reflecting, self._on_cells) if is_sharp else None
             return quickly_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
 
         key = self._key, "reflected light, quickly", light, is_preview, is_sharp
@@ -99,18 +108,24 @@ class Reflected:
     def _sent(self, light: Light) -> Sent:
         if not light.paths.reflect:
             return evenly(np.zeros((NO_CELL + 1, 3), np.float32))
-        return self._leaving(light).sent(self._cells)
+        return self._leaving(light).sent(self._exactly_on(light).cells)
+
+    def _exactly_on(self, light: Light) -> LightOnCells:
+        """What comes to cells, which lean as the look says."""
+        normals = tuple(map(normals_in, light.reflectances))
+        return self._leaning(normals) if any(normals) else self._on_cells
 
     def _leaving(self, light: Light) -> Leaving:
-        reflecting = self._reflecting(light, self._memory)
-        arrived = self._on_cells.arrived(light, reflecting, is_preview=False)
-        in_lobes = self._in_lobes(light, reflecting)
-        return sent_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
+        reflecting, on_cells = self._reflecting(light, self._memory), self._exactly_on(light)
+        arrived = on_cells.arrived(light, reflecting, is_preview=False)
+        in_lobes = self._in_lobes(light, reflecting, on_cells)
+        return sent_between(on_cells.cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
 
-    def _in_lobes(self, light: Light, reflecting: Reflecting) -> InLobes:
+    @staticmethod
+    def _in_lobes(light: Light, reflecting: Reflecting, on_cells: LightOnCells) -> InLobes:
         """What sharp highlights send of light that comes straight to them."""
-        lobes = self._cells.lobes(light.reflectances, reflecting)
-        return lobes, sent_in_lobes(self._cells, lobes, self._on_cells.straight(light, lobes.rows))
+        lobes = on_cells.cells.lobes(light.reflectances, reflecting)
+        return lobes, sent_in_lobes(on_cells.cells, lobes, on_cells.straight(light, lobes.rows))
 
     def _preview(self, light: Light) -> F32:
         if not light.paths.reflect:

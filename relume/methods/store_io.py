@@ -70,17 +70,18 @@ def read_cells(store: StoreReader) -> CellLight:
         make_pattern(links.shape[1] // points_a_cell, 0, int(store.attributes["gather_seed"])),
         material,
         np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
-        _read_uv_of_cells(store),
+        _read_if_there(store, "cells/uv"),
+        _read_if_there(store, "cells/surface_normal"),
     )
 
 
-def _read_uv_of_cells(store: StoreReader) -> F32 | None:
-    """Where the points of cells lie in textures; None in stores that do not say so."""
+def _read_if_there(store: StoreReader, path: str) -> F32 | None:
+    """An array that stores of before do not have; None in those."""
     try:
-        store.shape("cells/uv")
+        store.shape(path)
     except StoreError:
         return None
-    return np.asarray(store.read("cells/uv"), np.float32)
+    return np.asarray(store.read(path), np.float32)
 
 
 def has_holes(store: StoreReader) -> bool:

@@ -62,7 +62,7 @@ _MORE_POINTS = 1.05  # than asked for, at most
 _POINT_BYTES = 3 * 12 + 2
 _VERTEX_BYTES = 12 + 2 * 4 * POINTS_A_VERTEX
 _MAKING_BYTES_A_NODE = 600  # while nodes are shared: their surface, their keys, and the order of these
-_CELL_BYTES = POINTS_A_CELL * (24 + 2 * RAYS_A_CELL_POINT) + 64
+_CELL_BYTES = POINTS_A_CELL * (56 + 2 * RAYS_A_CELL_POINT) + 64
 _MAKING_BYTES_A_CELL = 4000
 _RAY_NS, _TRIANGLE_US = 2000.0, 40.0  # of one core, on scenes of 200 to a million triangles
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from relume import environments
 from relume.bake import StoreReader
+from relume.brdf.channels import NormalMap
 from relume.code_version import image_code
 from relume.environments.equirect import lookup, shrunk, turned
 from relume.errors import ParameterError, StoreError
@@ -24,6 +25,7 @@ from relume.light.triangles import TriangleLights, Unturned, weigh
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.memory import Memory
 from relume.methods.cells.cell_light import CellLight
+from relume.methods.cells.leaning import leant_cells
 from relume.methods.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.methods.local_lights import LocalLights, Shadows
 from relume.methods.on_cells import LightOnCells
@@ -32,7 +34,7 @@ from relume.methods.retracing import Retracing
 from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
 from relume.methods.thrown import MoreThrown, Thrown, ThrownLight
 from relume.operators.image_files import ImageFiles
-from relume.picture.light import Light
+from relume.picture.light import Light, leaning_as_baked
 from relume.picture.transfer import Arriving, Axis, Eyes
 from relume.points import Points
 from relume.project.receivers import GatherRays, Rays, Receivers
@@ -46,6 +48,8 @@ _EDITED_BYTES = 256 << 20
 _NOTHING = evenly(np.zeros((NO_CELL + 1, 3), np.float32))
 
 F32 = NDArray[np.float32]
+Lights = Callable[[EnvironmentKey], TriangleLights]
+"""Finds the triangles of an environment."""
 
 
 @dataclass(frozen=True)
@@ -294,10 +298,11 @@ class FewSamples:
         return int(2 * few.normal.nbytes + few.tangent.nbytes + few.wo.nbytes + few.visible.nbytes + links)
 
     def arriving(self, light: Light) -> Arriving:
-        """What arrives at them in a light; the environment from a small map, local lights exactly."""
+        """What arrives at them in a light; the environment from a small map, local lights exactly, what surfaces send
+        as if they leant as they were baked: tracing how they do now takes longer than a preview."""
         transfer, reflected = self.transfer, tuple[Rays, ...]()
         if self.gathered is not None:
-            reflected = transfer.between_surfaces(light, self.gathered, self.thrown)
+            reflected = transfer.between_surfaces(leaning_as_baked(light), self.gathered, self.thrown)
         local = transfer.local.all_rays(light, self.receivers.points)
         return transfer.preview_lights_of(light), replace(self.receivers, rays=(*reflected, *local))
 
@@ -319,10 +324,19 @@ class BouncedViews(BakedViews):
     @cached_property
     def reflected(self) -> Reflected:
         """Light that gather cells send out."""
-        on_cells = LightOnCells(
-            self.cells, self.local, self.lights_in, self.preview_lights_in, self.memory, self.key, self.harmonic
-        )
-        return Reflected(self.cells, on_cells, self.memory, self.key)
+        on_cells = LightOnCells(self.cells, *self._on_cells, self.harmonic)
+        return Reflected(on_cells, self._on_leant_cells, self.memory, self.key)
+
+    def _on_leant_cells(self, normals: tuple[NormalMap | None, ...]) -> LightOnCells:
+        """The light on cells of which some lean as images say. normals: the image of each material, None for none"""
+        key = self.key, "cells that lean", normals
+        leant = self.memory.keep(key, lambda: leant_cells(self.cells, normals, self.tracer))
+        return LightOnCells(leant, *self._on_cells, leaning=(normals,))
+
+    @property
+    def _on_cells(self) -> tuple[LocalLights, Lights, Lights, Memory, str]:
+        """What light comes to cells, and where it is kept."""
+        return self.local, self.lights_in, self.preview_lights_in, self.memory, self.key
 
     @cached_property
     def thrown_light(self) -> ThrownLight | None:

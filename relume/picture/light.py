@@ -7,7 +7,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
-from relume.brdf.albedo import Reflectances, reflectances_of
+from relume.brdf.albedo import Reflectances, reflectances_of, without_normals
 from relume.look import EnvironmentKey, LightGeometry, Look, Paths
 from relume.look.model import Rgb
 
@@ -180,6 +180,12 @@ def is_same_but_for_surfaces(before: Light, after: Light) -> bool:
     return alike and before.paths.direct == after.paths.direct and bool(before.paths.reflect and after.paths.reflect)
 
 
+@lru_cache(maxsize=_MOST_KNOWN)
+def leaning_as_baked(light: Light) -> Light:
+    """The same light, where surfaces that images of normals lean send what they did as they were baked."""
+    return light._replace(reflectances=tuple(map(without_normals, light.reflectances)))
+
+
 def light_of(look: Look, material_names: Sequence[str], *, has_bounces: bool, solo: Solo = None) -> Light:
     """The light of a look.
 
@@ -197,5 +203,5 @@ def light_of(look: Look, material_names: Sequence[str], *, has_bounces: bool, so
     light = Light(look.environment.key, (), paths, local, gain)
     if not paths.reflect:
         return light
-    terms = (look.materials[name].terms for name in material_names)
-    return light._replace(reflectances=tuple(map(reflectances_of, terms)))
+    materials = (look.materials[name] for name in material_names)
+    return light._replace(reflectances=tuple(reflectances_of(of.terms, of.normals) for of in materials))

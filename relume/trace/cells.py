@@ -18,7 +18,7 @@ from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS, CellTree, grow_tree
 from relume.trace.geometry import Geometry
 from relume.trace.photons import shoot_photons
-from relume.trace.surface import any_tangent, surface_at
+from relume.trace.surface import any_tangent, surface_at, turn_between
 
 F32 = NDArray[np.float32]
 
@@ -36,7 +36,9 @@ class Cells:
         normal: shading normals there. (C, `POINTS_A_CELL`, 3) float32
         diffuse, specular: texture channels, their means over the cell's points. (C, 3) float32
         material: index into the scene's materials. (C,) uint16
-        uv: where points lie in textures, and the side of what is read about them. (C, `POINTS_A_CELL`, 3) float32
+        uv: where points lie in textures, the side of what is read about them, and how textures are turned there, as
+            `relume.trace.surface.Surface` has it. (C, `POINTS_A_CELL`, 5) float32
+        surface_normal: normals there without bumps. (C, `POINTS_A_CELL`, 3) float32
     """
 
     tree: CellTree
@@ -46,6 +48,7 @@ class Cells:
     specular: F32
     material: NDArray[np.uint16]
     uv: F32
+    surface_normal: F32
 
     @property
     def num_cells(self) -> int:
@@ -100,13 +103,16 @@ def choose_cells(
     chosen = np.array([rows[(evenly * len(rows)).astype(np.int64)] for rows in members], np.int64).reshape(-1)
     some = hits.rows(chosen)
     surface = surface_at(geometry, some, directions[chosen], scene.materials, _TEXTURE_ANGLE)
-    shape = (len(members), POINTS_A_CELL, 3)
+    points, shape = surface.points, (len(members), POINTS_A_CELL, 3)
+    uv = surface.uv.copy()
+    uv[:, 3] += turn_between(points.normal, any_tangent(points.normal), points.tangent)
     return Cells(
         tree,
-        surface.points.position.reshape(shape),
-        surface.points.normal.reshape(shape),
+        points.position.reshape(shape),
+        points.normal.reshape(shape),
         surface.diffuse.reshape(shape).mean(axis=1),
         surface.specular.reshape(shape).mean(axis=1),
         geometry.face_material[some.face].reshape(shape[:2])[:, 0].astype(np.uint16),
-        surface.uv[:, :3].reshape(shape),
+        uv.reshape(*shape[:2], uv.shape[1]),
+        surface.surface_normal.reshape(shape),
     )

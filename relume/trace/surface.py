@@ -80,6 +80,18 @@ def across(vector: F32, normal: F32) -> F32:
     return _unit(part, any_tangent(normal))
 
 
+def turn_between(normal: F32, start: F32, end: F32) -> F32:
+    """Find the angles from some vectors to others about normals, radians.
+
+    Args:
+        normal: unit. (n, 3) start, end: across these, about. (n, 3) each
+    Returns:
+        Within [−π, π]. (n,) float32
+    """
+    y, x = np.einsum("nc,nc->n", np.cross(normal, start), end), np.einsum("nc,nc->n", start, end)
+    return np.asarray(np.arctan2(y, x), np.float32)
+
+
 def surface_at(
     geometry: Geometry,
     hits: Hits,

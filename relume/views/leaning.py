@@ -1,6 +1,6 @@
-"""Normals of a baked view where an image says how they lean: what a bake finds whose scene has the image as its map.
+"""Normals of a bake where an image says how they lean: what a bake finds whose scene has the image as its map.
 
-Bakes say where samples lie in textures and how these are turned there. So the image is looked up, as wide as a pixel,
+Bakes say where points lie in textures and how these are turned there. So the image is looked up, as wide as a pixel,
 and leans the surface's own normal in the frame of its texture; docs/adr/0107-images-of-normals.md.
 """
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relume.brdf.channels import NormalMap
 from relume.errors import StoreError
 from relume.images.shelf import normals_of
-from relume.trace.surface import across, covered_length, mapped_normal, towards_viewer
+from relume.trace.surface import across, covered_length, mapped_normal, towards_viewer, turn_between
 from relume.trace.texture import MipMap, sample_image
 from relume.views.store_io import read_eyes, read_surface_normal, read_uv, towards
 from relume.views.view import View
@@ -59,15 +59,29 @@ def leant(view: View, material: int, map_: NormalMap) -> Leant:
         view.store.read(f"views/{view.index}/{name}", rows.start, rows.stop)
         for name in ("normal", "tangent", "position")
     )
-    along = on_surface(np.cos(uv[:, 3:4]) * tangent + np.sin(uv[:, 3:4]) * np.cross(normal, tangent), normal, smooth)
+    return lean(map_, uv, smooth, normal, tangent, towards(read_eyes(*where), position))
+
+
+def lean(map_: NormalMap, uv: F32, smooth: F32, normal: F32, tangent: F32, wo: F32) -> Leant:
+    """Lean the normals of points on surfaces.
+
+    Args:
+        map_: the image. uv: places in it, see `relume.trace.surface.Surface`. (n, 5) float32
+        smooth: normals of the surface without bumps. (n, 3) normal, tangent: as they were. (n, 3) each
+        wo: whence the points are seen, and normals must not lean away. (n, 3)
+    Raises:
+        NotFoundError, SceneError: the image cannot be had.
+    """
+    turn = uv[:, 3:4]
+    along = np.asarray(np.cos(turn) * tangent + np.sin(turn) * np.cross(normal, tangent), np.float32)
+    along = on_surface(along, normal, smooth)
     texture = normals_of(map_)
     mapped = sample_image(texture, uv)
     found = mapped_normal(mapped, smooth, np.column_stack([along, uv[:, 4]]), smooth)
-    found = towards_viewer(found, -towards(read_eyes(*where), position))
+    found = towards_viewer(found, -wo)
     turned = across(on_surface(tangent, normal, smooth), found)
-    turn = np.arctan2(_dot(along, np.cross(found, turned)), _dot(along, turned))
     placed = uv.copy()
-    placed[:, 3] = turn
+    placed[:, 3] = turn_between(found, turned, along)
     length = covered_length(mapped, MipMap.of(texture).texels(uv[:, 2]))
     return Leant(found, turned, placed, length, np.asarray(normal, np.float32))
 

@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 from analytic_terms import ANALYTIC
 
-from relume.brdf.albedo import directional_albedo, reflectance
+from relume.brdf.albedo import (
+    directional_albedo,
+    images_in,
+    lobes_in,
+    mirrors_in,
+    normals_in,
+    reflectance,
+    reflectances_of,
+    shares_in,
+    without_normals,
+)
+from relume.brdf.channels import NormalMap
 from relume.brdf.document import complete_term
 from relume.brdf.evaluate import eval_brdf
 
@@ -53,3 +64,20 @@ def test_terms_add_up_and_its_mean_is_the_reflectance():
 def test_a_white_furnace_takes_light_and_a_bright_lobe_makes_some():
     assert directional_albedo([term_of("ggx", roughness=0.5, f0=1.0)])[1].max() <= 1.001
     assert directional_albedo([term_of("blinn_phong", exponent=50.0)])[1].max() > 2
+
+
+@pytest.mark.parametrize("roughness", [0.03, 0.1, 0.6])  # a mirror, a sharp highlight, a broad one
+def test_what_leans_a_material_is_part_of_what_it_sends(roughness):
+    """And of a mirror that is not flat any more none is known; all else is as it was."""
+    terms = [term_of("lambert", (0.5, 0.4, 0.2)), term_of("ggx", roughness=roughness, f0=0.9)]
+    terms[0]["texture"] = "image:0123456789abcdef"
+    normals = NormalMap("image:fedcba9876543210", 1.5)
+    flat, leant = reflectances_of(terms), reflectances_of(terms, normals)
+    assert (normals_in(flat), normals_in(leant)) == (None, normals)
+    assert leant not in (flat, reflectances_of(terms, normals._replace(scale=1.4)))
+    assert without_normals(leant) == without_normals(flat) == flat
+    assert images_in(leant) == images_in(flat) == (terms[0]["texture"], None)
+    assert lobes_in(leant) == lobes_in(flat)
+    np.testing.assert_array_equal(shares_in(leant), shares_in(flat))
+    assert bool(mirrors_in(flat)) == (roughness < 0.06)
+    assert mirrors_in(leant) == []

@@ -12,7 +12,7 @@ from relume.bake import Recipe
 from relume.environments.model import Environment
 from relume.look import LightGeometry
 from relume.memory import Memory
-from relume.methods.local_lights import SAMPLES_OF_CELLS
+from relume.methods.on_cells import SAMPLES_OF_CELLS, LocalOnCells
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.scene.archive import make_scene
@@ -166,7 +166,8 @@ def test_cells_reflect_local_light(tmp_path):
     parts = shown["direct"] + shown["first_bounce"] + shown["further_bounces"]
     np.testing.assert_allclose(shown["all"], parts, rtol=1e-3, atol=1e-5)
     cells = transfer.cells
-    arriving = transfer.local.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
+    on_cells = LocalOnCells(transfer.local, cells, transfer.memory, transfer.key, ())
+    arriving = on_cells.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
     on_floor = cells.material == 0
     position = transfer.store.read("cells/position").mean(axis=1)[on_floor]
     away = np.linalg.norm(position - [0, 0.9, 0], axis=1)

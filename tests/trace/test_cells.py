@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from tiny_scenes import looking, points_at, scene_of, sphere
+from tiny_scenes import corner, looking, points_at, scene_of, sphere
 
 from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of
 from relume.scene.cornell import cornell_box
+from relume.scene.model import Coding, Material, Texture
 from relume.trace.cell_tree import NO_CELL, grow_tree, locate
 from relume.trace.cells import POINTS_A_CELL, choose_cells
 from relume.trace.geometry import merge
@@ -230,3 +233,25 @@ def test_from_a_closed_room_no_ray_escapes():
     points = points_of(cells, 400)
     links = trace_links(geometry, cells.tree, points, points.normal, make_pattern(64, 0, 1))
     assert np.mean(links.cell == NO_CELL) < 1e-4
+
+
+def test_cells_know_how_textures_lie_on_them():
+    """On a floor along whose width u grows, as far as that is across their normals; and these without bumps."""
+    slope = np.full((2, 2, 3), (200, 128, 230), np.uint8)
+    bumps = Texture(slope, coding=Coding("normal"))
+    lambert = ({"model": "lambert"},)
+    scene = corner([Material("Floor", lambert, {}, bumps), Material("Wall", lambert)])
+    tangents = np.broadcast_to(np.float32([1, 0, 0, 1]), scene.meshes[0].tangents.shape)
+    scene = replace(scene, meshes=(replace(scene.meshes[0], tangents=tangents), *scene.meshes[1:]))
+    cells = choose_cells(scene, merge(scene), ("front",), (40, 30), 100)
+    points, place = cells.gather_samples, cells.uv.reshape(-1, 5)
+    of_floor = np.repeat(cells.material == 0, POINTS_A_CELL) & (points.position[:, 1] < 1e-3)
+    chosen = np.flatnonzero(of_floor)
+    assert len(chosen) > 20
+    normal, tangent, turn = points.normal[chosen], points.tangent[chosen], place[chosen, 3:4]
+    assert np.median(normal[:, 0]) > 0.5  # they lean to where red says, but for those bent into sight
+    expected = np.array([1, 0, 0]) - normal[:, :1] * normal
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    np.testing.assert_allclose(np.cos(turn) * tangent + np.sin(turn) * np.cross(normal, tangent), expected, atol=1e-4)
+    smooth = cells.surface_normal.reshape(-1, 3)[chosen]
+    np.testing.assert_allclose(np.abs(smooth), np.broadcast_to([0, 1, 0], smooth.shape), atol=1e-6)  # of both sides

@@ -2,17 +2,9 @@
 import { pointer } from "../document/pointer";
 import { edit } from "../edit/edit";
 import type { MaterialLook } from "../protocol";
-import { axes } from "../state/bakes";
 import { LabelledSlider } from "../ui/LabelledSlider";
 import { putNormals, takeNormalsOff } from "./images";
 import { MapImage } from "./MapImage";
-
-/** What an image of normals leaves as it is in the scene, in words; null where it is all of the material. */
-function keptWords(mirrors: boolean): string | null {
-  const kept = mirrors ? ["what it mirrors"] : [];
-  if (axes.value.includes("bounces")) kept.push("the light that it sends to other surfaces");
-  return kept.length === 0 ? null : `The image bends what is seen of the surface, not ${kept.join(" or ")}.`;
-}
 
 interface Props {
   material: string;
@@ -23,7 +15,6 @@ interface Props {
 
 export function NormalImage({ material, of, mirrors }: Props) {
   const map = of.normal_map ?? null;
-  const kept = keptWords(mirrors);
   return (
     <section class="normal-image" aria-label="Normals">
       <MapImage
@@ -52,7 +43,9 @@ export function NormalImage({ material, of, mirrors }: Props) {
           onChange={(scale) => edit("Strength of bumps", pointer("materials", material, "normal_map", "scale"), scale)}
         />
       )}
-      {map !== null && kept !== null && <p class="aside">{kept}</p>}
+      {map !== null && mirrors && (
+        <p class="aside">What is seen in this mirror stays as it was baked: the image does not bend it.</p>
+      )}
     </section>
   );
 }

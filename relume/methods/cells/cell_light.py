@@ -44,8 +44,9 @@ class CellLight:
         links: of their gather rays. (C, rays) uint16. pattern: the directions of a point's.
         material: index into the scene's materials. (C,) uint16
         textures: multipliers of each of `relume.brdf.channels.TEXTURES`. (2, C, 3) float32
-        uv: where points lie in textures, and the side of what is read about them, for images that looks name; None in
-            stores that do not say so. (C, points a cell, 3) float32
+        uv: where points lie in textures, for images that looks name, see `relume.trace.cells`; None in stores that do
+            not say so. (C, points a cell, ≥ 3) float32
+        surface_normal: normals without bumps, which images of others lean; None likewise. (C, points a cell, 3) float32
     """
 
     points: Points
@@ -55,6 +56,7 @@ class CellLight:
     material: NDArray[np.uint16]
     textures: F32
     uv: F32 | None = None
+    surface_normal: F32 | None = None
 
     @cached_property
     def few_links(self) -> NDArray[np.uint16]:
@@ -108,7 +110,7 @@ class CellLight:
         """What some cells show of a texture: its own mean where nobody knows where they lie in it. (rows or 1, 3)"""
         if self.uv is None:
             return mean_of(texture)[None].astype(np.float32)
-        of_points = sample_image(texture, self.uv[rows].reshape(-1, 3))
+        of_points = sample_image(texture, self.uv[rows].reshape(-1, self.uv.shape[2]))
         return np.asarray(of_points.reshape(len(rows), -1, 3).mean(axis=1), np.float32)
 
     def irradiance(self, lights: TriangleLights, among: NDArray[np.intp] | None = None) -> F32:
