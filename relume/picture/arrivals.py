@@ -56,7 +56,7 @@ def keep_arrived(
     known = known_arrived(images, material, texels, light)
     if known is not None and known.rotation == texels.rotation:
         return known
-    made = arrive(texels, *images.arriving(material, light), progress, cancelled)
+    made = arrive(texels, *images.arriving(material, light, cancelled), progress, cancelled)
     key = _key(images, material, texels, light)
     images.cache.forget(key)
     images.cache.get(key, Arrived, made.num_bytes, lambda: made)

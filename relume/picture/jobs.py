@@ -140,7 +140,7 @@ class Freeze:
         images, material, _ = self.place
 
         def frozen() -> Operator:
-            lights, receivers = images.arriving(material, self.light)
+            lights, receivers = images.arriving(material, self.light, cancelled)
 
             def freeze(some: Receivers) -> Frozen | Packed:
                 watched = progress, cancelled
@@ -278,7 +278,7 @@ class Shade:
         images, material, _ = self.place
         num, passing = material.num_samples, images.cache.passing
         begun = passing.get((*key, _BEGUN), Begun, self.num_bytes, lambda: Begun.of(num))
-        begun.shade(self.term, self.bands, *images.arriving(material, light), progress, cancelled, wanted)
+        begun.shade(self.term, self.bands, *images.arriving(material, light, cancelled), progress, cancelled, wanted)
         return begun.rows
 
     def _tell(self, progress: Progress, done: int, share: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from copy import copy
 from typing import cast
 
@@ -141,8 +141,18 @@ class ViewImages:
         shown = {k: None if look.materials[name].catcher else self.by_name[name].mirrors for k, name in names.items()}
         return self.mirrors.follow(shown)
 
-    def arriving(self, material: MaterialImage, light: Light) -> tuple[TriangleLights, Receivers]:
-        """What arrives at the samples of a material in a light; shadows that the memory lacks are traced."""
+    def arriving(
+        self, material: MaterialImage, light: Light, cancelled: Callable[[], bool]
+    ) -> tuple[TriangleLights, Receivers]:
+        """What arrives at the samples of a material in a light; what the memory lacks is traced.
+
+        Args:
+            material: of these. light: what arrives. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
+        """
+        if light.paths.reflect and material.num_samples:
+            self.view.trace_gather_rays(material.index, cancelled)
         return self.transfer.arriving(self.view, material.index, light, self.cache)
 
     def unlit(self, material: MaterialImage) -> Receivers:

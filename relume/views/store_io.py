@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, Protocol, runtime_checkable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +19,24 @@ from relume.scene.checks import check_camera
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
+
+
+@runtime_checkable
+class SomeReader(Protocol):
+    """A store that is asked for rows that do not lie together."""
+
+    def read_some(self, path: str, rows: NDArray[np.int64]) -> NDArray[Any]:
+        """Some rows of an array. path: of the array. rows: in any order"""
+        ...
+
+
+@runtime_checkable
+class Tracing(Protocol):
+    """A store whose gather rays may have to be traced."""
+
+    def trace_links(self, first: int, cancelled: Callable[[], bool]) -> None:
+        """Those of a material. first: row of its first sample. cancelled: asked now and then"""
+        ...
 
 
 def read_camera(store: StoreReader, k: int) -> Camera:

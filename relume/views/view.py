@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -27,6 +27,8 @@ from relume.trace.texture import sample_image
 from relume.views.mirrored import Mirrored, read_mirrored
 from relume.views.sharing import sharing
 from relume.views.store_io import (
+    SomeReader,
+    Tracing,
     pattern_of_material,
     read_camera,
     read_eyes,
@@ -45,15 +47,6 @@ Tile = tuple[int, int, int, int]
 TILE_PIXELS = 64
 _IMAGES = ("diffuse", "specular")
 _ROWS_AT_ONCE = 1 << 18
-
-
-@runtime_checkable
-class SomeReader(Protocol):
-    """A store that is asked for rows that do not lie together."""
-
-    def read_some(self, path: str, rows: NDArray[np.int64]) -> NDArray[Any]:
-        """Some rows of an array. path: of the array. rows: in any order"""
-        ...
 
 
 @dataclass(frozen=True)
@@ -239,6 +232,17 @@ class View:
         rows = self.rows(material)
         alone = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
         return replace(alone, sharing=self._sharing(material))
+
+    def trace_gather_rays(self, material: int, cancelled: Callable[[], bool]) -> None:
+        """Trace those that were not baked, as where an image leans the material; then reading them takes no time.
+
+        Args:
+            material: its index. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
+        """
+        if isinstance(self.store, Tracing):
+            self.store.trace_links(self.rows(material).start, cancelled)
 
     def _sharing(self, material: int) -> Sharing:
         def found() -> Sharing:

@@ -6,7 +6,9 @@ traced to the lights that come up, and gather rays leave about the normals as th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.light.gather_rays import Pattern
 from relume.memory import Memory
+from relume.parallel import for_steps
 from relume.points import Points
 from relume.views.leaning import Leant
 from relume.views.store_io import pattern_of_material, read_chance, read_eyes, read_seeds, towards
@@ -24,6 +27,7 @@ Rows = NDArray[np.int64]
 
 _LEANT = ("normal", "tangent", "uv", "normal_length")
 _TRACED = ("visibility", "links", "thrown")
+_STEP = 1024  # samples; a tenth of a second's rays
 
 
 class Tracer(Protocol):
@@ -50,6 +54,45 @@ class Tracer(Protocol):
     def thrown(self, points: Points) -> NDArray[np.uint8]:
         """Find which lights points see in flat mirrors. points: as they lean. Returns (n, bytes)"""
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class BegunLinks:
+    """Cells that gather rays of samples hit, of which some are traced: whoever is stopped goes on from there.
+
+    Attributes:
+        cell: that each ray hits. (n, rays) uint16
+        done: which steps of `_STEP` samples are traced. (steps,)
+        lock: held while they are.
+    """
+
+    cell: NDArray[np.uint16]
+    done: NDArray[np.bool_]
+    lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    @classmethod
+    def of(cls, num_samples: int, num_rays: int) -> BegunLinks:
+        """Nothing of them."""
+        return cls(np.zeros((num_samples, num_rays), np.uint16), np.zeros(-(-num_samples // _STEP), np.bool_))
+
+    def trace(self, linked: Callable[[Rows], NDArray[np.uint16]], cancelled: Callable[[], bool]) -> None:
+        """Trace what is left.
+
+        Args:
+            linked: finds the cells of some samples. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so; what was traced stays.
+        """
+        with self.lock:
+            lacking = np.flatnonzero(~self.done)
+
+            def step(start: int, stop: int) -> None:
+                for k in lacking[start:stop]:
+                    rows = np.arange(k * _STEP, min((k + 1) * _STEP, len(self.cell)))
+                    self.cell[rows] = linked(rows)
+                    self.done[k] = True
+
+            for_steps(step, len(lacking), 1, lambda share: None, cancelled, "tracing gather rays")
 
 
 class WornStore:
@@ -134,11 +177,32 @@ class WornStore:
         """Bring what was read of some samples of a material to their normals. first: row of the material's first."""
         if name in _LEANT:
             found[:] = getattr(self._leant[first], name)[some]
-        elif name == "links":  # many, for each of the material's terms
-            key = (*self._key, "links", first)
-            found[:] = self._memory.passing.keep(key, lambda: self._linked(first, self._every(first)))[some]
+        elif name == "links":
+            found[:] = self._links(first)[some]
         elif name in _TRACED:
             self._trace(name, first, self._every(first)[some], found)
+
+    def trace_links(self, first: int, cancelled: Callable[[], bool]) -> None:
+        """Trace the gather rays of a material's samples, where it leans; they are kept for a while.
+
+        Args:
+            first: row of the material's first sample. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so; what was traced is there for who asks next.
+        """
+        if first in self._leant:
+            self._links(first, cancelled)
+
+    def _links(self, first: int, cancelled: Callable[[], bool] = lambda: False) -> NDArray[np.uint16]:
+        """The cells that they hit, for each of the material's terms. (samples, rays)"""
+        pattern, num = self._pattern(first), len(self._leant[first].normal)
+        key = *self._key, "links", first
+        links = self._memory.passing.keep(key, lambda: BegunLinks.of(num, pattern.num_rays))
+        if not links.done.all():
+            every = self._every(first)
+            points, wo = self._points(first, every), self._wo(first, every)
+            links.trace(lambda rows: self._tracer.linked(points.rows(rows), wo[rows], pattern), cancelled)
+        return links.cell
 
     def _every(self, first: int) -> Rows:
         return np.arange(len(self._leant[first].normal))
@@ -146,7 +210,7 @@ class WornStore:
     def _trace(self, name: str, first: int, chosen: Rows, found: NDArray[Any]) -> None:
         """Trace rays of some samples of a material. found: what was baked; written."""
         if name == "links":
-            found[:] = self._linked(first, chosen)
+            found[:] = self._tracer.linked(self._points(first, chosen), self._wo(first, chosen), self._pattern(first))
             return
         points = self._points(first, chosen)
         if name == "visibility":
@@ -154,11 +218,13 @@ class WornStore:
         else:
             found[:] = self._tracer.thrown(points)
 
-    def _linked(self, first: int, chosen: Rows) -> NDArray[np.uint16]:
+    def _wo(self, first: int, chosen: Rows) -> F32:
+        """Towards the viewer, of some samples of a material. (n, 3)"""
         eyes = read_eyes(self, self._view, first, first + len(self._leant[first].normal))
-        points = self._points(first, chosen)
-        wo = towards(eyes if len(eyes) == 1 else eyes[chosen], points.position)
-        return self._tracer.linked(points, wo, pattern_of_material(self._store, self._view, self._materials[first]))
+        return towards(eyes if len(eyes) == 1 else eyes[chosen], self._points(first, chosen).position)
+
+    def _pattern(self, first: int) -> Pattern:
+        return pattern_of_material(self._store, self._view, self._materials[first])
 
     def _points(self, first: int, chosen: Rows) -> Points:
         """Some samples of a material, counted from its first."""

@@ -11,10 +11,13 @@ from sessions import bake_corner, relative_rmse, settle
 from tiny_scenes import corner
 
 from relume.brdf.channels import IMAGES, NormalMap
-from relume.errors import ParameterError, StoreError
+from relume.errors import CancelledError, ParameterError, StoreError
 from relume.eye.view_samples import sample_view
 from relume.images.shelf import keep, normals_of
 from relume.look import default_look, validate
+from relume.memory import Memory
+from relume.methods.gather import RAYS_A_SAMPLE
+from relume.methods.retracing import Retracing
 from relume.moving.points.images import OWN, Wears, dressed
 from relume.picture.picture import Picture
 from relume.reference.image import reference_image
@@ -23,6 +26,7 @@ from relume.scene.coding import decode
 from relume.scene.gltf.uvs import made_tangents
 from relume.scene.model import Coding, Material, Texture
 from relume.trace.geometry import merge
+from relume.views import worn_store
 
 SIDE = 64
 SCALE = 1.5
@@ -108,6 +112,30 @@ def test_what_surfaces_send_is_of_the_normals_that_are_seen(bakes, plain, named)
     assert np.median(np.abs(found - expected)) < 0.01 * expected.mean()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("bakes", ["gather"], indirect=True)
+def test_gather_rays_are_given_up_and_go_on(bakes, plain, named, monkeypatch):
+    """Where a hand comes back while they are traced; what was traced is not traced again."""
+    bare, _ = bakes
+    monkeypatch.setattr(worn_store, "_STEP", 64)
+    linked, traced = Retracing.linked, []
+
+    def counted(self, points, wo, pattern):
+        traced.extend(points.seed.tolist() if pattern.num_rays == RAYS_A_SAMPLE else ())  # others are of cells
+        return linked(self, points, wo, pattern)
+
+    monkeypatch.setattr(Retracing, "linked", counted)
+    picture = Picture(bare, "front", Memory(1 << 28))
+    picture.set_look(bumpy(plain, named, 1.25))
+    images = picture._images
+    floor, light = images.by_name["Floor"], images.light
+    with pytest.raises(CancelledError):
+        images.arriving(floor, light, lambda: len(traced) >= 128)
+    assert 128 <= len(traced) < 0.5 * floor.num_samples
+    images.arriving(floor, light, lambda: False)
+    assert sorted(traced) == sorted(images.view.points(0).seed.tolist())
+
+
 def test_lights_that_come_up_are_traced(bakes, plain, named):
     """And those that go down hidden: bits are those of the bake, on the floor, where frames are equal."""
     bare, baked = bakes
@@ -167,6 +195,22 @@ def test_no_strength_is_no_bumps(bakes, plain, named):
     positions, normals = _normals_of(picture._images.view)
     on_floor = positions[:, 1] < 1e-3
     np.testing.assert_allclose(normals[on_floor], np.broadcast_to([0, 1, 0], normals[on_floor].shape), atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["direct", pytest.param("gather", marks=pytest.mark.slow)])
+def test_what_is_seen_in_a_mirror_leans_as_well(named, method, tmp_path):
+    """A floor and a ball before a wall that is a mirror, among the pixels of the mirror."""
+    chrome = {"model": "ggx", "texture": None, "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.03, "f0": 1.0}}
+    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": True}
+    scene = with_tangents(corner([Material("Floor", (shiny,)), Material("Wall", (chrome,))]))
+    bare, baked = (opened(s, method, tmp_path / str(k)) for k, s in enumerate((scene, with_own(scene, named))))
+    in_mirror = bare.views["front"].material_ids() == 1
+    found, plain, expected = (
+        shown(transfer, bumpy(scene, name), method)[in_mirror]
+        for transfer, name in ((bare, named), (bare, None), (baked, None))
+    )
+    assert relative_rmse(found, expected) < 0.01
+    assert relative_rmse(plain, expected) > 0.4
 
 
 def test_truths_show_it(plain, named):
