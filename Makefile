@@ -83,10 +83,11 @@ $(LOCK_TOOLS)/bin/uv:
 	@python="$$(.ci/find-python)" && "$$python" -m venv $(LOCK_TOOLS)
 	@$(LOCK_TOOLS)/bin/pip install --quiet uv
 
+# The lock names all that is needed, so nothing is looked for; what is imported is compiled then, a part of all there is.
 $(PYTHON_STAMP): requirements.lock
 	@python="$$(.ci/find-python)" && { [ -x $(BIN)/python ] || "$$python" -m venv $(VENV); }
 	@echo "Installing Python packages into $(VENV) …"
-	@$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --no-deps --no-compile --require-hashes -r requirements.lock
 	@touch $@
 
 $(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml

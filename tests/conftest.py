@@ -22,6 +22,7 @@ settings.register_profile("relume", deadline=None, derandomize=True, suppress_he
 settings.load_profile("relume")
 
 TOGETHER = ("gestures", "journeys", "btf")  # folders whose tests share what is dear: a server and a browser, a BTF
+FIRST = (*TOGETHER, "worker")  # files of the last are long, and wait for processes and databases
 
 
 class _Sharing(LoadScopeScheduling):
@@ -43,8 +44,9 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What goes together takes longest and begins, so that no process is left alone with it at the end."""
-    items.sort(key=lambda item: item.path.parent.name not in TOGETHER)
+    """What takes longest begins, so that no process is left alone with it at the end."""
+    order = {folder: place for place, folder in enumerate(FIRST)}
+    items.sort(key=lambda item: order.get(item.path.parent.name, len(FIRST)))
 
 
 @pytest.fixture(scope="session")

@@ -16,23 +16,30 @@ from relume.scene.archive import make_scene
 from relume.scene.demo import demo_scene, still_life
 from relume.scene.demo.materials import materials
 from relume.scene.demo.teapot import patches, teapot, tessellate
-from relume.scene.model import Mesh
-
-SCENE = demo_scene()
-MESHES = {mesh.name: mesh for mesh in SCENE.meshes}
+from relume.scene.model import Mesh, Scene
 
 
-def test_the_scene_is_the_same_every_time() -> None:
-    again = make_scene(SCENE.name, still_life.meshes(), materials(), still_life.cameras(), studio())
-    assert again.id == SCENE.id
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return demo_scene()
 
 
-def test_the_scene_is_small_enough_for_a_quick_bake() -> None:
-    assert 30_000 < sum(len(mesh.faces) for mesh in SCENE.meshes) < 100_000
+@pytest.fixture(scope="module")
+def meshes(scene: Scene) -> dict[str, Mesh]:
+    return {mesh.name: mesh for mesh in scene.meshes}
 
 
-def test_frames_are_orthonormal() -> None:
-    for mesh in SCENE.meshes:
+def test_the_scene_is_the_same_every_time(scene: Scene) -> None:
+    again = make_scene(scene.name, still_life.meshes(), materials(), still_life.cameras(), studio())
+    assert again.id == scene.id
+
+
+def test_the_scene_is_small_enough_for_a_quick_bake(scene: Scene) -> None:
+    assert 30_000 < sum(len(mesh.faces) for mesh in scene.meshes) < 100_000
+
+
+def test_frames_are_orthonormal(scene: Scene) -> None:
+    for mesh in scene.meshes:
         tangents = mesh.tangents[:, :3]
         np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-5)
         np.testing.assert_allclose(np.linalg.norm(tangents, axis=1), 1, atol=1e-5)
@@ -40,25 +47,25 @@ def test_frames_are_orthonormal() -> None:
         assert set(np.unique(mesh.tangents[:, 3])) == {1.0}
 
 
-def test_faces_look_where_their_normals_do() -> None:
-    for mesh in SCENE.meshes:
+def test_faces_look_where_their_normals_do(scene: Scene) -> None:
+    for mesh in scene.meshes:
         corners = mesh.positions[mesh.faces].astype(np.float64)
         faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         faces /= np.linalg.norm(faces, axis=1, keepdims=True)
         assert (faces * mesh.normals[mesh.faces].mean(1)).sum(1).min() > 0.3, mesh.name
 
 
-def test_the_table_shows_its_front_to_both_views() -> None:
+def test_the_table_shows_its_front_to_both_views(scene: Scene, meshes: dict[str, Mesh]) -> None:
     """It is no closed surface; a renderer that draws fronts only must see it."""
-    mesh = MESHES["Table"]
-    for camera in SCENE.cameras:
+    mesh = meshes["Table"]
+    for camera in scene.cameras:
         towards = camera.to_world[:3, 3] - mesh.positions
         assert np.mean((mesh.normals * towards).sum(axis=1) > 0) > 0.95
 
 
-def test_spheres_and_shells_are_closed_and_turned_outwards() -> None:
+def test_spheres_and_shells_are_closed_and_turned_outwards(meshes: dict[str, Mesh]) -> None:
     for name in ("Tray", "Bowl", "Pearls"):
-        mesh = MESHES[name]
+        mesh = meshes[name]
         welded = trimesh.Trimesh(np.round(mesh.positions.astype(np.float64), 7), mesh.faces)
         welded.merge_vertices(merge_norm=True, merge_tex=True)
         assert welded.is_watertight, name
@@ -89,20 +96,20 @@ def test_the_teapot_is_newells(shared_data: Path) -> None:
     assert distance.max() < 1e-5
 
 
-def test_things_stand_on_what_is_under_them() -> None:
+def test_things_stand_on_what_is_under_them(meshes: dict[str, Mesh]) -> None:
     pot = teapot(14, still_life.TEAPOT_HEIGHT)
     assert pot.positions[:, 1].min() == pytest.approx(0, abs=1e-12)
-    floor = MESHES["Tray"].positions
+    floor = meshes["Tray"].positions
     inside = np.abs(floor[:, [0, 2]]).max(1) < 0.05
     tray_floor = floor[inside & (floor[:, 1] > 0.005)][:, 1].max()
     for name in ("Teapot", "Bowl"):
-        assert 0 < MESHES[name].positions[:, 1].min() - tray_floor < 1e-4, name
-    assert MESHES["Table"].positions[:, 1].min() >= 0
-    assert 0 < MESHES["Cloth"].positions[:, 1].min() < 2e-3
+        assert 0 < meshes[name].positions[:, 1].min() - tray_floor < 1e-4, name
+    assert meshes["Table"].positions[:, 1].min() >= 0
+    assert 0 < meshes["Cloth"].positions[:, 1].min() < 2e-3
 
 
-def test_pearls_touch_the_ground_but_not_each_other() -> None:
-    balls = _balls(MESHES["Pearls"])
+def test_pearls_touch_the_ground_but_not_each_other(meshes: dict[str, Mesh]) -> None:
+    balls = _balls(meshes["Pearls"])
     assert len(balls) > 50
     centres, radii = np.array([c for c, _ in balls]), np.array([r for _, r in balls])
     gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2) - radii[:, None] - radii[None]
@@ -112,17 +119,17 @@ def test_pearls_touch_the_ground_but_not_each_other() -> None:
     assert (lowest >= ground - 1e-6).all()
 
 
-def test_nothing_reaches_into_a_pearl() -> None:
-    balls = _balls(MESHES["Pearls"])
+def test_nothing_reaches_into_a_pearl(meshes: dict[str, Mesh]) -> None:
+    balls = _balls(meshes["Pearls"])
     for name in ("Teapot", "Tray", "Handles", "Bowl", "Cloth", "Table"):
-        distance, _ = cKDTree(MESHES[name].positions).query([centre for centre, _ in balls])
+        distance, _ = cKDTree(meshes[name].positions).query([centre for centre, _ in balls])
         assert (distance - [radius for _, radius in balls]).min() > -2e-4, name
 
 
-def test_the_teapot_touches_neither_bowl_nor_pearls() -> None:
-    pot = cKDTree(MESHES["Teapot"].positions)
+def test_the_teapot_touches_neither_bowl_nor_pearls(meshes: dict[str, Mesh]) -> None:
+    pot = cKDTree(meshes["Teapot"].positions)
     for name in ("Bowl", "Pearls"):
-        distance, _ = pot.query(MESHES[name].positions)
+        distance, _ = pot.query(meshes[name].positions)
         assert distance.min() > 0.002, name
 
 
@@ -131,8 +138,8 @@ def _balls(mesh: Mesh) -> list[tuple[np.ndarray, float]]:
     return [(p.vertices.mean(0), float(np.linalg.norm(p.vertices - p.vertices.mean(0), axis=1).max())) for p in parts]
 
 
-def test_terms_name_models_parameters_and_textures_that_exist() -> None:
-    for material in SCENE.materials:
+def test_terms_name_models_parameters_and_textures_that_exist(scene: Scene) -> None:
+    for material in scene.materials:
         for term in material.terms:
             declared = TERMS[term["model"]]
             for name, value in term.get("params", {}).items():
@@ -142,13 +149,13 @@ def test_terms_name_models_parameters_and_textures_that_exist() -> None:
                 assert term["texture"] in material.textures
 
 
-def test_five_models_are_on_show() -> None:
-    shown = {term["model"] for material in SCENE.materials for term in material.terms}
+def test_five_models_are_on_show(scene: Scene) -> None:
+    shown = {term["model"] for material in scene.materials for term in material.terms}
     assert shown == {"lambert", "ggx", "cook_torrance", "ashikhmin_shirley", "blinn_phong"}
 
 
-def test_the_studio_has_a_large_key_and_a_small_lamp() -> None:
-    radiance = SCENE.environment.radiance.mean(-1).astype(np.float64)
+def test_the_studio_has_a_large_key_and_a_small_lamp(scene: Scene) -> None:
+    radiance = scene.environment.radiance.mean(-1).astype(np.float64)
     power = radiance * texel_solid_angles(*radiance.shape)[:, None]
     lamp = radiance > 100
     key = (radiance > 5) & ~lamp
@@ -159,10 +166,10 @@ def test_the_studio_has_a_large_key_and_a_small_lamp() -> None:
     assert (texel_directions(*radiance.shape)[lamp | key][:, 1] > 0).all()
 
 
-def test_the_views_show_the_still_life() -> None:
-    assert [camera.name for camera in SCENE.cameras] == ["front", "left"]
-    for camera in SCENE.cameras:
-        local = (MESHES["Teapot"].positions - camera.to_world[:3, 3]) @ camera.to_world[:3, :3]
+def test_the_views_show_the_still_life(scene: Scene, meshes: dict[str, Mesh]) -> None:
+    assert [camera.name for camera in scene.cameras] == ["front", "left"]
+    for camera in scene.cameras:
+        local = (meshes["Teapot"].positions - camera.to_world[:3, 3]) @ camera.to_world[:3, :3]
         half_height = np.tan(camera.yfov / 2)
         x, y = -local[:, 0] / local[:, 2] / (half_height * 4 / 3), -local[:, 1] / local[:, 2] / half_height
         assert max(np.abs(x).max(), np.abs(y).max()) < 0.95
