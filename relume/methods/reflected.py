@@ -7,15 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import normals_in
-from relume.brdf.channels import NormalMap
 from relume.memory import Memory
 from relume.methods.cells.between import preview_between, quickly_between, sent_between
 from relume.methods.cells.in_lobes import sent_in_lobes
 from relume.methods.cells.leaving import InLobes, Leaving
 from relume.methods.cells.reflecting import Reflecting
 from relume.methods.on_cells import LightOnCells
-from relume.picture.light import Light, is_same_but_for_surfaces
+from relume.picture.light import Light, Normals, is_same_but_for_surfaces
 from relume.project.sent import Sent, evenly
 from relume.trace.cell_tree import NO_CELL
 
@@ -36,7 +34,7 @@ class Reflected:
     def __init__(
         self,
         on_cells: LightOnCells,
-        leaning: Callable[[tuple[NormalMap | None, ...]], LightOnCells],
+        leaning: Callable[[Normals], LightOnCells],
         memory: Memory,
         key: str,
     ) -> None:
@@ -112,8 +110,7 @@ class Reflected:
 
     def _exactly_on(self, light: Light) -> LightOnCells:
         """What comes to cells, which lean as the look says."""
-        normals = tuple(map(normals_in, light.reflectances))
-        return self._leaning(normals) if any(normals) else self._on_cells
+        return self._leaning(light.normals) if any(light.normals) else self._on_cells
 
     def _leaving(self, light: Light) -> Leaving:
         reflecting, on_cells = self._reflecting(light, self._memory), self._exactly_on(light)

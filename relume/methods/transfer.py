@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from relume import environments
 from relume.bake import StoreReader
-from relume.brdf.channels import NormalMap
 from relume.code_version import image_code
 from relume.environments.equirect import lookup, shrunk, turned
 from relume.errors import ParameterError, StoreError
@@ -34,7 +33,7 @@ from relume.methods.retracing import Retracing
 from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
 from relume.methods.thrown import MoreThrown, Thrown, ThrownLight
 from relume.operators.image_files import ImageFiles
-from relume.picture.light import Light, leaning_as_baked
+from relume.picture.light import Light, Normals, leaning_as_baked
 from relume.picture.transfer import Arriving, Axis, Eyes
 from relume.points import Points
 from relume.project.receivers import GatherRays, Rays, Receivers
@@ -187,6 +186,9 @@ class BakedViews:
         """What the gather cells send; None where nothing of it comes to the picture."""
         return self.reflected.under(light) if self.reflected is not None and light.paths.reflect else None
 
+    def trace_cells(self, light: Light, cancelled: Callable[[], bool]) -> None:
+        """Trace what gather cells lack: there are none. See `Transfer`."""
+
     def between_surfaces(
         self, light: Light, gathered: GatherRays, thrown: NDArray[np.uint8] | None
     ) -> tuple[Rays, ...]:
@@ -327,11 +329,18 @@ class BouncedViews(BakedViews):
         on_cells = LightOnCells(self.cells, *self._on_cells, self.harmonic)
         return Reflected(on_cells, self._on_leant_cells, self.memory, self.key)
 
-    def _on_leant_cells(self, normals: tuple[NormalMap | None, ...]) -> LightOnCells:
+    def _on_leant_cells(self, normals: Normals) -> LightOnCells:
         """The light on cells of which some lean as images say. normals: the image of each material, None for none"""
+        return LightOnCells(self._leant_cells(normals), *self._on_cells, leaning=(normals,))
+
+    def _leant_cells(self, normals: Normals, cancelled: Callable[[], bool] = lambda: False) -> CellLight:
         key = self.key, "cells that lean", normals
-        leant = self.memory.keep(key, lambda: leant_cells(self.cells, normals, self.tracer))
-        return LightOnCells(leant, *self._on_cells, leaning=(normals,))
+        return self.memory.keep(key, lambda: leant_cells(self.cells, normals, self.tracer, cancelled))
+
+    def trace_cells(self, light: Light, cancelled: Callable[[], bool]) -> None:
+        """Trace what cells lack that lean otherwise than they were baked. See `Transfer`."""
+        if any(normals := light.normals):
+            self._leant_cells(normals, cancelled)
 
     @property
     def _on_cells(self) -> tuple[LocalLights, Lights, Lights, Memory, str]:

@@ -7,13 +7,16 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
-from relume.brdf.albedo import Reflectances, reflectances_of, without_normals
+from relume.brdf.albedo import Reflectances, normals_in, reflectances_of, without_normals
+from relume.brdf.channels import NormalMap
 from relume.look import EnvironmentKey, LightGeometry, Look, Paths
 from relume.look.model import Rgb
 
 ENVIRONMENT = "environment"  # among the names of sources: the light around, beside local lights by their own names
 
 Solo = frozenset[str] | None
+Normals = tuple[NormalMap | None, ...]
+"""The image in the place of each material's normal map; None for none."""
 
 _ONE: Rgb = (1.0, 1.0, 1.0)
 _NOTHING: Rgb = (0.0, 0.0, 0.0)
@@ -42,6 +45,11 @@ class Light(NamedTuple):
     paths: Paths
     local: tuple[Source, ...] = ()
     environment_gain: Rgb = (1.0, 1.0, 1.0)
+
+    @property
+    def normals(self) -> Normals:
+        """How images lean the materials that reflect light onto each other."""
+        return tuple(map(normals_in, self.reflectances))
 
     @property
     def is_environment_lit(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
@@ -191,6 +191,16 @@ class Transfer(Opened, Protocol):
 
         Args:
             view: whose samples. material: index of the material. memory: keeps shadows that must be traced.
+        """
+        ...
+
+    def trace_cells(self, light: Light, cancelled: Callable[[], bool]) -> None:
+        """Trace what pieces of surfaces lack that send light in a look, where images lean them.
+
+        Args:
+            light: with what they reflect. cancelled: asked now and then.
+        Raises:
+            CancelledError: `cancelled` said so.
         """
         ...
 

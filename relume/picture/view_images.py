@@ -153,6 +153,7 @@ class ViewImages:
         """
         if light.paths.reflect and material.num_samples:
             self.view.trace_gather_rays(material.index, cancelled)
+            self.transfer.trace_cells(light, cancelled)
         return self.transfer.arriving(self.view, material.index, light, self.cache)
 
     def unlit(self, material: MaterialImage) -> Receivers:

@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from relume.brdf.channels import IMAGES, NormalMap
+from relume.errors import CancelledError
 from relume.images.shelf import keep
 from relume.light.gather_rays import make_pattern
 from relume.methods.cells.cell_light import CellLight
@@ -92,6 +93,11 @@ def test_frames_are_those_of_the_normals(cells, named):
 def test_those_of_bakes_that_do_not_say_how_textures_lie_stay(cells, named, lacking):
     older = replace(cells, **{lacking: None})
     assert leant_cells(older, (NormalMap(named), None), Traced()) is older
+
+
+def test_who_does_not_want_them_any_more_gets_none(cells, named):
+    with pytest.raises(CancelledError):
+        leant_cells(cells, (None, NormalMap(named)), Traced(), lambda: True)
 
 
 def test_images_on_what_has_no_cells_trace_nothing(cells, named):

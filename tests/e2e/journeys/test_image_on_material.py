@@ -81,6 +81,7 @@ def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> N
     expect(strength).to_have_count(0)
     page.get_by_label("File of a normal map").set_input_files(bumps)
     expect(chosen.locator("option:checked")).to_have_text("bumps")
+    expect(page.get_by_text("stays as it was baked")).to_have_count(0)  # which is said of mirrors alone
     bumpy = editor.pixels()
     assert np.abs(bumpy - plain).max() > 20
     for _ in range(2):
