@@ -26,8 +26,8 @@ def unmeasured():
 
 @pytest.fixture(scope="session")
 def baked(tmp_path_factory):
-    """The still life in two views of 64×48 under 150 lights."""
-    recipe = Recipe("direct", ("front", "left"), (64, 48), 150)
+    """The still life in two views of 64×48 under 100 lights."""
+    recipe = Recipe("direct", ("front", "left"), (64, 48), 100)
     return bake_here(METHODS["direct"], still_life(), recipe, tmp_path_factory.mktemp("bake") / "store.zarr")
 
 
