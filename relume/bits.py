@@ -5,10 +5,12 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from relume.uncounted import UNCOUNTED
+
 WORD = 64  # points whose bits a word holds
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _turn_over(words):  # type: ignore[no-untyped-def]
     """Let bit j of word k become bit k of word j: halves of the square change places, then halves of those. (64,)"""
     size, low = 32, np.uint64(0xFFFFFFFF)

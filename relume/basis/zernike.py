@@ -19,6 +19,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.uncounted import UNCOUNTED
+
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
@@ -111,7 +113,7 @@ def in_basis(wi: F64) -> F64:
     return out * (wi[..., 2:] > 0)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def add_light(rungs, num, columns, out):  # type: ignore[no-untyped-def]
     """Add the light of rays to a point's light vector, t_k += Σ w h_k(ωi).
 
@@ -147,7 +149,7 @@ def add_light(rungs, num, columns, out):  # type: ignore[no-untyped-def]
             _add(num, columns, _IM, rungs.norm[rung], rungs.sine[rung], out)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def functions_of(rungs, num, wi, scratch, out):  # type: ignore[no-untyped-def]
     """Evaluate all functions for some rays.
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from relume.basis.arcs import acos_clamped
 from relume.brdf.term import Angle
+from relume.uncounted import UNCOUNTED
 
 _HALF_PI = np.float32(math.pi / 2)
 _ONE = np.float32(1)
@@ -31,7 +32,7 @@ TILT_X = np.int64(Angle.TILT_X)
 TILT_Y = np.int64(Angle.TILT_Y)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
     """x ** exponent for x in (0, 1] and exponent in [0, 1], relative error below 2e-6.
 
@@ -60,7 +61,7 @@ def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
     return e * np.int32((k + np.int32(127)) << np.int32(23)).view(np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """γ of one pair of directions, in radians.
 
@@ -98,7 +99,7 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     return acos_clamped(power_below_one(cos_theta_h, power))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """γ · scale of many directions wi and one wo.
 
@@ -141,7 +142,7 @@ def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-un
             out[k] = scale * angle_at(THETA_O, ix[k], iy[k], iz[k], ox, oy, oz)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def alpha_and_beta_into(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ignore[no-untyped-def]
     """γα and γβ times scales, of many directions wi and one wo, by one power: cos γα · cos γβ = cos θh.
 

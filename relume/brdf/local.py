@@ -10,6 +10,8 @@ from typing import Any
 import numba as nb
 import numpy as np
 
+from relume.uncounted import UNCOUNTED
+
 # Cosines below this are within 2e-4 degrees of the horizon. Quotients divide by them, and one over their square must
 # stay finite in float32; it is, at 1e12.
 MIN_COSINE = np.float32(1e-6)
@@ -17,7 +19,7 @@ MIN_COSINE = np.float32(1e-6)
 ZERO, ONE, TWO, HALF = np.float32(0), np.float32(1), np.float32(2), np.float32(0.5)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
     """cos θh = n·h and cos θd = wo·h = |wi + wo| / 2, of unit directions above the horizon.
 

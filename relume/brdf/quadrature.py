@@ -22,6 +22,7 @@ from relume.brdf.curves import curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.brdf.term import F64, Angle
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 Fixed = tuple[tuple[str, float | str], ...]  # from `Term.fixed_values`
@@ -92,7 +93,7 @@ def _quotient(pairs: Quadrature, model: str, fixed: Fixed) -> F64:
     return np.ascontiguousarray(found, np.float64).reshape(len(found), -1)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _multiply(places, values, out):  # type: ignore[no-untyped-def]
     """Multiply each pair by a curve, linear between its values."""
     for n in range(out.shape[0]):

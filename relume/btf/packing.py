@@ -11,6 +11,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.uncounted import UNCOUNTED
+
 I8 = NDArray[np.int8]
 U8 = NDArray[np.uint8]
 
@@ -43,7 +45,7 @@ def packed_bytes(num: int, bits: U8) -> int:
     return -(-num * int(bits.sum(dtype=np.int64)) // 8)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _unpack(found, bits, out):  # type: ignore[no-untyped-def]
     """found: (bytes,). out: (n, C), written"""
     at: Any = 0

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.btf.rings import Rings, directions
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -33,7 +34,7 @@ def slants(rings: Rings) -> F32:
     return np.asarray(w[:, :2] / w[:, 2:], np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def slant_of(rings, x, y, z):  # type: ignore[no-untyped-def]
     """s of a direction; beyond the last ring it is the last ring's.
 
@@ -46,7 +47,7 @@ def slant_of(rings, x, y, z):  # type: ignore[no-untyped-def]
     return x / steep, y / steep
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True)
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def _at(height, u, v):  # type: ignore[no-untyped-def]
     """Interpolate heights between texels, which repeat without end."""
     rows, columns = height.shape
@@ -61,7 +62,7 @@ def _at(height, u, v):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def height_seen(height, lowest, highest, u, v, slant):  # type: ignore[no-untyped-def]
     """Find how high the relief is where a ray meets it first, in steps of half a texel, linear on the last.
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from relume.basis.arcs import acos_clamped, azimuth_turns
 from relume.errors import MaterialError
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -88,7 +89,7 @@ def polar(theta: F64, phi: F64) -> F64:
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def taps_at(rings, theta, turn, index, weight):  # type: ignore[no-untyped-def]
     """Do as `taps` of angles.
 
@@ -112,7 +113,7 @@ def taps_at(rings, theta, turn, index, weight):  # type: ignore[no-untyped-def]
         weight[2 * k], weight[2 * k + 1] = of_ring * (np.float32(1) - part), of_ring * part
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
     """Find the four directions about one, and their weights.
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.btf.eigen import F32, EigenBtf
 from relume.btf.parallax import height_seen, height_seen_numpy, slant_of, slants
 from relume.btf.rings import taps, taps_numpy
+from relume.uncounted import UNCOUNTED
 
 F64 = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def sent_numpy(found: EigenBtf, seen: F64, wi: F64) -> F64:
     return np.asarray(np.einsum("mk,m,mkc->mc", of_light, left, seen[light]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _add_texels(size, u, v, share, cluster, weight, slot_of, slots, factors):  # type: ignore[no-untyped-def]
     """Add the four texels about a place to the factors of their clusters' means and components.
 

@@ -20,6 +20,7 @@ from relume.scene.model import Scene
 from relume.trace.geometry import Geometry
 from relume.trace.primary import trace_from
 from relume.trace.surface import any_tangent, places_on
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -149,7 +150,7 @@ def seen_in(normal: F32, directions: F32) -> F32:
     return np.asarray(directions[None] - twice[..., None] * normal[:, None], np.float32)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _may_see(position, normal, mirrors, towards, start, stop, may):  # type: ignore[no-untyped-def]
     """Mark the lights whose way over a plane from points [start, stop) meets it where mirrors are. may: (n, P T)"""
     planes, offset, axes, low, high = mirrors

@@ -18,6 +18,7 @@ from relume.errors import ParameterError, ShapeMismatchError
 from relume.imageio.ocio.current import needed
 from relume.imageio.ocio.view import OcioView
 from relume.parallel import for_ranges
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -47,7 +48,7 @@ _AGX_MIN_EV, _AGX_RANGE_EV = np.float32(-12.47393), np.float32(4.026069 + 12.473
 _DARKEST = np.float32(1e-10)  # has a logarithm, and lies below AGX_MIN_EV
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _agx_curve(v):  # type: ignore[no-untyped-def]
     x = min(max((math.log2(max(v, _DARKEST)) - _AGX_MIN_EV) / _AGX_RANGE_EV, _ZERO), _ONE)
     p = np.float32(15.5) * x - np.float32(40.14)
@@ -58,7 +59,7 @@ def _agx_curve(v):  # type: ignore[no-untyped-def]
     return p * x - np.float32(0.00232)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _srgb(v):  # type: ignore[no-untyped-def]
     v = min(max(v, _ZERO), _ONE)
     if v <= np.float32(0.0031308):
@@ -66,7 +67,7 @@ def _srgb(v):  # type: ignore[no-untyped-def]
     return np.float32(1.055) * v ** np.float32(1 / 2.4) - np.float32(0.055)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _filmic(x):  # type: ignore[no-untyped-def]
     above = x * (np.float32(2.51) * x + np.float32(0.03))
     return above / (x * (np.float32(2.43) * x + np.float32(0.59)) + np.float32(0.14))

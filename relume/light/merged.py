@@ -17,6 +17,7 @@ from relume.color import luminance
 from relume.light.hierarchy import highest, inner_nodes
 from relume.light.tiles import SOLID_ANGLE_EXPONENT, UNIFORM_SHARE, Tiles
 from relume.light.triangles import Parts, TriangleLights, merged_into
+from relume.uncounted import UNCOUNTED
 
 F64 = NDArray[np.float64]
 Codes = NDArray[np.uint64]
@@ -94,7 +95,7 @@ def see_parts_numpy(visible: NDArray[np.uint8], parts: Parts, num: int) -> F64:
     return np.asarray(bits @ shares)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def weigh_by_parts(first, light, seen, shading):  # type: ignore[no-untyped-def]
     """Weigh what listed merged lights bring by the share that is seen of them.
 

@@ -18,6 +18,7 @@ from relume.color import luminance
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.errors import PlanError
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -146,7 +147,7 @@ def _middle_edges(corners: F64) -> F64:
     return np.cross(middles, middles[:, (2, 0, 1)])
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _child(d, edges):  # type: ignore[no-untyped-def]
     """Tell which of four children a direction lies in: 0, 1, 2 at the corners, 3 in the middle.
 
@@ -159,7 +160,7 @@ def _child(d, edges):  # type: ignore[no-untyped-def]
     return 3
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _locate(directions, edges, children, start, stop, found):  # type: ignore[no-untyped-def]
     for n in range(start, stop):
         d = directions[n]
@@ -169,7 +170,7 @@ def _locate(directions, edges, children, start, stop, found):  # type: ignore[no
         found[n] = -1 - node
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _split(texels, directions, edges, child_of):  # type: ignore[no-untyped-def]
     for k in range(texels.shape[0]):
         child_of[k] = _child(directions[texels[k]], edges)

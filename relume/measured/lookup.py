@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from relume.measured.merl import CHANNEL_SCALE, F64, SHAPE, is_measured
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -48,7 +49,7 @@ def table_of(planes: F64) -> F32:
     return np.ascontiguousarray(np.moveaxis(filled * CHANNEL_SCALE[:, None, None, None], 0, -1), np.float32)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _between(position, num):  # type: ignore[no-untyped-def]
     """Node below a position, and how far it is on the way to the next; constant beyond the last one."""
     position = min(max(position, 0.0), num - 1.0)
@@ -56,13 +57,13 @@ def _between(position, num):  # type: ignore[no-untyped-def]
     return node, position - node
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _on_curve(knots, position):  # type: ignore[no-untyped-def]
     node, share = _between(position, NUM_KNOTS)
     return (1.0 - share) * knots[node] + share * knots[node + 1]
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _measured(table, h, d, phi, out):  # type: ignore[no-untyped-def]
     """Trilinear; φd goes round at π. h, d, phi: positions in nodes. out: (3,), written."""
     h0, th = _between(h, _NUM_H)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from relume.moving.look_up import Seen
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 from relume.views.resolve import pack_rgb9e5
 
 F32 = NDArray[np.float32]
@@ -46,7 +47,7 @@ class Shown(NamedTuple):
     first: NDArray[np.intp]
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _mark_vertices(vertices, is_seen, points, out):  # type: ignore[no-untyped-def]
     for v in range(is_seen.shape[0]):
         if is_seen[v]:
@@ -55,7 +56,7 @@ def _mark_vertices(vertices, is_seen, points, out):  # type: ignore[no-untyped-d
                     out[v] = 1
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _mark_rays(material, is_changed, vertices, face, vertex, weight, owner, out, pixels):  # type: ignore[no-untyped-def]
     num_pixels = pixels.shape[0]
     for r in range(face.shape[0]):
@@ -86,7 +87,7 @@ def shown_of(surface: Surface, seen: Seen, is_changed: NDArray[np.bool_], num_pi
     return Shown(part, chosen, np.searchsorted(seen.owner, chosen))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _resolve_some(radiance, owner, first, pixels, start, stop, out, words):  # type: ignore[no-untyped-def]
     """Resolve the pixels that are [start, stop) of pixels."""
     num_pixels = out.shape[0]

@@ -21,6 +21,7 @@ from relume.moving.transfer import MovingTransfer
 from relume.parallel import for_shares
 from relume.picture.background.backdrop import MOST_SHARE
 from relume.picture.light import Light
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -88,7 +89,7 @@ def lay_over(surface: Surface, seen: Seen, behind: F32, caught: Caught, gain: F3
     return hides
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _lay_over(  # type: ignore[no-untyped-def]
     luminance, face, face_material, is_catcher, unhidden, vertex, weight, behind, gain, is_direct, start, stop, out,
     hides,

@@ -24,6 +24,7 @@ from relume.color import LUMINANCE
 from relume.moving.points.surface import Surface
 from relume.moving.points.texels import sample_texture
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -46,7 +47,7 @@ def expansions() -> F32:
     return np.asarray(np.einsum("tpi,tpk,t->ik", wi, in_basis(wi), solid_angle), np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _lean(expanded, luminance, normal, tangent, vectors, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
     """Find D of points [start, stop)."""
     for p in range(start, stop):
@@ -93,7 +94,7 @@ def towards_light_numpy(surface: Surface, vectors: F32, point: int) -> F64:
     return np.asarray((expansions().astype(np.float64) @ luminous) @ np.stack([t, np.cross(n, t), n]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def unit(vector):  # type: ignore[no-untyped-def]
     """Scale a vector, a tuple of three, to length one."""
     x, y, z = vector
@@ -101,7 +102,7 @@ def unit(vector):  # type: ignore[no-untyped-def]
     return np.float32(scale * x), np.float32(scale * y), np.float32(scale * z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def leaning(textures, texture, place, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
     """Look up where a normal map turns a normal; see `relume.trace.surface`, which does so for fixed views.
 
@@ -124,7 +125,7 @@ def leaning(textures, texture, place, footprint, n, t, handedness, outward, scra
     return x, y, z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def shading_ratio(light, n, leant):  # type: ignore[no-untyped-def]
     """Compute n'·D / n·D, bounded.
 

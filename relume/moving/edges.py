@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
 from relume.trace.primary import Hits
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -23,7 +24,7 @@ _COS_CREASE = np.float32(np.cos(np.radians(20.0)))
 _DEPTH_EDGE = np.float32(0.02)  # of the distance, off the plane of the surface beside
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def differ(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
     """Tell whether two pixels see different things, or one thing turned or offset.
 
@@ -44,7 +45,7 @@ def differ(material, normals, faces, distance, directions, p, q):  # type: ignor
     return (f != g) & (is_sky | is_other)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _mark(material, normals, faces, distance, directions, width, height, start, stop, is_edge):  # type: ignore[no-untyped-def]
     """Mark pixels [start, stop) and those to the right and below that differ from them; shares may mark one twice."""
     column = start % width

@@ -21,6 +21,7 @@ from relume.moving.basis.rows import LEAST_COSINE, seen_from
 from relume.moving.basis.tables import Tables
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -83,7 +84,7 @@ def _send(rungs, points, material, vectors, others, tables, eye, rows, start, st
                         out[p, group, channel] += max(sent[group, channel], np.float32(0))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_uneven(tables, of, material, kind, seen, vectors, others, p, out):  # type: ignore[no-untyped-def]
     """Add sums of the light vector of point p with tables over θo and φo. out: (groups, 3)"""
     row, share, cosine_phi, sine_phi = seen

@@ -18,6 +18,7 @@ from relume.scene.model import Camera
 from relume.trace.cutout_filter import EVERYWHERE, PAST_GLASS
 from relume.trace.embree import EmbreeScene
 from relume.trace.primary import Hits, trace_from
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -62,7 +63,7 @@ class Seen(NamedTuple):
         return len(self.directions) - len(panes) + place if has_glass else pixel
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _aim(rotation, half_width, half_height, width, height, pixels, places, start, stop, out):  # type: ignore[no-untyped-def]
     """Direct rays through places in pixels [start, stop), those of one pixel in a row."""
     for i in range(start, stop):
@@ -77,7 +78,7 @@ def _aim(rotation, half_width, half_height, width, height, pixels, places, start
                 out[r, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _find(lattice, face_normal, face, uv, directions, start, stop, vertex, weight, is_seen):  # type: ignore[no-untyped-def]
     """Find the vertices about hits [start, stop); of a side without any, those of the other."""
     for p in range(start, stop):
@@ -176,7 +177,7 @@ def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32]
     return directions
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def need_points(vertices, is_seen, is_needed):  # type: ignore[no-untyped-def]
     """Note the points that vertices follow from.
 
@@ -190,7 +191,7 @@ def need_points(vertices, is_seen, is_needed):  # type: ignore[no-untyped-def]
                     is_needed[vertices.point[v, k]] = 1
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def _spread(vertices, rows, values, start, stop, out):  # type: ignore[no-untyped-def]
     """Find what the vertices that are [start, stop) of rows take from points."""
     for v in rows[start:stop]:

@@ -21,6 +21,7 @@ from relume.moving.solid import Solid
 from relume.parallel import for_ranges, for_shares
 from relume.trace.embree import occluded, packet_arguments
 from relume.trace.packet import LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -58,7 +59,7 @@ def _join(packet, lane, start, end):  # type: ignore[no-untyped-def]
     aim(packet, lane, end[0] - start[0], end[1] - start[1], end[2] - start[2], np.float32(1))
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _flush(occluded, packet, waiting, ends, is_parted):  # type: ignore[no-untyped-def]
     """Trace the first lanes, and note both ends of what is blocked. ends: vertices. (`LANES`, 2)"""
     ask_first(packet, waiting)
@@ -155,7 +156,7 @@ def _mend(occluded, scene, arguments, grids, is_parted, face, uv, directions, ve
         _weigh(occluded, packet, waiting, weight)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _weigh(occluded, packet, waiting, weight):  # type: ignore[no-untyped-def]
     """Trace three lanes for each ray that waits; weights of nodes that are not seen become nothing."""
     ask_first(packet, 3 * waiting)

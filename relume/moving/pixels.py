@@ -16,6 +16,7 @@ from relume.moving.look_up import Seen
 from relume.moving.points.surface import EMISSION, NORMAL_MAP, Surface
 from relume.moving.points.texels import sample_texture
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -40,7 +41,7 @@ class Mirrored(NamedTuple):
     is_fine: bool
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
     """Interpolate vectors between the three vertices about a pixel.
 
@@ -54,7 +55,7 @@ def blend(values, vertex, weight):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _beyond(x):  # type: ignore[no-untyped-def]
     """Approximate b, with 1 / (1 + b) the share of a normal distribution above −x."""
     if x > _ALL_ABOVE:
@@ -62,7 +63,7 @@ def _beyond(x):  # type: ignore[no-untyped-def]
     return math.exp(np.float32(-1.702) * max(x, np.float32(-20)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # type: ignore[no-untyped-def]
     """Find what the lobe of a pixel sees.
 
@@ -97,7 +98,7 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
     return row, share
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
     """Find the place in textures of a place in a triangle.
 
@@ -109,7 +110,7 @@ def in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
     return w0 * uvs[a, 0] + w1 * uvs[b, 0] + w2 * uvs[c, 0], w0 * uvs[a, 1] + w1 * uvs[b, 1] + w2 * uvs[c, 1]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def footprint_of(distance, pixel_angle, metre, along):  # type: ignore[no-untyped-def]
     """Find the side of what a pixel sees of a texture.
 
@@ -120,7 +121,7 @@ def footprint_of(distance, pixel_angle, metre, along):  # type: ignore[no-untype
     return distance * pixel_angle * metre / math.sqrt(max(abs(along), _LEAST_SLANT))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _lean(textures, texture, place, footprint, tangents, corners, uv, n, outward, is_behind, scratch):  # type: ignore[no-untyped-def]
     """Look up where the normal n of a pixel leans. outward: of the face. is_behind: its other side is seen."""
     a, b, c = corners

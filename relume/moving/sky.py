@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relume.basis.arcs import acos_clamped, azimuth_turns
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -45,7 +46,7 @@ def sky_of(sharp: F32, map_of: Callable[[float], F32]) -> Sky:
     return Sky(np.concatenate([radiance.reshape(-1, 3) for radiance in maps]), np.array(levels, np.int64))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _place(turn, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Find u and v of a direction, both in [0, 1]."""
     u = azimuth_turns(dx, dz) + turn
@@ -55,7 +56,7 @@ def _place(turn, dx, dy, dz):  # type: ignore[no-untyped-def]
     return u - np.float32(whole - 1 if u < whole else whole), v
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _level_at(sky, level, u, v):  # type: ignore[no-untyped-def]
     """Look up one level in a place; bilinear, round about in u. Returns three numbers."""
     first, height, width = sky.levels[level, 0], sky.levels[level, 1], sky.levels[level, 2]
@@ -78,7 +79,7 @@ def _level_at(sky, level, u, v):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def level_of(sigma):  # type: ignore[no-untyped-def]
     """Find the level of a blur of σ radians, as if there were any number of them."""
     step = np.float32(_STEPS) * math.log2(max(sigma * np.float32(180 / math.pi / _NARROWEST), np.float32(1e-3)))
@@ -86,7 +87,7 @@ def level_of(sigma):  # type: ignore[no-untyped-def]
 
 
 # Inlined, as what it calls: calls would count the references of arrays, for which threads wait for each other.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def add_sky_about(sky, turn, direction, level, gain, out):  # type: ignore[no-untyped-def]
     """Add the light about a direction.
 
@@ -105,7 +106,7 @@ def add_sky_about(sky, turn, direction, level, gain, out):  # type: ignore[no-un
         out[channel] += gain * (sharp[channel] + share * (blurred[channel] - sharp[channel]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _fill(sky, turn, gain, face, directions, start, stop, out):  # type: ignore[no-untyped-def]
     """Fill pixels [start, stop) that see nothing."""
     for p in range(start, stop):

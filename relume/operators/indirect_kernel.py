@@ -8,6 +8,7 @@ import numba as nb
 import numpy as np
 
 from relume.trace.cell_tree import NO_CELL
+from relume.uncounted import UNCOUNTED
 
 BLOCK_SAMPLES = 64
 STEPS = 32_767  # of 16-bit weights
@@ -37,7 +38,7 @@ def number_cells(links, start, stop, place):  # type: ignore[no-untyped-def]
     return seen
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def sum_by_cell(links, start, stop, place, weight, sums):  # type: ignore[no-untyped-def]
     """Add the weights of the rays of samples [start, stop) to those of the cells that they hit.
 
@@ -162,7 +163,7 @@ def apply_rows(kept, scale, rows, light, start, stop, alone):  # type: ignore[no
             alone[first + s, 0], alone[first + s, 1], alone[first + s, 2] = red[s], green[s], blue[s]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def add_shared(first, among, weight, alone, start, stop, image):  # type: ignore[no-untyped-def]
     """Add to samples [start, stop) of an image the weighted means of what samples have alone.
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from relume.operators.operator import Operator
 from relume.operators.stream import Columns, columns_of, within_tile
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -73,7 +74,7 @@ def pack(rows: F32) -> tuple[NDArray[np.int16], F32]:
     return np.rint(rows * per[:, None]).clip(-_LARGEST, _LARGEST).astype(np.int16), scale
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _stream(transport, scale, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
     """Add the changed columns of planes [start, stop), a plane being a channel of a tile; four columns at a time."""
     samples = image.shape[2]

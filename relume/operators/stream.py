@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -58,7 +59,7 @@ def within_tile(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
     return max(bounds[level] - tile * samples, 0), min(bounds[level + 1] - tile * samples, samples)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _stream(transport, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
     """Add the changed columns of planes [start, stop), a plane being a channel of a tile.
 

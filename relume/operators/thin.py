@@ -18,6 +18,7 @@ from relume.operators.frozen import Frozen, packed_bytes
 from relume.operators.operator import Operator
 from relume.operators.packed import Packed
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -76,7 +77,7 @@ def thin_bytes(num_samples: int, num_few: int, num_bands: int) -> int:
     return packed_bytes(num_few, num_bands) + num_samples * _BYTES_NEAR
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _spread(rows, near, weight, image, start, stop):  # type: ignore[no-untyped-def]
     """Add to tiles [start, stop) of an image."""
     samples, num = image.shape[2], near.shape[1]

@@ -16,6 +16,7 @@ from relume.light.gather_rays import Pattern, local_ray, small_shifts_of, weight
 from relume.parallel import for_shares
 from relume.project.sent import Sent, light_along
 from relume.project.squares import Squares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -36,7 +37,7 @@ def weighed_functions(pattern: Pattern, seed: int, degree: int) -> F32:
     return np.ascontiguousarray((functions * weight[:, None]).T, np.float32)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _direct(pattern, seed, wi, weight):  # type: ignore[no-untyped-def]
     shifts, up = small_shifts_of(pattern, seed), np.float32(1)
     for ray in range(len(wi)):

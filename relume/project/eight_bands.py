@@ -19,6 +19,7 @@ import numpy as np
 from llvmlite import ir
 from numba.core import types
 
+from relume.uncounted import UNCOUNTED
 from relume.vector_code import (
     FAST,
     FLOAT,
@@ -40,7 +41,7 @@ _ONE = np.float32(1)
 _CLOSE = np.float32(1e-4)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def overlap_of(a, b, c):  # type: ignore[no-untyped-def]
     """Compute what the share below an angle needs of a triangle, whose corners have the angles a, b, c in bands.
 

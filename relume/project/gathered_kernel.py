@@ -14,6 +14,7 @@ import numpy as np
 from relume.light.gather_rays import density_about_mirror, small_shifts_of
 from relume.project.sent import square_of
 from relume.trace.cell_tree import NO_CELL
+from relume.uncounted import UNCOUNTED
 
 _ZERO, _ONE, _TWO, _HALF = np.float32(0), np.float32(1), np.float32(2), np.float32(0.5)
 _PI = np.float32(math.pi)
@@ -30,7 +31,7 @@ def in_frame(n, t, o):  # type: ignore[no-untyped-def]
     return (bx, by, bz), (ox, oy, oz)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _cosine_rays(rays, shift, x, y, z, square):  # type: ignore[no-untyped-def]
     """Direct the cosine rays of a point, as `cosine_ray` does. square: scratch. (rays,) each"""
     moved, cosine, sine = shift[0], shift[2], shift[3]
@@ -46,7 +47,7 @@ def _cosine_rays(rays, shift, x, y, z, square):  # type: ignore[no-untyped-def]
         z[k] = math.sqrt(_ONE - square[k])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _glossy_rays(rays, shift, o, x, y, z, away, twice):  # type: ignore[no-untyped-def]
     """Direct the glossy rays of a point, as `glossy_ray` does. away, twice: scratch. (rays,) each"""
     moved, grown, cosine, sine = shift[0], shift[1], shift[2], shift[3]
@@ -70,7 +71,7 @@ def _glossy_rays(rays, shift, o, x, y, z, away, twice):  # type: ignore[no-untyp
         z[k] = twice[k] * (_ONE - away[k]) - oz
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
     """Weigh all rays of a point, as `weight_of` does."""
     ox, oy, oz = o
@@ -87,7 +88,7 @@ def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
         weight[k] = cosine / (of_cosine * cosine / _PI + of_glossy * about_mirror)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _direct(pattern, seed, o, local, weight):  # type: ignore[no-untyped-def]
     """Direct and weigh all rays of a point. o: local wo. local: written, and scratch. (5, rays) weight: (rays,)"""
     num = pattern.num_cosine
@@ -99,7 +100,7 @@ def _direct(pattern, seed, o, local, weight):  # type: ignore[no-untyped-def]
     _weights(num, x, y, z, o, weight)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _lobes_hit(links, lobe, rows, rays):  # type: ignore[no-untyped-def]
     """List the rays of a point that hit a lobe, without a branch that nobody could foretell; returns their number.
 
@@ -143,11 +144,19 @@ def list_gathered(  # type: ignore[no-untyped-def]
     Returns:
         K, the number of rays.
     """
+    most = links.shape[1]
+    local, weights, place = np.empty((5, most), np.float32), np.empty(most, np.float32), np.empty(most, np.int64)
+    scratch = np.empty(most + 1, np.int32), np.empty(most + 1, np.int64), local, weights, place
+    return _list(points, wo, links, pattern, sent, start, stop, scratch, first, wi, out, irradiance)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _list(points, wo, links, pattern, sent, start, stop, scratch, first, wi, out, irradiance):  # type: ignore[no-untyped-def]
+    """Do what `list_gathered` is for. scratch: `rows` and `rays` of `_lobes_hit`, `local` and `weight` of `_direct`,
+    and where each ray is listed. (rays,)"""
     _, normal, tangent, seed, _ = points
-    has_lobes, most = sent.table.shape[0] > 0, links.shape[1]
-    rows, rays, place = np.empty(most + 1, np.int32), np.empty(most + 1, np.int64), np.empty(most, np.int64)
-    local, weights = np.empty((5, most), np.float32), np.empty(most, np.float32)
-    end = 0
+    rows, rays, local, weights, place = scratch
+    has_lobes, most, end = sent.table.shape[0] > 0, links.shape[1], 0
     for p in range(start, stop):
         first[p - start] = end
         n, t = normal[p], tangent[p]
@@ -182,10 +191,18 @@ def sum_gathered(points, wo, links, pattern, sent, start, stop, out):  # type: i
         points, wo, links, pattern, sent, start, stop: as there.
         out: Σ w · L, written. (points, 3) float32
     """
-    _, normal, tangent, seed, _ = points
-    has_lobes, most = sent.table.shape[0] > 0, links.shape[1]
-    rows, rays = np.empty(most + 1, np.int32), np.empty(most + 1, np.int64)
+    most = links.shape[1]
     local, weights = np.empty((5, most), np.float32), np.empty(most, np.float32)
+    scratch = np.empty(most + 1, np.int32), np.empty(most + 1, np.int64), local, weights
+    _sum(points, wo, links, pattern, sent, start, stop, scratch, out)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _sum(points, wo, links, pattern, sent, start, stop, scratch, out):  # type: ignore[no-untyped-def]
+    """Do what `sum_gathered` is for. scratch: as of `_list`, but for the last."""
+    _, normal, tangent, seed, _ = points
+    rows, rays, local, weights = scratch
+    has_lobes, most = sent.table.shape[0] > 0, links.shape[1]
     for p in range(start, stop):
         n, t = normal[p], tangent[p]
         b, o = in_frame(n, t, wo[p])

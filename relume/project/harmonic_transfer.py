@@ -21,6 +21,7 @@ from relume.basis.local_pca import cluster, distances
 from relume.basis.zernike import functions_of, in_basis, ladder, num_functions
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
+from relume.uncounted import UNCOUNTED
 
 F16 = NDArray[np.float16]
 F32 = NDArray[np.float32]
@@ -151,7 +152,7 @@ class ClusteredTransfer(NamedTuple):
         return out
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sum(transferred, cluster, weight, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the mean and the components of points rows[start:stop]. out: (m, 3 K)"""
     for i in range(start, stop):

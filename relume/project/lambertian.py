@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.receivers import Receivers
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -33,7 +34,7 @@ def uprights(term: Term, points: Receivers, start: int, stop: int) -> F32:
     return np.asarray(term.quotients(nothing, nothing, nothing + 1, nothing, nothing, cos_theta_o)[0])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sum_of_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # type: ignore[no-untyped-def]
     """Sum the lights of a point: a function of its own, whose loops are vectors. weight: scratch. (M,)"""
     for m in range(weight.shape[0]):
@@ -59,9 +60,14 @@ def sum_lights(normal, visible, direction, irradiance, start, stop, out):  # typ
         direction, irradiance: of the lights. (3, M) float32
         out: Σ V L Ω cos θi, written. (stop - start, 3) float32
     """
+    _sum(normal, visible, direction, irradiance, start, stop, np.empty(direction.shape[1], np.float32), out)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _sum(normal, visible, direction, irradiance, start, stop, weight, out):  # type: ignore[no-untyped-def]
+    """Do what `sum_lights` is for. weight: scratch. (M,)"""
     x, y, z = direction[0], direction[1], direction[2]
     red, green, blue = irradiance[0], irradiance[1], irradiance[2]
-    weight = np.empty(x.shape[0], np.float32)
     for p in range(start, stop):
         _sum_of_point(
             normal[p, 0], normal[p, 1], normal[p, 2], visible[p], x, y, z, red, green, blue, weight, out[p - start]

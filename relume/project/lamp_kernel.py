@@ -17,6 +17,7 @@ from relume.light.local import light_sample
 from relume.light.strata import NOT_FLAT
 from relume.project.gathered_kernel import in_frame
 from relume.project.light_culling import keep_near
+from relume.uncounted import UNCOUNTED
 
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _THIRD, _TWO = np.float32(1 / 3), np.float32(2)
@@ -41,7 +42,7 @@ def _num_seen(bits, first, count):  # type: ignore[no-untyped-def]
     return found
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _square(x, y, z, nx, ny, nz, half, corner):  # type: ignore[no-untyped-def]
     """Lay a square about a place, across a normal. half: of its side. corner: written. (4, 3)"""
     length = math.sqrt(max(nx * nx + nz * nz, ny * ny + nz * nz))
@@ -55,13 +56,13 @@ def _square(x, y, z, nx, ny, nz, half, corner):  # type: ignore[no-untyped-def]
         corner[k, 0], corner[k, 1], corner[k, 2] = x + s * ex + t * fx, y + s * ey + t * fy, z + s * ez + t * fz
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _unit(x, y, z):  # type: ignore[no-untyped-def]
     inverse = _ONE / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-30)))
     return x * inverse, y * inverse, z * inverse
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _nodes(corner, second, node):  # type: ignore[no-untyped-def]
     """Find the directions of a triangle's corners, 0, `second` and the next of four, and of its edges' middles.
 
@@ -77,7 +78,7 @@ def _nodes(corner, second, node):  # type: ignore[no-untyped-def]
         node[3 + k, 0], node[3 + k, 1], node[3 + k, 2] = _unit(x, y, z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _radius(x, y, z, node):  # type: ignore[no-untyped-def]
     """Find the angle from a direction to the farthest of a triangle's corners."""
     most = _ZERO

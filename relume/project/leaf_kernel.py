@@ -9,12 +9,13 @@ import numba as nb
 import numpy as np
 
 from relume.project.eight_bands import add_means_of_eight, deposit_eight, mean_of_eight, overlap_of
+from relume.uncounted import UNCOUNTED
 from relume.vector_code import NUM as EIGHT
 
 _BELOW_ONE = np.float32(1 - 2**-24)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _overlaps(corner, num_bands, num, overlap):  # type: ignore[no-untyped-def]
     """Find `overlap_of` leaves, angles held below the last band's end. corner: (3, n), overlap: (5, n), written."""
     end = np.float32(num_bands) * _BELOW_ONE
@@ -26,7 +27,7 @@ def _overlaps(corner, num_bands, num, overlap):  # type: ignore[no-untyped-def]
         overlap[3, n], overlap[4, n] = rise, fall
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _multiply_means(overlap, bands, falls, num_bands, num_rows, num, weight):  # type: ignore[no-untyped-def]
     """Multiply the weights (3, n) of leaves by the mean of a dormant curve over each.
 
@@ -51,7 +52,7 @@ def _multiply_means(overlap, bands, falls, num_bands, num_rows, num, weight):  #
         weight[2, n] *= blue + bands[2, top] if num_rows == 3 else red
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-def]
     """Share leaves out to the bands of the free curve (eq. 22). weight: (3, n), out: (3, ≥ J + 8)."""
     last = num_bands - 1
@@ -65,7 +66,7 @@ def _deposit(overlap, num_bands, num, weight, out):  # type: ignore[no-untyped-d
             )  # fmt: skip
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _multiply_settings(overlap, settings, num_bands, num, mean, product):  # type: ignore[no-untyped-def]
     """Multiply each leaf's product (n, rows) by the means of a dormant curve at all its settings over that leaf.
 
@@ -84,7 +85,7 @@ def _multiply_settings(overlap, settings, num_bands, num, mean, product):  # typ
             product[n, row] *= mean[row]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight, mean, product, out):  # type: ignore[no-untyped-def]
     """Add the leaves' weights (3, n) times their curves at all settings. out: (3, N)
 
@@ -106,7 +107,7 @@ def _add_settings(leaves, num, num_bands, settings, setting_of, overlap, weight,
                     out[channel, row] += of_channel * product[n, offset * channel + row]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weight):  # type: ignore[no-untyped-def]
     """Weigh the light of each leaf: irradiance · q cos θi · its share of the triangle.
 
@@ -124,7 +125,7 @@ def weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weigh
         weight[2, n] = irradiance[m, 2] * (shading[blue_row, entry] * shares[n])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def spend(  # type: ignore[no-untyped-def]
     leaves, num, num_bands, bands, falls, num_rows, settings, setting_of, active, overlap, weight, mean, product, out
 ):  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 
 from relume.basis.arcs import acos_clamped
 from relume.brdf.angles import THETA_D, THETA_H, THETA_I, THETA_R
+from relume.uncounted import UNCOUNTED
 
 _HALF = np.float32(0.5)
 _ZERO = np.float32(0)
@@ -16,7 +17,7 @@ _ZERO = np.float32(0)
 _SLACK = np.float32(1e-3)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Bound how far the half vector turns while wi turns by `radius`; and compute cos θd of the two directions.
 
@@ -32,13 +33,13 @@ def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untype
     return half / max(farthest, np.float32(1e-6)), cos_theta_d
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True)
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def has_bound(kind):  # type: ignore[no-untyped-def]
     """Whether `nearest_into` bounds an angle."""
     return kind in (THETA_I, THETA_R, THETA_D, THETA_H)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def nearest_into(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """Bound γ(wi', wo) from below over all wi' within `radius` of wi; zero for angles without a bound.
 
@@ -66,7 +67,7 @@ def nearest_into(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-
         out[: ix.shape[0]] = 0
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
     """Drop those of the lights [begin, end) that a dormant curve does not see at all; returns the new end.
 
@@ -117,8 +118,19 @@ def list_lights(  # type: ignore[no-untyped-def]
     Returns:
         K, the number of entries.
     """
-    num_lights = directions.shape[0]
-    reach, nearest = np.empty(num_lights, np.float32), np.empty(num_lights, np.float32)
+    reach, nearest = np.empty(len(directions), np.float32), np.empty(len(directions), np.float32)
+    return _list(
+        normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, (reach, nearest),
+        first, light, wi, out,
+    )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _list(  # type: ignore[no-untyped-def]
+    normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, scratch, first, light, wi, out
+):
+    """Do what `list_lights` is for. scratch: of `keep_near`. (M,) each"""
+    num_lights, (reach, nearest) = directions.shape[0], scratch
     end = np.int64(0)
     for p in range(start, stop):
         begin = end

@@ -19,6 +19,7 @@ from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges, for_shares
 from relume.points import Points
 from relume.project.receivers import Rays, Receivers, listed
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -149,7 +150,7 @@ def add_scaled(
     for_shares(lambda start, stop: _add_scaled(part, gain, of, into, start, stop, total), len(into))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_scaled(part, gain, of, into, start, stop, out):  # type: ignore[no-untyped-def]
     for i in range(start, stop):
         q, p = of[i], into[i]

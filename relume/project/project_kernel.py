@@ -15,6 +15,7 @@ import numpy as np
 
 from relume.brdf.angles import ALPHA, BETA, alpha_and_beta_into, angles_into
 from relume.project.leaf_kernel import spend, weigh_leaves
+from relume.uncounted import UNCOUNTED
 
 _QUARTER = np.float32(0.25)
 _HALF = np.float32(0.5)
@@ -40,20 +41,20 @@ _MOST_LEAVES = _BATCH * 4**_MAX_DEPTH
 _LEAVES_AT_ONCE = 64  # multiplied by the settings of a curve
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _padded(num):  # type: ignore[no-untyped-def]
     """Round a number of triangles up to whole vectors."""
     return (num + _LANES - 1) // _LANES * _LANES
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _bend_of(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
     """Compute how far an angle at the edges' midpoints is from linear between the corners, over what is tolerated."""
     bend = max(abs(ab - _HALF * (a + b)), max(abs(bc - _HALF * (b + c)), abs(ca - _HALF * (c + a))))
     return bend / (_TOLERANCE_BANDS + _TOLERANCE_SHARE * min(a, min(b, c)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _turn_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
     """Turn the nodes of the listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
@@ -66,7 +67,7 @@ def _turn_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyp
             local[2, node, entry - begin] = n[0] * x + n[1] * y + n[2] * z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
     """Find the largest bend over all angles of each light, or `_CULLED` where a dormant curve is nothing all over it.
 
@@ -86,7 +87,7 @@ def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
             bend[e] = _CULLED if is_nothing else max(bend[e], of_curve)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _bows(gamma, num, bow):  # type: ignore[no-untyped-def]
     """Sum how far each angle bends at the edges' midpoints. bow: (C, …), written."""
     num = _padded(num)
@@ -97,7 +98,7 @@ def _bows(gamma, num, bow):  # type: ignore[no-untyped-def]
             of_curve[e] = ab[e] + bc[e] + ca[e] - (a[e] + b[e] + c[e])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _append(gamma, bow, which, count, nodes, bent, origin, share, leaves, shares, of_entry, num):  # type: ignore[no-untyped-def]
     """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves.
 
@@ -116,7 +117,7 @@ def _append(gamma, bow, which, count, nodes, bent, origin, share, leaves, shares
     return num + count
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sort_out(gamma, bend, bow, num_triangles, level, fine, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
     """Make leaves of the triangles over which all angles are linear, four of those that one division straightens.
 
@@ -149,7 +150,7 @@ def _sort_out(gamma, bend, bow, num_triangles, level, fine, origin, leaves, shar
     return num, num_divided
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _children(local, gamma, origin, which, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
     """Make the four children of the listed triangles: corners, and midpoints of edges. Returns their number."""
     for child in range(4):
@@ -179,7 +180,7 @@ def _children(local, gamma, origin, which, count, child_local, child_gamma, chil
     return 4 * count
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no-untyped-def]
     """Compute the angles of all curves at nodes [first_node, 6) of the first triangles, in bands.
 
@@ -202,7 +203,7 @@ def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no
                 angles_into(kinds[k], scale[k], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _divide(  # type: ignore[no-untyped-def]
     kinds, scale, wo, support, fine, local, gamma, origin, count, parts, lists, bend, bow, leaves, shares, of_entry, num
 ):  # fmt: skip

@@ -15,11 +15,12 @@ from relume.brdf.angles import angles_into
 from relume.light.gather_rays import shift_of
 from relume.light.local import light_sample
 from relume.project.gathered_kernel import in_frame
+from relume.uncounted import UNCOUNTED
 
 _NONE = np.int64(-1)  # no curve is free
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def list_local(  # type: ignore[no-untyped-def]
     points, wo, light, strata, gain, visible, start, stop, first, wi, out, irradiance
 ):
@@ -60,7 +61,7 @@ def list_local(  # type: ignore[no-untyped-def]
     return end
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def list_thrown(  # type: ignore[no-untyped-def]
     points, wo, direction, across, visible, start, stop, first, wi, out, irradiance
 ):
@@ -94,7 +95,7 @@ def list_thrown(  # type: ignore[no-untyped-def]
     return end
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
     """Multiply the weights of rays by a dormant curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
     for channel in range(3):
@@ -103,23 +104,29 @@ def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-de
             weight[channel, n] *= bands[row, band[n]]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spread(settings, setting_of, band, weight, num, out):  # type: ignore[no-untyped-def]
-    """Add rays to all settings of the curves that have several. band: of each curve and ray. out: (3, ≥ N)"""
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _spread(settings, setting_of, band, weight, num, product, out):  # type: ignore[no-untyped-def]
+    """Add rays to all settings of the curves that have several.
+
+    Args:
+        band: of each curve and ray. product: scratch, as long as a row of the settings. out: (3, ≥ N)
+    """
     num_padded = out.shape[1]
     blue = settings.shape[2] // num_padded - 1
-    product = np.empty(settings.shape[2], np.float32)
     for n in range(num):
         product[:] = 1
         for k in range(setting_of.shape[0]):
             if setting_of[k] >= 0:
-                product *= settings[setting_of[k], band[k, n]]
+                values = settings[setting_of[k], band[k, n]]
+                for j in range(product.shape[0]):
+                    product[j] *= values[j]
         for channel in range(3):
-            begin = (blue * channel // 2) * num_padded
-            out[channel] += weight[channel, n] * product[begin : begin + num_padded]
+            begin, of_channel, brought = (blue * channel // 2) * num_padded, out[channel], weight[channel, n]
+            for j in range(num_padded):
+                of_channel[j] += brought * product[begin + j]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _contract(  # type: ignore[no-untyped-def]
     begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, active,
     gamma, band, weight,
@@ -130,7 +137,9 @@ def _contract(  # type: ignore[no-untyped-def]
     """
     num, blue_row = end - begin, shading.shape[0] - 1
     for channel in range(3):
-        weight[channel, :num] = irradiance[channel, begin:end] * shading[blue_row * channel // 2, begin:end]
+        of_channel, quotient, weighed = irradiance[channel], shading[blue_row * channel // 2], weight[channel]
+        for n in range(num):
+            weighed[n] = of_channel[begin + n] * quotient[begin + n]
     for k in range(kinds.shape[0]):
         scale = np.float32(num_bands[k] / (math.pi / 2))
         angles_into(
@@ -161,10 +170,11 @@ def weigh_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands
                 begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, _NONE,
                 gamma, band, weight,
             )  # fmt: skip
-            out[:, begin:end] = weight[:, : end - begin]
+            for channel in range(3):
+                out[channel, begin:end] = weight[channel, : end - begin]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def sum_rays(first, irradiance, shading, out):  # type: ignore[no-untyped-def]
     """Sum listed rays where no curve is listed: all that is left of a term is its quotient.
 
@@ -192,7 +202,20 @@ def project_rays(  # type: ignore[no-untyped-def]
     """
     most = np.diff(first[: out.shape[0] + 1]).max()
     gamma, weight = np.empty(most, np.float32), np.empty((3, most), np.float32)
-    band = np.zeros((kinds.shape[0], most), np.int64)
+    band, product = np.zeros((kinds.shape[0], most), np.int64), np.empty(settings.shape[2], np.float32)
+    _project(
+        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active,
+        (gamma, weight, band, product), out,
+    )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _project(  # type: ignore[no-untyped-def]
+    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active,
+    scratch, out,
+):  # fmt: skip
+    """Do what `project_rays` is for. scratch: `gamma`, `weight` and `band` of `_contract`, `product` of `_spread`."""
+    gamma, weight, band, product = scratch
     for p in range(out.shape[0]):
         begin, end = first[p], first[p + 1]
         num = end - begin
@@ -207,7 +230,10 @@ def project_rays(  # type: ignore[no-untyped-def]
                 for channel in range(3):
                     out[p, channel, band[active, n]] += weight[channel, n]
         elif settings.shape[0] > 0:
-            _spread(settings, setting_of, band, weight, num, out[p])
+            _spread(settings, setting_of, band, weight, num, product, out[p])
         else:
             for channel in range(3):
-                out[p, channel, 0] += weight[channel, :num].sum()
+                of_channel, brought = weight[channel], np.float32(0)
+                for n in range(num):
+                    brought += of_channel[n]
+                out[p, channel, 0] += brought

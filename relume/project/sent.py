@@ -26,6 +26,7 @@ from relume.basis.lobe_grid import SIDE, within_squares
 from relume.basis.zernike import DEGREES, FALL, SENT_DEGREE, in_basis, num_functions
 from relume.parallel import for_ranges
 from relume.trace.cell_tree import NO_CELL
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -140,7 +141,7 @@ def square_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
     return min(max(across, 0), SIDE - 1) * SIDE + min(max(along, 0), SIDE - 1)  # type: ignore[operator]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def light_along(sent, links, squares, out):  # type: ignore[no-untyped-def]
     """Look up what cells send along the rays of a point.
 

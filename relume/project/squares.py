@@ -15,6 +15,7 @@ from relume.parallel import for_ranges
 from relume.points import Points
 from relume.project.sent import square_of
 from relume.trace.cell_tree import NO_CELL
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 Squares = NDArray[np.uint8]
@@ -22,7 +23,7 @@ Squares = NDArray[np.uint8]
 _POINTS_A_RANGE = 1024
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _towards(n, t, pattern, ray, shifts):  # type: ignore[no-untyped-def]
     """Direct a ray of a point with normal n and tangent t, in world space."""
     x, y, z = cosine_ray(pattern.rays[ray], shifts)
@@ -30,7 +31,7 @@ def _towards(n, t, pattern, ray, shifts):  # type: ignore[no-untyped-def]
     return t[0] * x + bx * y + n[0] * z, t[1] * x + by * y + n[1] * z, t[2] * x + bz * y + n[2] * z
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _leaving(points, links, pattern, frames, start, stop, out):  # type: ignore[no-untyped-def]
     """Find the squares in which cells are seen by points [start, stop)."""
     for p in range(start, stop):
@@ -58,7 +59,7 @@ def leaving_squares(points: Points, links: NDArray[np.uint16], pattern: Pattern,
     return out
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _coming(points, points_a_cell, pattern, frames, start, stop, out):  # type: ignore[no-untyped-def]
     """Find the squares in which rays of points [start, stop) come into their own cells."""
     for p in range(start, stop):

@@ -23,6 +23,7 @@ from relume.btf.sent import seen_numpy, sent_numpy
 from relume.light.triangles import TriangleLights
 from relume.project.arrived import arrived_rows, into_texture, texture_axes
 from relume.project.receivers import Receivers
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -34,7 +35,7 @@ _APART = np.float32(1.5)  # texels, between them at most
 _LONGEST = np.float32(3)  # footprint, in widths: of longer ones coarser texels are summed
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _beside(place, count):  # type: ignore[no-untyped-def]
     """Find the two texels of a row beside a place within [0, 1], and the share of the second."""
     x: Any = place * np.float32(count) - np.float32(0.5)
@@ -44,7 +45,7 @@ def _beside(place, count):  # type: ignore[no-untyped-def]
     return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), share
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-untyped-def]
     """Find the texels about a place, of the two levels about a footprint.
 
@@ -59,13 +60,13 @@ def texels_about(levels, u, v, footprint, texel, share):  # type: ignore[no-unty
     return texels_at(levels, u, v, level, texel, share)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def level_of(footprint, finest):  # type: ignore[no-untyped-def]
     """Level of halvings for a footprint, however many there are. finest: side of the finest, in texels."""
     return log2_above_one(max(_TEXEL * footprint * finest, np.float32(1)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def texels_at(levels, u, v, level, texel, share):  # type: ignore[no-untyped-def]
     """Do as `texels_about`.
 
@@ -98,7 +99,7 @@ def texels_at(levels, u, v, level, texel, share):  # type: ignore[no-untyped-def
     return num
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def along_footprint(footprint, up, finest):  # type: ignore[no-untyped-def]
     """Find places whose texels, summed, are as long as a footprint, which a slant makes longer than wide.
 
@@ -121,7 +122,7 @@ def along_footprint(footprint, up, finest):  # type: ignore[no-untyped-def]
     return num, np.float32(math.sqrt(beyond / np.float32(num * num - 1))), width
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _add_weights(cluster, weight, view, texel, share, num, part, num_found, found, sums):  # type: ignore[no-untyped-def]
     """Add the weights of texels, seen from one side, by their clusters.
 
@@ -150,7 +151,7 @@ def _add_weights(cluster, weight, view, texel, share, num, part, num_found, foun
     return num_found
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _places_in(levels, relief, place, x, y, z, slant, out):  # type: ignore[no-untyped-def]
     """Find the places that stand for a footprint, and how high the relief is that is seen there.
 

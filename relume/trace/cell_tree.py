@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.trace.packet import LANES
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
@@ -41,7 +42,7 @@ class CellTree(NamedTuple):
     roots: I32
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def locate(tree, keys, nodes):  # type: ignore[no-untyped-def]
     """Locate the cells of `LANES` points; all go down the tree together, so that none waits for memory alone.
 

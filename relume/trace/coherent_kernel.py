@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from relume.bits import WORD, into_rows
 from relume.trace.packet import FAR, LANES, aim, ask_first, is_free, new_packet, set_origin, take_chance, trace_shadows
+from relume.uncounted import UNCOUNTED
 
 U64 = NDArray[np.uint64]
 
@@ -80,7 +81,7 @@ def _new_level(num_lights):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _flush(occluded, packet, block, waiting):  # type: ignore[no-untyped-def]
     """Trace the rays of the first lanes. A lane's owner: its light, then its sample in the lowest six bits."""
     if waiting == 0:
@@ -93,7 +94,7 @@ def _flush(occluded, packet, block, waiting):  # type: ignore[no-untyped-def]
             block.seen[owner >> _BLOCK_BITS] |= np.uint64(1) << np.uint64(owner & (BLOCK - 1))
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
     """Trace lights against the samples of a mask each, those above the horizon and not yet traced; counts the rays."""
     facing, known = block.facing, block.known
@@ -145,7 +146,7 @@ def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
     return np.int64(count)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _farthest(origins, start, stop, x, y, z):  # type: ignore[no-untyped-def]
     """Find the sample of [start, stop) that is farthest from a point."""
     best, at = np.float32(-1), start
@@ -156,7 +157,7 @@ def _farthest(origins, start, stop, x, y, z):  # type: ignore[no-untyped-def]
     return at
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _centre(origins, start, stop):  # type: ignore[no-untyped-def]
     """Average the positions [start, stop)."""
     x, y, z = np.float32(0), np.float32(0), np.float32(0)
@@ -168,7 +169,7 @@ def _centre(origins, start, stop):  # type: ignore[no-untyped-def]
     return x * share, y * share, z * share
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _ends(origins, start, stop):  # type: ignore[no-untyped-def]
     """Choose two samples of [start, stop) far apart, as a mask."""
     x, y, z = _centre(origins, start, stop)
@@ -177,7 +178,7 @@ def _ends(origins, start, stop):  # type: ignore[no-untyped-def]
     return np.uint64(1) << np.uint64(one) | np.uint64(1) << np.uint64(other)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _mask(start, stop):  # type: ignore[no-untyped-def]
     """Set bits [start, stop) of a word."""
     mask = np.uint64(0)
@@ -186,7 +187,7 @@ def _mask(start, stop):  # type: ignore[no-untyped-def]
     return mask
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _predict(facing, known, seen):  # type: ignore[no-untyped-def]
     """Predict what the traced samples of a region agree on."""
     traced = facing & known
@@ -197,13 +198,13 @@ def _predict(facing, known, seen):  # type: ignore[no-untyped-def]
     return _LIT if seen & traced else _HIDDEN
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _contradicted(traced, seen, prediction):  # type: ignore[no-untyped-def]
     """Tell whether a traced sample sees what was not predicted."""
     return (prediction == _LIT and ~seen & traced != 0) or (prediction == _HIDDEN and seen & traced != 0)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _begin(block, region, before, level):  # type: ignore[no-untyped-def]
     """Take over the predictions of the level before, and queue what it doubts. Returns the length of the queue."""
     end = 0
@@ -217,7 +218,7 @@ def _begin(block, region, before, level):  # type: ignore[no-untyped-def]
     return end
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _judge(block, region, lights, before, level, start, stop):  # type: ignore[no-untyped-def]
     """Predict anew the lights of the queue in [start, stop); the neighbours of wrong predictions join its end."""
     first, index = lights
@@ -236,7 +237,7 @@ def _judge(block, region, lights, before, level, start, stop):  # type: ignore[n
     return end
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _flood(occluded, packet, block, points, lights, region, samples, before, level):  # type: ignore[no-untyped-def]
     """Trace `samples` against the lights that `before` doubts, then against the neighbours of wrong predictions.
 
@@ -252,7 +253,7 @@ def _flood(occluded, packet, block, points, lights, region, samples, before, lev
     return rays
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _doubt(level, lights):  # type: ignore[no-untyped-def]
     """Mark the lights that were traced, yet are unknown, strong, or predicted otherwise than a light beside them."""
     _, first, index, strong = lights
@@ -267,7 +268,7 @@ def _doubt(level, lights):  # type: ignore[no-untyped-def]
             level.doubted[light] = doubted
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _check(occluded, packet, block, points, lights, region, start, salt, level):  # type: ignore[no-untyped-def]
     """Trace a few of the predicted samples; lights that are wrong come into doubt. Returns rays and wrong ones."""
     origins, (directions, _, _, _) = points, lights
@@ -288,7 +289,7 @@ def _check(occluded, packet, block, points, lights, region, start, salt, level):
     return rays, wrong
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _keep(block, region, level):  # type: ignore[no-untyped-def]
     """Believe the predictions of what was not traced."""
     for light in range(level.prediction.shape[0]):
@@ -296,7 +297,7 @@ def _keep(block, region, level):  # type: ignore[no-untyped-def]
             block.seen[light] |= block.facing[light] & ~block.known[light] & region
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _trace_quarter(occluded, packets, block, points, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
     """Trace samples `span` of a block: two of them, then all of them where need be; then check."""
     (packet, alike), (whole, quarter, each) = packets, levels

@@ -22,6 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from relume.color import LUMINANCE
 from relume.trace.cutouts import PASSES, TINTED, Cutouts
 from relume.trace.texture import two_texels
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
@@ -110,7 +111,7 @@ _at: Any = intrinsic(_cast)  # makes an address (int64) a pointer
 _array: Any = nb.carray  # type: ignore[attr-defined]  # an array over the memory at a pointer
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
     """Look opacity up, between four texels. image: of `Cutouts.images`. u, v: v from the top"""
     first, height, width = image[0], image[1], image[2]
@@ -123,7 +124,7 @@ def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
     return ((one - y) * top + y * bottom) / np.float32(255)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _hashed(word):  # type: ignore[no-untyped-def]
     """Mix the bits of a word (the finaliser of MurmurHash3). uint32"""
     word = np.uint32((word ^ (word >> np.uint32(16))) * np.uint32(0x85EBCA6B))  # a product of two has 64 bits
@@ -131,7 +132,7 @@ def _hashed(word):  # type: ignore[no-untyped-def]
     return np.uint32(word ^ (word >> np.uint32(16)))
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _chance(given, face, sheet, x, y, z, is_behind):  # type: ignore[no-untyped-def]
     """A number in (0, 1) for a ray that meets a surface that blends: the given one, or one of its direction (x, y, z).
 

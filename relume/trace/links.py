@@ -27,6 +27,7 @@ from relume.trace.packet import (
     take_chance,
     trace_hits,
 )
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -47,7 +48,7 @@ class Links:
     trace_s: float
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _enter(points, wo, pattern, first, width, packet, frame, towards, shifts):  # type: ignore[no-untyped-def]
     """Begin with points [first, first + width): origins of their rays, local frames, shifts; one lane each.
 
@@ -69,7 +70,7 @@ def _enter(points, wo, pattern, first, width, packet, frame, towards, shifts):  
             shifts[0, m, k], shifts[1, m, k] = of_cosine[m], of_glossy[m]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def _aim(pattern, ray, frame, towards, shifts, packet, width):  # type: ignore[no-untyped-def]
     """Aim the same ray of all lanes; returns how many of them are above their horizon."""
     of_ray, is_cosine = pattern.rays[ray], ray < pattern.num_cosine
@@ -91,7 +92,7 @@ def _aim(pattern, ray, frame, towards, shifts, packet, width):  # type: ignore[n
     return num_valid
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def _find(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
     """Find the cells that the rays of all lanes have hit, into nodes. (`LANES`,) int32. keys: scratch. (6, `LANES`)"""
     normals, sides, roots = surfaces[0], surfaces[1], tree.roots

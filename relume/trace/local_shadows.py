@@ -18,6 +18,7 @@ from relume.parallel import for_ranges
 from relume.points import Points
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 from relume.trace.packet import LANES, aim, ask, is_free, new_packet, set_origin, take_chance, trace_shadows
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -132,7 +133,7 @@ def trace_local(
     return bits
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _arriving(light, strata, points, visible, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum what points [start, stop) see of a light into `out`. (n,)"""
     position, normal, _, seed, _ = points

@@ -12,6 +12,7 @@ from relume.parallel import for_ranges
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits
 from relume.trace.surface import LEAST_FACING, OFF_EDGES
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -42,7 +43,7 @@ def _turned(v, is_turned):  # type: ignore[no-untyped-def]
     return (-v[0], -v[1], -v[2]) if is_turned else (v[0], v[1], v[2])
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _shares(uv, edges, twice_area, epsilon):  # type: ignore[no-untyped-def]
     """Move barycentric coordinates off the edges; see `relume.trace.surface`. edges: opposite to each corner"""
     per_area = 1 / max(twice_area, 1e-20)
@@ -53,7 +54,7 @@ def _shares(uv, edges, twice_area, epsilon):  # type: ignore[no-untyped-def]
     return a / total, b / total, c / total
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _normals(positions, normals, faces, face, uv, directions, epsilon, start, stop, out):  # type: ignore[no-untyped-def]
     """Find the normals at hits [start, stop). out: written. (n, 3) float32"""
     for k in range(start, stop):

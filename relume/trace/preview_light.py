@@ -22,6 +22,7 @@ from relume.points import Points
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 from relume.trace.local_shadows import shadow_ray
 from relume.trace.packet import LANES, aim, ask_first, is_free, new_packet, set_origin, take_chance, trace_shadows
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -46,7 +47,7 @@ def is_probe(k):  # type: ignore[no-untyped-def]
     return k & 3 == (k >> 2) & 3
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _flush(occluded, packet, waiting, seen):  # type: ignore[no-untyped-def]
     """Trace the rays of the first lanes, which belong to rays of the block; returns how many reach the light."""
     ask_first(packet, waiting)
@@ -59,7 +60,7 @@ def _flush(occluded, packet, waiting, seen):  # type: ignore[no-untyped-def]
     return num_seen
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _ask(occluded, packet, position, chance, first, width, rays, given, are_probes, seen):  # type: ignore[no-untyped-def]
     """Trace the rays that would bring light to the probes of a block, or to its other points.
 
@@ -84,7 +85,7 @@ def _ask(occluded, packet, position, chance, first, width, rays, given, are_prob
     return asked, num_seen
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _aim(light, strata, off_surface, points, first, width, rays, given):  # type: ignore[no-untyped-def]
     """Aim the rays of a block's points, sample after sample of `BLOCK` each: direction and end, and w · cos θi."""
     position, normal, _, seed, _ = points

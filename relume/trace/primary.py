@@ -15,6 +15,7 @@ from relume.parallel import for_ranges, for_shares, num_threads
 from relume.scene.model import Camera
 from relume.trace.embree import EmbreeScene, intersect, packet_arguments
 from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_origin, take_chance, trace_hits, uv_of
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -110,7 +111,7 @@ def camera_directions(camera: Camera, size: tuple[int, int], x: F32, y: F32) -> 
     return out
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _aim(rotation, half_width, half_height, width, height, x, y, start, stop, out):  # type: ignore[no-untyped-def]
     """Aim rays [start, stop), in double precision: pixels of wide pictures are a ten thousandth apart."""
     for r in range(start, stop):

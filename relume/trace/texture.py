@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relume.parallel import for_ranges
 from relume.scene.coding import ROWS_AT_ONCE, decode, wrapped
 from relume.scene.model import WRAPS, Texture
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -118,7 +119,7 @@ def _halve(image: F32) -> F32:
     )
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True)
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
     """Fold a texel's index into an image that is mirrored outside, or clamp it."""
     if wrap == _CLAMP:
@@ -127,7 +128,7 @@ def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
     return min(folded, 2 * size - 1 - folded)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def two_texels(wrap, place, size):  # type: ignore[no-untyped-def]
     """Find the two texels about a place along one side of an image, and the share of the second.
 

@@ -13,6 +13,7 @@ from relume.parallel import for_ranges, for_shares
 from relume.points import ALIKE
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, take_chance, trace_shadows
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -104,7 +105,7 @@ def trace_visibility(
     return Traced(bits, sum(counts), time.perf_counter() - began)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _pick(visible, rows, lights, start, stop, out):  # type: ignore[no-untyped-def]
     for i in range(start, stop):
         for k in range(len(lights)):

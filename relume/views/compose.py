@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, num, replace, start, stop, radiance):  # type: ignore[no-untyped-def]
     """Add planes [start, stop) of one term, a plane being a channel of a tile, to radiance (3, samples of the view).
 
@@ -35,7 +36,7 @@ def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, num,
                 radiance[channel, first + row] += value
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_even(arriving, factor, start, stop, image):  # type: ignore[no-untyped-def]
     """Add samples [start, stop) in all channels."""
     samples = image.shape[2]

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from relume.errors import ParameterError
 from relume.imageio.files import to_bytes
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 from relume.views.view import Tile, View
 
 F32 = NDArray[np.float32]
@@ -20,7 +21,7 @@ _BIAS, _MANTISSA_BITS, _LARGEST = 15, 9, np.float32(65408.0)  # RGB9_E5 of OpenG
 _FLOAT_BIAS = 127
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
     """Pack a pixel's red, green and blue into 32 bits: 9-bit mantissas, red lowest, and a 5-bit exponent they share."""
     red = min(red, _LARGEST) if red > 0 else np.float32(0)  # not a number is no light
@@ -40,7 +41,7 @@ def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
     return r | (g << np.uint32(9)) | (b << np.uint32(18)) | (np.uint32(shared) << np.uint32(27))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _resolve(radiance, gain, first, order, gains, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the samples of each pixel of tiles [start, stop) into out (pixels, 3)."""
     middle, last = gains.shape[1] // 2, gains.shape[1] - 1  # columns of green and blue
@@ -60,7 +61,7 @@ def _resolve(radiance, gain, first, order, gains, width, tiles, offsets, start, 
                 at += 1
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _pack(pixels, start, stop, out):  # type: ignore[no-untyped-def]
     """Pack pixels [start, stop) of (pixels, 3) into words (pixels,)."""
     for p in range(start, stop):

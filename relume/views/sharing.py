@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 
 from relume.points import Points
 from relume.sharing import Sharing, Weights
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -26,7 +27,7 @@ _MIN_COS_TURN_OF_HIGHLIGHTS = 0.9986  # 3°
 _MAX_RISE = 0.2  # off the tangent plane, over the distance
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _most_neighbours(first, pixel, width):  # type: ignore[no-untyped-def]
     """Count the samples of the pixels around all samples. first: where each pixel's samples begin. (pixels + 1,)"""
     height, count = (first.shape[0] - 1) // width, 0
@@ -38,7 +39,7 @@ def _most_neighbours(first, pixel, width):  # type: ignore[no-untyped-def]
     return count
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _weigh(  # type: ignore[no-untyped-def]
     order, first, pixel, width, position, normal, chance, min_cos_turn, starts, among, weights
 ):

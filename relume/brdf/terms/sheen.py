@@ -17,6 +17,7 @@ import numpy as np
 
 from relume.brdf.local import HALF, MIN_COSINE, ONE, TWO, ZERO, quotient_ufunc_with
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
+from relume.uncounted import UNCOUNTED
 
 LEAST_ROUGHNESS = 0.07  # of the specification's sample implementation; less is a spike at the horizon
 _QUARTER = np.float32(0.25)
@@ -26,7 +27,7 @@ _ROUGH = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
 _DEFAULT = 0.5
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _hidden(a, b, c, d, e, cosine):  # type: ignore[no-untyped-def]
     """Λ of fibres that are seen at a cosine, eq. 3: e^L(x), and about x = 1/2 its logarithm is odd."""
     x = min(cosine, ONE - cosine)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from relume.light.triangles import TriangleLights
 from relume.parallel import for_ranges, for_shares
 from relume.trace.cell_tree import NO_CELL
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -24,7 +25,7 @@ _PREVIEW_BOUNCES = 6  # a thousandth of the light in a Cornell box is wrong then
 _LARGEST_SHARE = 0.999
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def _irradiance(normal, visible, directions, across, start, stop, out):  # type: ignore[no-untyped-def]
     for p in range(start, stop):
         red = green = blue = 0.0

@@ -21,6 +21,7 @@ from relume.methods.cells.cell_light import CellLight
 from relume.methods.cells.lobes import Lobes
 from relume.parallel import for_ranges
 from relume.project.receivers import Rays, Receivers, listed
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -100,7 +101,7 @@ def _are_alike(normals):  # type: ignore[no-untyped-def]
     return True
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # type: ignore[no-untyped-def]
     """Put the light triangles that the points of cells see into bins.
 
@@ -129,7 +130,7 @@ def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # ty
                     bins[g, mirroring, b, channel] += share * seen * cosine * irradiance[m, channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_listed(frames, points, first, wi, irradiance, bins):  # type: ignore[no-untyped-def]
     """The same of listed rays, whose light has been weighed by the cosine. points: of the cells. wi: (3, K) local"""
     num_points = points.normal.shape[0] // bins.shape[0]

@@ -10,11 +10,12 @@ from relume.basis.lobe_grid import SIDE
 from relume.project.sent import grid_means
 from relume.project.squares import Squares
 from relume.trace.cell_tree import NO_CELL
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _count(links, squares, counts):  # type: ignore[no-untyped-def]
     """Count rays by the cell that they hit and the square that they come from. counts: (C, SIDE²)"""
     for p in range(links.shape[0]):

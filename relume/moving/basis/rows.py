@@ -9,11 +9,12 @@ import numba as nb
 import numpy as np
 
 from relume.moving.basis.out_factors import NUM_ROWS
+from relume.uncounted import UNCOUNTED
 
 LEAST_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True)
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def row_of(cosine):  # type: ignore[no-untyped-def]
     """Find where cos θo lies in tables: a row, and the share of the next."""
     place = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
@@ -21,7 +22,7 @@ def row_of(cosine):  # type: ignore[no-untyped-def]
     return row, np.float32(place - row)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def seen_from(position, normal, tangent, eye):  # type: ignore[no-untyped-def]
     """Find where a point's wo lies in tables: a row, the share of the next, and cos φo, sin φo.
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -28,7 +29,7 @@ _APART = 0.5  # of σ, that each begins off the middle
 _NARROWEST, _WIDEST = np.float32(1e-8), np.float32(1.0)  # σ²
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _share_of_first(x):  # type: ignore[no-untyped-def]
     """Find 1 / (1 + e^x), to 1e-4, by Lambert's continued fraction of the hyperbolic tangent: eight at once."""
     h = min(max(np.float32(-0.5) * x, np.float32(-4.9)), np.float32(4.9))
@@ -38,7 +39,7 @@ def _share_of_first(x):  # type: ignore[no-untyped-def]
     return np.float32(0.5) + np.float32(0.5) * above / below
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _width_of(length):  # type: ignore[no-untyped-def]
     """Find σ² = 1 / κ from the length of the mean direction, R: κ ≈ R (3 − R²) / (1 − R²)."""
     r = min(max(length, np.float32(1e-3)), np.float32(1 - 1e-7))

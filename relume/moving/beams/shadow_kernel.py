@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from relume.light.suns import NUM_TARGETS
 from relume.moving.edges import differ
 from relume.trace.packet import FAR, LANES, aim, ask, is_free, new_packet, set_origin, trace_shadows
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -151,7 +152,7 @@ def _is_beside(rays, p, q):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def predict(rays, width, height, start, stop, num, is_doubted):  # type: ignore[no-untyped-def]
     """Predict what was not asked in squares of 2 × 2 pixels [start, stop); doubt it where others disagree.
 
@@ -175,7 +176,7 @@ def predict(rays, width, height, start, stop, num, is_doubted):  # type: ignore[
                     _predict_pixel(rays, width, height, x, y, num, is_doubted)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _predict_pixel(rays, width, height, x, y, num, is_doubted):  # type: ignore[no-untyped-def]
     """Predict a pixel from those of its surface about it that were asked."""
     p, found, agree, value = y * width + x, 0, True, np.uint8(0)
@@ -191,7 +192,7 @@ def _predict_pixel(rays, width, height, x, y, num, is_doubted):  # type: ignore[
         num[p] = value
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def doubt(rays, width, height, found, is_known, num, start, stop, is_doubted):  # type: ignore[no-untyped-def]
     """Doubt what was predicted near found[start:stop], on their surface, and differs from them.
 
@@ -209,7 +210,7 @@ def doubt(rays, width, height, found, is_known, num, start, stop, is_doubted):  
                     is_doubted[q] = True
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def doubt_across(rays, owner, num_pixels, more, num, start, stop, is_doubted):  # type: ignore[no-untyped-def]
     """Doubt rays across edges of pixels owner[more · (start:stop)] that differ from others on a surface.
 
@@ -230,7 +231,7 @@ def doubt_across(rays, owner, num_pixels, more, num, start, stop, is_doubted):  
                     is_doubted[k] = _is_beside(rays, p, other)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def even_out(rays, width, height, num, start, stop, out):  # type: ignore[no-untyped-def]
     """Write the shares of pixels [start, stop): the mean of nine where all of them are partly in shadow.
 

@@ -17,12 +17,13 @@ from relume.moving.highlights.lobe_lights import MOST_LAMPS, LobeLights, square_
 from relume.moving.highlights.looking import along_both
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _middle(one, other, first, sigma, sigma_2):  # type: ignore[no-untyped-def]
     """Find the mean direction of two lobes, three numbers, and how wide both are together, σ²."""
     x = first * one[0] + (np.float32(1) - first) * other[0]
@@ -34,7 +35,7 @@ def _middle(one, other, first, sigma, sigma_2):  # type: ignore[no-untyped-def]
     return per * x, per * y, per * z, own + max(np.float32(1) - length, np.float32(0))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _glance(points, material, visible, listed, lobes, eye, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Look along lobes from the points that are [start, stop) of rows."""
     position, normal, _, _, _ = points

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from relume.light.suns import MOST_SUNS
 from relume.moving.basis.lobes import Lobes
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -54,14 +55,14 @@ class LobeLights(NamedTuple):
     share: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def width_of(sigma):  # type: ignore[no-untyped-def]
     """Find which width's lists a lobe of σ takes: the nearest."""
     step = np.float32(2) * math.log2(max(sigma, np.float32(1e-6)) * np.float32(1 / NARROWEST))
     return min(max(np.int64(step + np.float32(0.5)), 0), NUM_WIDTHS - 1)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def square_of(x, y, z):  # type: ignore[no-untyped-def]
     """Find the square of a direction, whose parts are x, y, z."""
     per = np.float32(1) / (abs(x) + abs(y) + abs(z))
@@ -99,7 +100,7 @@ def _squares() -> tuple[F64, F64]:
 _SQUARES = _squares()
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def weight_of(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
     """Find w of a light.
 
@@ -110,7 +111,7 @@ def weight_of(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
     return _weight(off, lights[light, 3], lights[light, 4], variance)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _weight(off, spread, luminous, variance):  # type: ignore[no-untyped-def]
     """Find w from 1 − ω · ω_l, r² and E."""
     per = np.float32(1) / (variance + spread)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relume.moving.basis.rows import LEAST_COSINE, row_of
 from relume.moving.sky import Sky, add_sky_about, level_of
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -33,7 +34,7 @@ class SkyLight(NamedTuple):
     gain: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def along_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     """Find where a lobe looks.
 
@@ -48,7 +49,7 @@ def along_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     return row, share, _leaning(mean, aside, n), wide
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def along_both(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     """Find where the two lobes that a point has for one look.
 
@@ -67,7 +68,7 @@ def along_both(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     return row, share, _leaning(one, aside, n), _leaning(other, aside, n), first, sigma, sigma_2
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _aside(n, d):  # type: ignore[no-untyped-def]
     """Find where θo lies in tables, and the unit direction along the surface in which d goes on."""
     facing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
@@ -78,14 +79,14 @@ def _aside(n, d):  # type: ignore[no-untyped-def]
     return row, share, (per * x, per * y, per * z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _leaning(cosine, aside, n):  # type: ignore[no-untyped-def]
     """The direction between n and `aside`, by the cosine of its angle from n."""
     flat = math.sqrt(max(np.float32(1) - cosine * cosine, np.float32(0)))
     return flat * aside[0] + cosine * n[0], flat * aside[1] + cosine * n[1], flat * aside[2] + cosine * n[2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def add_sky_in_lobe(light, seen, direction, sigma, gain, out):  # type: ignore[no-untyped-def]
     """Add what a lobe shows of the sky, without the sky's gain.
 
@@ -108,7 +109,7 @@ def add_sky_in_lobe(light, seen, direction, sigma, gain, out):  # type: ignore[n
                 out[channel] += near * light.lamps[lamp, 3 + channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _decay(x):  # type: ignore[no-untyped-def]
     """e^−x, without a call where nothing is left."""
     return np.float32(math.exp(-x)) if x < _NOTHING_LEFT else np.float32(0)

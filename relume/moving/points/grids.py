@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
@@ -114,7 +115,7 @@ def nodes_about(lattice, face, side, u, v):  # type: ignore[no-untyped-def]
     return first + node_of(rows, i + 1, j + 1), b, c, np.float32(fx + fy - 1), np.float32(1 - fy), np.float32(1 - fx)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _least(grids, power, steps, start, stop, out):  # type: ignore[no-untyped-def]
     """Find the least of the three nodes about each of the steps [start, stop)."""
     for k in range(start, stop):

@@ -9,10 +9,11 @@ import numba as nb
 import numpy as np
 
 from relume.trace.texture import two_texels
+from relume.uncounted import UNCOUNTED
 
 
 # Inlined, as what it calls: calls count the references of arrays, which is two thirds of the time of a look-up.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _add_level(textures, texture, level, u, v, share, out):  # type: ignore[no-untyped-def]
     """Add a share of a bilinear lookup in one level of a texture. out: (3,)"""
     row = textures.first[texture] + level
@@ -34,7 +35,7 @@ def _add_level(textures, texture, level, u, v, share, out):  # type: ignore[no-u
         )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-untyped-def]
     """Look a texture up, trilinear.
 

@@ -16,6 +16,7 @@ from relume.moving.points.following import APART, from_ends, from_nearby
 from relume.moving.points.grids import Lattice
 from relume.parallel import for_shares
 from relume.points import Points
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -129,7 +130,7 @@ def extent_of(points: Points) -> tuple[F32, float]:
     return position.min(axis=0), max(float(np.ptp(position, axis=0).max()), 1e-30)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _key(points, material, side, level, size, corner, alike, start, stop, where, what):  # type: ignore[no-untyped-def]
     """Find the keys of nodes [start, stop). size: of the boxes in which they lie together. (n,) float64"""
     position, normal = points

@@ -21,6 +21,7 @@ from relume.moving.points.vertices import Vertices
 from relume.moving.relief.numbers import EMPTY, FUNCTIONS, HALF, OF_ORDER, PAIRS, WIDTH
 from relume.moving.relief.place import cross, dot, face_places, row
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
@@ -42,7 +43,7 @@ class VertexLight(NamedTuple):
     vectors: F32
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def turned_by(x, y):  # type: ignore[no-untyped-def]
     """Find cos δ and sin δ, of δ as a vector of any length; (0, 0) turns nothing."""
     square = x * x + y * y
@@ -52,7 +53,7 @@ def turned_by(x, y):  # type: ignore[no-untyped-def]
     return np.float32(1), np.float32(0)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _turn_by(x, y):  # type: ignore[no-untyped-def]
     """Find cos mδ and sin mδ for m of 1 to 4, of δ as `turned_by` has it."""
     c1, s1 = turned_by(x, y)
@@ -60,7 +61,7 @@ def _turn_by(x, y):  # type: ignore[no-untyped-def]
     return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def add_turned(lanes, turn, side, weight, is_added, out):  # type: ignore[no-untyped-def]
     """Add a light vector, turned.
 
@@ -81,7 +82,7 @@ def add_turned(lanes, turn, side, weight, is_added, out):  # type: ignore[no-unt
         out[PAIRS + i] = other + sine * a + cosine * b
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _lay(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Lay the light vectors of the points that are [start, stop) of rows into lanes. out: (points, 3 F)"""
     for p in rows[start:stop]:

@@ -18,6 +18,7 @@ from relume.basis.arcs import acos_clamped, azimuth_turns
 from relume.moving.pixels import footprint_of
 from relume.moving.points.surface import Surface
 from relume.project.texels import level_of
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
@@ -36,19 +37,19 @@ _OF_FACE = np.array([X, X + AT_ONCE, X + 2 * AT_ONCE, SIDE, U, V, _TO1, _TO1 + A
 """Where the numbers of `face_places` go."""
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Inner product of tuples of three."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def cross(a, b):  # type: ignore[no-untyped-def]
     """Cross product of tuples of three."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def row(array, k):  # type: ignore[no-untyped-def]
     """One of (n, 3) as a tuple, which is not counted as a reference."""
     return array[k, 0], array[k, 1], array[k, 2]
@@ -76,7 +77,7 @@ def face_places(positions: F32, surface: Surface) -> F32:
     return out
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _projected(face_normal):  # type: ignore[no-untyped-def]
     """Find the axes of a texture that is projected along the axis of the world that a face looks along most."""
     a, b, c = abs(face_normal[0]), abs(face_normal[1]), abs(face_normal[2])
@@ -93,7 +94,7 @@ def _projected(face_normal):  # type: ignore[no-untyped-def]
     return across, cross(axis, across)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def gather(places, normals, face, uv, distance, directions, vertex, weight, rows, start, num, columns):  # type: ignore[no-untyped-def]
     """Gather what rays rows[start:start + num] see, at most `AT_ONCE`.
 
@@ -113,25 +114,25 @@ def gather(places, normals, face, uv, distance, directions, vertex, weight, rows
         columns[_UV + j], columns[_UV + AT_ONCE + j], columns[_DISTANCE + j] = uv[ray, 0], uv[ray, 1], distance[ray]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def three(columns, first, j):  # type: ignore[no-untyped-def]
     """Row j of the three columns that begin at `first`, a tuple of what `columns` has."""
     return columns[first + j], columns[first + AT_ONCE + j], columns[first + 2 * AT_ONCE + j]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _set_three(columns, first, j, of):  # type: ignore[no-untyped-def]
     """Write a tuple into one row of three columns."""
     columns[first + j], columns[first + AT_ONCE + j], columns[first + 2 * AT_ONCE + j] = of
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _unit(vector):  # type: ignore[no-untyped-def]
     scale = np.float32(1) / math.sqrt(max(dot(vector, vector), _LEAST))
     return scale * vector[0], scale * vector[1], scale * vector[2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _frame(columns):  # type: ignore[no-untyped-def]
     """Find axes across normals, and places in repeats, where faces have some."""
     for j in range(AT_ONCE):
@@ -148,7 +149,7 @@ def _frame(columns):  # type: ignore[no-untyped-def]
         _set_three(columns, Y, j, (side * y[0], side * y[1], side * y[2]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _project(columns, eye, num):  # type: ignore[no-untyped-def]
     """Find axes and places of faces without any: textures are projected onto them, a metre for each repeat."""
     for j in range(num):
@@ -164,7 +165,7 @@ def _project(columns, eye, num):  # type: ignore[no-untyped-def]
         _set_three(columns, Y, j, y)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _share(place):  # type: ignore[no-untyped-def]
     """What a place is beyond whole repeats, whatever it is; a floor would be a call."""
     near: Any = min(max(place, -_MOST), _MOST)
@@ -172,7 +173,7 @@ def _share(place):  # type: ignore[no-untyped-def]
     return beyond + np.float32(1) if beyond < 0 else beyond
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def lay(columns, num, eye, pixel_angle, turned, scale, finest):  # type: ignore[no-untyped-def]
     """Find where gathered rays meet their texture, and how it lies there.
 

@@ -43,6 +43,7 @@ from relume.moving.relief.place import (
 from relume.moving.relief.tables import Cover
 from relume.parallel import for_shares
 from relume.project.texels import texels_at
+from relume.uncounted import UNCOUNTED
 from relume.vector_code import call_for
 
 F32 = NDArray[np.float32]
@@ -99,7 +100,7 @@ def _list(face, face_material, is_covered, is_alike, vertex, first, rows, is_ask
                 is_asked[vertex[ray, k]] = 1
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _part(owner, num_pixels, is_covered, face_material, face_normal, face, distance, directions, is_alike, out):  # type: ignore[no-untyped-def]
     """Find rays across edges that see the texture of their pixel's middle, and take from them what that shows.
 
@@ -117,7 +118,7 @@ def _part(owner, num_pixels, is_covered, face_material, face_normal, face, dista
                 out[ray, channel] -= out[p, channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _join(owner, num_pixels, is_alike, out):  # type: ignore[no-untyped-def]
     """Give rays that `_part` found what their pixels' middles show by now."""
     for k in range(owner.shape[0]):
@@ -128,7 +129,7 @@ def _join(owner, num_pixels, is_alike, out):  # type: ignore[no-untyped-def]
 
 # Helpers are inlined, and get arrays, not what holds them: a call, or an attribute, would count references to arrays,
 # which threads share; that was three quarters of the kernel.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _ask(levels, rings, weights, columns, num_rays, of_one, asked, counts):  # type: ignore[no-untyped-def]
     """Find the texels and the sides that rays show, and call for their numbers: they arrive while others are summed.
 
@@ -150,7 +151,7 @@ def _ask(levels, rings, weights, columns, num_rays, of_one, asked, counts):  # t
                 call_for(weights, (view[k], texel[first + 1], NUMBERS - 1))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _arriving(numbers, axes, few_axes, tangents, vectors, about, shares, x, y, side):  # type: ignore[no-untyped-def]
     """Sum numbers with the light between three vertices, of each channel.
 

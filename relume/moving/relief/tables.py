@@ -24,6 +24,7 @@ from relume.btf.eigen import LARGEST, EigenBtf
 from relume.btf.rings import Rings, taps_numpy
 from relume.moving.relief.numbers import AXIS_OF, FUNCTIONS, LANE_OF, NUM_FUNCTIONS, NUMBERS, WIDTH
 from relume.parallel import for_ranges
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -79,7 +80,7 @@ def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> list[Cover]:
     return found
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _numbers_of(factors, cluster, weight, view, texel, out):  # type: ignore[no-untyped-def]
     """Sum the numbers of a texel from one side. factors: (K, 1 + C, 24) of that side. out: (24,)"""
     of = cluster[view, texel]

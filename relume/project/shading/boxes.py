@@ -16,6 +16,7 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import LOBE, THETA_D, THETA_I, THETA_R, angles_into
+from relume.uncounted import UNCOUNTED
 
 _ZERO, _HALF, _THIRD = np.float32(0), np.float32(0.5), np.float32(1 / 3)
 CHUNK = 256  # triangles evaluated together: their scratch memory stays in a core's first-level cache
@@ -27,7 +28,7 @@ _CORNER = np.float32(1.64)
 _SHAPE, _BEND, _MOST_BEND = np.float32(0.08), np.float32(0.05), np.float32(0.5)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _spread(gamma, num, mean, half):  # type: ignore[no-untyped-def]
     """Find mean angles of triangles, and half the widths of boxes in which angles vary alike. gamma: (3, ≥ num)"""
     a, b, c = gamma[0], gamma[1], gamma[2]
@@ -39,7 +40,7 @@ def _spread(gamma, num, mean, half):  # type: ignore[no-untyped-def]
         half[n] = max(math.sqrt((ab * ab + bc * bc + ca * ca) * _THIRD), _LEAST_HALF)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _reach_into(kind, scale, wo, local, radius, half, num, reach):  # type: ignore[no-untyped-def]
     """Bound how far an angle varies within triangles, in bands.
 
@@ -61,7 +62,7 @@ def _reach_into(kind, scale, wo, local, radius, half, num, reach):  # type: igno
             reach[n] = max(turned, _CORNER * half[n])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
     """Find where boxes begin and end, in bands. last: angle in the last band."""
     for n in range(num):
@@ -70,7 +71,7 @@ def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
         high[n] = max(min(mean[n] + half[n], last), low[n] + _LEAST_HALF)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _lean_into(gamma, mean, local, between, num, lean):  # type: ignore[no-untyped-def]
     """Find how an angle varies with cos θi between the lights of groups: their covariance over the mean cosine.
 
@@ -87,7 +88,7 @@ def _lean_into(gamma, mean, local, between, num, lean):  # type: ignore[no-untyp
         lean[n] = between[n] * covariance * _THIRD / max(cosine, abs(by_a) + abs(by_b) + abs(by_c) + np.float32(1e-6))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _integrals(steps, low, high, lean, num, integral):  # type: ignore[no-untyped-def]
     """Integrate a curve times cos θi from where boxes begin to where they end, over the mean cosine.
 
@@ -103,14 +104,14 @@ def _integrals(steps, low, high, lean, num, integral):  # type: ignore[no-untype
         integral[n] = whole - (begins + lean[n]) * steps[first, 0] + (ends + lean[n]) * steps[final, 0]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _means(low, high, num, value):  # type: ignore[no-untyped-def]
     """Divide integrals over boxes by their widths."""
     for n in range(num):
         value[n] /= high[n] - low[n]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _variations(steps, mean, reach, last, num, variation):  # type: ignore[no-untyped-def]
     """Find by how much a curve varies within reach of mean angles.
 
@@ -122,7 +123,7 @@ def _variations(steps, mean, reach, last, num, variation):  # type: ignore[no-un
         variation[n] = steps[first, 2] - steps[final, 2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_errors(mean, reach, variation, value, num, error):  # type: ignore[no-untyped-def]
     """Add what a curve's means over boxes may be wrong by, as a share of them.
 
@@ -134,13 +135,13 @@ def _add_errors(mean, reach, variation, value, num, error):  # type: ignore[no-u
         error[n] += (_SHAPE + bend) * variation[n] / max(value[n], np.float32(1e-30))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _multiply(factor, num, value):  # type: ignore[no-untyped-def]
     for n in range(num):
         value[n] *= factor[n]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def evaluate(curves, scale, wo, local, radius, between, num, scratch, value, error):  # type: ignore[no-untyped-def]
     """Multiply the means of all curves over triangles.
 
@@ -180,7 +181,7 @@ def evaluate(curves, scale, wo, local, radius, between, num, scratch, value, err
             _multiply(one, num, value[row])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def look_up(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untyped-def]
     """Look up a node of listed lights [begin, begin + num).
 
@@ -193,7 +194,7 @@ def look_up(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untyped
         x[k], y[k], z[k] = nodes[m, node, 0], nodes[m, node, 1], nodes[m, node, 2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def look_up_middles(nodes, light, begin, num, local):  # type: ignore[no-untyped-def]
     """Look up the midpoints of edges of listed lights [begin, begin + num).
 
@@ -210,7 +211,7 @@ def look_up_middles(nodes, light, begin, num, local):  # type: ignore[no-untyped
         ca_x[k], ca_y[k], ca_z[k] = nodes[m, 5, 0], nodes[m, 5, 1], nodes[m, 5, 2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def turn(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
     """Turn nodes [first_node, 6) into the frame of normal n and tangent t. local: (3, 6, ≥ num)"""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
@@ -224,7 +225,7 @@ def turn(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
             c[k] = nx * x + ny * y + nz * z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def weigh(brings, light, shading, begin, num, weight, reach):  # type: ignore[no-untyped-def]
     """Look up what listed lights [begin, begin + num) bring, and how wide they are.
 
@@ -242,7 +243,7 @@ def weigh(brings, light, shading, begin, num, weight, reach):  # type: ignore[no
         reach[k] = brings[m, 3]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def sum_up(value, weight, num, total):  # type: ignore[no-untyped-def]
     """Add weight (3, ≥ num) times value (1 or 3, ≥ num) to the total (3,)."""
     blue_row = value.shape[0] - 1

@@ -6,6 +6,7 @@ import numba as nb
 import numpy as np
 
 from relume.project.shading.boxes import CHUNK, evaluate, look_up_middles, sum_up, turn, weigh
+from relume.uncounted import UNCOUNTED
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 # Not near enough is whose error may be above both: a share of what it brings, and of all that the point receives.
@@ -22,7 +23,7 @@ def scales_of(curves):  # type: ignore[no-untyped-def]
     return scale, most
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def by_axes(axes, local_wo, entry, out):  # type: ignore[no-untyped-def]
     """Weigh wo by the axes of each curve.
 
@@ -42,9 +43,9 @@ def room(num, num_rows):  # type: ignore[no-untyped-def]
     return weight, radius, np.empty((num, CHUNK + 1), np.int64), value, error
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def evaluate_listed(  # type: ignore[no-untyped-def]
-    n, t, listed, begin, end, lights, curves, scale, wo, local, scratch, chunks, total
+    n, t, listed, begin, end, lights, curves, scale, wo, local, scratch, share, chunks, total
 ):
     """Evaluate what a point's listed lights [begin, end) bring, chunk by chunk.
 
@@ -52,12 +53,12 @@ def evaluate_listed(  # type: ignore[no-untyped-def]
         n, t: normal and tangent of the point. listed: light and shading of its list.
         lights: nodes and brings, see `shade_points`, and `between`, see `evaluate`, of all lights.
         curves, scale, wo, scratch: as in `evaluate`. local: of one chunk, written.
+        share: scratch for `between` of a chunk; empty where that is. (CHUNK,)
         chunks: `room`, written but for which are not near enough. total: what all bring, added to. (3,)
     """
     light, shading = listed
     nodes, brings, between = lights
     weight, reach, _, value, error = chunks
-    share = np.empty(min(between.shape[0], CHUNK), np.float32)
     for chunk in range((end - begin + CHUNK - 1) // CHUNK):
         at = begin + chunk * CHUNK
         num = min(CHUNK, end - at)
@@ -72,13 +73,13 @@ def evaluate_listed(  # type: ignore[no-untyped-def]
         sum_up(value[chunk], weight[chunk], num, total)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def least_of(total, row):  # type: ignore[no-untyped-def]
     """Find what may be wrong where so much arrives. total: (3,) row: what the point has already. (3,)"""
     return _TOLERANCE_OF_ALL * (total[0] + total[1] + total[2] + abs(row[0]) + abs(row[1]) + abs(row[2]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def set_aside(value, weight, error, num, least, which):  # type: ignore[no-untyped-def]
     """List the triangles that are not near enough, and let them bring nothing as they are; returns their number.
 

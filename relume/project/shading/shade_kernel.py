@@ -13,6 +13,7 @@ import numpy as np
 
 from relume.project.shading.boxes import CHUNK, evaluate, look_up, sum_up, turn
 from relume.project.shading.listed import by_axes, evaluate_listed, least_of, room, scales_of, set_aside
+from relume.uncounted import UNCOUNTED
 
 _ONE, _HALF, _QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
@@ -20,13 +21,19 @@ _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _MAX_DEPTH = 6
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _copy(source, which, target):  # type: ignore[no-untyped-def]
     for n in range(which.shape[0]):
         target[n] = source[which[n]]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+def _add_to(row, total):  # type: ignore[no-untyped-def]
+    for channel in range(3):
+        row[channel] += total[channel]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _divide(local, weight, radius, which, parent, to_local, to_weight, to_radius):  # type: ignore[no-untyped-def]
     """Make the four children of the listed triangles; returns their number.
 
@@ -67,22 +74,22 @@ def _divide(local, weight, radius, which, parent, to_local, to_weight, to_radius
     return 4 * count
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_divided(curves, scale, wo, alone, num, least, generations, scratch, total):  # type: ignore[no-untyped-def]
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _add_divided(curves, scale, wo, alone, num, least, generations, family, scratch, total):  # type: ignore[no-untyped-def]
     """Add triangles that are divided: the first `num` of the first generation, and what comes of them.
 
     Args:
         curves, scale, wo, scratch: as in `evaluate`. alone: its `between` of what is no group.
         least: as in `set_aside`.
         generations: local, weight, radius, which, value and error of each, written but for the first's first three.
+        family: scratch for parents, and for how many of each generation there are, and are done, see `shade_points`.
         total: added to. (3,)
     """
     local, weight, radius, which, value, error = generations
-    count, done = np.zeros(_MAX_DEPTH + 1, np.int64), np.zeros(_MAX_DEPTH + 1, np.int64)
-    parent = np.empty((22, CHUNK // 4), np.float32)
+    parent, count, done = family
     for n in range(num):
         which[0, n] = n
-    level, count[0] = 0, num
+    level, count[0], done[0] = 0, num, 0
     while level >= 0:
         if done[level] == count[level]:
             level -= 1
@@ -114,13 +121,24 @@ def shade_points(  # type: ignore[no-untyped-def]
     """
     num_curves, (scale, num_rows) = axes.shape[0], scales_of(curves)
     # made here: a constant could not be written, and what it is handed to would be compiled once more for that
-    wo, alone = np.empty((num_curves, 3), np.float32), np.empty(0, np.float32)
-    lights = (nodes, brings, alone)
-    chunks = room(nodes.shape[0] // CHUNK + 1, num_rows)
-    weight, reach, which, value, error = chunks
+    wo, total, alone = np.empty((num_curves, 3), np.float32), np.empty(3, np.float32), np.empty(0, np.float32)
+    chunks, of_parts = room(nodes.shape[0] // CHUNK + 1, num_rows), room(_MAX_DEPTH + 1, num_rows)
     local, scratch = np.empty((_MAX_DEPTH + 1, 3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
-    of_parts, total = room(_MAX_DEPTH + 1, num_rows), np.empty(3, np.float32)
-    chosen, generations = np.empty(CHUNK, np.int32), (local, *of_parts)
+    count, done = np.empty(_MAX_DEPTH + 1, np.int64), np.empty(_MAX_DEPTH + 1, np.int64)
+    family = (np.empty((22, CHUNK // 4), np.float32), count, done)
+    _shade(
+        normal, tangent, (first, light, shading), local_wo, (nodes, brings, alone), axes, (curves, scale), start, stop,
+        (wo, total, np.empty(CHUNK, np.int32), chunks, (local, *of_parts), family, scratch), out,
+    )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _shade(normal, tangent, listed, local_wo, lights, axes, curves, start, stop, memory, out):  # type: ignore[no-untyped-def]
+    """Do what `shade_points` is for, in the memory that it has made."""
+    (first, light, shading), (nodes, _, alone), (curves, scale) = listed, lights, curves
+    wo, total, chosen, chunks, generations, family, scratch = memory
+    weight, reach, which, value, error = chunks
+    local, of_parts = generations[0], generations[1:]
     for p in range(start, stop):
         begin, end = first[p - start], first[p - start + 1]
         if begin == end:
@@ -128,13 +146,14 @@ def shade_points(  # type: ignore[no-untyped-def]
         by_axes(axes, local_wo, begin, wo)
         total[:] = 0
         evaluate_listed(
-            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local[0], scratch, chunks,
-            total,
+            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local[0], scratch, alone,
+            chunks, total,
         )  # fmt: skip
-        if num_curves == 0:
-            out[p - start, :, 0] += total
+        row = out[p - start, :, 0]
+        if axes.shape[0] == 0:
+            _add_to(row, total)
             continue
-        least = least_of(total, out[p - start, :, 0])  # what is there already counts as well
+        least = least_of(total, row)  # what is there already counts as well
         total[:] = 0
         for chunk in range((end - begin + CHUNK - 1) // CHUNK):
             at = begin + chunk * CHUNK
@@ -151,5 +170,5 @@ def shade_points(  # type: ignore[no-untyped-def]
             for node in range(6):
                 look_up(nodes, node, chosen, 0, divided, local[0, 0, node], local[0, 1, node], local[0, 2, node])
             turn(normal[p], tangent[p], 0, divided, local[0])
-            _add_divided(curves, scale, wo, alone, divided, least, generations, scratch, total)
-        out[p - start, :, 0] += total
+            _add_divided(curves, scale, wo, alone, divided, least, generations, family, scratch, total)
+        _add_to(row, total)
