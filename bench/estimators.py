@@ -21,9 +21,9 @@ from bench.standard_error import over_points
 from relume.light.gather_rays import make_pattern
 from relume.look import validate
 from relume.memory import Memory
+from relume.methods.opened.bounced_views import BouncedViews
 from relume.methods.registry import open_transfer
 from relume.methods.store_io import read_tree
-from relume.methods.transfer import BouncedViews
 from relume.picture.light import light_of
 from relume.points import Points
 from relume.scene.cornell import cornell_box

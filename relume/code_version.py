@@ -21,7 +21,7 @@ _BAKES = ("methods.registry", "scene.archive", "store.fill")
 _AFTER_BAKES = (  # methods import these to open what was baked, and to look at it
     "operators", "picture", "project",
     "methods.local_lights", "methods.moving_error", "methods.moving_views", "methods.reflected",
-    "methods.retracing", "methods.transfer",
+    "methods.opened", "methods.retracing",
 )  # fmt: skip
 
 

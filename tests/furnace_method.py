@@ -20,9 +20,10 @@ from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
 from relume.environments.equirect import texel_solid_angles
 from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
+from relume.methods.opened.baked_views import BakedViews, FewSamples
+from relume.methods.opened.described import described
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
 from relume.methods.store_io import SHARD_ROWS
-from relume.methods.transfer import BakedViews, FewSamples, described
 from relume.picture.light import Light
 from relume.picture.transfer import Arriving, Axis
 from relume.project.sent import Sent, evenly

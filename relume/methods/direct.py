@@ -11,8 +11,9 @@ from typing import Any
 from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, Written
 from relume.memory import Memory
 from relume.methods import bounds
+from relume.methods.opened.baked_views import BakedViews
+from relume.methods.opened.described import described
 from relume.methods.sampled_views import SampledViews
-from relume.methods.transfer import BakedViews, described
 from relume.scene.model import Scene
 
 

@@ -29,10 +29,11 @@ from relume.light.gather_rays import make_pattern
 from relume.memory import Memory
 from relume.methods import bounds
 from relume.methods.last_read import LastRead
+from relume.methods.opened.bounced_views import BouncedViews
+from relume.methods.opened.described import described
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
 from relume.methods.store_io import SHARD_ROWS, read_cells, read_gather_samples, read_tree
 from relume.methods.thrown import make_thrown, most_seen, read_thrown
-from relume.methods.transfer import BouncedViews, described
 from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS
 from relume.trace.cells import POINTS_A_CELL, choose_cells

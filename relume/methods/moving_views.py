@@ -17,11 +17,12 @@ from relume.light.gather_rays import Pattern
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
 from relume.memory import Memory
+from relume.methods.opened.bounced_views import BouncedViews
+from relume.methods.opened.described import described_light
 from relume.methods.skies_in_lobes import SkiesInLobes
 from relume.methods.store_io import read_cells
 from relume.methods.suns_of_skies import SunsOfSkies
 from relume.methods.thrown import read_thrown
-from relume.methods.transfer import BouncedViews, described_light
 from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
 from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights

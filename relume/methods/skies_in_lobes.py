@@ -13,7 +13,7 @@ from relume.environments.equirect import turned
 from relume.light.blur import blurred, reduced
 from relume.light.suns import LAMPS, Divided, without_suns
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
-from relume.methods.transfer import BakedViews
+from relume.methods.opened.baked_views import BakedViews
 from relume.moving.highlights.by_lights import SkyLights
 from relume.moving.highlights.lobe_lights import LobeLights, lobe_lights
 from relume.moving.sky import Sky, sky_of

@@ -22,8 +22,9 @@ from relume.bake import Recipe, StoreReader, Task
 from relume.errors import CancelledError
 from relume.methods.gather import GatherMethod
 from relume.methods.local_lights import LocalLights
+from relume.methods.opened.baked_views import BakedViews, FewSamples
+from relume.methods.opened.bounced_views import BouncedViews
 from relume.methods.reflected import Reflected
-from relume.methods.transfer import BakedViews, BouncedViews, FewSamples
 from relume.operators.image_files import ImageFiles
 from relume.picture.jobs import Cancelled, Progress
 from relume.scene.model import Camera, Scene

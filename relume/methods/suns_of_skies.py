@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relume.light.suns import Divided, without_suns
 from relume.light.triangles import TriangleLights, Unturned, weigh
 from relume.look import EnvironmentKey
-from relume.methods.transfer import BakedViews, shown_of
+from relume.methods.opened.baked_views import BakedViews, shown_of
 from relume.moving.beams.beam import Beam, light_of_sun, targets_of_sun
 from relume.picture.light import Light
 from relume.points import Points

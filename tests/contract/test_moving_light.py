@@ -52,7 +52,7 @@ def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatc
         return picture.image()
 
     harmonic = rough(moving)
-    monkeypatch.setattr("relume.methods.transfer.read_harmonic_light", lambda store, cells: None)
+    monkeypatch.setattr("relume.methods.opened.bounced_views.read_harmonic_light", lambda store, cells: None)
     plain = rough(open_bake(baked, Memory(1 << 30)))
     assert 0 < relative_rmse(harmonic, plain) < 0.04
 

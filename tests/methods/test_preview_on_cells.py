@@ -7,8 +7,8 @@ import pytest
 from sessions import BUDGET, look_of, relative_rmse
 
 from relume.memory import Memory
-from relume.methods import transfer as transfers
 from relume.methods.cells.between import sent_between
+from relume.methods.opened import baked_views as transfers
 from relume.methods.registry import open_transfer
 from relume.picture.light import light_of
 

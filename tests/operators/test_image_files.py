@@ -12,7 +12,7 @@ from pictures import opened, sigma
 from sessions import BUDGET, look_of
 
 from relume.memory import Memory
-from relume.methods import transfer as transfer_module
+from relume.methods.opened import baked_views as transfer_module
 from relume.methods.registry import open_transfer
 from relume.operators.image_files import ImageFiles
 from relume.operators.shade import Shaded

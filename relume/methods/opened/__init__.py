@@ -1,0 +1,1 @@
+"""Bakes of fixed views, opened: what their arrays are to pictures."""
