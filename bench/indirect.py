@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bench.mitsuba import passes_of, render
 from relume.brdf.albedo import is_diffuse, reflectances_of
+from relume.brdf.channels import NormalMap
 from relume.look import validate
 from relume.look.document import MAX_BOUNCES
 from relume.picture.transfer import Transfer
@@ -46,7 +47,11 @@ def reflected(transfer: Transfer, terms: Mapping[str, Sequence[Mapping[str, Any]
 @contextmanager
 def highlights_send_nothing() -> Iterator[None]:
     """Restrict our light between surfaces to what diffuse terms send, for peers that are restricted alike."""
-    with patch("relume.picture.light.reflectances_of", lambda terms: reflectances_of(list(filter(is_diffuse, terms)))):
+
+    def of_diffuse(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None) -> bytes:
+        return reflectances_of(list(filter(is_diffuse, terms)), normals)
+
+    with patch("relume.picture.light.reflectances_of", of_diffuse):
         yield
 
 
