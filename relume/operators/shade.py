@@ -8,9 +8,8 @@ or two.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -19,12 +18,12 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.operators.frozen import tiles_of
-from relume.parallel import for_steps
 from relume.project.contraction import Contraction
 from relume.project.levels import contract_levels, project_levels
 from relume.project.receivers import Receivers
 from relume.project.shading.shader import Shader
 from relume.project.texels import texel_rows
+from relume.steps import Steps
 
 F32 = NDArray[np.float32]
 
@@ -84,29 +83,26 @@ def shaded_rows(
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """An image of one term of which some is shaded: whoever is stopped goes on from there, and some of it may go first.
+    """An image of one term of which some is shaded.
 
     Attributes:
         rows: one for each sample, nothing where it is not shaded yet. (n, 3) float32
-        done: which steps of `grain` samples are. (steps,)
-        lock: held while it is shaded.
+        steps: which of them are.
     """
 
     rows: F32
-    done: NDArray[np.bool_]
-    grain: int
-    lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    steps: Steps
 
     @classmethod
     def of(cls, num_samples: int) -> Begun:
         """Nothing of it."""
         grain = min(max(num_samples // _STEPS, _FEWEST_A_STEP), _MOST_A_STEP)
-        return cls(np.zeros((num_samples, 3), np.float32), np.zeros(-(-num_samples // grain), np.bool_), grain)
+        return cls(np.zeros((num_samples, 3), np.float32), Steps.of(num_samples, grain))
 
     @property
     def num_bytes(self) -> int:
         """Memory it holds."""
-        return self.rows.nbytes + self.done.nbytes
+        return self.rows.nbytes + self.steps.done.nbytes
 
     def shade(
         self,
@@ -128,20 +124,11 @@ class Begun:
             CancelledError: `cancelled` said so; what was shaded stays.
         """
         contractions = contract_levels(term, bands, None)
-        with self.lock:
-            lacking = np.flatnonzero(~self.done if wanted is None else self._steps_of(wanted) & ~self.done)
 
-            def step(start: int, stop: int) -> None:
-                for k in lacking[start:stop]:
-                    rows = slice(int(k) * self.grain, min((int(k) + 1) * self.grain, len(self.rows)))
-                    self.rows[rows] = shaded_rows(term, contractions, lights, receivers, rows.start, rows.stop)
-                    self.done[k] = True
+        def some(start: int, stop: int) -> None:
+            self.rows[start:stop] = shaded_rows(term, contractions, lights, receivers, start, stop)
 
-            for_steps(step, len(lacking), 1, progress, cancelled, "shading")
-
-    def _steps_of(self, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which steps have any of some samples."""
-        return np.logical_or.reduceat(wanted, np.arange(0, len(wanted), self.grain))
+        self.steps.work(some, progress, cancelled, "shading", wanted)
 
 
 def shade(

@@ -6,9 +6,8 @@ traced to the lights that come up, and gather rays leave about the normals as th
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,8 +16,8 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.light.gather_rays import Pattern
 from relume.memory import Memory
-from relume.parallel import for_steps
 from relume.points import Points
+from relume.steps import Steps
 from relume.views.leaning import Leant
 from relume.views.store_io import pattern_of_material, read_chance, read_eyes, read_seeds, towards
 
@@ -58,22 +57,20 @@ class Tracer(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class BegunLinks:
-    """Cells that gather rays of samples hit, of which some are traced: whoever is stopped goes on from there.
+    """Cells that gather rays of samples hit, of which some are traced.
 
     Attributes:
         cell: that each ray hits. (n, rays) uint16
-        done: which steps of `_STEP` samples are traced. (steps,)
-        lock: held while they are.
+        steps: which samples' are traced.
     """
 
     cell: NDArray[np.uint16]
-    done: NDArray[np.bool_]
-    lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    steps: Steps
 
     @classmethod
     def of(cls, num_samples: int, num_rays: int) -> BegunLinks:
         """Nothing of them."""
-        return cls(np.zeros((num_samples, num_rays), np.uint16), np.zeros(-(-num_samples // _STEP), np.bool_))
+        return cls(np.zeros((num_samples, num_rays), np.uint16), Steps.of(num_samples, _STEP))
 
     def trace(self, linked: Callable[[Rows], NDArray[np.uint16]], cancelled: Callable[[], bool]) -> None:
         """Trace what is left.
@@ -83,16 +80,11 @@ class BegunLinks:
         Raises:
             CancelledError: `cancelled` said so; what was traced stays.
         """
-        with self.lock:
-            lacking = np.flatnonzero(~self.done)
 
-            def step(start: int, stop: int) -> None:
-                for k in lacking[start:stop]:
-                    rows = np.arange(k * _STEP, min((k + 1) * _STEP, len(self.cell)))
-                    self.cell[rows] = linked(rows)
-                    self.done[k] = True
+        def some(start: int, stop: int) -> None:
+            self.cell[start:stop] = linked(np.arange(start, stop))
 
-            for_steps(step, len(lacking), 1, lambda share: None, cancelled, "tracing gather rays")
+        self.steps.work(some, lambda share: None, cancelled, "tracing gather rays")
 
 
 class WornStore:
@@ -198,7 +190,7 @@ class WornStore:
         pattern, num = self._pattern(first), len(self._leant[first].normal)
         key = *self._key, "links", first
         links = self._memory.passing.keep(key, lambda: BegunLinks.of(num, pattern.num_rays))
-        if not links.done.all():
+        if not links.steps.done.all():
             every = self._every(first)
             points, wo = self._points(first, every), self._wo(first, every)
             links.trace(lambda rows: self._tracer.linked(points.rows(rows), wo[rows], pattern), cancelled)

@@ -54,6 +54,6 @@ def test_a_step_that_fails_is_traced_again(begun):
 
     with pytest.raises(ValueError, match="no ray leaves"):
         begun.trace(failing, lambda: False)
-    assert not begun.done.any()
+    assert not begun.steps.done.any()
     begun.trace(Linked(), lambda: False)
-    assert begun.done.all()
+    assert begun.steps.done.all()
