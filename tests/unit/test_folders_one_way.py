@@ -7,7 +7,7 @@ another is an arrow. Arrows may not go round. What still does is listed here, an
 from __future__ import annotations
 
 import ast
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -94,6 +94,12 @@ def test_folders_are_small_enough_to_be_looked_over() -> None:
     for path in modules().values():
         files[path.parent.relative_to(ROOT).as_posix()] += 1
     assert {folder: count for folder, count in files.items() if count > MOST_FILES} == LARGER
+
+
+def test_files_of_tests_have_names_of_their_own() -> None:
+    """Test folders are no packages: of two files of one name, pytest would import the first for both."""
+    count = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, times in count.items() if times > 1] == []
 
 
 def test_a_circle_would_be_found() -> None:
