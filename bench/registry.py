@@ -56,6 +56,8 @@ GROUPS = (
             "opening.first_s",
             "opening.exact_s",
             "opening.exact_gather_s",
+            "opening.ahead_s",
+            "opening.ahead_gather_s",
             "opening.relit_s",
             "opening.relit_gather_s",
             "opening.large_first_s",

@@ -93,6 +93,8 @@ TARGETS = {
     "opening.first_s": "≤ 1 s",
     "opening.exact_s": "≤ 1 s",
     "opening.exact_gather_s": "≤ 2 s",
+    "opening.ahead_s": "≤ 1 s",
+    "opening.ahead_gather_s": "≤ 2 s",
     "opening.relit_s": "≤ 1 s",
     "opening.relit_gather_s": "≤ 2 s",
     "opening.large_first_s": "≤ 1 s",

@@ -16,11 +16,12 @@ from relume.environments.built_in import built_in
 from relume.resident import held_bytes
 from server.access import tables as access_tables  # noqa: F401  like those of the records
 from server.access.access import Access
+from server.apart.ahead import Ahead
 from server.apart.pool import Pool
 from server.apart.step import Batches
+from server.apart.thumbnails import Thumbnails
 from server.files.importers import Importers
 from server.files.importing import remove_strays
-from server.files.thumbnails import Thumbnails
 from server.library.caretaker import Caretaker
 from server.library.disk import free_bytes
 from server.library.ports import Library
@@ -120,6 +121,8 @@ async def open_services(
     access = Access(sessions, settings)
     queues = _queues(settings, service, batch, access)
     transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
+    thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
+    ahead = Ahead(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
     caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
     _watch_memory(metrics, library, transfers)
     _watch_work(metrics, settings, service, batch, leave)
@@ -129,6 +132,8 @@ async def open_services(
         importers.start()
     for queue in queues:
         queue.start()
+    if settings.ahead:
+        ahead.start()
     rounds = asyncio.create_task(caretaker.run())
     traces = open_traces() if settings.traces else None
     rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
@@ -149,7 +154,7 @@ async def open_services(
             threads=threads,
             transfers=transfers,
             caretaker=caretaker,
-            thumbnails=Thumbnails(settings.data / "thumbnails", transfers, threads, library),
+            thumbnails=thumbnails,
             live=_live(settings, metrics, traces, library, threads, service, access, leave, rooms, keeper),
             importers=importers,
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
@@ -160,7 +165,8 @@ async def open_services(
         keeping.cancel()
         rooms.close()
         await keeper.close()
-        ends = importers.close, *(queue.close for queue in reversed(queues)), batch.close, service.close, threads.close
+        queued = (queue.close for queue in reversed(queues))
+        ends = importers.close, ahead.close, *queued, batch.close, service.close, threads.close
         for end in (*ends, *([] if traces is None else [traces.close])):
             await asyncio.to_thread(end)
 

@@ -65,6 +65,7 @@ class Settings(BaseSettings):
         default_factory=lambda: _quarter_of_memory() // 2, gt=0, description="that each keeps of what it makes"
     )
     batch_nice: int = Field(default=10, ge=0, le=19, description="how much they yield to all else, as nice(1) says")
+    ahead: bool = Field(default=True, description="whether what a bake shows first is made before anybody opens it")
     max_queued: int = Field(default=100, ge=1, description="renders, and comparisons, that wait or run")
     max_queued_each: int = Field(default=100, ge=1, description="of them, of one client")
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")

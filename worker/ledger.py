@@ -98,6 +98,12 @@ class Ledger:
         ahead = self._ahead(rows)
         return [_status(row, ahead) for row in rows]
 
+    def ready(self) -> list[str]:
+        """Ids of all bakes that are, newest first."""
+        query = select(BakeRow.id).where(BakeRow.state == "ready").order_by(BakeRow.created.desc(), BakeRow.id)
+        with self.sessions() as session:
+            return list(session.scalars(query))
+
     def _ahead(self, rows: Sequence[BakeRow]) -> dict[str, int]:
         """How many bakes will run before each of those that are queued: tiny ones never wait for others, and clients
         have their turns, here as if their shares were equal."""

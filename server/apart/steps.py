@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from relume.picture.jobs import Cancelled, Progress
-from server.apart import btfs
+from server.apart import bakes, btfs
 from server.apart.frames import pack, paint_frame
 from server.apart.passes import make_frame, make_pass, time_pass
 from server.apart.step import Step
@@ -14,6 +14,8 @@ from server.apart.workshop import Workshop
 
 STEPS: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     "BTF": btfs.make,
+    "first picture of a bake": bakes.shade,
+    "thumbnail of a bake": bakes.paint_thumbnail,
     "frame of a batch": paint_frame,
     "pack of a batch": pack,
     "frame of a comparison": make_frame,

@@ -69,6 +69,11 @@ class TransferPool:
         futures = [entry.future for entry in list(self._entries.values()) if entry.future.done()]
         return [future.result() for future in futures if not future.cancelled() and future.exception() is None]
 
+    def is_used(self, bake: str) -> bool:
+        """Whether somebody uses a bake now; may be asked from any thread."""
+        entry = self._entries.get(bake)
+        return entry is not None and entry.num_users > 0
+
     def let_go(self) -> tuple[int, Collection[Path]]:
         """Close bakes that nobody has used for a while.
 

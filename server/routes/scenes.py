@@ -16,8 +16,8 @@ from fastapi.responses import FileResponse
 from relume.errors import NotFoundError, ParameterError
 from relume.folders import folder_bytes
 from server.access.roles import Caller, Who
+from server.apart.bakes import MAX_WIDTH
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
-from server.files.thumbnails import MAX_WIDTH
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.services import Services, Shared
 from server.wire.bodies import SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
@@ -148,7 +148,7 @@ async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> 
     pictured = _pictured([status for status in statuses if bake in (None, status.id)])
     if pictured is None:
         raise NotFoundError("there is no picture of this scene; bake it first")
-    path = await services.thumbnails.find(pictured, services.bakes.store_path(pictured))
+    path = await services.thumbnails.find(pictured)
     return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "public, max-age=86400"})
 
 

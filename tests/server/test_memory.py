@@ -112,7 +112,7 @@ def test_a_thumbnail_of_other_code_is_painted_again(
     address = real.get("/api/scenes").json()[0]["thumbnail"]
     assert real.get(address).status_code == 200
     (before,) = (tmp_path / "thumbnails").iterdir()
-    monkeypatch.setattr("server.files.thumbnails.image_code", lambda: "0123456789abcdef")
+    monkeypatch.setattr("server.apart.thumbnails.image_code", lambda: "0123456789abcdef")
     assert real.get(address).status_code == 200
     (after,) = (tmp_path / "thumbnails").iterdir()
     assert after != before

@@ -1,0 +1,172 @@
+"""What a new bake shows first is made before anybody opens it, by one server, and never against somebody's hand."""
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from server_fakes import BatchesHere
+from tiny_scenes import still_life
+
+from relume.bake import Recipe
+from relume.memory import Memory
+from relume.methods.registry import open_bake
+from relume.picture.picture import Picture
+from server.apart import ahead as module
+from server.apart.ahead import Ahead
+from server.apart.step import IsWanted, Step, Tell
+from server.apart.thumbnails import Thumbnails
+from server.library.opening import open_library
+from server.settings import Settings
+from worker.paths import bake_path
+from worker.scenes import register_scene
+from worker.service import BakeService
+
+SIZE = (24, 16)
+
+
+class Steps:
+    """Does steps here and remembers them; `before` is called first."""
+
+    def __init__(self, data: Path) -> None:
+        self._here = BatchesHere(Settings(data=data), open_library(1 << 28, 0))
+        self.asked: list[tuple[str, str]] = []
+        self.is_done = threading.Event()
+        self.before: Callable[[IsWanted], None] = lambda is_wanted: None
+
+    def run(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
+        self.before(is_wanted)
+        self.asked.append((step.kind, step.values["bake"]))
+        answer = self._here.run(step, tell, is_wanted)
+        if step.kind.startswith("thumbnail"):
+            self.is_done.set()
+        return answer
+
+
+@pytest.fixture
+def bakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[BakeService]:
+    monkeypatch.setattr(module, "ROUND_S", 0.02)
+    with BakeService(tmp_path) as service:
+        yield service
+
+
+def bake(bakes: BakeService, num_lights: int = 40) -> str:
+    scene = register_scene(bakes.data_dir, bakes.ledger, still_life())
+    identity = bakes.submit(scene, Recipe("direct", ("front",), SIZE, num_lights))
+    with bakes.subscribe(identity) as changes:
+        assert list(changes)[-1].state == "ready"
+    return identity
+
+
+def looking(bakes: BakeService, steps: Steps, is_used: Callable[[str], bool] = lambda bake: False) -> Ahead:
+    thumbnails = Thumbnails(bakes.data_dir / "thumbnails", steps.run)
+    return Ahead(bakes.data_dir, bakes.ledger, steps.run, thumbnails, is_used)
+
+
+def settled(bakes: BakeService, identity: str) -> np.ndarray:
+    """The exact picture of a bake that nothing is in memory of. (height, width, 3)"""
+    path, memory = bake_path(bakes.data_dir, identity), Memory(1 << 28)
+    picture = Picture(open_bake(path, memory), "front", memory)
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        picture.freeze(lambda share: None, lambda: False)
+    return picture.image()
+
+
+def test_a_bake_opens_with_its_exact_picture(bakes: BakeService, monkeypatch: pytest.MonkeyPatch) -> None:
+    before, steps = bake(bakes), Steps(bakes.data_dir)
+    ahead = looking(bakes, steps)
+    ahead.start()
+    assert steps.is_done.wait(60)
+    steps.is_done.clear()
+    later = bake(bakes, num_lights=50)
+    assert steps.is_done.wait(60)
+    ahead.close()
+    assert [bake for _, bake in steps.asked] == [before, before, later, later]
+    assert len(list((bakes.data_dir / "thumbnails").iterdir())) == 2
+
+    with monkeypatch.context() as patched:
+        patched.setattr("relume.operators.shade.shaded_rows", refuse)
+        kept_picture = settled(bakes, later)
+    for file in bake_path(bakes.data_dir, later).glob("derived/*/*.npy"):
+        file.unlink()
+    np.testing.assert_array_equal(kept_picture, settled(bakes, later))
+
+
+def kept(bakes: BakeService, identity: str) -> dict[str, np.ndarray]:
+    files = bake_path(bakes.data_dir, identity).glob("derived/*/*.npy")
+    return {file.name: np.load(file) for file in files}
+
+
+def refuse(*args: object, **named: object) -> None:
+    raise AssertionError("nothing is to be shaded")
+
+
+def test_what_somebody_has_open_is_left_to_them(bakes: BakeService) -> None:
+    mine, other, steps = bake(bakes), bake(bakes, num_lights=50), Steps(bakes.data_dir)
+    ahead = looking(bakes, steps, lambda bake: bake == mine)
+    ahead.start()
+    assert steps.is_done.wait(60)
+    ahead.close()
+    assert {bake for _, bake in steps.asked} == {other}
+
+
+def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> None:
+    used: set[str] = set()
+    identity, steps, asked = bake(bakes), Steps(bakes.data_dir), threading.Event()
+
+    def wait(is_wanted: IsWanted) -> None:
+        assert is_wanted()
+        used.add(identity)
+        assert not is_wanted()
+        used.clear()
+        asked.set()
+        while is_wanted():
+            threading.Event().wait(0.01)
+
+    steps.before = wait
+    ahead = looking(bakes, steps, used.__contains__)
+    ahead.start()
+    assert asked.wait(60)
+    ahead.close()
+    assert kept(bakes, identity) == {}
+
+
+def test_one_server_of_several_does_it(bakes: BakeService) -> None:
+    identity, first, second = bake(bakes), Steps(bakes.data_dir), Steps(bakes.data_dir)
+    is_held, may_go = threading.Event(), threading.Event()
+
+    def hold(is_wanted: IsWanted) -> None:
+        is_held.set()
+        assert may_go.wait(60)
+
+    first.before = hold
+    servers = [looking(bakes, first), looking(bakes, second)]
+    servers[0].start()
+    assert is_held.wait(60)
+    servers[1].start()
+    threading.Event().wait(0.2)  # ten rounds
+    assert second.asked == []
+    may_go.set()
+    assert first.is_done.wait(60)
+    for server in servers:
+        server.close()
+    assert second.asked == []
+    assert kept(bakes, identity)
+
+
+def test_a_bake_that_is_deleted_under_it_leaves_nothing(bakes: BakeService, caplog: pytest.LogCaptureFixture) -> None:
+    identity, steps, is_over = bake(bakes), Steps(bakes.data_dir), threading.Event()
+
+    def delete(is_wanted: IsWanted) -> None:
+        bakes.forget(identity)
+        is_over.set()
+
+    steps.before = delete
+    ahead = looking(bakes, steps)
+    ahead.start()
+    assert is_over.wait(60)
+    ahead.close()
+    assert not bake_path(bakes.data_dir, identity).exists()
+    assert [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")] == []
