@@ -83,14 +83,17 @@ def pieces(lights, depth):
     return unit(corners.mean(axis=2)), area / area.sum(axis=1, keepdims=True)
 
 
-def samples_of(term, lights, receivers, row, depth):
-    """The light one receiver gets, piece by piece: q cos θi · power (K, 3), shares (K, P), local wi (K, P, 3), wo."""
+def samples_of(term, lights, receivers, row, divided):
+    """The light one receiver gets, piece by piece: q cos θi · power (K, 3), shares (K, P), local wi (K, P, 3), wo.
+
+    divided: the `pieces` of the lights.
+    """
     seen = np.nonzero(visible_lights(receivers, lights.num_lights)[row])[0]
     frame = frames(receivers)[row]
     wo = frame @ receivers.wo[row].astype(float)
     wi = lights.direction[seen].astype(float) @ frame.T
     shading = term.quotients(*wi.T, *(np.full(len(seen), o) for o in wo)).T * wi[:, 2:]
-    middles, shares = pieces(lights, depth)
+    middles, shares = divided
     return lights.irradiance[seen].astype(float) * shading, shares[seen], middles[seen] @ frame.T, wo
 
 
@@ -102,8 +105,9 @@ def project(term, bands, active, lights, receivers, depth=5):
     """
     num_bands = term.curve(active).num_bands if active else 1
     out = np.zeros((len(receivers.normal), num_bands, 3))
+    divided = pieces(lights, depth)
     for row in range(len(out)):
-        power, shares, wi, wo = samples_of(term, lights, receivers, row, depth)
+        power, shares, wi, wo = samples_of(term, lights, receivers, row, divided)
         weight = power[:, None, :] * shares[..., None]
         band = np.zeros(shares.shape, int)
         for curve in term.curves:
@@ -114,7 +118,8 @@ def project(term, bands, active, lights, receivers, depth=5):
                 band = of_curve
             else:
                 weight = weight * np.moveaxis(bands[curve.name][:, of_curve], 0, -1)
-        np.add.at(out[row], band.ravel(), weight.reshape(-1, 3))
+        for c in range(3):
+            out[row, :, c] = np.bincount(band.ravel(), weight[..., c].ravel(), num_bands)
     return out
 
 
@@ -127,8 +132,9 @@ def band_of(curve, wi, wo):
 def project_points(term, bands, lights, receivers):
     """The environment as points: all power of a light at its direction, in the band its angle falls in. (n, 3)"""
     out = np.zeros((len(receivers.normal), 3))
+    whole = pieces(lights, 0)
     for row in range(len(out)):
-        power, _, _, wo = samples_of(term, lights, receivers, row, 0)
+        power, _, _, wo = samples_of(term, lights, receivers, row, whole)
         seen = visible_lights(receivers, lights.num_lights)[row]
         wi = lights.direction[seen].astype(float) @ frames(receivers)[row].T
         for curve in term.curves:
@@ -213,17 +219,18 @@ def radiance_of(transfer, view: View, look):
         if rows.start == rows.stop:
             continue
         lights, receivers = arriving(transfer, view, index, look)
-        for document, has_level in as_rough(view, index, look.materials[name].terms):
+        for document, of_level in as_rough(view, index, look.materials[name].terms):
             term = TERMS[document["model"]].settled(document)
             bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
             projector = Projector(term, contract(term, bands, None), lights, receivers)
-            image = projector.project(0, rows.stop - rows.start)[:, 0].astype(float) * document["color"]
-            if document["texture"] is not None:
-                image *= view.textures[index].get(document["texture"], 1)
+            image = projector.project(of_level.start, of_level.stop)[:, 0].astype(float) * document["color"]
+            texture = view.textures[index].get(document["texture"])
+            if texture is not None:
+                image *= texture[of_level]
             for curve in term.curves:
                 if curve.outgoing:
-                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows])).T
-            out[rows] += image * has_level[:, None]
+                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows][of_level])).T
+            out[rows][of_level] += image
         out[rows] += shining(transfer, view, index, look)
     if look.transport.paths.direct:
         background = transfer.background_in(look.environment.key, view)
@@ -234,14 +241,16 @@ def radiance_of(transfer, view: View, look):
 def as_rough(view: View, index, terms):
     """Each term with the samples that it is of: of one that follows a map of roughness, a term for every level."""
     ratios, level = view.levels(index)
+    assert np.all(np.diff(level.astype(int)) >= 0)  # samples of a level are a slice
     for term in terms:
         if not (ratios and term.get("roughness_map")):
-            yield term, np.ones(len(level))
+            yield term, slice(0, len(level))
             continue
         assert term["model"] == "ggx"
         for k, ratio in enumerate(ratios):
             rough = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.03, 1).tolist()
-            yield {**term, "params": {**term["params"], "roughness": rough}}, level == k
+            of_level = slice(*np.searchsorted(level, [k, k + 1]))
+            yield {**term, "params": {**term["params"], "roughness": rough}}, of_level
 
 
 def shining(transfer, view: View, index, look):
