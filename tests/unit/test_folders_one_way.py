@@ -32,9 +32,17 @@ def modules() -> dict[str, Path]:
     return {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
 
 
+def statements(outer: ast.AST) -> Iterator[ast.AST]:
+    """All statements inside another, or a file; expressions, which are most of a tree, import nothing."""
+    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for inner in getattr(outer, part, ()):
+            yield inner
+            yield from statements(inner)
+
+
 def imported(path: Path, known: dict[str, Path]) -> Iterator[str]:
     """Modules of ours that a file imports, anywhere in it."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in known)
         elif isinstance(node, ast.ImportFrom) and node.module in known:
