@@ -22,7 +22,8 @@ os.environ.setdefault("RELUME_AHEAD", "false")  # nor should each bake be follow
 settings.register_profile("relume", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("relume")
 
-TOGETHER = ("gestures", "journeys", "btf")  # folders whose tests share what is dear: a server and a browser, a BTF
+# folders whose tests share what is dear: a server and a browser, a BTF, a measured material, a bake by every method
+TOGETHER = ("gestures", "journeys", "btf", "contract", "measured")
 FIRST = (*TOGETHER, "worker")  # files of the last are long, and wait for processes and databases
 
 
