@@ -15,7 +15,7 @@ from relume.picture.picture import Picture
 from relume.reference import reference_image
 from relume.store import bake_here
 
-SIZE, NUM_LIGHTS = (40, 30), 1500
+SIZE, NUM_LIGHTS = (32, 24), 1500
 # What 1,500 triangles with one shadow ray each leave over: shadow edges move by up to a triangle, for all terms alike
 # (SHADOWS); a highlight also sees quotient and cosine at one direction for a whole triangle (HIGHLIGHT), and a quotient
 # without masking grows towards the horizon, where it changes across the triangle (UNMASKED).

@@ -158,14 +158,14 @@ def test_direct_light_seen_in_a_mirror_is_no_light_between_surfaces(tmp_path: Pa
     ]
     camera = looking("front", [0, 0.6, 1.2], [0, 0.35, -1], 0.3)
     scene = scene_of(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=materials)
-    look, size = validate({}, default_look(scene.materials)), (32, 24)
+    look, size = validate({}, default_look(scene.materials)), (24, 18)
     store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, 500), tmp_path / "store.zarr")
     frame = render_image(open_transfer(store, Memory(1 << 30)), "front", look)
     followed = reference_image(scene, "front", look, size, 1024)
-    in_mirror = followed[16:].mean(axis=(0, 1))
+    in_mirror = followed[12:].mean(axis=(0, 1))
     assert in_mirror[0] == pytest.approx(8 * in_mirror[2], rel=0.01)
-    np.testing.assert_allclose(frame[16:].mean(axis=(0, 1)), in_mirror, rtol=0.03)
-    assert relative_rmse(frame[:14], followed[:14]) < 0.02
+    np.testing.assert_allclose(frame[12:].mean(axis=(0, 1)), in_mirror, rtol=0.03)
+    assert relative_rmse(frame[:10], followed[:10]) < 0.02
 
 
 def test_drawn_texels_estimate_all_of_them() -> None:
