@@ -1,4 +1,4 @@
-"""A small synthetic BTF, made once, and where looks find it."""
+"""A small synthetic BTF, made once, and where looks find it; nobody asks what bakes are off by."""
 
 import shutil
 from pathlib import Path
@@ -6,12 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from shared_bakes import unmeasured
 
 from relume.btf.rings import ubo_rings
 from relume.btf.shelf import STORE, BtfRecord
 from relume.btf.values import Values
 from relume.synthetic.make import MESH, Made, make_btf
 from relume.synthetic.render import SmallGeometry
+
+__all__ = ["unmeasured"]  # a fixture
 
 SIZE, GRID, BOUND = 16, 1, 0.02
 STEPS = 24  # of the cords, along each side

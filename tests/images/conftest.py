@@ -1,11 +1,14 @@
-"""Fixtures: a file of an image, and the shelf that it is on."""
+"""Fixtures: a file of an image, and the shelf that it is on; nobody asks what bakes are off by."""
 
 import numpy as np
 import pytest
 from PIL import Image
+from shared_bakes import unmeasured
 
 from relume.brdf.channels import IMAGES
 from relume.images.shelf import keep
+
+__all__ = ["unmeasured"]  # a fixture
 
 SIDE = 32
 

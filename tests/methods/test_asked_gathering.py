@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from sessions import relative_rmse
+from shared_bakes import unmeasured
 from tiny_scenes import looking, quad, scene_of
 
 from relume.bake import Recipe
@@ -17,6 +18,8 @@ from relume.methods.registry import METHODS, open_transfer
 from relume.render.image import render_image
 from relume.store import bake_here, open_store
 from worker.status import recipe_from_json, recipe_json
+
+__all__ = ["unmeasured"]  # a fixture
 
 SIZE = (24, 18)
 GATHERING = ["gather", "surface"]

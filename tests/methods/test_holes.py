@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from sessions import look_of, relative_rmse
+from shared_bakes import unmeasured
 from tiny_scenes import looking, points_at, quad, scene_of, studio
 
 from relume.bake import Recipe
@@ -19,6 +20,8 @@ from relume.scene.model import Material, Opacity
 from relume.store import bake_here
 from relume.trace.geometry import merge
 from relume.trace.local_shadows import trace_local
+
+__all__ = ["unmeasured"]  # a fixture
 
 LAMP = LightGeometry("point", (0.2, 1.8, 0.5))
 

@@ -11,12 +11,13 @@ import OpenImageIO
 import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
+from shared_bakes import unmeasured
 from test_end_to_end import wait_until_done
 from test_moving_eyes import SIZE, bake, client, eye, scene
 
 from server.files.video import write_video
 
-__all__ = ["bake", "client", "scene"]  # fixtures
+__all__ = ["bake", "client", "scene", "unmeasured"]  # fixtures
 
 
 @pytest.fixture
@@ -43,7 +44,7 @@ def frames_of(client: TestClient, request: dict[str, Any], folder: Path) -> list
     return found
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def view(client: TestClient, bake: str) -> dict[str, Any]:
     with client.websocket_connect(f"/api/bakes/{bake}/session", subprotocols=["relume.v1"]) as session:
         found: dict[str, Any] = session.receive_json()["views"][0]
@@ -53,10 +54,10 @@ def view(client: TestClient, bake: str) -> dict[str, Any]:
 def test_a_turntable_goes_once_around_exactly_or_quickly(
     client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
-    request = {"bake": bake, "view": view["name"], "path": {"turntable": 3}, "size": [40, 30]}
+    request = {"bake": bake, "view": view["name"], "path": {"turntable": 3}, "size": [24, 18]}
     exact = frames_of(client, request, tmp_path)
     quick = frames_of(client, request | {"exact": False}, tmp_path)
-    assert [frame.shape for frame in exact] == [(30, 40, 3)] * 3
+    assert [frame.shape for frame in exact] == [(18, 24, 3)] * 3
     for k in range(3):
         assert np.abs(exact[k] - exact[k - 1]).max() > 0.05
         assert 0 < np.sqrt(np.mean((exact[k] - quick[k]) ** 2)) < 0.3 * np.sqrt(np.mean(exact[k] ** 2))
