@@ -57,12 +57,12 @@ class Cluster:
         """Stop it as a restart does: open connections are ended."""
         self._run([str(self._ctl), "-D", str(self._data), "-w", "-m", "fast", "stop"])
 
-    def new_database(self) -> str:
-        """The URL of an empty database."""
+    def new_database(self, like: str | None = None) -> str:
+        """The URL of an empty database, or of a copy of the one at a URL, which nobody may be connected to."""
         name = f"test_{uuid.uuid4().hex}"
         with pg8000.connect(USER, host="127.0.0.1", port=self._port, database="postgres") as connection:
             connection.autocommit = True
-            connection.run(f"CREATE DATABASE {name}")
+            connection.run(f"CREATE DATABASE {name}" + (f" TEMPLATE {like.rpartition('/')[2]}" if like else ""))
         return f"postgresql://{USER}@127.0.0.1:{self._port}/{name}"
 
     def remove(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -47,11 +48,9 @@ def bake(service: BakeService) -> BakeStatus:
         return list(changes)[-1]
 
 
-@pytest.fixture
-def data(tmp_path: Path, ledger_url: str) -> Path:
-    """A data directory with a scene, a finished bake, a saved look, a render's picture, and what stays behind."""
-    data = tmp_path / "data"
-    service = open_service(data, ledger_url)
+def fill(data: Path, url: str) -> None:
+    """Make a scene, a finished bake, a saved look, a render's picture, and what stays behind."""
+    service = open_service(data, url)
     register_scene(data, service.ledger, SCENE)
     LookStore(service.ledger.sessions).put("red", "{}", None, None)
     status = bake(service)
@@ -61,7 +60,39 @@ def data(tmp_path: Path, ledger_url: str) -> Path:
     for path in ("thumbnails/a.png", "upload-x/b.glb", f"bakes/{status.id}.zarr/derived/c.npy", ".unfinished-d"):
         (data / path).parent.mkdir(exist_ok=True)
         (data / path).write_bytes(b"not worth keeping")
-    return data
+
+
+@pytest.fixture(scope="module")
+def beside_sqlite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A filled data directory and its ledger, which every test copies."""
+    folder = tmp_path_factory.mktemp("filled")
+    fill(folder / "data", url := f"sqlite:///{folder / 'relume.db'}")
+    return folder, url
+
+
+@pytest.fixture(scope="module")
+def beside_postgresql(tmp_path_factory: pytest.TempPathFactory, postgresql: Cluster) -> tuple[Path, str]:
+    folder = tmp_path_factory.mktemp("filled")
+    fill(folder / "data", url := postgresql.new_database())
+    return folder, url
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def ledger_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """A copy of a filled ledger; one of its data directory lies in `tmp_path`."""
+    folder, url = request.getfixturevalue(f"beside_{request.param}")
+    shutil.copytree(folder / "data", tmp_path / "data")
+    if request.param == "postgresql":
+        return str(request.getfixturevalue("postgresql").new_database(like=url))
+    for file in folder.glob("relume.db*"):
+        shutil.copy(file, tmp_path)
+    return f"sqlite:///{tmp_path / 'relume.db'}"
+
+
+@pytest.fixture
+def data(tmp_path: Path, ledger_url: str) -> Path:
+    """A data directory of the test's own."""
+    return tmp_path / "data"
 
 
 def take(data: Path, url: str, shelf: Shelf, **options: Callable[[int], Callable[[int], None]]) -> str:
