@@ -56,10 +56,10 @@ def go_round(client: TestClient) -> None:
     client.portal.call(client.app.state.services.caretaker.go_round)
 
 
-def bake_scenes(client: TestClient) -> list[str]:
+def bake_scenes(client: TestClient, num_scenes: int = NUM_SCENES) -> list[str]:
     """Bakes of scenes that differ in the colour of the ball."""
     bakes, base, found = client.app.state.services.bakes, still_life(), []
-    for number in range(NUM_SCENES):
+    for number in range(num_scenes):
         ball = base.materials[2]
         diffuse = {"model": "lambert", "color": [0.1 * number, 0.05, 0.05]}
         materials = [*base.materials[:2], replace(ball, terms=(diffuse, *ball.terms[1:]))]
@@ -96,7 +96,7 @@ def held(client: TestClient) -> dict[tuple[str, str], float]:
 
 
 def test_metrics_tell_who_holds_what(real: TestClient) -> None:
-    bakes = bake_scenes(real)
+    bakes = bake_scenes(real, 2)
     for bake in bakes:
         look_at(real, bake)
     found = held(real)
@@ -108,7 +108,7 @@ def test_metrics_tell_who_holds_what(real: TestClient) -> None:
 def test_a_thumbnail_of_other_code_is_painted_again(
     real: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bake_scenes(real)
+    bake_scenes(real, 1)
     address = real.get("/api/scenes").json()[0]["thumbnail"]
     assert real.get(address).status_code == 200
     (before,) = (tmp_path / "thumbnails").iterdir()
@@ -142,7 +142,7 @@ def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -
 
 
 def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) -> None:
-    shown, left = bake_scenes(real)[:2]
+    shown, left = bake_scenes(real, 2)
     look_at(real, left)
     with open_session(real, shown) as session:
         session.send(type="touch", curve=CURVE)
