@@ -22,6 +22,7 @@ from relume.project.shading.shader import Shader
 NUM_POINTS = 24
 SHARP = [("ggx", {"roughness": 0.2}), ("ggx", {"roughness": 0.4, "f0": [0.9, 0.5, 0.1]}), ("ward", {"alpha": 0.08})]
 CASES = [(model, {}) for model in ANALYTIC] + SHARP
+NARROW = [("cook_torrance", {"sigma": 0.02}), ("blinn_phong", {"exponent": 2000.0}), ("ggx", {"roughness": 0.1})]
 # all are held to their operators; these, and with the long tests the others, to finely divided light
 OFTEN = ("lambert", "cook_torrance", "ward_anisotropic", "ggx")
 DIVIDED = [pytest.param(*case, marks=[pytest.mark.slow] * (case[0] not in OFTEN)) for case in CASES]
@@ -49,6 +50,10 @@ def shaded(term, bands, lights, receivers):
 def error(found, expected):
     """Relative RMSE."""
     return np.sqrt(np.square(found - expected).mean() / np.square(expected).mean())
+
+
+def everything_seen(receivers, lights):
+    return twins.only_above(replace(receivers, visible=np.full_like(receivers.visible, 255)), lights)
 
 
 @pytest.mark.parametrize(("model", "params"), DIVIDED)
@@ -125,11 +130,29 @@ def test_groups_of_lights_bring_what_their_lights_bring(model, params, lights, r
     assert error(shaded(term, bands, lights, receivers), alone) < 6e-4
 
 
+@pytest.mark.parametrize(("model", "params"), NARROW)
+def test_lobes_narrower_than_lights_are_apart_lose_no_light(model, params):
+    """In groups whose cosines lean they took light away, a hundred times what arrives; beside groups and lights whose
+    means are nothing in float32, they were not looked for there."""
+    few, (term, bands) = subdivide(studio(), 200), curves_of(model, params)
+    receivers = everything_seen(twins.make_receivers(100, few.num_lights, seed=4), few)
+    found, alone = (shaded(term, bands, lights, receivers) for lights in (few, replace(few, codes=None)))
+    assert found.min() >= 0
+    assert error(found, alone) < 1e-3
+
+
+def test_a_narrow_lobe_is_found_within_wide_lights():
+    few, (term, bands) = subdivide(studio(), 200), curves_of("cook_torrance", {"sigma": 0.01})
+    receivers = everything_seen(twins.make_receivers(4, few.num_lights, seed=4), few)
+    expected = twins.project(term, bands, None, few, receivers, depth=6)[:, 0]
+    assert error(shaded(term, bands, replace(few, codes=None), receivers), expected) < 4e-3
+
+
 def test_most_lights_are_shaded_in_groups(lights, receivers, monkeypatch):
     """A broad term, and all the sky in sight: else the test above would compare lights with themselves."""
     left = []
     monkeypatch.setattr(shader, "shade_points", lambda *args: left.append(args[2][args[11] - args[10]]))
     term, bands = curves_of("blinn_phong", {"exponent": 2.0})
-    everything = twins.only_above(replace(receivers, visible=np.full_like(receivers.visible, 255)), lights)
+    everything = everything_seen(receivers, lights)
     shaded(term, bands, lights, everything)
     assert 0 < sum(left) < 0.4 * np.unpackbits(everything.visible).sum()

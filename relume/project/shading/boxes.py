@@ -23,6 +23,12 @@ CHUNK = 256  # triangles evaluated together: their scratch memory stays in a cor
 # Half of a box has at least this width, in bands: sums of bands are differences of larger ones.
 _LEAST_HALF = np.float32(0.025)
 _CORNER = np.float32(1.64)
+# Two moments tell nothing of a peak within a box: what a leaning cosine changes is no more than this share, which the
+# error that is estimated for such a peak exceeds. Else light would be taken away, and be too little to be looked at.
+_MOST_LEANT = np.float32(0.5)
+# A mean over a box beside a lobe may be nothing at all, and a share of nothing is nothing: it is this share of what the
+# curve varies by within reach at least, which adds up to some millionths.
+_LEAST_MEAN = np.float32(1e-9)
 # A curve that varies by its own mean within a triangle's reach gives it at most about this share of that as an error:
 # where the angle is linear, since a box is no triangle; by an angle's pole in the ratio of reach and distance.
 _SHAPE, _BEND, _MOST_BEND = np.float32(0.08), np.float32(0.05), np.float32(0.5)
@@ -99,9 +105,11 @@ def _integrals(steps, low, high, lean, num, integral):  # type: ignore[no-untype
     for n in range(num):
         first, final = np.uint32(low[n]), np.uint32(high[n])
         begins, ends = low[n] - np.float32(first), high[n] - np.float32(final)
-        whole = steps[first, 1] - steps[final, 1]
+        at_first, at_final = steps[first, 0], steps[final, 0]
+        even = steps[first, 1] - steps[final, 1] - begins * at_first + ends * at_final
         # what a curve rises by over the box, times how the cosine leans: the second of the two moments
-        integral[n] = whole - (begins + lean[n]) * steps[first, 0] + (ends + lean[n]) * steps[final, 0]
+        rises, most = lean[n] * (at_final - at_first), _MOST_LEANT * abs(even)
+        integral[n] = even + min(max(rises, -most), most)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
@@ -128,8 +136,11 @@ def _add_errors(mean, reach, variation, value, num, error):  # type: ignore[no-u
     """Add what a curve's means over boxes may be wrong by, as a share of them.
 
     Args:
-        mean, reach, variation: as in `_variations`. value: the means. error: added to. (≥ num,) each
+        mean, reach, variation: as in `_variations`. value: the means; the least that a share can be told of is written
+            where there is less. error: added to. (≥ num,) each
     """
+    for n in range(num):
+        value[n] = max(value[n], _LEAST_MEAN * variation[n])
     for n in range(num):
         bend = min(_BEND * reach[n] / max(mean[n], np.float32(1e-6)), _MOST_BEND)
         error[n] += (_SHAPE + bend) * variation[n] / max(value[n], np.float32(1e-30))
