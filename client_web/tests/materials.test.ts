@@ -33,8 +33,8 @@ test("a material uses what its rows say", () => {
 
 test("only layers that somebody needs are drawn", () => {
   expect(layersOf(read([diffuse]))).toEqual([0]);
-  expect(layersOf(read([diffuse, glossy]))).toEqual([0, 3]);
-  expect(layersOf(read([diffuse, textured, mirror]))).toEqual([0, 1, 2, 3]);
+  expect(layersOf(read([diffuse, glossy]))).toEqual([0, 3, 4]);
+  expect(layersOf(read([diffuse, textured, mirror]))).toEqual([0, 1, 2, 3, 4]);
 });
 
 test("faces of like materials are drawn together, each once", () => {

@@ -31,9 +31,8 @@ NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
 DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
 """Degree of each function. (K,)"""
 FALL = 1 / (2 * 8.0**2)
-WINDOW = np.exp(-FALL * DEGREES * (DEGREES + 2)).astype(np.float32)
-"""w of each function: e^(−n (n + 2) / 2 d²), d = 8. Functions cut off at a degree ring beside what is bright; w takes
-a part of that away for a little blur (docs/adr/0063-highlights.md, docs/adr/0047-cells-send-by-direction.md)."""
+"""1 / 2d², d = 8, of windows e^(−n (n + 2) / 2d²). Functions cut off at a degree ring beside what is bright; a window
+takes a part of that away for a little blur (docs/adr/0063-highlights.md, docs/adr/0047-cells-send-by-direction.md)."""
 AT_ONCE = 128  # rays that `add_light` takes; all columns of them stay in the first cache
 WI, LIGHT, _X, _RE, _IM, _BEFORE, _LAST, NUM_COLUMNS = 0, *(AT_ONCE * k for k in (2, 5, 6, 7, 8, 9)), 10
 """Where the columns of `add_light` begin, and how many there are."""

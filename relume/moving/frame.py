@@ -24,6 +24,7 @@ from relume.moving.highlights.by_lights import by_lights
 from relume.moving.highlights.glances import glance
 from relume.moving.highlights.lobe_lights import MOST_LAMPS, widths_of
 from relume.moving.highlights.looking import SkyLight
+from relume.moving.highlights.turning import turning
 from relume.moving.look_up import Seen, at_vertices
 from relume.moving.panes import hide_less, lay_over_glass
 from relume.moving.pixels import FromVertices, Mirrored, combine
@@ -124,13 +125,15 @@ class Sums(NamedTuple):
 
     Attributes:
         glances: of points along their lobes. (points, 3) float32. sent: by points.
-        at_vertices: both of vertices. towards_light: of vertices, see `FromVertices`.
+        turning: of points, from `relume.moving.highlights.turning`. (points, 4) float32
+        at_vertices: all three of vertices. towards_light: of vertices, see `FromVertices`.
         radiance: along the rays. (rays, 3) float32
     """
 
     glances: F32
     sent: Sent
-    at_vertices: tuple[F32, F32]
+    turning: F32
+    at_vertices: tuple[F32, F32, F32]
     towards_light: F32
     radiance: F32
 
@@ -259,22 +262,24 @@ def _summed(
     materials, arriving = wanted.materials, wanted.arriving
     surface = transfer.surface_with(materials.wears)
     lobes, eye, (points, vertices, rays) = materials.lobes, camera.to_world[:3, 3].astype(np.float32), part
-    glances, sent, (broad, along), towards, out = into or (None, None, (None, None), None, None)
+    glances, sent, turns, of_vertices, towards, out = into or (None, None, None, (None,) * 3, None, None)
     glances = _glanced(transfer, wanted, eye, points, glances)
     sky = _sky_in(transfer, wanted.light)
     sent = send(surface, arriving.total, arriving.others, materials.tables, eye, points, sent)
     lit = _lit(transfer, wanted, eye, points)
     add_sky_in_highlights(surface, lobes, sky, eye, glances, lit, points, sent, is_fine=wanted.is_fine)
-    broad, along = at_vertices(surface, vertices, sent.radiance, broad), at_vertices(surface, vertices, glances, along)
+    turns = turning(surface, arriving.others, materials.tables, lobes, eye, points, turns)
+    of_points = sent.radiance, glances, turns
+    broad, along, turn = (at_vertices(surface, vertices, *of) for of in zip(of_points, of_vertices, strict=True))
     towards = _towards_light(surface, arriving, seen) if towards is None else towards
     emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
     pixel_angle, from_vertices = camera.yfov / height, FromVertices(broad, materials.sends, towards)
-    mirrored = Mirrored(lobes, sky, along, wanted.is_fine)
+    mirrored = Mirrored(lobes, sky, along, turn, wanted.is_fine)
     out = combine(surface, seen, pixel_angle, from_vertices, emission, mirrored, rays, out)
     sight = Sight(eye, pixel_angle, seen)
     arrived = Arrived(arriving.total, wanted.relief)
     show_texels(materials.covers, transfer.surface, transfer.positions, sight, arrived, out)
-    return Sums(glances, sent, (broad, along), towards, out)
+    return Sums(glances, sent, turns, (broad, along, turn), towards, out)
 
 
 def _glanced(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8], out: F32 | None) -> F32:

@@ -9,6 +9,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.color import LUMINANCE
 from relume.moving.basis.lobes import NUM_GROUPS, Lobes
 from relume.moving.bumps import leaning, shading_ratio, unit
 from relume.moving.highlights.looking import SkyLight, add_sky_in_lobe, along_both, along_lobe
@@ -23,6 +24,8 @@ F32 = NDArray[np.float32]
 _LEAST_SLANT = np.float32(0.05)  # cosine, below which footprints grow no more
 _SHARES = 4  # for each thread: a ray that sees a highlight costs five times as much as others
 _MOST_TAKEN = np.float32(0.5)  # by points, of what a pixel's lobe shows: more is an error of theirs, a black patch
+_MOST_TURNED = np.float32(0.125)  # of what a pixel shows, that turning its lobe may take or add
+_RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
 _ALL_ABOVE = np.float32(10)  # widths of a lobe, from which on all of it is above: a share of 4e-8 is missing
 
 
@@ -32,12 +35,14 @@ class Mirrored(NamedTuple):
     Attributes:
         lobes: of all materials. sky: that they show where points see it.
         glances: of vertices along their lobes, from `relume.moving.highlights.glances`. (vertices, 3) float32
+        turning: of vertices, from `relume.moving.highlights.turning`. (vertices, 4) float32
         is_fine: two lobes stand for each highlight, as at points, not for those alone that ask for it.
     """
 
     lobes: Lobes
     sky: SkyLight
     glances: F32
+    turning: F32
     is_fine: bool
 
 
@@ -99,6 +104,34 @@ def _mirror(mirrored, vertex, weight, direction, outward, lobe, n, light):  # ty
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _albedo(lobes, lobe, row, share, group):  # type: ignore[no-untyped-def]
+    """The albedo of a lobe in a group of terms, three numbers; row, share: see `_mirror`."""
+    near, far = lobes.albedo[lobe, row, group], lobes.albedo[lobe, row + 1, group]
+    return (
+        near[0] + share * (far[0] - near[0]),
+        near[1] + share * (far[1] - near[1]),
+        near[2] + share * (far[2] - near[2]),
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _turned(turning, vertex, weight, direction, n):  # type: ignore[no-untyped-def]
+    """Find how much more other light a lobe sees than is interpolated: luminance, for an albedo of one.
+
+    Args:
+        turning: of all vertices. (vertices, 4). vertex, weight, direction: of the pixel, see `combine`.
+        n: its normal, before a normal map bends it, which points know nothing of.
+    """
+    x, y, z = blend(turning, vertex, weight)
+    of_points = np.float32(0)
+    for k in range(3):
+        of_points += weight[k] * turning[vertex[k], 3]
+    twice = np.float32(2) * (direction[0] * n[0] + direction[1] * n[1] + direction[2] * n[2])
+    rx, ry, rz = direction[0] - twice * n[0], direction[1] - twice * n[1], direction[2] - twice * n[2]
+    return np.float32(0.5) * (x * rx + y * ry + z * rz - of_points)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def in_texture(uvs, corners, uv):  # type: ignore[no-untyped-def]
     """Find the place in textures of a place in a triangle.
 
@@ -145,7 +178,7 @@ def _combine(  # type: ignore[no-untyped-def]
     textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = surface
     face, uv, distance = hits
     lobes = mirrored.lobes
-    texture_value, light = np.empty(3, np.float32), np.empty(3, np.float32)
+    texture_value, light, shown = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
     for r in range(start, stop):
         p = rows[r]
         f = face[p]
@@ -164,9 +197,11 @@ def _combine(  # type: ignore[no-untyped-def]
         footprint = footprint_of(distance[p], pixel_angle, uv_scale[f], along)
         place = in_texture(uvs, (uv_faces[f, 0], uv_faces[f, 1], uv_faces[f, 2]), at)
         is_mapped = textures.of_material[material, NORMAL_MAP] >= 0
-        n = d
+        n, more = d, np.float32(0)
         if is_mapped or lobe >= 0:
             n = unit(blend(normals, about, shares))
+        if lobe >= 0:
+            more = _turned(mirrored.turning, about, shares, d, n)
         if is_mapped:
             leant = _lean(
                 textures, textures.of_material[material, NORMAL_MAP], place, footprint, tangents, corners, at,
@@ -190,17 +225,26 @@ def _combine(  # type: ignore[no-untyped-def]
             texture = textures.of_material[material, group - 1] if group else -1
             if texture >= 0:
                 sample_texture(textures, texture, place[0], place[1], footprint, texture_value)
+            albedo = np.float32(0), np.float32(0), np.float32(0)
+            if lobe >= 0:
+                albedo = _albedo(lobes, lobe, row, share, group)
             for channel in range(3):
                 total = np.float32(0)
                 for k in range(3):
                     total += shares[k] * sent[about[k], group, channel]
                 total *= ratio
                 if lobe >= 0:
-                    near = lobes.albedo[lobe, row, group, channel]
-                    albedo = near + share * (lobes.albedo[lobe, row + 1, group, channel] - near)
-                    shown = albedo * light[channel]
-                    total = max(total, -_MOST_TAKEN * shown) + shown
-                out[p, channel] += texture_value[channel] * max(total, np.float32(0))
+                    of_lobe = albedo[channel] * light[channel]
+                    total = max(total, -_MOST_TAKEN * of_lobe) + of_lobe
+                shown[channel] = max(total, np.float32(0))
+            gain = np.float32(1)
+            if more != 0:
+                whole = _RED * shown[0] + _GREEN * shown[1] + _BLUE * shown[2]
+                part = more * (_RED * albedo[0] + _GREEN * albedo[1] + _BLUE * albedo[2])
+                part = min(max(part, -_MOST_TURNED * whole), _MOST_TURNED * whole)
+                gain += part / max(whole, np.float32(1e-20))
+            for channel in range(3):
+                out[p, channel] += texture_value[channel] * gain * shown[channel]
 
 
 class FromVertices(NamedTuple):

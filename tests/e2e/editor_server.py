@@ -13,6 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiny_scenes import looking, quad, scene_of, sphere, studio
+
+from relume.scene.model import Material
+from worker.database import open_database
+from worker.ledger import Ledger
+from worker.scenes import register_scene
 
 SIZE = (320, 240)
 START_S, BAKE_S = 240.0, 300.0
@@ -59,6 +65,24 @@ class Server:
         identity = str(self.call("/api/built-ins/cornell_box", {})["id"])
         self.bake({"scene": identity, "method": "surface", "size": (120, 120), "lights": 100, "points": 4000})
         return identity
+
+    def ball_on_a_floor(self) -> str:
+        """A metal one, and what it reflects, with one bake of few points whose view moves."""
+        metal = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.4, "f0": 0.9}}
+        clay = {"model": "lambert", "color": [0.8, 0.5, 0.3]}
+        floor = quad("floor", [[-3, -2, 3], [3, -2, 3], [3, -2, -3], [-3, -2, -3]], 1)
+        scene = scene_of(
+            sphere("ball", [0, 0, 0], 1, 0, 24),
+            floor,
+            camera=looking("front", [0, 0.8, 3.2], [0, -0.2, 0], 0.75),
+            environment=studio(),
+            materials=[Material("Ball", (metal,)), Material("Floor", (clay,))],
+        )
+        ledger = Ledger(open_database(f"sqlite:///{self.data / 'relume.db'}"))
+        register_scene(self.data, ledger, scene)
+        ledger.close()
+        self.bake({"scene": scene.id, "method": "surface", "size": (120, 120), "lights": 100, "points": 400})
+        return scene.id
 
     def bake(self, recipe: dict[str, Any]) -> None:
         """Bake and wait until it is there."""

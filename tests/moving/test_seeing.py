@@ -167,6 +167,7 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
             moving.sky_in(None), moving.lamps_in(EnvironmentKey(None, 0.0)), turn_of(0.0), np.zeros(3, np.float32)
         ),
         np.zeros((len(sent), 3), np.float32),
+        np.zeros((len(sent), 4), np.float32),
         False,
     )
     all_groups = FromVertices(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))

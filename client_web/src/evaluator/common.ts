@@ -129,6 +129,12 @@ vec3 skyInBoth(Lobes lobes, vec3 seen) {
 export const albedoOf = (of: string) =>
   `mix(texelFetch(uLobes, at(${of}), 0).rgb, texelFetch(uLobes, at(${of} + ${GROUPS + 1}), 0).rgb, share)`;
 
+/** How that changes from a row to the next. */
+export const albedoStepOf = (of: string) => `(texelFetch(uLobes, at(${of} + ${GROUPS + 1}), 0).rgb - texelFetch(uLobes, at(${of}), 0).rgb)`;
+/** Y of linear Rec. 709. */
+export const LUMINANCE = [0.2126, 0.7152, 0.0722] as const;
+export const luminous = `vec3(${LUMINANCE.join(", ")})`;
+
 /** What lies behind surfaces: a map, or one colour. */
 export const behindBy = (isMap: boolean) =>
   isMap

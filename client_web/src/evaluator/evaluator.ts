@@ -7,7 +7,7 @@ import { pointShader, slotShader } from "./pointShader";
 import { read } from "./reading";
 import { isSoftware } from "./software";
 import { backgroundShader, cornerShader, surfaceShader, wordsShader, type PictureFeatures } from "./surfaceShader";
-import { Images, Values } from "./targets";
+import { Images, LAYERS, Values } from "./targets";
 import { BYTES, Texels, type Kind } from "./texels";
 
 type Tables = NonNullable<FrameHeader["tables"]>;
@@ -87,6 +87,7 @@ export class Evaluator {
   ) {
     this.gl = gl;
     if (gl.getExtension("EXT_color_buffer_float") === null) throw new Error("this browser draws no floating-point images");
+    if (gl.getParameter(gl.MAX_DRAW_BUFFERS) < LAYERS) throw new Error("this browser draws into too few images at once");
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.texels = new Texels(gl);
     for (const [name, bytes] of arrays) this.keep(name, bytes);

@@ -68,7 +68,7 @@ export function readMaterials(rows: Int32Array, functions: Functions): Material[
 export function layersOf(materials: readonly Material[]): number[] {
   const any = (is: (material: Material) => boolean) => materials.some(is);
   const [groups, map, lobes] = [any(({ pixels }) => pixels.groups), any(({ points }) => points.map), any(({ pixels }) => pixels.lobes)];
-  return [0, ...(groups ? [1] : []), ...(groups || map ? [2] : []), ...(lobes ? [3] : [])];
+  return [0, ...(groups ? [1] : []), ...(groups || map ? [2] : []), ...(lobes ? [3, 4] : [])];
 }
 
 /** Faces that show the same features, as the numbers of their corners; in the order of the faces. */

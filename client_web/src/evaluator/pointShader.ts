@@ -1,14 +1,15 @@
 /** What points send to an eye: the sum over the in-basis of `relume.moving.evaluate`, what they see along lobes
- * (`highlights.glances`), how the sky in highlights differs from what lobes say (`highlights.by_lights`), and where their
- * light comes from (`bumps`), written from the ladder. Sixteen numbers of each point: radiance of three groups, the
- * direction of the light, the share of the sky along the lobe, that of two lamps. */
+ * (`highlights.glances`), how the sky in highlights differs from what lobes say (`highlights.by_lights`), how other light
+ * in them changes (`highlights.turning`), and where their light comes from (`bumps`), written from the ladder. Twenty
+ * numbers of each point: radiance of three groups, the direction of the light, the share of the sky along the lobe, that
+ * of two lamps, one of nothing, the gradient. */
 import type { SurfaceBody } from "../protocol";
-import { albedoOf, GROUPS, HEAD, LOBES, PLACE, rowOf, SKY, WIDTH } from "./common";
+import { albedoOf, GROUPS, HEAD, LOBES, LUMINANCE, PLACE, rowOf, SKY, WIDTH } from "./common";
 import { glance } from "./glanceShader";
 import { byLights } from "./highlightShader";
+import { turning } from "./turningShader";
 
 const CHANNELS = [0, 1, 2];
-const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const FOUR = "xyzw";
 
 const float = (value: number) => (Number.isInteger(value) ? value.toFixed(1) : String(value));
@@ -39,10 +40,12 @@ export interface PointFeatures {
   map: boolean;
 }
 
+/** Whether pixels ask how other light in highlights changes. */
+const turns = ({ lobe, beside }: PointFeatures) => lobe && beside.even.includes(true);
 const isAsked = ({ even, uneven }: Kinds) => [...even, ...uneven].includes(true);
 
 /** cos mφ and sin mφ of all orders, from those of φ. */
-function turns(orders: number): string {
+function turnsOf(orders: number): string {
   const lines = ["float c0 = 1.0, s0 = 0.0;"];
   for (let m = 1; m < orders; m++) {
     lines.push(`float c${m} = c${m - 1} * cp - s${m - 1} * sp, s${m} = c${m - 1} * sp + s${m - 1} * cp;`);
@@ -61,15 +64,16 @@ function light(features: PointFeatures, of: Sent, channel: number, k: number): s
   return of === "plain" ? all : of === "beside" ? others : `(${all} - ${others})`;
 }
 
-/** Light vectors turned to the eye's φ, rung by rung. */
-function turned(surface: SurfaceBody, features: PointFeatures, of: Sent): string {
+/** Light vectors turned to the eye's φ, rung by rung; or how they change with it. */
+function turned(surface: SurfaceBody, features: PointFeatures, of: Sent, isChange = false): string {
   const { ladder } = surface;
   const lines = CHANNELS.flatMap((channel) =>
     rungsOf(surface, features).map((rung) => {
       const m = ladder.order[rung] as number;
       const cosine = light(features, of, channel, ladder.cosine[rung] as number);
       const sine = light(features, of, channel, ladder.sine[rung] as number);
-      const value = m === 0 ? cosine : `c${m} * ${cosine} + s${m} * ${sine}`;
+      const turn = isChange ? `${m.toFixed(1)} * (c${m} * ${sine} - s${m} * ${cosine})` : `c${m} * ${cosine} + s${m} * ${sine}`;
+      const value = m > 0 ? turn : isChange ? "0.0" : cosine;
       return `${part("turned", channel * ladder.order.length + rung)} = ${value};`;
     }),
   );
@@ -89,8 +93,8 @@ function expanded({ expansions }: SurfaceBody, features: PointFeatures): string 
   return `vec3 local = vec3(${sums.join(", ")});`;
 }
 
-/** Radiance by a table over θo alone. */
-function even(surface: SurfaceBody, features: PointFeatures): string {
+/** Radiance by a table over θo alone; or how it changes from a row to the next. */
+function even(surface: SurfaceBody, features: PointFeatures, isStep = false): string {
   const rungs = surface.ladder.order.length / 4;
   const used = new Set(rungsOf(surface, features));
   // texels of rungs that hold functions of high degrees alone are left out
@@ -98,13 +102,14 @@ function even(surface: SurfaceBody, features: PointFeatures): string {
     const here = FOUR.split("").filter((_, k) => used.has(4 * q + k)).join("");
     if (here === "") return [];
     const sums = CHANNELS.map((channel) => channel * rungs + q).map((k) => {
-      const table = ["near", "far"].map((row) => `texelFetch(uEven, at(${row} + ${k}), 0).${here}`).join(", ");
-      const factors = [`mix(${table}, share)`, `turned${k}.${here}`].join(here.length > 1 ? ", " : " * ");
+      const [near, far] = ["near", "far"].map((row) => `texelFetch(uEven, at(${row} + ${k}), 0).${here}`);
+      const factor = isStep ? `(${far} - ${near})` : `mix(${near}, ${far}, share)`;
+      const factors = [factor, `turned${k}.${here}`].join(here.length > 1 ? ", " : " * ");
       return here.length > 1 ? `dot(${factors})` : factors;
     });
     return `sum += vec3(${sums.join(",\n    ")});`;
   });
-  return `vec3 even(int table, int row, float share) {
+  return `vec3 ${isStep ? "evenStep(int table, int row)" : "even(int table, int row, float share)"} {
   int near = (table * ${surface.rows} + row) * ${3 * rungs}, far = near + ${3 * rungs};
   vec3 sum = vec3(0.0);
   ${lines.join("\n  ")}
@@ -189,6 +194,7 @@ function declared(surface: SurfaceBody, features: PointFeatures): string {
   return `${numbers("t", features.functions)}
 ${numbers("o", features.others)}
 ${isEven ? `${named("turned", 3 * (surface.ladder.order.length / 4))}\n${even(surface, features)}` : ""}
+${turns(features) ? even(surface, features, true) : ""}
 ${kinds.filter((of) => features[of].uneven.includes(true)).map((of) => uneven(surface, features, of)).join("\n")}`;
 }
 
@@ -196,12 +202,13 @@ export function pointShader(surface: SurfaceBody, features: PointFeatures, layer
   const { functions, others, lobe, map, beside } = features;
   const orders = rungsOf(surface, features).map((rung) => surface.ladder.order[rung] as number);
   const besides = `${sum(surface, features, "beside", "beside")}
-  ${range(GROUPS).map((group) => `sent${group} += max(beside${group}, 0.0);`).join(" ")}`;
+  ${range(GROUPS).map((group) => `sent${group} += max(beside${group}, 0.0);`).join(" ")}
+  ${turns(features) ? turning(surface, beside, turned(surface, features, "beside", true)) : ""}`;
   const looked = `int of = (uLobe * ${surface.rows} + row) * ${GROUPS + 1} + ${GROUPS};
   Lobes lobes = alongBoth(of, share, n, -wo);
   glance.xyz = glanceAlong(lobes, p);
   ${sky(surface, features)}`;
-  const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance"];
+  const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance", "turn"];
   return `${HEAD}${rowOf(surface.rows)}${lobe ? `${PLACE}${SKY}${LOBES}${glance(surface)}${isAsked(features.sky) ? "" : byLights(surface)}` : ""}${UNIFORMS}
 ${outputs(layers)}
 ${declared(surface, features)}
@@ -217,8 +224,9 @@ void main() {
 
   ${loaded("t", "uVectors", "uScale", 3 * functions)}
   ${loaded("o", "uOthers", "uOthersScale", 3 * others)}
-  ${orders.length > 0 ? turns(Math.max(...orders) + 1) : ""}
+  ${orders.length > 0 ? turnsOf(Math.max(...orders) + 1) : ""}
   ${sum(surface, features, "plain", "sent")}
+  vec4 turn = vec4(0.0);
   ${isAsked(beside) ? besides : ""}
 
   vec3 towards = vec3(0.0);

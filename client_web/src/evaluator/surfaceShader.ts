@@ -1,7 +1,7 @@
 /** Surfaces as an eye sees them: the places of `relume.moving.look_up`, the sum of `relume.moving.pixels`, catchers of
  * `relume.moving.behind`. Triangles are drawn as they are; what slots of the lattice send is found in each pixel. */
 import type { SurfaceBody } from "../protocol";
-import { albedoOf, behindBy, GROUPS, HEAD, LOBES, MATERIAL, PLACE, rowOf, SKY } from "./common";
+import { albedoOf, behindBy, GROUPS, HEAD, LOBES, luminous, MATERIAL, PLACE, rowOf, SKY } from "./common";
 import type { Shows } from "./materials";
 
 /** What a picture makes use of: the rest is not compiled in. */
@@ -129,6 +129,12 @@ const blended = (value: (k: string) => string) => ["x", "y", "z"].map((k) => `we
 const fetched = (name: string, layer: number) =>
   `vec4 ${name} = ${blended((k) => `texelFetch(uValues, ivec3(at(slots.${k}), ${layer}), 0)`)};`;
 
+/** Adds what a lobe sees, and what turning it changes of what is shown, `more` for an albedo of one. */
+const OF_LOBE = (albedo: string) => `vec3 albedo = ${albedo}, shown = light * albedo;
+      total = max(max(total, -0.5 * shown) + shown, 0.0);
+      float whole = dot(${luminous}, total);
+      total *= 1.0 + clamp(more * dot(${luminous}, albedo), -0.125 * whole, 0.125 * whole) / max(whole, 1e-20);`;
+
 /** Adds what a group of terms sends. */
 function group(number: number, sent: string, { lobes, textures }: Shows, rows: number): string {
   if (!lobes && !textures) return `color += max(${sent}, 0.0);`;
@@ -137,7 +143,7 @@ function group(number: number, sent: string, { lobes, textures }: Shows, rows: n
     ivec4 of = texelFetch(uMaterials, at(material + ${number}), 0);
     if (of.z > 0) {
       vec3 total = ratio * ${sent};
-      ${lobes ? `vec3 shown = light * ${albedo};\n      total = max(total, -0.5 * shown) + shown;` : ""}
+      ${lobes ? `${OF_LOBE(albedo)}` : ""}
       ${textures ? "if (of.w >= 0) total *= textureAt(of.w, place, footprint);" : ""}
       color += max(total, 0.0);
     }
@@ -151,7 +157,7 @@ const CAUGHT = `bvec3 isLit;
     if (isLit[channel] && uGain[channel] > 0.0) shown[channel] = min(color[channel] / arrives[channel], 8.0);
   }
   color = shown * behind(d);
-  hides -= dot(vec3(0.2126, 0.7152, 0.0722), min(shown, 1.0));`;
+  hides -= dot(${luminous}, min(shown, 1.0));`;
 
 /** What catchers would receive if nothing were in the way. */
 const UNHIDDEN = `
@@ -230,6 +236,7 @@ export function surfaceShader({ rows }: SurfaceBody, features: SurfaceFeatures):
   int material = int(vCorners.w) * ${MATERIAL};
   ${lobes ? fetched("glance", 3) : ""}
   ${lobes || textures ? `vec3 n = ${blended((k) => `texelFetch(uNormals, at(slots.${k}), 0).xyz`)};\n  n *= inversesqrt(max(dot(n, n), 1e-12));` : ""}
+  ${lobes ? `${fetched("turn", 4)}\n  float more = 0.5 * (dot(turn.xyz, reflect(d, n)) - turn.w);` : ""}
   ${textures ? TEXTURED : ""}
   ${lobes ? "int row;\n  float share;\n  vec3 light = mirrored(vKind.x, n, d, vFacing.xyz, glance, row, share);" : ""}`;
   return `${HEAD}${PLACE}${parts.filter(Boolean).join("\n")}${finished(features)}

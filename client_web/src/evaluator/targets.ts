@@ -3,7 +3,7 @@ import { WIDTH } from "./common";
 
 type Gl = WebGL2RenderingContext;
 
-const LAYERS = 4;
+export const LAYERS = 5;
 
 function attach(gl: Gl, make: () => number[]): WebGLFramebuffer {
   const buffer = gl.createFramebuffer();
@@ -19,7 +19,7 @@ function check(gl: Gl): void {
   }
 }
 
-/** Sixteen numbers for each of many points or slots: four layers of texels. */
+/** Twenty numbers for each of many points or slots: five layers of texels. */
 export class Values {
   readonly texture: WebGLTexture;
   readonly rows: number;

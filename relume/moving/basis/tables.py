@@ -13,12 +13,14 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import NUM_FUNCTIONS, WINDOW, ladder
+from relume.basis.zernike import DEGREES, FALL, NUM_FUNCTIONS, ladder
 from relume.brdf.channels import group_of
 from relume.moving.basis.lobes import NUM_GROUPS, are_lobes, is_told
 from relume.moving.basis.out_factors import NUM_COLUMNS, NUM_ROWS, out_factors
 
 F32 = NDArray[np.float32]
+
+_RINGS = 0.6  # what functions miss of a highlight, RMS, from which on all of the window is asked for
 
 
 class Tables(NamedTuple):
@@ -46,6 +48,16 @@ class Tables(NamedTuple):
         return cls(even, uneven, np.where(of >= 0, of + np.tile(first, 3)[:, None], of))
 
 
+def window(missed: float) -> F32:
+    """Find w of each function, e^(−n (n + 2) f). (K,) float32
+
+    Args:
+        missed: by all functions of a highlight, RMS: little rings where they miss little, and blurs for nothing.
+    """
+    fall = FALL * min(missed / _RINGS, 1.0)
+    return np.asarray(np.exp(-fall * DEGREES * (DEGREES + 2)), np.float32)
+
+
 def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
     """Sum the out-factors of the terms of each material that the same texture multiplies, highlights apart.
 
@@ -62,10 +74,10 @@ def tables_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
         tells_sky = is_told([*compress(terms, of_lobe)])
         every = [*zip(map(group_of, terms), found_of, of_lobe, strict=True)]
         for group in range(NUM_GROUPS):
-            shared = [(one.table, is_lobe) for of_group, one, is_lobe in every if of_group == group]
-            plain = [table for table, is_lobe in shared if not is_lobe]
-            told = [table for table, is_lobe in shared if is_lobe and tells_sky]
-            others = [table * WINDOW for table, is_lobe in shared if is_lobe]
+            shared = [(one, is_lobe) for of_group, one, is_lobe in every if of_group == group]
+            plain = [one.table for one, is_lobe in shared if not is_lobe]
+            told = [one.table for one, is_lobe in shared if is_lobe and tells_sky]
+            others = [one.table * window(one.missed) for one, is_lobe in shared if is_lobe]
             for first, found in ((0, plain), (2, told), (4, others)):
                 for kind, kept, tables in (
                     (0, even, [t[:, 0][..., rungs.cosine] for t in found if t.shape[1] == 1]),

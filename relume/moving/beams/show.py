@@ -59,7 +59,8 @@ def add_beams(
     """
     num_materials, eye = len(materials.sends), camera.to_world[:3, 3].astype(np.float32)
     dark = np.zeros((num_materials, 3), np.float32)
-    nothing = Mirrored(lobes_of([[]] * num_materials), no_sky, np.zeros((0, 3), np.float32), False)
+    glances, turns = np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32)
+    nothing = Mirrored(lobes_of([[]] * num_materials), no_sky, glances, turns, is_fine=False)
     for beam, share in zip(beams, shares, strict=True):
         rows = np.flatnonzero(share > 0).astype(np.int32) if rays is None else rays[share[rays] > 0]
         by_points = send(surface, beam.vectors, None, materials.tables, eye, seen.is_needed).radiance

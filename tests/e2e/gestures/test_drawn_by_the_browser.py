@@ -222,3 +222,21 @@ def test_the_exact_picture_takes_over_where_the_eye_rests_twice(
             page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=drawn, timeout=DRAWN_MS)
             editor.page.wait_for_timeout(500)
             assert changed(before, editor.pixels()) > 0.05
+
+
+@pytest.mark.slow
+def test_reflections_turn_between_points_as_the_server_has_them(server: Server, browser: Browser) -> None:
+    """Of a floor in a metal ball: a tenth of all pixels would be other ones without gradients (ADR 112)."""
+    with opened_page(browser) as page:
+        never_at_rest(page, [])
+        page.goto(f"{server.url}/?scene={server.ball_on_a_floor()}")
+        wait_until_drawn(page)
+        editor = Editor(page)
+        editor.canvas.focus()
+        page.keyboard.press("ArrowLeft")
+        by_server = settled(editor)
+        draw_here(page)
+        off = np.abs(by_server - settled(editor)).max(axis=2)
+        inside = beside_edges(by_server)
+        assert inside.mean() > 0.3
+        assert (off[inside] > 2).mean() < 0.01

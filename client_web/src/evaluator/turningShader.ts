@@ -1,0 +1,25 @@
+/** How other light than the sky's changes in highlights as they look elsewhere, as `relume.moving.highlights.turning`. */
+import type { SurfaceBody } from "../protocol";
+import { albedoOf, albedoStepOf, GROUPS, luminous } from "./common";
+import type { Kinds } from "./pointShader";
+
+/** Finds `turn`, after the sums of other light. `crossed`: turns light vectors to how they change with φ. */
+export function turning({ rows }: SurfaceBody, { even, uneven }: Kinds, crossed: string): string {
+  const groups = even.flatMap((is, group) => (is ? [group] : []));
+  const sum = (value: (group: number) => string) => groups.map(value).join(" + ");
+  const table = (group: number) => `uHighlights[${group}].z`;
+  const sent = (group: number) => (uneven[group] ? `even(${table(group)}, row, share)` : `beside${group}`);
+  const texel = (group: number) => `albedos + ${group}`;
+  return `int albedos = (uLobe * ${rows} + row) * ${GROUPS + 1};
+  vec3 sent = ${sum(sent)}, ofRow = ${sum((group) => `evenStep(${table(group)}, row)`)};
+  vec3 white = ${sum((group) => albedoOf(texel(group)))}, whiter = ${sum((group) => albedoStepOf(texel(group)))};
+  ${crossed}
+  vec3 crossing = ${sum((group) => `even(${table(group)}, row, share)`)};
+  vec3 isLit = vec3(greaterThan(sent, vec3(0.0))) * vec3(greaterThan(white, vec3(1e-6)));
+  vec3 weight = isLit * ${luminous} / max(white, 1e-6);
+  float facing = dot(n, wo), sine = max(sqrt(max(1.0 - facing * facing, 0.0)), 1e-3);
+  float rowsARadian = facing < 0.01 ? 0.0 : ${((rows - 1) / 2).toFixed(1)} * sqrt(1.0 + cosine);
+  float byTheta = rowsARadian * dot(weight, ofRow - sent * whiter / max(white, 1e-6)), byPhi = dot(weight, crossing) / sine;
+  turn.xyz = (sp * byPhi - facing * cp * byTheta) * tangent - (cp * byPhi + facing * sp * byTheta) * bitangent - sine * byTheta * n;
+  turn.w = dot(turn.xyz, 2.0 * facing * n - wo);`;
+}

@@ -1,0 +1,126 @@
+"""How other light changes in highlights between points: gradients, and what pixels make of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tiny_scenes import looking, scene_of, sphere, studio
+
+from relume.bake import Recipe
+from relume.basis.zernike import DEGREES, FALL, in_basis
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.moving.basis.lobes import lobes_of
+from relume.moving.basis.tables import tables_of, window
+from relume.moving.evaluate import send
+from relume.moving.highlights.looking import SkyLight
+from relume.moving.highlights.turning import turning, turning_numpy
+from relume.moving.look_up import at_vertices, look
+from relume.moving.pixels import FromVertices, Mirrored, combine
+from relume.moving.sky import turn_of
+from relume.points import Points
+from relume.scene.model import Material
+from relume.store import bake_here
+
+CAMERA, SIZE = looking("front", [0, 0.5, 3], [0, 0, 0], 0.75), (64, 48)
+EYE = CAMERA.to_world[:3, 3].astype(np.float32)
+WHITE = {"model": "ggx", "color": [1.0] * 3, "texture": None, "curves": {}}
+COAT = {**WHITE, "params": {"roughness": 0.3, "f0": 0.05}}
+METAL = {**WHITE, "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.4, "f0": 0.9}}
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    material = Material("Ball", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
+    ball = sphere("ball", [0, 0, 0], 1, 0, 24)
+    scene = scene_of(ball, camera=CAMERA, environment=studio(16, 20.0), materials=[material])
+    store = tmp_path_factory.mktemp("ball") / "surface.zarr"
+    bake_here(METHODS["surface"], scene, Recipe("surface", ("front",), SIZE, 60, num_points=1500), store)
+    return open_bake(store, Memory(1 << 30))
+
+
+def from_afar(points):
+    """Light vectors of a few far lights that nothing hides. (points, 3, K) float32"""
+    rng = np.random.default_rng(3)
+    towards, light = rng.normal(size=(12, 3)), rng.uniform(0, 2, (12, 3))
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    wi = np.einsum("nij,lj->nli", np.stack([t, np.cross(n, t), n], axis=1), towards)
+    cosine = np.maximum(wi[..., 2], 0)
+    return np.einsum("nl,lc,nlk->nck", cosine, light, in_basis(wi)).astype(np.float32)
+
+
+@pytest.mark.parametrize("terms", [[METAL], [METAL, COAT]])
+def test_gradients_are_what_points_send_otherwise_aside(moving, terms):
+    surface, tables, lobes = moving.surface, tables_of([terms]), lobes_of([terms])
+    others, num = from_afar(surface.points), surface.points.num_points
+    is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
+    found = turning(surface, others, tables, lobes, EYE, is_needed)
+    assert not found[is_needed == 0].any()
+    expected = np.array([turning_numpy(surface, others, tables, lobes, EYE, p) for p in range(0, num, 5)])
+    is_asked = is_needed[::5] > 0
+    largest = np.abs(expected[is_asked]).max()
+    assert largest > 0.1
+    np.testing.assert_allclose(found[::5][is_asked], expected[is_asked], rtol=2e-3, atol=2e-3 * largest)
+
+
+def test_what_has_no_highlight_or_no_other_light_turns_nothing(moving):
+    surface, num = moving.surface, moving.surface.points.num_points
+    dull, everywhere = [{**METAL, "model": "lambert", "params": {}}], np.ones(num, np.uint8)
+    others = from_afar(surface.points)
+    assert not turning(surface, others, tables_of([dull]), lobes_of([dull]), EYE, everywhere).any()
+    assert not turning(surface, 0 * others, tables_of([[METAL]]), lobes_of([[METAL]]), EYE, everywhere).any()
+
+
+def pixels(moving, gain):
+    """Pixels of a metal ball in that light, with gradients times a gain; and of points that lie where pixels look."""
+    surface, tables, lobes = moving.surface, tables_of([[METAL]]), lobes_of([[METAL]])
+    seen = look(surface, moving.embree, CAMERA, SIZE).middles(SIZE[0] * SIZE[1])
+    others, everywhere = from_afar(surface.points), np.ones(surface.points.num_points, np.uint8)
+    sent = send(surface, np.zeros_like(others), others, tables, EYE, everywhere).radiance
+    turns = np.float32(gain) * turning(surface, others, tables, lobes, EYE, everywhere)
+    broad, turn = (at_vertices(surface, seen.is_seen, of) for of in (sent, turns))
+    dark, nothing = np.zeros((1, 3), np.float32), np.empty((0, 3), np.float32)
+    no_sky = SkyLight(moving.sky_in(None), np.empty((0, 7), np.float32), turn_of(0.0), dark[0])
+    mirrored = Mirrored(lobes, no_sky, np.zeros((len(turn), 3), np.float32), turn, False)
+    shown = FromVertices(broad, np.ones((1, broad.shape[1]), bool), nothing)
+    found = combine(surface, seen, CAMERA.yfov / SIZE[1], shown, dark, mirrored)
+
+    hit = np.flatnonzero(seen.hits.face >= 0)
+    position = EYE + seen.hits.distance[hit, None] * seen.directions[hit]
+    normal = np.einsum("nk,nkc->nc", seen.weight[hit], surface.vertices.normal[seen.vertex[hit]])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    tangent = np.cross(normal, [0.0, 0.0, 1.0])
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    fields = (np.ascontiguousarray(of, np.float32) for of in (position, normal, tangent))
+    points = Points(*fields, hit.astype(np.uint32))
+    exactly = replace(surface, points=points, material=np.zeros(len(hit), surface.material.dtype))
+    light, every = from_afar(points), np.ones(len(hit), np.uint8)
+    expected = send(exactly, np.zeros_like(light), light, tables, EYE, every).radiance[:, 0]
+    inside = np.einsum("nc,nc->n", normal, -seen.directions[hit]) > 0.3
+    return found[hit][inside], expected[inside]
+
+
+def test_half_gradients_meet_what_lies_between_points(moving):
+    def error(gain):
+        found, expected = pixels(moving, gain)
+        return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+
+    plain, half, whole = error(0), error(1), error(2)
+    assert plain > 0.03
+    assert half < 0.5 * plain
+    assert half < whole
+
+
+def test_a_gradient_changes_pixels_within_bounds(moving):
+    plain, _ = pixels(moving, 0)
+    wild, _ = pixels(moving, 1e4)
+    ratio = wild[plain > 1e-3] / plain[plain > 1e-3]
+    np.testing.assert_allclose([ratio.min(), ratio.max()], [0.875, 1.125], rtol=1e-3)
+
+
+def test_the_window_is_for_functions_that_miss_much():
+    np.testing.assert_array_equal(window(0.0), 1)
+    np.testing.assert_allclose(window(0.9), np.exp(-FALL * DEGREES * (DEGREES + 2)), rtol=1e-6)
+    assert np.all(window(0.9)[1:] < window(0.3)[1:])
+    assert np.all(np.diff(window(0.3)) <= 0)
