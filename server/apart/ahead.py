@@ -21,6 +21,7 @@ from worker.database.faults import Complaint
 from worker.ledger import Ledger
 from worker.paths import bake_path
 from worker.status import MOVING
+from worker.storage.locks import open_locked
 
 log = logging.getLogger(__name__)
 
@@ -108,15 +109,12 @@ class Ahead:
     @contextmanager
     def _turn(self) -> Iterator[bool]:
         """Whether it is for this process to look, for as long as the block runs."""
-        file = self._data / _LOCK
-        file.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                yield False
-                return
+            lock = open_locked(self._data / _LOCK, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+            return
+        try:
             yield True
         finally:
-            os.close(descriptor)
+            os.close(lock)

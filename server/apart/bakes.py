@@ -10,18 +10,15 @@ from relume import look as looks
 from relume.imageio.files import write_image
 from relume.imageio.shrink import shrink
 from relume.picture.jobs import Cancelled, Progress
-from relume.picture.transfer import Eyes
 from server.apart.workshop import Workshop
 
 MAX_WIDTH = 320
 
 
 def shade(shop: Workshop, tell: Progress, cancelled: Cancelled, *, bake: str) -> Mapping[str, Any]:
-    """Shade the scene's own look in every fixed view of a bake; its images stay beside the store, where an opened
-    picture looks for them."""
+    """Shade the scene's own look in every view of a bake of fixed views; its images stay beside the store, where an
+    opened picture looks for them."""
     transfer = shop.transfer(bake)
-    if transfer.eyes is not Eyes.BAKED:
-        return {}
     look, num_views = looks.validate(transfer.default_look, transfer.default_look), len(transfer.views)
     for done, view in enumerate(transfer.views):
 

@@ -19,6 +19,7 @@ from relume.folders import folder_bytes
 from relume.replacing import UNFINISHED
 from relume.store.publish import manifest_digests
 from relume.store.schema import MANIFEST_NAME
+from worker.storage.locks import open_locked
 from worker.storage.parts import forget_parts
 from worker.storage.remote import Remote, configured
 
@@ -145,12 +146,9 @@ def _lock_path(path: Path, what: str) -> Path:
 
 
 def _lock(path: Path, what: str, how: int) -> int:
-    """An open file that holds a lock; closing it gives it up, as does the end of the process."""
-    file = _lock_path(path, what)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+    """A lock of a scene or a bake, see `open_locked`; a shared one says when it was opened last."""
+    descriptor = open_locked(_lock_path(path, what), how)
     try:
-        fcntl.flock(descriptor, how)
         if how == fcntl.LOCK_SH:
             os.utime(descriptor)
     except BaseException:
