@@ -21,6 +21,7 @@ from relume.errors import CancelledError
 
 P = ParamSpec("P")
 T = TypeVar("T")
+Item = TypeVar("Item")
 Kernel = Callable[[int, int], object]
 """Works on a range: its start and its stop."""
 
@@ -179,6 +180,25 @@ def for_steps(
             progress(done / count)
 
     for_ranges(step, count, grain)
+
+
+def each_in_order(work: Callable[[Item], T], items: Sequence[Item], at_once: int) -> Iterator[T]:
+    """Call `work` with each item, several at once, and give what it returns in the order of the items.
+
+    Args:
+        work: called from several threads. items: independent of each other.
+        at_once: what of the results is in memory together, at most.
+    """
+    step = min(at_once, num_threads())
+    for first in range(0, len(items), step):
+        some = items[first : first + step]
+        found = dict[int, T]()
+
+        def one(start: int, stop: int, some: Sequence[Item] = some, found: dict[int, T] = found) -> None:
+            found.update({k: work(some[k]) for k in range(start, stop)})
+
+        for_ranges(one, len(some), 1)
+        yield from (found[k] for k in range(len(some)))
 
 
 def for_shares(kernel: Kernel, count: int, shares_a_thread: int = _SHARES_A_THREAD) -> None:

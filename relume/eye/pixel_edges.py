@@ -58,7 +58,7 @@ def is_off_plane(normal: F32, distance: F32, direction: F32, other_distance: F32
         other_distance, other: of the other hit, and of its ray. (…), (…, 3)
     """
     with np.errstate(invalid="ignore", divide="ignore"):  # background is infinitely far
-        slope = np.sum(direction * normal, axis=-1) / np.sum(other * normal, axis=-1)
+        slope = np.vecdot(direction, normal) / np.vecdot(other, normal)
         nearer = np.minimum(distance, other_distance)
         return np.asarray(np.abs(other_distance - distance * slope) > _DEPTH_EDGE * nearer)
 

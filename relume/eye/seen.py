@@ -12,7 +12,8 @@ from relume.eye.layers import Layer, layers_of
 from relume.eye.merged import Chosen, alone, joined, merged
 from relume.eye.mirrors import MOST_MIRRORS
 from relume.eye.pixel_edges import bright_edges_of, brightness_of, edges_of, is_partly_there, is_turning
-from relume.eye.windows import Window, windows_of
+from relume.eye.windows import AT_ONCE, Window, windows_of
+from relume.parallel import each_in_order
 from relume.scene.model import Camera, Scene
 from relume.trace.cutout_filter import EVERYWHERE
 from relume.trace.geometry import Geometry
@@ -80,19 +81,22 @@ class Eye:
 
     def edges(self, *, smooths: bool) -> Edges:
         """Look at all pixels. smooths: else none is an edge."""
-        num_pixels, windows = self.size[0] * self.size[1], windows_of(self.size)
+        num_pixels = self.size[0] * self.size[1]
         is_edge, shown = np.zeros(num_pixels, np.bool_), np.zeros(num_pixels, np.uint8)
-        cosine, num_rays = np.ones(num_pixels, np.float32), 0
-        for window in windows:
+        cosine = np.ones(num_pixels, np.float32)
+
+        def looked_at(window: Window) -> int:
             wider, pixel = window.widened(self.size), window.pixels(self.size)
             directions = self._directions(wider.pixels(self.size))
             layers = self._layers(directions)
-            num_rays += sum(len(layer.ray) for layer in layers)
             of_layers = sum(np.bincount(layer.ray[layer.is_shown], minlength=len(directions)) for layer in layers)
             shown[pixel] = window.cut_from(wider, np.asarray(of_layers))
             if smooths:
                 found, turn = self._edges_in(wider, layers, directions)
                 is_edge[pixel], cosine[pixel] = window.cut_from(wider, found), window.cut_from(wider, turn)
+            return sum(len(layer.ray) for layer in layers)
+
+        num_rays = sum(each_in_order(looked_at, windows_of(self.size), AT_ONCE))
         is_edge |= is_turning(cosine)
         return Edges(is_edge, int(shown[~is_edge].sum(dtype=np.int64)), num_rays)
 

@@ -26,7 +26,8 @@ from relume.eye.seen import Edges, Eye
 from relume.eye.sorted_rows import Column, SortedRows
 from relume.eye.tinted import NUM_CHANNELS, POINTS_A_BLOCK, ColumnOfParted, TintedLight, has_tinted_glass, parted
 from relume.eye.ways import Chain
-from relume.eye.windows import morton, windows_of
+from relume.eye.windows import AT_ONCE, Window, morton, windows_of
+from relume.parallel import each_in_order
 from relume.points import Points
 from relume.scene.model import Material, Scene
 from relume.scene.roughness import level_of, levels_of
@@ -181,12 +182,15 @@ def _rows(
         None where they are more than there is room for; how many rays were traced.
     """
     rows, num_samples, num_rays = SortedRows(scratch), edges.num_alone, 0
-    for window in windows_of(eye.size):
+
+    def found(window: Window) -> tuple[dict[str, NDArray[Any]], int, int]:
         chosen, num_fine, num_traced = eye.chosen(window, edges.is_edge, positions)
+        return _sorted_samples(eye, chosen), num_fine, num_traced
+
+    for columns, num_fine, num_traced in each_in_order(found, windows_of(eye.size), AT_ONCE):
         num_samples, num_rays = num_samples + num_fine, num_rays + num_traced
         if num_samples > most:
             return None, num_rays
-        columns = _sorted_samples(eye, chosen)
         rows.add(_key(columns["material"], columns["level"]), {name: columns[name] for name in names})
     return rows, num_rays
 

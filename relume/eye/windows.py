@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SIDE = 256  # of a window, pixels; a power of two
+AT_ONCE = 4  # windows at most that are looked at by a thread each: a hundred megabytes each
 
 
 class Window(NamedTuple):

@@ -136,7 +136,12 @@ def places_on(geometry: Geometry, face: NDArray[np.integer], uv: F32, normal: F3
     twice_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
     shares = np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
     inside = _off_edges(shares, p, twice_area, OFF_EDGES * geometry.epsilon)
-    return np.asarray(np.einsum("nk,nkc->nc", inside, p) + geometry.epsilon * normal, np.float32)
+    return np.asarray(_blended(inside, p) + geometry.epsilon * normal, np.float32)
+
+
+def _blended(shares: F32, corners: F32) -> F32:
+    """Interpolate what corners have. shares: barycentric. (n, 3). corners: (n, 3, c). Returns (n, c)"""
+    return np.asarray(np.einsum("nk,nkc->nc", shares, corners))
 
 
 def _surface_at(
@@ -153,14 +158,14 @@ def _surface_at(
     face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     twice_area = np.linalg.norm(face_normal, axis=1)
     b = np.stack([1 - hits.uv.sum(axis=1), hits.uv[:, 0], hits.uv[:, 1]], axis=1)
-    b = _off_edges(b, p, twice_area, OFF_EDGES * geometry.epsilon)[:, :, None]
+    b = _off_edges(b, p, twice_area, OFF_EDGES * geometry.epsilon)
     face_normal = _unit(face_normal, -directions)
     face_normal *= -np.sign(np.einsum("nc,nc->n", face_normal, directions) + 1e-30)[:, None].astype(np.float32)
-    normal = _unit((geometry.normals[corners] * b).sum(axis=1), face_normal)
+    normal = _unit(_blended(b, geometry.normals[corners]), face_normal)
     normal = np.where(np.einsum("nc,nc->n", normal, face_normal)[:, None] < 0, -normal, normal)
-    tangents = (geometry.tangents[corners] * b).sum(axis=1)
-    uv = (geometry.uvs[corners] * b).sum(axis=1)
-    position = (p * b).sum(axis=1) + geometry.epsilon * face_normal
+    tangents = _blended(b, geometry.tangents[corners])
+    uv = _blended(b, geometry.uvs[corners])
+    position = _blended(b, p) + geometry.epsilon * face_normal
     channels = dict(zip(_IMAGES, np.ones((3, *position.shape), np.float32), strict=True))
     channels["roughness"] = np.ones((len(uv), 1), np.float32)
     length, smooth = np.ones(len(uv), np.float32), normal
