@@ -20,7 +20,14 @@ from relume.moving.basis.rows import LEAST_COSINE
 from relume.moving.evaluate import Sent
 from relume.moving.highlights.between_points import add_sky_in_highlights
 from relume.moving.highlights.glances import glance
-from relume.moving.highlights.lobe_lights import SIDE, lists_numpy, lobe_lights, widths_of
+from relume.moving.highlights.lobe_lights import (
+    NUM_LISTED,
+    NUM_WIDTHS,
+    SIDE,
+    lists_numpy,
+    lobe_lights,
+    widths_of,
+)
 from relume.moving.highlights.looking import SkyLight
 from relume.moving.pixels import combine
 from relume.moving.points.density import by_distance
@@ -232,6 +239,17 @@ def test_lists_have_the_lights_that_weigh_most(width):
     for square in range(0, SIDE * SIDE, 31):
         found = listed.lists[listed.first[width] + square]
         assert set(found[found >= 0]) == set(lists_numpy(listed, width, square))
+
+
+def test_lists_are_full_where_lights_weigh_alike():
+    directions, radius = np.tile(np.array([0, 0.6, 0.8], np.float32), (100, 1)), np.full(100, 0.1, np.float32)
+    luminous = np.where(np.arange(100) < 20, 2, 1).astype(np.float32)
+    none = np.zeros((0, 100), np.float32)
+    for found in lobe_lights(directions, radius, luminous, none, (NUM_WIDTHS - 1,)).lists:
+        assert len(set(found)) == NUM_LISTED and set(range(20)) < set(found) <= set(range(100))
+    few = np.where(np.arange(100) < 90, 0, 1).astype(np.float32)
+    found = {tuple(each[each >= 0]) for each in lobe_lights(directions, radius, few, none, (0,)).lists}
+    assert found == {(), tuple(range(90, 100))}
 
 
 @pytest.mark.parametrize("degrees", [4.0, 16.0])

@@ -125,7 +125,8 @@ def _weight(off, spread, luminous, variance):  # type: ignore[no-untyped-def]
 def _list(columns, about, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
     """List the lights that weigh most anywhere in squares [start, stop). columns: of the lights. (5, lights)"""
     num, most = columns.shape[1], out.shape[1]
-    weight, near, heavy = np.empty(num, np.float32), np.empty(num, np.int32), np.empty(num, np.float32)
+    weight = np.empty(num, np.float32)
+    bits = weight.view(np.int32)  # of numbers that are not negative these are in the same order
     for square in range(start, stop):
         x, y, z = about[square, 0], about[square, 1], about[square, 2]
         cosine, sine = np.float32(math.cos(radius[square])), np.float32(math.sin(radius[square]))
@@ -135,17 +136,47 @@ def _list(columns, about, radius, variance, start, stop, out):  # type: ignore[n
             nearest = along * cosine + across * sine  # at the place in the square that is nearest to the light
             off = np.float32(1) - (nearest if along < cosine else np.float32(1))
             weight[k] = _weight(off, columns[3, k], columns[4, k], variance)
-        found = 0
-        for k in range(num):
-            near[found], heavy[found] = k, weight[k]
-            found += weight[k] > 0
-        least = np.partition(heavy[:found], found - most)[found - most] if found > most else np.float32(0)
+        least, alike = _least_of(bits, most)
         n = 0
-        for k in range(found):
-            if n < most and heavy[k] >= least:
-                out[square, n] = near[k]
+        for k in range(num):
+            if bits[k] > least or (bits[k] == least and alike > 0):
+                alike -= bits[k] == least
+                out[square, n] = k
                 n += 1
         out[square, n:] = -1
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _least_of(bits, most):  # type: ignore[no-untyped-def]
+    """Find the least of the largest `most` numbers, none of them 0.
+
+    By halving the range that it is in: counting is vector code, sorting is not.
+
+    Args:
+        bits: of n numbers, not negative. (n,) int32
+    Returns:
+        Its bits, and how many like it may be among these.
+    """
+    num_lit, high = np.int32(0), np.int32(0)
+    for k in range(bits.shape[0]):
+        num_lit += bits[k] > 0
+        high = max(high, bits[k])
+    if num_lit <= most:
+        return np.int32(1), np.int32(most)
+    # more than `most` are at least `low`, fewer at least `high`
+    low, high, above = np.int32(1), high + np.int32(1), np.int32(0)
+    while high - low > 1:
+        middle = low + (high - low) // np.int32(2)
+        count = np.int32(0)
+        for k in range(bits.shape[0]):
+            count += bits[k] >= middle
+        if count == most:
+            return middle, count
+        if count > most:
+            low = middle
+        else:
+            high, above = middle, count
+    return low, np.int32(most) - above
 
 
 def lobe_lights(directions: F32, radius: F32, luminous: F32, of_lamps: F32, widths: Sequence[int]) -> LobeLights:
