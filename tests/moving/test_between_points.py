@@ -246,7 +246,8 @@ def test_lists_are_full_where_lights_weigh_alike():
     luminous = np.where(np.arange(100) < 20, 2, 1).astype(np.float32)
     none = np.zeros((0, 100), np.float32)
     for found in lobe_lights(directions, radius, luminous, none, (NUM_WIDTHS - 1,)).lists:
-        assert len(set(found)) == NUM_LISTED and set(range(20)) < set(found) <= set(range(100))
+        assert len(set(found)) == NUM_LISTED
+        assert set(range(20)) < set(found) <= set(range(100))
     few = np.where(np.arange(100) < 90, 0, 1).astype(np.float32)
     found = {tuple(each[each >= 0]) for each in lobe_lights(directions, radius, few, none, (0,)).lists}
     assert found == {(), tuple(range(90, 100))}
