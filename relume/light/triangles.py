@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.color import luminance
 from relume.environments.equirect import texel_directions, texel_solid_angles, turned
 from relume.light.hierarchy import highest, inner_nodes
+from relume.light.moments import Texels, moments_of
 from relume.light.tiles import Tiles, choose_tiles, solid_angles, unit
 
 F32 = NDArray[np.float32]
@@ -121,25 +122,6 @@ def _sums(place: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
     return np.asarray(np.bincount(place, values, num), np.float64)
 
 
-@dataclass(frozen=True)
-class Texels:
-    """The texels of an environment, or other small places, and the tiles they lie in.
-
-    Attributes:
-        tile: that each lies in. (n,) luminous: luminance × solid angle. (n,) directions: unit. (n, 3)
-        solid_angles: (n,)
-    """
-
-    tile: NDArray[np.int32]
-    luminous: F64
-    directions: F64
-    solid_angles: F64
-
-    def sums(self, values: F64, num_tiles: int) -> F64:
-        """Sum values (n,) over the texels of each tile. (M,)"""
-        return _sums(self.tile, values, num_tiles)
-
-
 def _tangent_frames(normals: F64) -> F64:
     """Find for each of M unit vectors two that are across it and across each other. (M, 2, 3)"""
     aside = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
@@ -174,40 +156,14 @@ def matched(corners: F64, texels: Texels) -> tuple[F64, F64]:
     is_small = np.einsum("mci,mi->mc", corners, mean).min(axis=1) >= _TANGENT_COSINE
     fitted = np.nonzero(is_lit & is_small)[0]
     matched = corners.copy()
-    centre, spread = _moments(texels, total, mean, fitted)
     frames = _tangent_frames(mean[fitted])
+    centre, spread = moments_of(texels, total[fitted], mean[fitted], frames, fitted)
     corner = np.stack([_on_tangent_plane(corners[fitted, c], mean[fitted], frames) for c in range(3)], axis=1)
     corner -= corner.mean(axis=1, keepdims=True)
     uniform = corner.transpose(0, 2, 1) @ corner / 12  # second moment of a uniform triangle about its centroid
     placed = corner @ _power_of(uniform, -0.5) @ _power_of(spread, 0.5) + centre[:, None]
     matched[fitted] = unit(mean[fitted, None] + placed @ frames)
     return matched, mean
-
-
-def _moments(texels: Texels, total: F64, mean: F64, fitted: NDArray[np.intp]) -> tuple[F64, F64]:
-    """Compute first (F, 2) and second central (F, 2, 2) moments of tiles' light in the planes that touch at `mean`.
-
-    Args:
-        total: luminous light of all tiles. (M,) mean: its directions. (M, 3) fitted: the tiles in question. (F,)
-    """
-    place_of = np.full(len(total), -1, np.int32)
-    place_of[fitted] = np.arange(len(fitted))
-    place = place_of[texels.tile]
-    if len(fitted) < len(total):
-        is_fitted = place >= 0
-        texels, place = Texels(*(values[is_fitted] for values in vars(texels).values())), place[is_fitted]
-    frames, weight = _tangent_frames(mean[fitted]), texels.luminous / total[texels.tile]
-
-    def summed(values: F64) -> F64:
-        return _sums(place, weight * values, len(fitted))
-
-    position = _on_tangent_plane(texels.directions, mean[texels.tile], frames[place])
-    centre = np.stack([summed(position[:, i]) for i in range(2)], axis=1)
-    position -= centre[place]
-    # a texel is no point: its own extent counts, as that of a square of its solid angle
-    extent = summed(texels.solid_angles) / 12
-    xx, xy, yy = (summed(position[:, i] * position[:, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
-    return centre, np.stack([xx + extent, xy, xy, yy + extent], axis=1).reshape(-1, 2, 2)
 
 
 def merged_into(lights: TriangleLights, group: NDArray[np.integer[Any]], codes: NDArray[np.uint64]) -> TriangleLights:

@@ -9,6 +9,7 @@ from tiny_scenes import studio
 from relume.color import luminance
 from relume.environments.equirect import shrunk, texel_directions, texel_solid_angles
 from relume.errors import PlanError
+from relume.light.moments import Texels, moments_numpy, moments_of
 from relume.light.tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
 from relume.light.triangles import Unturned, subdivide, weigh
 
@@ -102,6 +103,23 @@ def test_triangles_have_the_moments_of_the_light_in_their_tiles(num_lights):
         np.testing.assert_allclose((corner - middle).T @ (corner - middle) / 12, spread, atol=1e-3 * size**2)
         compared += 1
     assert compared > 0.8 * num_lights
+
+
+def test_moments_of_texels_are_those_of_their_oracle():
+    rng = np.random.default_rng(2)
+    axis = np.eye(3)[rng.integers(0, 3, 400)]
+    directions = axis + 0.3 * rng.normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    tile = (2 * axis.argmax(axis=1)).astype(np.int32)
+    texels = Texels(tile, rng.uniform(0, 9, 400), directions, rng.uniform(0, 0.1, 400))
+    fitted = np.array([4, 0])  # of five tiles, of which two have no light and one is not asked about
+    mean, total = np.eye(3)[[2, 0]], texels.sums(texels.luminous, 5)
+    frames = np.array([[[1.0, 0, 0], [0, 1, 0]], [[0, 0.6, 0.8], [0, -0.8, 0.6]]])
+    centre, spread = moments_of(texels, total[fitted], mean, frames, fitted)
+    for k, of_tile in enumerate(fitted):
+        expected = moments_numpy(texels, mean[k], frames[k], of_tile)
+        np.testing.assert_allclose(centre[k], expected[0], atol=1e-12)
+        np.testing.assert_allclose(spread[k], expected[1], atol=1e-12)
 
 
 def test_where_light_is_uniform_triangles_are_their_tiles():
