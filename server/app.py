@@ -41,6 +41,7 @@ from server.routes import (
 from server.routes.shelves import btf_works, btfs, environments, images, library, materials
 from server.running.leave import Leave
 from server.running.process import Process
+from server.running.sockets import Socket
 from server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
 from server.settings import Settings
 from server.wire.protocol import MAX_MESSAGE_BYTES
@@ -153,6 +154,7 @@ def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
         host=settings.host,
         port=settings.port,
         loop="uvloop",
+        ws=Socket,
         ws_max_size=MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves
         log_config=None,  # `server.logs` has set it up

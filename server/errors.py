@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 from collections.abc import Mapping, Sequence
@@ -9,9 +10,8 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
 from pydantic import ValidationError
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
@@ -199,7 +199,7 @@ def headers_of(error: Exception) -> dict[str, str]:
 def validation_problem(errors: Sequence[Any], status: int = 422) -> Problem:
     """The body for a request or message that does not have the declared form."""
     places = [
-        {"pointer": "/" + "/".join(str(part) for part in error["loc"]), "detail": str(error["msg"])[:200]}
+        {"pointer": "/" + "/".join(str(part) for part in error["loc"]), "detail": _told(str(error["msg"]))}
         for error in errors[:20]
     ]
     detail = "; ".join(f"{place['pointer']}: {place['detail']}" for place in places[:3])
@@ -208,9 +208,28 @@ def validation_problem(errors: Sequence[Any], status: int = 422) -> Problem:
     )
 
 
-def problem_response(problem: Problem, headers: Mapping[str, str] | None = None) -> JSONResponse:
-    """A problem as an HTTP response."""
-    return JSONResponse(problem.model_dump(), problem.status, dict(headers or {}), MEDIA_TYPE)
+def _told(message: str) -> str:
+    """What is not as declared, in words for who has sent it."""
+    is_text = message.startswith("Value error, Expected UploadFile")
+    return "Input should be a file, with a file name in its part of the form" if is_text else message[:200]
+
+
+def http_problem(error: HTTPException) -> Problem:
+    """The body for what the framework refuses before a route has it: no such call, or a body that is none."""
+    status, detail = error.status_code, str(error.detail)
+    if status == HTTPStatus.BAD_REQUEST:
+        detail = f"the body cannot be read ({detail.rstrip('.')}); send what /api/openapi.json describes"
+    if status == HTTPStatus.METHOD_NOT_ALLOWED:
+        detail = f"this address takes {(error.headers or {}).get('Allow', 'other calls')} alone"
+    slug = {400: "form", 405: "method"}.get(status, "not-found")
+    title = HTTPStatus(status).phrase
+    return Problem(type=f"urn:relume:problem:{slug}", title=title, status=status, detail=detail)
+
+
+def problem_response(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
+    """A problem as an HTTP response; half a surrogate pair that it repeats is no UTF-8, and becomes its number."""
+    document = json.dumps(problem.model_dump(), ensure_ascii=False, separators=(",", ":"))
+    return Response(document.encode(errors="backslashreplace"), problem.status, dict(headers or {}), MEDIA_TYPE)
 
 
 def message_problem(error: ValidationError) -> Problem:
@@ -227,23 +246,21 @@ OPENAPI_RESPONSES: dict[int | str, dict[str, Any]] = {
 def install(app: FastAPI) -> None:
     """Make every failure of the app an `application/problem+json` response."""
 
-    async def on_known(_: Request, error: Exception) -> JSONResponse:
+    async def on_known(_: Request, error: Exception) -> Response:
         if is_away(error):
             database_away.meet(error)
         elif row_of(error).status >= 500 and not isinstance(error, SAID):
             log.error("%s: %s", type(error).__name__, told(error))
         return problem_response(problem_of(error), headers_of(error))
 
-    async def on_defect(_: Request, error: Exception) -> JSONResponse:
+    async def on_defect(_: Request, error: Exception) -> Response:
         return problem_response(problem_of(error))
 
-    async def on_http(_: Request, error: Exception) -> JSONResponse:
+    async def on_http(_: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
-        title = HTTPStatus(error.status_code).phrase
-        problem = Problem(type="about:blank", title=title, status=error.status_code, detail=str(error.detail))
-        return problem_response(problem, error.headers)
+        return problem_response(http_problem(error), error.headers)
 
-    async def on_validation(_: Request, error: Exception) -> JSONResponse:
+    async def on_validation(_: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
         return problem_response(validation_problem(error.errors()))
 

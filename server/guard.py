@@ -10,6 +10,7 @@ request and its WebSocket through. None counts the bytes of a body.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Sequence
 from urllib.parse import urlsplit
@@ -17,12 +18,14 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from relume.errors import ParameterError
 from relume.measured.merl import FILE_BYTES
 from server.errors import ForbiddenOriginError, TooLargeError, problem_of, problem_response
 
 # as large as the settings allow
 UPLOADS = ("/api/scenes", "/api/materials/btf-works", "/api/materials/btf-works/geometry")
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
+_NULL = re.compile(rb"%00|\0")  # no name has it, and PostgreSQL takes no text with it
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
@@ -91,6 +94,8 @@ class Guard:
             is_safe = scope["type"] == "http" and scope["method"] in SAFE_METHODS
             if not is_safe and not origin_is_allowed(headers, self._allowed_origins):
                 return ForbiddenOriginError("calls from pages of other sites are refused; see RELUME_ALLOWED_ORIGINS")
+            if "\0" in scope["path"] or _NULL.search(scope["query_string"]) is not None:
+                return ParameterError("the address", "with a null character", "one without %00")
             length = headers.get("content-length", "0")
             if not length.isdecimal() or int(length[:20]) > self._limit(scope):
                 return self._too_large(scope)

@@ -95,7 +95,8 @@ def _rigid(to_world: Sequence[float]) -> tuple[float, ...]:
         raise ParameterError("to_world", list(to_world), allowed)
     if np.abs(frame[:3, 3]).max() > FARTHEST:
         raise ParameterError("to_world", frame[:3, 3].tolist(), f"an eye at most {FARTHEST:,.0f} m from the origin")
-    lengths = np.linalg.norm(frame[:3, :3], axis=0)
+    most = np.abs(frame[:3, :3]).max()  # asked first: squares of larger ones overflow
+    lengths = np.linalg.norm(frame[:3, :3], axis=0) if most <= 1e12 else np.full(3, most)
     if lengths.min() < 1e-12 or lengths.max() > 1e12:
         raise ParameterError("to_world", frame[:3, :3].tolist(), "three axes of a length, none of them zero")
     axes = frame[:3, :3] / lengths

@@ -118,7 +118,7 @@ class Gate:
         async def audited(message: Message) -> None:
             if message["type"] == "http.response.start":
                 status, made = message["status"], Headers(raw=message["headers"]).get("location", "")
-                if status < 400 and status != _UNCHANGED:
+                if _UNCHANGED < status < 300:  # what is sent to another address changes nothing yet
                     what = f"{scope['method']} {scope['path']}"
                     change = Change.by(caller, what, made or scope["path"], status)
                     await run_sync(self._access().audit.add, change)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ipaddress
-from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING
 
 from anyio.to_thread import run_sync
 from starlette.datastructures import Headers
+from starlette.requests import cookie_parser
 from starlette.types import Scope
 
 from server.access.roles import ROLES, Caller, Role
@@ -68,7 +68,7 @@ class Identity:
 
     def _by_proxy(self, headers: Headers, address: str) -> Caller | None:
         """Whom the proxy names; a name that is none is nobody's."""
-        name = headers.get(self._header, "").strip()
+        name = _as_utf8(headers.get(self._header, "")).strip()
         if not name or not name.isprintable() or len(name) > MAX_NAME:
             return None
         return Caller(name, ROLES[self._roles.get(name, self._role)], address, "proxy")
@@ -86,10 +86,18 @@ def _peer(scope: Scope) -> str:
     return scope["client"][0] if scope.get("client") else ""
 
 
-def cookie_of(headers: Headers) -> str:
-    """The token in the cookie; empty where there is none."""
+def _as_utf8(value: str) -> str:
+    """A header's value, which is read as Latin-1: proxies write names in UTF-8, as settings have them."""
     try:
-        morsel = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
-    except CookieError:
-        return ""
-    return "" if morsel is None else morsel.value
+        return value.encode("latin-1").decode()
+    except UnicodeDecodeError:  # it is Latin-1
+        return value
+
+
+def cookie_of(headers: Headers) -> str:
+    """The token in the cookie; empty where there is none.
+
+    Read as browsers write them: `http.cookies` reads none beside one of another program on the host that is not as
+    RFC 6265 wants it.
+    """
+    return cookie_parser(headers.get("cookie", "")).get(COOKIE, "")

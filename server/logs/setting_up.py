@@ -63,4 +63,5 @@ def set_up(form: Format, level: str) -> None:
     verbose = [logging.INFO] if any(each.level == logging.INFO for each in root.handlers) else []
     handler.setLevel(min([logging.getLevelNamesMapping()[level.upper()], *verbose]))
     root.handlers = [handler]
+    logging.captureWarnings(True)  # they are lines of this log, too
     root.setLevel(handler.level)

@@ -136,6 +136,19 @@ def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: Access)
     assert client.get("/api/me").json()["by"] == "nobody"
 
 
+@pytest.mark.parametrize("beside", ['prefs={"a":1,"b":2}', "a[b]=1", "a@b=1", "novalue", "name=Zo\xeb", "path=/x"])
+def test_cookies_of_other_programs_on_the_host_hide_no_login(client: TestClient, access: Access, beside: str) -> None:
+    cookie = f"{beside}; relume_token={access.tokens.add('Ann', 'edit')}; {beside}".encode("latin-1")
+    answer = client.get("/api/me", headers=[(b"cookie", cookie)])
+    assert answer.json()["name"] == "Ann"
+
+
+def test_what_is_sent_to_another_address_is_no_change(client: TestClient, access: Access, bearer: Bearer) -> None:
+    headers = bearer("admin")
+    assert client.delete("/api/looks/Red/", headers=headers, follow_redirects=False).status_code == 307
+    assert not [line for line in access.audit.list() if line.status]
+
+
 def test_another_site_cannot_use_the_cookie(client: TestClient, access: Access) -> None:
     client.post("/api/login", json={"token": access.tokens.add("Ann", "edit")})
     refused = client.put("/api/looks/Red", json={}, headers={"Origin": "https://evil.example"})
@@ -161,6 +174,12 @@ class TestProxy:
         assert (ann["name"], ann["role"], ann["by"]) == ("Ann", "edit", "proxy")
         assert (bob["name"], bob["role"]) == ("Bob", "view")
         assert proxy.get("/api/scenes").status_code == 401
+
+    def test_it_writes_names_in_utf_8(self, client: TestClient, settings: Settings) -> None:
+        settings.proxy_roles["Zoë"] = "edit"
+        for sent in ("Zoë".encode(), "Zoë".encode("latin-1")):
+            told = self.at(client, "10.1.2.3").get("/api/me", headers={b"X-Forwarded-User": sent}).json()
+            assert (told["name"], told["role"]) == ("Zoë", "edit")
 
     def test_nobody_elses_word_counts(self, client: TestClient) -> None:
         for address in ("192.168.0.1", "testclient", ""):

@@ -152,7 +152,7 @@ def test_no_path_leaves_the_editors_folder(client: TestClient, settings: Any, pa
     (settings.client / "index.html").write_text("page")
     (settings.client.parent / "secret.txt").write_text("secret")
     response = client.get(path)
-    assert response.status_code in (200, 404)
+    assert response.status_code in (200, 404, 422)
     assert "secret" not in response.text
     assert "root:" not in response.text
 
@@ -173,6 +173,44 @@ def test_no_path_leaves_the_editors_folder(client: TestClient, settings: Any, pa
 )
 def test_every_refusal_is_a_problem(client: TestClient, method: str, path: str, status: int) -> None:
     assert problem_of(client.request(method, path))["status"] == status
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [("DELETE", f"/api/scenes/{IDS}/cameras/a%00b"), ("GET", "/api/audit?who=%00"), ("GET", f"/api/shares/{IDS}%00")],
+)
+def test_null_characters_come_to_no_database(client: TestClient, method: str, path: str) -> None:
+    refused = problem_of(client.request(method, path))
+    assert (refused["status"], refused["parameter"]) == (422, "the address")
+
+
+@pytest.mark.parametrize("path", ["/api/models/albedo", "/api/models/in-out"])
+def test_names_that_are_no_unicode_are_refused_in_unicode(client: TestClient, path: str) -> None:
+    body = b'{"terms": [{"model": "lambert", "\\ud800": 1}]}'
+    refused = problem_of(client.post(path, content=body, headers={"Content-Type": "application/json"}))
+    assert refused["status"] == 422
+    assert "is 'unknown'" in refused["detail"]
+
+
+@pytest.mark.parametrize(
+    ("content", "kind", "words"),
+    [
+        (b"hello", "multipart/form-data; boundary=b", "the body cannot be read"),
+        (b"\xff\xfe{", "application/json", "send what /api/openapi.json describes"),
+    ],
+)
+def test_bodies_that_cannot_be_read_are_a_kind_of_problem(
+    client: TestClient, content: bytes, kind: str, words: str
+) -> None:
+    refused = problem_of(client.post("/api/environments", content=content, headers={"Content-Type": kind}))
+    assert refused["type"] == "urn:relume:problem:form"
+    if refused["status"] == 400:
+        assert words in refused["detail"]
+
+
+def test_text_in_the_place_of_a_file_is_told_in_words(client: TestClient) -> None:
+    refused = problem_of(client.post("/api/scenes", files={"scene": (None, b"text")}))
+    assert refused["detail"] == "/body/scene: Input should be a file, with a file name in its part of the form"
 
 
 def test_missing_data_directory_is_a_problem_not_a_trace(client: TestClient, settings: Any) -> None:

@@ -51,6 +51,7 @@ def test_scale_is_taken_out_and_what_is_left_stays_the_same_text(scale: float) -
         (changed(12, 0.1), "the last four"),
         (changed(3, 2 * FARTHEST), "from the origin"),
         (changed(5, 0.0), "none of them zero"),
+        (changed(5, 1e308), "none of them zero"),
         (changed(1, 0.5), "right angles"),
         (changed(0, -1.0), "not mirrored"),
     ],

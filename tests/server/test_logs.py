@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -66,6 +67,15 @@ def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> 
 
     said = logged(capsys, "plain", lambda: run_alone(asyncio.to_thread(say)))
     assert said == "WARNING server.somewhere: nothing is known\nWARNING server.somewhere: the user is [user=Ann]\n"
+
+
+def test_warnings_of_libraries_are_lines_like_others(capsys: pytest.CaptureFixture[str]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        logging.captureWarnings(False)  # as in a process that has not been set up
+        said = logged(capsys, "json", lambda: warnings.warn("overflow", RuntimeWarning, stacklevel=1))
+        logging.captureWarnings(False)
+    assert "overflow" in json.loads(said)["message"]
 
 
 def test_requests_and_sessions_are_lines_without_their_tokens(

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import socket
 import struct
 from collections.abc import Iterator
 
@@ -36,6 +37,26 @@ def test_session_runs_without_compression(url: str) -> None:
         assert isinstance(frame, bytes)
         (length,) = struct.unpack_from("<I", frame)
         assert json.loads(frame[4 : 4 + length])["frame"] == 1
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [({"Cookie": "a=" + "x" * 9000}, 431), ({f"X-{number}": "" for number in range(130)}, 431)],
+)
+def test_request_with_more_than_is_read_is_refused_and_does_not_wait(
+    url: str, headers: dict[str, str], status: int
+) -> None:
+    with pytest.raises(InvalidStatus, match=str(status)):
+        connect(url, subprotocols=["relume.v1"], additional_headers=headers)
+
+
+def test_request_that_is_none_is_refused(url: str) -> None:
+    host, _, path = url.removeprefix("ws://").partition("/")
+    name, _, port = host.partition(":")
+    sent = f"POST /{path} HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\r\n"
+    with socket.create_connection((name, int(port)), timeout=30) as asking:
+        asking.sendall(sent.encode())
+        assert asking.recv(100).startswith(b"HTTP/1.1 4")
 
 
 def test_message_beyond_the_limit_closes_1009(url: str) -> None:
