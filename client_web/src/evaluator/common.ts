@@ -4,6 +4,11 @@
 export const WIDTH = 2048;
 /** Groups of terms: untextured, then those that a diffuse and a specular texture multiply. */
 export const GROUPS = 3;
+/** Which groups have a table over θo alone, and which one over φo too. */
+export interface Kinds {
+  even: readonly boolean[];
+  uneven: readonly boolean[];
+}
 /** Texels of one material: its groups, its lobe and its normal map, its emission, the tables of its highlights. */
 export const MATERIAL = 2 * GROUPS + 2;
 /** The most lamps of a sky. */

@@ -1,6 +1,6 @@
 /** What each material of a look makes use of, from the rows that `relume.moving.shader.tables` writes of it. */
-import { GROUPS, MATERIAL } from "./common";
-import type { Kinds, PointFeatures } from "./pointShader";
+import { GROUPS, type Kinds, MATERIAL } from "./common";
+import type { PointFeatures } from "./pointShader";
 
 /** What pixels of a material make use of. */
 export interface Shows {

@@ -4,7 +4,7 @@
  * numbers of each point: radiance of three groups, the direction of the light, the share of the sky along the lobe, that
  * of two lamps, one of nothing, the gradient. */
 import type { SurfaceBody } from "../protocol";
-import { albedoOf, GROUPS, HEAD, LOBES, LUMINANCE, PLACE, rowOf, SKY, WIDTH } from "./common";
+import { albedoOf, GROUPS, HEAD, type Kinds, LOBES, LUMINANCE, PLACE, rowOf, SKY, WIDTH } from "./common";
 import { glance } from "./glanceShader";
 import { byLights } from "./highlightShader";
 import { turning } from "./turningShader";
@@ -18,11 +18,6 @@ const part = (texels: string, k: number) => `${texels}${k >> 2}.${FOUR[k & 3]}`;
 const range = (count: number) => Array.from({ length: count }, (_, k) => k);
 const named = (texels: string, count: number) => `vec4 ${range(count).map((k) => `${texels}${k}`).join(", ")};`;
 
-/** Which groups have a table over θo alone, and which one over φo too. */
-export interface Kinds {
-  even: readonly boolean[];
-  uneven: readonly boolean[];
-}
 type Sent = "plain" | "sky" | "beside";
 
 /** What a material makes use of: the rest is not compiled in. Software takes both ways of every branch. */

@@ -1,7 +1,6 @@
 /** How other light than the sky's changes in highlights as they look elsewhere, as `relume.moving.highlights.turning`. */
 import type { SurfaceBody } from "../protocol";
-import { albedoOf, albedoStepOf, GROUPS, luminous } from "./common";
-import type { Kinds } from "./pointShader";
+import { albedoOf, albedoStepOf, GROUPS, type Kinds, luminous } from "./common";
 
 /** Finds `turn`, after the sums of other light. `crossed`: turns light vectors to how they change with φ. */
 export function turning({ rows }: SurfaceBody, { even, uneven }: Kinds, crossed: string): string {
