@@ -31,7 +31,7 @@ from relume.trace.cell_tree import NO_CELL, CellTree
 from relume.trace.geometry import Geometry, merge
 from relume.trace.links import trace_links
 from relume.trace.primary import trace_from
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 
 F64 = NDArray[np.float64]
 _NAMES = (

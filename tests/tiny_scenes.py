@@ -10,7 +10,7 @@ from relume.light.local import Triangles
 from relume.points import Points
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene, Texture
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 
 
 def points_at(position, normal, first=0):

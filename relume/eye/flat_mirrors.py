@@ -18,8 +18,9 @@ from relume.parallel import for_shares
 from relume.points import Points
 from relume.scene.model import Scene
 from relume.trace.geometry import Geometry
+from relume.trace.on_faces import places_on
 from relume.trace.primary import trace_from
-from relume.trace.surface import any_tangent, places_on
+from relume.trace.tangents import any_tangent
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]

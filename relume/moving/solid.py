@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from relume.moving.points.surface import Surface
 from relume.trace.embree import EmbreeScene
 from relume.trace.geometry import off_surface
-from relume.trace.surface import OFF_EDGES, least_shares
+from relume.trace.on_faces import OFF_EDGES, least_shares
 
 F32 = NDArray[np.float32]
 

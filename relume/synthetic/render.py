@@ -28,7 +28,7 @@ from relume.btf.rings import Rings, directions, polar, taps_numpy
 from relume.synthetic.tile import I64, Tile, levelled, repeated
 from relume.trace.embree import EmbreeScene
 from relume.trace.primary import Hits, trace_from
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 from relume.trace.visibility import trace_visibility
 
 F32 = NDArray[np.float32]

@@ -18,7 +18,8 @@ from relume.scene.model import Scene
 from relume.trace.cell_tree import MAX_CELLS, CellTree, grow_tree
 from relume.trace.geometry import Geometry
 from relume.trace.photons import shoot_photons
-from relume.trace.surface import any_tangent, surface_at, turn_between
+from relume.trace.surface import surface_at
+from relume.trace.tangents import any_tangent, turn_between
 
 F32 = NDArray[np.float32]
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from relume.parallel import for_ranges
 from relume.trace.geometry import Geometry
+from relume.trace.leaning import LEAST_FACING
+from relume.trace.on_faces import OFF_EDGES
 from relume.trace.primary import Hits
-from relume.trace.surface import LEAST_FACING, OFF_EDGES
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]

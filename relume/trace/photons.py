@@ -24,7 +24,8 @@ from relume.points import Points
 from relume.scene.model import Camera, Scene
 from relume.trace.geometry import Geometry
 from relume.trace.primary import Hits, camera_directions, trace_from
-from relume.trace.surface import any_tangent, surface_at
+from relume.trace.surface import surface_at
+from relume.trace.tangents import any_tangent
 
 F32 = NDArray[np.float32]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +14,16 @@ from relume.points import Points
 from relume.scene.model import Material
 from relume.scene.roughness import widened, widening_base
 from relume.trace.geometry import Geometry
+from relume.trace.leaning import covered_length, mapped_normal, towards_viewer
+from relume.trace.on_faces import OnFaces
 from relume.trace.primary import Hits
+from relume.trace.tangents import across
 from relume.trace.texture import MipMap
 
 F32 = NDArray[np.float32]
 
 _IMAGES = ("diffuse", "specular", "emission")
 _RAYS_A_RANGE = 16_384
-OFF_EDGES = 1 / 8  # of the distance that ray origins keep from their surface; many times what positions are rounded by
-LEAST_FACING = 0.01  # cosine between a shading normal and the way back of its ray
 
 
 @dataclass(frozen=True)
@@ -60,38 +62,6 @@ class Surface:
         return Surface(points, *(each[chosen] for each in of_surface))
 
 
-def _unit(v: F32, otherwise: F32) -> F32:
-    """Scale vectors (n, 3) to length one; where they have none, take another."""
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.where(length > 1e-12, v / np.maximum(length, 1e-12), otherwise).astype(np.float32)
-
-
-def any_tangent(normal: F32) -> F32:
-    """Find a unit vector across each normal (n, 3) (Duff 2017). (n, 3) float32"""
-    x, y, z = normal.T
-    sign = np.where(z >= 0, 1.0, -1.0)
-    a = -1.0 / (sign + z)
-    return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=-1).astype(np.float32)
-
-
-def across(vector: F32, normal: F32) -> F32:
-    """Take the part of vectors (n, 3) across normals (n, 3), unit; any direction across where there is none."""
-    part = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
-    return _unit(part, any_tangent(normal))
-
-
-def turn_between(normal: F32, start: F32, end: F32) -> F32:
-    """Find the angles from some vectors to others about normals, radians.
-
-    Args:
-        normal: unit. (n, 3) start, end: across these, about. (n, 3) each
-    Returns:
-        Within [−π, π]. (n,) float32
-    """
-    y, x = np.einsum("nc,nc->n", np.cross(normal, start), end), np.einsum("nc,nc->n", start, end)
-    return np.asarray(np.arctan2(y, x), np.float32)
-
-
 def surface_at(
     geometry: Geometry,
     hits: Hits,
@@ -122,26 +92,40 @@ def surface_at(
     return Surface(Points(position, normal, tangent, seed), *of_surface)
 
 
-def places_on(geometry: Geometry, face: NDArray[np.integer], uv: F32, normal: F32) -> F32:
-    """Points of faces, moved off them, as `surface_at` has them, and nothing else of what is there.
+class _Textured(NamedTuple):
+    """What textures say of n points.
 
-    Args:
-        geometry: the triangles. face: numbers of n faces.
-        uv: places on them, barycentric, of the second and third corner. (n, 2)
-        normal: of the faces, unit, to the side that the points are on. (n, 3)
-    Returns:
-        (n, 3) float32
+    Attributes:
+        channels: of images. (n, 3) each, roughness (n, 1). length: of the mean of normals that a pixel covers. (n,)
+        normal: leant by normal maps. (n, 3)
     """
-    p = geometry.positions[geometry.faces[face]]
-    twice_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    shares = np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
-    inside = _off_edges(shares, p, twice_area, OFF_EDGES * geometry.epsilon)
-    return np.asarray(_blended(inside, p) + geometry.epsilon * normal, np.float32)
 
+    channels: dict[str, F32]
+    length: F32
+    normal: F32
 
-def _blended(shares: F32, corners: F32) -> F32:
-    """Interpolate what corners have. shares: barycentric. (n, 3). corners: (n, 3, c). Returns (n, c)"""
-    return np.asarray(np.einsum("nk,nkc->nc", shares, corners))
+    @classmethod
+    def of(cls, on: OnFaces, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32) -> _Textured:
+        """Those of points. material: that each is of, −1 for none. (n,) footprint: of a pixel in textures. (n,)"""
+        channels = dict(zip(_IMAGES, np.ones((3, *on.position.shape), np.float32), strict=True))
+        channels["roughness"] = np.ones((len(on.uv), 1), np.float32)
+        length, normal = np.ones(len(on.uv), np.float32), on.normal
+        for index, m in enumerate(materials):
+            rows = np.nonzero(material == index)[0]
+            if not len(rows):
+                continue
+            for name, out in channels.items():
+                if name in m.textures:
+                    out[rows] = MipMap.of(m.textures[name]).sample(on.uv[rows], footprint[rows])
+            if m.normal_map is not None:
+                pyramid = MipMap.of(m.normal_map)
+                mapped = pyramid.sample(on.uv[rows], footprint[rows])
+                length[rows] = covered_length(mapped, pyramid.texels(footprint[rows]))
+                if (own := widening_base(m)) is not None:
+                    channels["roughness"][rows, 0] = widened(channels["roughness"][rows, 0], length[rows], own)
+                normal = normal.copy() if normal is on.normal else normal
+                normal[rows] = mapped_normal(mapped, normal[rows], on.tangents[rows], on.face_normal[rows])
+        return cls(channels, length, normal)
 
 
 def _surface_at(
@@ -152,55 +136,21 @@ def _surface_at(
     pixel_angle: float,
 ) -> tuple[F32, ...]:
     """Interpolate a range of `surface_at`: position, normal, tangent, and the others of `Surface` in their order."""
-    hit = hits.face >= 0
-    corners = geometry.faces[np.maximum(hits.face, 0)]
-    p = geometry.positions[corners]
-    face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    twice_area = np.linalg.norm(face_normal, axis=1)
-    b = np.stack([1 - hits.uv.sum(axis=1), hits.uv[:, 0], hits.uv[:, 1]], axis=1)
-    b = _off_edges(b, p, twice_area, OFF_EDGES * geometry.epsilon)
-    face_normal = _unit(face_normal, -directions)
-    face_normal *= -np.sign(np.einsum("nc,nc->n", face_normal, directions) + 1e-30)[:, None].astype(np.float32)
-    normal = _unit(_blended(b, geometry.normals[corners]), face_normal)
-    normal = np.where(np.einsum("nc,nc->n", normal, face_normal)[:, None] < 0, -normal, normal)
-    tangents = _blended(b, geometry.tangents[corners])
-    uv = _blended(b, geometry.uvs[corners])
-    position = _blended(b, p) + geometry.epsilon * face_normal
-    channels = dict(zip(_IMAGES, np.ones((3, *position.shape), np.float32), strict=True))
-    channels["roughness"] = np.ones((len(uv), 1), np.float32)
-    length, smooth = np.ones(len(uv), np.float32), normal
-    footprint = np.zeros(len(uv), np.float32)
-    if materials:
-        (du_0, dv_0), (du_1, dv_1) = np.diff(geometry.uvs[corners], axis=1).transpose(1, 2, 0)
-        uv_area = np.abs(du_0 * dv_1 - dv_0 * du_1)
-        distance = np.where(hit, hits.distance, 1.0)
-        cosine = np.maximum(-np.einsum("nc,nc->n", face_normal, directions), 0.05)
-        # side of the pixel's footprint in uv: its area over the triangle's, in texture space
-        footprint = distance * pixel_angle * np.sqrt(uv_area / np.maximum(twice_area, 1e-20) / cosine)
-        material = np.where(hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
-        for index, m in enumerate(materials):
-            rows = np.nonzero(material == index)[0]
-            for name, out in channels.items():
-                if name in m.textures and len(rows):
-                    out[rows] = MipMap.of(m.textures[name]).sample(uv[rows], footprint[rows])
-            if m.normal_map is not None and len(rows):
-                pyramid = MipMap.of(m.normal_map)
-                mapped = pyramid.sample(uv[rows], footprint[rows])
-                length[rows] = covered_length(mapped, pyramid.texels(footprint[rows]))
-                if (own := widening_base(m)) is not None:
-                    channels["roughness"][rows, 0] = widened(channels["roughness"][rows, 0], length[rows], own)
-                normal = normal.copy() if normal is smooth else normal
-                normal[rows] = mapped_normal(mapped, normal[rows], tangents[rows], face_normal[rows])
-    normal = towards_viewer(normal, directions)
-    tangent = across(tangents[:, :3], normal)
-    place = _in_texture(p, geometry.uvs[corners], uv, normal, tangent)
+    on = OnFaces.of(geometry, hits, directions)
+    hit, distance = on.hit, np.where(on.hit, hits.distance, 1.0)
+    footprint = on.footprint(distance, directions, pixel_angle) if materials else np.zeros(len(hit), np.float32)
+    material = np.where(hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
+    channels, length, leant = _Textured.of(on, materials, material, footprint)
+    normal = towards_viewer(leant, directions)
+    tangent = across(on.tangents[:, :3], normal)
+    place = _in_texture(on.p, on.uvs, on.uv, normal, tangent)
     place[:, 2] = footprint
     is_flat = place[:, 4] == 0
     if is_flat.any():
-        side = (np.where(hit, hits.distance, 1.0) * pixel_angle)[is_flat]
-        place[is_flat] = _projected(position[is_flat], face_normal[is_flat], normal[is_flat], tangent[is_flat], side)
+        of_flat = (each[is_flat] for each in (on.position, on.face_normal, normal, tangent, distance * pixel_angle))
+        place[is_flat] = _projected(*of_flat)
     return (
-        np.where(hit[:, None], position, directions).astype(np.float32),
+        np.where(hit[:, None], on.position, directions).astype(np.float32),
         np.where(hit[:, None], normal, -directions).astype(np.float32),
         tangent,
         channels["diffuse"],
@@ -209,7 +159,7 @@ def _surface_at(
         channels["roughness"][:, 0],
         length,
         channels["emission"],
-        smooth.astype(np.float32, copy=False),
+        on.normal.astype(np.float32, copy=False),
     )
 
 
@@ -258,62 +208,3 @@ def _projected(position: F32, face_normal: F32, normal: F32, tangent: F32, side:
     x = np.einsum("nc,nc->n", across, tangent)
     y = np.einsum("nc,nc->n", across, np.cross(normal, tangent))
     return np.asarray(np.column_stack([u, v, side, np.arctan2(y, x), np.ones(len(u))]))
-
-
-def _off_edges(b: F32, p: F32, twice_area: F32, epsilon: float) -> F32:
-    """Move points that lie on an edge of their triangle inside.
-
-    Where two walls meet, a point on the one would lie in the other's plane, and see what is behind it.
-
-    Args:
-        b: barycentric coordinates. (n, 3). p: corners. (n, 3, 3). epsilon: least distance from the edges, metres, but
-            that a tenth of a height is enough.
-    """
-    moved = np.maximum(b, least_shares(p, twice_area, epsilon))
-    return np.asarray(moved / moved.sum(axis=1, keepdims=True), np.float32)
-
-
-def least_shares(p: F32, twice_area: F32, epsilon: float) -> F32:
-    """Find the least barycentric coordinates of places off the edges of triangles. See `_off_edges`. (n, 3) float32"""
-    edges = np.linalg.norm(p[:, [1, 2, 0]] - p[:, [2, 0, 1]], axis=2)  # opposite to each corner
-    least = np.minimum(epsilon * edges, 0.1 * twice_area[:, None]) / np.maximum(twice_area, 1e-20)[:, None]
-    return np.asarray(least, np.float32)
-
-
-def covered_length(mapped: F32, texels: F32) -> F32:
-    """How long the mean of the normals is that a pixel covers: one where it covers no more than a texel, for what is
-    between two is turned from one to the other, and covers nothing.
-
-    Args:
-        mapped: means of normals. (n, 3) texels: side of the pixel, in those of the map. (n,)
-    Returns:
-        (n,) float32
-    """
-    covers = np.clip(np.log2(np.maximum(texels, 1)), 0, 1)
-    return np.asarray(1 - covers * (1 - np.minimum(np.linalg.norm(mapped, axis=1), 1)), np.float32)
-
-
-def mapped_normal(mapped: F32, normal: F32, tangents: F32, face_normal: F32) -> F32:
-    """Turn tangent-space normals into world space, kept on the outer side of the face.
-
-    Args:
-        mapped: means of normals of tangent space. (n, 3) normal: of the surface, unit. (n, 3)
-        tangents: not yet across these, with the sign of the bitangent. (n, 4) face_normal: unit. (n, 3)
-    """
-    tangent = across(tangents[:, :3], normal)
-    bitangent = np.cross(normal, tangent) * np.where(tangents[:, 3:] < 0, -1, 1)
-    world = mapped[:, :1] * tangent + mapped[:, 1:2] * bitangent + mapped[:, 2:] * normal
-    world = _unit(world, normal)
-    below = np.einsum("nc,nc->n", world, face_normal)[:, None] <= 0
-    return np.where(below, normal, world).astype(np.float32)
-
-
-def towards_viewer(normal: F32, directions: F32) -> F32:
-    """Bend shading normals that face away from the viewer just into view: interpolation must lose no sample.
-
-    Args:
-        normal: unit. (n, 3) directions: in which they are seen, unit. (n, 3)
-    """
-    facing = -np.einsum("nc,nc->n", normal, directions)
-    lacking = np.maximum(LEAST_FACING - facing, 0)[:, None]
-    return _unit(normal - lacking * directions, -directions)

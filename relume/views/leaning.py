@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from relume.brdf.channels import NormalMap
 from relume.errors import StoreError
 from relume.images.shelf import normals_of
-from relume.trace.surface import across, covered_length, mapped_normal, towards_viewer, turn_between
+from relume.trace.leaning import covered_length, mapped_normal, towards_viewer
+from relume.trace.tangents import across, turn_between
 from relume.trace.texture import MipMap, sample_image
 from relume.views.store_io import read_eyes, read_surface_normal, read_uv, towards
 from relume.views.view import View

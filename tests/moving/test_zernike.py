@@ -8,7 +8,7 @@ from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, functions_along, in_basi
 from relume.light.triangles import TriangleLights
 from relume.points import Points
 from relume.project.light_vectors import light_vectors, light_vectors_numpy
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 
 
 def hemisphere(radii=24, turns=48):

@@ -22,7 +22,7 @@ from relume.project.receivers import GatherRays
 from relume.project.sent import NUM_SENT, evenly, sent_by
 from relume.project.squares import leaving_squares
 from relume.trace.cell_tree import NO_CELL
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 from relume.trace.visibility import visible_of
 
 DEGREE = 4

@@ -11,7 +11,7 @@ from relume.brdf.registry import TERMS
 from relume.light.triangles import subdivide
 from relume.project.contraction import contract
 from relume.project.projector import Projector
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 
 
 @pytest.fixture(scope="module")

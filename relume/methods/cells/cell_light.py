@@ -24,7 +24,7 @@ from relume.project.sent import NUM_SENT, Sent
 from relume.project.squares import Squares, coming_squares, leaving_squares
 from relume.scene.coding import mean_of
 from relume.scene.model import Texture
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 from relume.trace.texture import sample_image
 from relume.trace.visibility import visible_of
 

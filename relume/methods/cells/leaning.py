@@ -16,7 +16,7 @@ from relume.brdf.channels import NormalMap
 from relume.methods.cells.cell_light import CellLight
 from relume.parallel import for_steps
 from relume.points import Points
-from relume.trace.surface import any_tangent
+from relume.trace.tangents import any_tangent
 from relume.views.leaning import lean
 from relume.views.worn_store import Tracer
 

@@ -16,9 +16,9 @@ from scipy.sparse.csgraph import connected_components
 
 from relume.scene.model import Camera
 from relume.trace.geometry import Geometry
+from relume.trace.on_faces import places_on
 from relume.trace.photons import lobe_directions
 from relume.trace.primary import Hits, camera_directions, trace_from
-from relume.trace.surface import places_on
 
 F32 = NDArray[np.float32]
 
