@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, NamedTuple
@@ -111,36 +111,50 @@ async def open_services(
     batches: OpenBatches,
     clock: Callable[[], float],
 ) -> AsyncIterator[Services]:
-    """Open everything; close it in the reverse order."""
+    """Open everything; close it in the reverse order, what there is of it where something cannot be opened."""
     settings.data.mkdir(parents=True, exist_ok=True)
     remove_strays(settings.data, older_than_s=2 * settings.import_seconds)
-    library = open_library(settings.cache_bytes, settings.cache_floor_bytes)
-    threads = Threads()
-    service = await asyncio.to_thread(bakes, settings)
-    batch, sessions = batches(settings, library), service.ledger.sessions
-    access = Access(sessions, settings)
-    queues = _queues(settings, service, batch, access)
-    transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
-    thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
-    ahead = Ahead(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
-    caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
-    _watch_memory(metrics, library, transfers)
-    _watch_work(metrics, settings, service, batch, leave)
-    await asyncio.to_thread(service.start)
-    importers = Importers()
-    if settings.importer_at_start:
-        importers.start()
-    for queue in queues:
-        queue.start()
-    if settings.ahead:
-        ahead.start()
-    rounds = asyncio.create_task(caretaker.run())
-    traces = open_traces() if settings.traces else None
-    rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
-    news = asyncio.create_task(CommentNews(rooms, comments.marks).run())
-    keeper = Keeper(rooms, RoomLeases(sessions), leave)
-    keeping = asyncio.create_task(keeper.run())
-    try:
+    async with AsyncExitStack() as ends:
+
+        def at_end(close: Callable[[], None]) -> None:
+            ends.push_async_callback(asyncio.to_thread, close)
+
+        def beside(work: Coroutine[None, None, None]) -> None:
+            ends.callback(asyncio.create_task(work).cancel)
+
+        if (traces := open_traces() if settings.traces else None) is not None:
+            at_end(traces.close)
+        library, threads = open_library(settings.cache_bytes, settings.cache_floor_bytes), Threads()
+        at_end(threads.close)
+        service = await asyncio.to_thread(bakes, settings)
+        at_end(service.close)
+        batch, sessions = batches(settings, library), service.ledger.sessions
+        at_end(batch.close)
+        access = Access(sessions, settings)
+        transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
+        thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
+        caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
+        _watch_memory(metrics, library, transfers)
+        _watch_work(metrics, settings, service, batch, leave)
+        await asyncio.to_thread(service.start)
+        queues = _queues(settings, service, batch, access)
+        for queue in queues:
+            at_end(queue.close)
+            queue.start()
+        ahead = Ahead(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
+        at_end(ahead.close)
+        if settings.ahead:
+            ahead.start()
+        importers = Importers()
+        at_end(importers.close)
+        if settings.importer_at_start:
+            importers.start()
+        rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
+        keeper = Keeper(rooms, RoomLeases(sessions), leave)
+        ends.push_async_callback(keeper.close)
+        ends.callback(rooms.close)
+        for work in (caretaker.run(), CommentNews(rooms, comments.marks).run(), keeper.run()):
+            beside(work)
         yield Services(
             settings=settings,
             metrics=metrics,
@@ -159,16 +173,6 @@ async def open_services(
             importers=importers,
             import_slots=asyncio.Semaphore(MAX_IMPORTS),
         )
-    finally:
-        rounds.cancel()
-        news.cancel()
-        keeping.cancel()
-        rooms.close()
-        await keeper.close()
-        queued = (queue.close for queue in reversed(queues))
-        ends = importers.close, ahead.close, *queued, batch.close, service.close, threads.close
-        for end in (*ends, *([] if traces is None else [traces.close])):
-            await asyncio.to_thread(end)
 
 
 class _Queues(NamedTuple):

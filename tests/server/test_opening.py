@@ -1,0 +1,32 @@
+"""A server that cannot be opened closes what it has opened so far."""
+
+from __future__ import annotations
+
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import Control
+from server_fixtures import open_fake_bakes
+
+from server.app import create_app
+from server.settings import Settings
+
+
+def test_what_was_opened_is_closed_where_something_cannot_be(tmp_path):
+    closed = []
+
+    def bakes(settings):
+        service = open_fake_bakes(settings)
+        close = service.close
+        service.close = lambda: closed.append(close())
+        return service
+
+    def no_batches(settings, library):
+        raise OSError("there is no room for processes")
+
+    control = Control()
+    app = create_app(
+        Settings(data=tmp_path), open_library=control.open_library, open_bakes=bakes, open_batches=no_batches
+    )
+    with pytest.raises(OSError, match="no room for processes"), TestClient(app):
+        pass
+    assert closed == [None]
