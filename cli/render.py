@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -11,6 +11,11 @@ from cli.options import BakeName, Data, LookFile, View, read_look
 
 if TYPE_CHECKING:
     from relume.exr.layers import Layering
+    from relume.methods.stills import Stills
+    from relume.picture.transfer import Opened
+    from worker.scenes import SceneRecord
+    from worker.service import BakeService
+    from worker.status import BakeStatus
 
 Turns = Literal["eye", "object", "environment"]
 Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp|DIR", help="Where to write the picture, or frames.")]
@@ -43,19 +48,13 @@ def render(
     data: Data = None,
 ) -> None:
     """Render one exact frame of a bake, or a turntable."""
-    from cli.data_folder import complete_look, find_shown, open_bakes, open_settings
+    from cli.data_folder import complete_look, open_bakes, open_settings
     from cli.picture import check_output, check_shown, save, save_exr
     from cli.turntable import check_frames, render_turntable
     from relume.errors import ParameterError
     from relume.exr.attributes import Origin
-    from relume.memory import Memory
-    from relume.methods.moving_views import MovingViews
-    from relume.methods.registry import open_bake
-    from relume.methods.stills import Stills
     from relume.render.image import render_image
     from server.wire.renders import Animation, Turntable
-    from worker.storage import open_kept
-    from worker.tasks import scene_of
 
     if turntable is None:
         check_output(output)
@@ -71,31 +70,55 @@ def render(
     service = open_bakes(open_settings(data))
     try:
         is_moved = turntable is not None and turns != "environment"
-        scene, shown, view_name = find_shown(service, bake, view, moves=is_moved)
-        transfer = open_kept(service.store_path(shown.id), lambda store: open_bake(store, Memory(4 << 30)))
-        if not shown.is_current:
-            typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene.id}", err=True)
-        stills = None
-        if isinstance(transfer, MovingViews) and not quick:
-            stills = Stills(transfer.lit, scene_of(service.data_dir, scene.id))
-        if isinstance(transfer, MovingViews) and quick:
-            typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
-        document = complete_look(partial, transfer.default_look)
+        of = _open(service, bake, view, moves=is_moved, quick=quick)
+        document = complete_look(partial, of.transfer.default_look)
         check_shown(output, document)
         if document.environment.map is not None:
             typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
         if turntable is not None:
-            way = Turntable(turntable=turntable, turns=turns)
-            render_turntable(transfer, view_name, Animation(bake=shown.id, looks=[partial], path=way), output, stills)
+            asked = Animation(bake=of.shown.id, looks=[partial], path=Turntable(turntable=turntable, turns=turns))
+            render_turntable(of.transfer, of.view, asked, output, of.stills)
         elif is_exr:
-            origin = Origin(scene.id, scene.name, shown.id)
+            origin = Origin(of.scene.id, of.scene.name, of.shown.id)
             precision: Literal["half", "float"] = "float" if full_float else "half"
-            save_exr(output, transfer, view_name, document, origin, layering, precision, stills, color_space)
+            save_exr(output, of.transfer, of.view, document, origin, layering, precision, of.stills, color_space)
         else:
-            image = render_image(transfer, view_name, document, for_display=True, stills=stills)
+            image = render_image(of.transfer, of.view, document, for_display=True, stills=of.stills)
             save(output, image, document)
     finally:
         service.close()
+
+
+class _Shown(NamedTuple):
+    """What is rendered: a bake of a scene, opened, one of its views, and what makes exact pictures of moved eyes."""
+
+    scene: SceneRecord
+    shown: BakeStatus
+    view: str
+    transfer: Opened
+    stills: Stills | None
+
+
+def _open(service: BakeService, bake: str, view: str | None, *, moves: bool, quick: bool) -> _Shown:
+    """Open what was asked for, and say what its pictures are not."""
+    from cli.data_folder import find_shown
+    from relume.memory import Memory
+    from relume.methods.moving_views import MovingViews
+    from relume.methods.registry import open_bake
+    from relume.methods.stills import Stills
+    from worker.storage import open_kept
+    from worker.tasks import scene_of
+
+    scene, shown, view_name = find_shown(service, bake, view, moves=moves)
+    transfer = open_kept(service.store_path(shown.id), lambda store: open_bake(store, Memory(4 << 30)))
+    if not shown.is_current:
+        typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene.id}", err=True)
+    stills = None
+    if isinstance(transfer, MovingViews) and quick:
+        typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
+    elif isinstance(transfer, MovingViews):
+        stills = Stills(transfer.lit, scene_of(service.data_dir, scene.id))
+    return _Shown(scene, shown, view_name, transfer, stills)
 
 
 def _layering(layers: bool, light_groups: bool) -> Layering:
