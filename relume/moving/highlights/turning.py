@@ -28,6 +28,7 @@ from relume.moving.basis.tables import Tables
 from relume.moving.evaluate import send_numpy
 from relume.moving.points.surface import Surface
 from relume.parallel import for_shares
+from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -38,78 +39,124 @@ _LEAST_SINE = np.float32(1e-3)
 _ASIDE = 1e-5  # radians
 
 
-# In one piece: arrays that are handed to functions, even to inlined ones, are counted as references, at every point.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _turn(rungs, points, material, others, tables, lobes, eye, rows, start, stop, out):  # type: ignore[no-untyped-def]
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _factors_into(tables, lobes, material, row, channel, near, step):  # type: ignore[no-untyped-def]
+    """Sum the tables and albedos of a material's terms with a highlight.
+
+    Args:
+        tables, lobes: of all materials. material, row, channel: which one, and where.
+        near, step: written, w_k p_k in the row and what the next has more. (rungs,)
+    Returns:
+        The albedo in the row, and what the next has more.
+    """
+    albedo = albedo_step = np.float32(0)
+    lobe, num_rungs = lobes.of[material], near.shape[0]
+    for rung in range(num_rungs):
+        near[rung] = step[rung] = 0
+    for group in range(tables.of.shape[1]):
+        table = tables.of[material, group, _BESIDE]
+        if table < 0:
+            continue
+        for rung in range(num_rungs):
+            near[rung] += tables.even[table, row, channel, rung]
+            step[rung] += tables.even[table, row + 1, channel, rung] - tables.even[table, row, channel, rung]
+        here, there = lobes.albedo[lobe, row, group, channel], lobes.albedo[lobe, row + 1, group, channel]
+        albedo, albedo_step = albedo + here, albedo_step + (there - here)
+    return albedo, albedo_step
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _sum(rungs, light_of, channel, near, step, seen):  # type: ignore[no-untyped-def]
+    """Sum the light of a point with factors, and how that changes.
+
+    Args:
+        rungs: of the ladder. light_of: t of the point. (3, K). channel, near, step: see `_factors_into`.
+        seen: from `seen_from`.
+    Returns:
+        Σ_k w_k p_k t_k; what it changes by in a row; and in a radian of φo.
+    """
+    _, share, cosine_phi, sine_phi = seen
+    sent = of_row = of_turn = np.float32(0)
+    re, im = np.float32(1), np.float32(0)
+    for rung in range(near.shape[0]):
+        m = rungs.order[rung]
+        if rungs.a[rung] == 0 and m > 0:
+            re, im = re * cosine_phi - im * sine_phi, re * sine_phi + im * cosine_phi
+        factor = near[rung] + share * step[rung]
+        light = light_of[channel, rungs.cosine[rung]]
+        if m > 0:
+            other = light_of[channel, rungs.sine[rung]]
+            of_turn += np.float32(m) * factor * (re * other - im * light)
+            light = re * light + im * other
+        sent += factor * light
+        of_row += step[rung] * light
+    return sent, of_row, of_turn
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _turn_of(rungs, n, t, o, seen, others, tables, lobes, material, near, step):  # type: ignore[no-untyped-def]
+    """Find G of a point, in world space.
+
+    Args:
+        n, t, o: its normal, its tangent and where the eye is, unit, tuples. seen: from `seen_from`.
+        others: t of it. (3, K). near, step: room. (rungs,)
+    """
+    row, share, cosine_phi, sine_phi = seen
+    facing = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+    cosine: Any = min(max(facing, LEAST_COSINE), np.float32(1))
+    sine: Any = max(math.sqrt(max(np.float32(1) - facing * facing, np.float32(0))), _LEAST_SINE)
+    # rows of tables for a radian of θo; none where tables end
+    rows_a_radian = np.float32(0.5 * (NUM_ROWS - 1)) * math.sqrt(np.float32(1) + cosine)
+    if facing < LEAST_COSINE:
+        rows_a_radian = np.float32(0)
+    by_theta = by_phi = np.float32(0)
+    for channel in range(3):
+        albedo, albedo_step = _factors_into(tables, lobes, material, row, channel, near, step)
+        albedo += share * albedo_step
+        sent, of_row, of_turn = _sum(rungs, others, channel, near, step, seen)
+        if sent > 0 and albedo > np.float32(1e-6):
+            weight = _LUMINANCE[channel] / albedo
+            by_theta += weight * rows_a_radian * (of_row - sent * albedo_step / albedo)
+            by_phi += weight * of_turn / sine
+    # ωr goes down where θo grows, away from the eye, and turns against φ̂
+    of_t = sine_phi * by_phi - facing * cosine_phi * by_theta
+    of_b, of_n = -cosine_phi * by_phi - facing * sine_phi * by_theta, -sine * by_theta
+    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+    return (
+        of_t * t[0] + of_b * bx + of_n * n[0],
+        of_t * t[1] + of_b * by + of_n * n[1],
+        of_t * t[2] + of_b * bz + of_n * n[2],
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _turn_rows(rungs, points, material, others, tables, lobes, eye, rows, start, stop, near, step, out):  # type: ignore[no-untyped-def]
     """Find G and G · ω_p of the points that are [start, stop) of rows. out: (points, 4), written there"""
     position, normal, tangent, _, _ = points
-    num_rungs, num_groups = rungs.order.shape[0], tables.of.shape[1]
-    near, step = np.empty(num_rungs, np.float32), np.empty(num_rungs, np.float32)
-    for p in rows[start:stop]:
+    for at in range(start, stop):
+        p = rows[at]
         out[p, 0] = out[p, 1] = out[p, 2] = out[p, 3] = 0
-        lobe, is_asked = lobes.of[material[p]], False
-        for group in range(num_groups):
+        is_asked = False
+        for group in range(tables.of.shape[1]):
             is_asked |= tables.of[material[p], group, _BESIDE] >= 0
-        if lobe < 0 or not is_asked:
+        if lobes.of[material[p]] < 0 or not is_asked:
             continue
-        nx, ny, nz, tx, ty, tz = normal[p, 0], normal[p, 1], normal[p, 2], tangent[p, 0], tangent[p, 1], tangent[p, 2]
-        bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-        ox, oy, oz = eye[0] - position[p, 0], eye[1] - position[p, 1], eye[2] - position[p, 2]
-        per = np.float32(1) / math.sqrt(max(ox * ox + oy * oy + oz * oz, np.float32(1e-20)))
-        ox, oy, oz = per * ox, per * oy, per * oz
-        facing = nx * ox + ny * oy + nz * oz
-        row, share, cosine_phi, sine_phi = seen_from(position[p], normal[p], tangent[p], eye)
-        seen: Any = min(max(facing, LEAST_COSINE), np.float32(1))
-        sine: Any = max(math.sqrt(max(np.float32(1) - facing * facing, np.float32(0))), _LEAST_SINE)
-        # rows of tables for a radian of θo; none where tables end
-        rows_a_radian = np.float32(0.5 * (NUM_ROWS - 1)) * math.sqrt(np.float32(1) + seen)
-        if facing < LEAST_COSINE:
-            rows_a_radian = np.float32(0)
-        by_theta = by_phi = np.float32(0)
-        for channel in range(3):
-            albedo = albedo_step = np.float32(0)
-            for rung in range(num_rungs):
-                near[rung] = step[rung] = 0
-            for group in range(num_groups):
-                table = tables.of[material[p], group, _BESIDE]
-                if table < 0:
-                    continue
-                low, high = tables.even[table, row, channel], tables.even[table, row + 1, channel]
-                for rung in range(num_rungs):
-                    near[rung] += low[rung]
-                    step[rung] += high[rung] - low[rung]
-                here, there = lobes.albedo[lobe, row, group, channel], lobes.albedo[lobe, row + 1, group, channel]
-                albedo, albedo_step = albedo + here, albedo_step + (there - here)
-            albedo += share * albedo_step
-            sent = of_row = of_turn = np.float32(0)
-            re, im = np.float32(1), np.float32(0)
-            for rung in range(num_rungs):
-                m = rungs.order[rung]
-                if rungs.a[rung] == 0 and m > 0:
-                    re, im = re * cosine_phi - im * sine_phi, re * sine_phi + im * cosine_phi
-                factor = near[rung] + share * step[rung]
-                light = others[p, channel, rungs.cosine[rung]]
-                if m > 0:
-                    other = others[p, channel, rungs.sine[rung]]
-                    of_turn += np.float32(m) * factor * (re * other - im * light)
-                    light = re * light + im * other
-                sent += factor * light
-                of_row += step[rung] * light
-            if sent > 0 and albedo > np.float32(1e-6):
-                weight = _LUMINANCE[channel] / albedo
-                by_theta += weight * rows_a_radian * (of_row - sent * albedo_step / albedo)
-                by_phi += weight * of_turn / sine
-        # ωr goes down where θo grows, away from the eye, and turns against φ̂
-        of_t = sine_phi * by_phi - facing * cosine_phi * by_theta
-        of_b, of_n = -cosine_phi * by_phi - facing * sine_phi * by_theta, -sine * by_theta
-        gx, gy, gz = (
-            of_t * tx + of_b * bx + of_n * nx,
-            of_t * ty + of_b * by + of_n * ny,
-            of_t * tz + of_b * bz + of_n * nz,
-        )
-        twice = np.float32(2) * facing
+        n, t = (normal[p, 0], normal[p, 1], normal[p, 2]), (tangent[p, 0], tangent[p, 1], tangent[p, 2])
+        x, y, z = eye[0] - position[p, 0], eye[1] - position[p, 1], eye[2] - position[p, 2]
+        per = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
+        o = per * x, per * y, per * z
+        seen = seen_from(position[p], normal[p], tangent[p], eye)
+        gx, gy, gz = _turn_of(rungs, n, t, o, seen, others[p], tables, lobes, material[p], near, step)
+        twice = np.float32(2) * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
         out[p, 0], out[p, 1], out[p, 2] = gx, gy, gz
-        out[p, 3] = gx * (twice * nx - ox) + gy * (twice * ny - oy) + gz * (twice * nz - oz)
+        out[p, 3] = gx * (twice * n[0] - o[0]) + gy * (twice * n[1] - o[1]) + gz * (twice * n[2] - o[2])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _turn(rungs, points, material, others, tables, lobes, eye, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Make room, and do as `_turn_rows`."""
+    near, step = np.empty(rungs.order.shape[0], np.float32), np.empty(rungs.order.shape[0], np.float32)
+    _turn_rows(rungs, points, material, others, tables, lobes, eye, rows, start, stop, near, step, out)
 
 
 def turning(
