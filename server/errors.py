@@ -155,8 +155,8 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (PoolTimeoutError, Row(503, "database", "Database too slow", CLOSE_BUSY)),
     (OSError, Row(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
 )
-SAID = (LeavingError, NearlyFullError)
-"""What the log says once, when it begins, however often somebody asks meanwhile."""
+SAID = (BusyError, LeavingError, NearlyFullError)
+"""No faults: the log says once when they begin, or metrics how much there is, however often somebody asks meanwhile."""
 DEFECT = Row(500, "defect", "Defect in the server", CLOSE_INTERNAL)
 
 

@@ -31,7 +31,7 @@ from sqlalchemy.orm import Session, sessionmaker
 from relume.errors import CancelledError, NotFoundError, RelumeError
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
-from server.errors import BusyError, problem_of
+from server.errors import BusyError, QuotaError, problem_of
 from server.records.tables import WorkRow
 from worker.database.clock import epoch_s
 from worker.database.faults import Complaint
@@ -173,15 +173,17 @@ class WorkQueue(ABC, Generic[Request]):
         Returns:
             The id of the work.
         Raises:
-            BusyError: enough is waiting already, of this client or of all.
+            BusyError, QuotaError: enough waits or runs already, of all or of this client.
         """
         identity, row, quota = identity or new_id(), self.row, self._quota
         with self._sessions.begin() as session:
             waiting = session.scalars(select(row.client).where(row.state.in_(_ACTIVE))).all()
             if len(waiting) >= quota.of_all:
-                raise BusyError(f"{quota.of_all} {self.noun}s are waiting; try again when some are done")
+                text = f"as many {self.noun}s wait or run as may, {quota.of_all}; try again when some are done"
+                raise BusyError(f"{text} (RELUME_MAX_QUEUED)")
             if sum((other or "") == client for other in waiting) >= quota.of_each:
-                raise BusyError(f"{quota.of_each} {self.noun}s of yours are waiting; try again when some are done")
+                text = f"as many {self.noun}s of yours wait or run as may, {quota.of_each}; wait, or stop one"
+                raise QuotaError(f"{text} (RELUME_MAX_QUEUED_EACH)")
             if prepare is not None:
                 (self.folder / identity).mkdir(parents=True)
                 prepare(self.folder / identity)
