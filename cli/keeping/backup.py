@@ -58,4 +58,8 @@ def _verify(shelf: Shelf) -> int:
     for kept in damaged:
         typer.echo(f"damaged: {kept.path}", err=True)
     typer.echo(f"{snapshot.name}: {len(damaged)} of {len(snapshot.all):,} files are damaged", err=True)
+    for kept in damaged:
+        shelf.set_aside(kept)
+    if damaged:
+        typer.echo("back up again: what is still in the data folder is copied anew", err=True)
     return 1 if damaged else 0

@@ -252,16 +252,39 @@ def test_what_is_damaged_is_left_out_and_said(data: Path, ledger_url: str, shelf
     assert any("scenes/" in kept.path for kept in snapshot.files)
 
 
-def test_a_damaged_backup_is_found_and_not_restored(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+def test_a_damaged_backup_is_found_and_the_next_is_whole(data: Path, ledger_url: str, shelf: Shelf) -> None:
     take(data, ledger_url, shelf)
     kept = next(kept for kept in shelf.read().files if kept.path.startswith("scenes/"))
-    path = shelf.path_of(kept.sha256)
-    path.write_bytes(bytes(kept.num_bytes))
+    shelf.path_of(kept.sha256).write_bytes(bytes(kept.num_bytes))
     assert list(shelf.damaged(shelf.read(), lambda done: None)) == [kept]
+    shelf.set_aside(kept)
+    take(data, ledger_url, shelf)
+    assert list(shelf.damaged(shelf.read(), lambda done: None)) == []
+
+
+def test_a_damaged_bake_costs_no_other_of_a_backup(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+    take(data, ledger_url, shelf)
+    kept = next(kept for kept in shelf.read().files if "/visibility/c/" in kept.path)
+    shelf.path_of(kept.sha256).write_bytes(bytes(kept.num_bytes))
+    elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
+    _, damaged = restore(shelf, None, elsewhere, url)
+    assert damaged == [f"{kept.thing} is damaged in the backup: bake or import it again"]
+    assert not (elsewhere / kept.thing).exists()
+    assert load_scene(scene_path(elsewhere, SCENE.id)).id == SCENE.id
+    with closing(open_service(elsewhere, url)) as service:
+        (status,) = service.bakes()
+        assert service.submit(SCENE.id, RECIPE) == status.id
+        assert service.get(status.id).state == "queued"  # what is asked for again is made again
+
+
+def test_a_damaged_ledger_is_not_restored(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+    take(data, ledger_url, shelf)
+    ledger = shelf.read().ledger
+    shelf.path_of(ledger.sha256).write_bytes(bytes(ledger.num_bytes))
     elsewhere = tmp_path / "elsewhere"
-    with pytest.raises(BackupError, match=r"is damaged in the backup"):
+    with pytest.raises(BackupError, match=r"the ledger is damaged in the backup"):
         restore(shelf, None, elsewhere, f"sqlite:///{elsewhere / 'relume.db'}")
-    assert not (elsewhere / kept.path).exists()
+    assert (elsewhere / "restoring.json").exists()
 
 
 def test_nothing_is_overwritten(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from relume.errors import BackupError, DiskFullError
@@ -31,17 +32,18 @@ def refuse_unfinished(data_dir: Path) -> None:
 
 def restore(
     shelf: Shelf, name: str | None, data_dir: Path, ledger_url: str, begin: Begin = lambda total: lambda done: None
-) -> Snapshot:
-    """Restore a snapshot, every file of it checked.
+) -> tuple[Snapshot, Sequence[str]]:
+    """Restore a snapshot, every file of it checked. Of what has damaged files nothing is restored, as nothing is
+    backed up: one bake must not cost all others, and what the ledger names and is not there is made again.
 
     Args:
         shelf: the folder of backups. name: of the snapshot; None: the newest.
         data_dir: empty or missing, or where the same restore was interrupted. ledger_url: of an empty ledger.
         begin: hears of progress.
     Returns:
-        What was restored.
+        The snapshot, and a sentence for each thing that is damaged in the backup.
     Raises:
-        BackupError: there is no such backup, it is damaged, or there is something where it should go.
+        BackupError: there is no such backup, its ledger is damaged, or there is something where it should go.
         DiskFullError: there is no room for it.
     """
     snapshot = shelf.read(name)
@@ -50,11 +52,13 @@ def restore(
     if num_bytes > shutil.disk_usage(data_dir).free + folder_bytes(data_dir):
         raise DiskFullError(f"a backup of {num_bytes / 1e6:,.0f} MB")
     tell = begin(num_bytes)
-    for kept in snapshot.files:
-        _put(shelf, kept, data_dir / kept.path, tell)
+    lost = {kept.thing for kept in snapshot.files if not _put(shelf, kept, data_dir / kept.path, tell)}
+    for thing in lost:
+        _forget(data_dir / thing)
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "ledger.db"
-        _put(shelf, snapshot.ledger, copy, lambda done: None)
+        if not _put(shelf, snapshot.ledger, copy, lambda done: None):
+            raise BackupError("the ledger is damaged in the backup; empty the folder, and restore an older one")
         target = open_database(ledger_url)
         try:
             if is_empty(target):  # else the restore was killed after this, which is all or nothing
@@ -64,7 +68,7 @@ def restore(
     for leftover in data_dir.rglob(UNFINISHED):  # of restores that were killed
         leftover.unlink(missing_ok=True)
     (data_dir / MARK).unlink()
-    return snapshot
+    return snapshot, [f"{thing} is damaged in the backup: bake or import it again" for thing in sorted(lost)]
 
 
 def _mark(shelf: Shelf, snapshot: Snapshot, data_dir: Path, ledger_url: str) -> None:
@@ -91,11 +95,17 @@ def _mark(shelf: Shelf, snapshot: Snapshot, data_dir: Path, ledger_url: str) -> 
         engine.dispose()
 
 
-def _put(shelf: Shelf, kept: Kept, target: Path, tell: Tell) -> None:
+def _forget(thing: Path) -> None:
+    if thing.is_dir():
+        shutil.rmtree(thing)
+    thing.unlink(missing_ok=True)
+
+
+def _put(shelf: Shelf, kept: Kept, target: Path, tell: Tell) -> bool:
+    """Whether a file is there as it was."""
     if target.exists() and target.stat().st_size == kept.num_bytes:  # put there before an interruption, whole
         tell(kept.num_bytes)
-        return
+        return True
     target.parent.mkdir(parents=True, exist_ok=True)
     source = shelf.path_of(kept.sha256)
-    if not source.is_file() or not copy_verified(source, target, kept.sha256, tell):
-        raise BackupError(f"{kept.path} is damaged in the backup; restore an older one, or copy the folder again")
+    return source.is_file() and copy_verified(source, target, kept.sha256, tell)

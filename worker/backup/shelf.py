@@ -46,6 +46,11 @@ class Kept:
     sha256: str
     mtime_ns: int
 
+    @property
+    def thing(self) -> str:
+        """The bake, scene or other thing that it is a file of: nothing of one is of use without the rest."""
+        return "/".join(self.path.split("/")[:2])
+
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -161,6 +166,12 @@ class Shelf:
             path = self.path_of(kept.sha256)
             if not path.is_file() or path.stat().st_size != kept.num_bytes or digest_of(path, tell) != kept.sha256:
                 yield kept
+
+    def set_aside(self, kept: Kept) -> None:
+        """Give a damaged content another name, so that the next backup copies it anew where it still is."""
+        path = self.path_of(kept.sha256)
+        if path.exists():
+            path.rename(path.with_name(f"{path.name}.damaged"))
 
 
 def digest_of(path: Path, tell: Tell) -> str:

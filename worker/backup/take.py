@@ -102,7 +102,7 @@ def _keep_files(data_dir: Path, shelf: Shelf, known: dict[str, Kept], begin: Beg
             kept.append(one)
         else:
             damaged.add("/".join(file.path.split("/")[:2]))
-    whole = [one for one in kept if "/".join(one.path.split("/")[:2]) not in damaged]
+    whole = [one for one in kept if one.thing not in damaged]
     return whole, [f"{name} is damaged: delete it, and bake or import it again" for name in sorted(damaged)]
 
 
