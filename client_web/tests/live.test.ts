@@ -1,9 +1,10 @@
 import { beforeEach, expect, test, vi } from "vitest";
+import { replaceLook } from "../src/edit/edit";
 import { connect } from "../src/live/connect";
 import { disconnect } from "../src/live/connections";
 import type { SessionHandlers } from "../src/net/session";
 import { stage } from "../src/picture/stage";
-import type { HelloMessage } from "../src/protocol";
+import type { HelloMessage, Look } from "../src/protocol";
 import { bake } from "../src/state/bakes";
 import { placeEye } from "../src/state/eyes";
 import { look } from "../src/state/look";
@@ -21,6 +22,7 @@ interface FakeSession {
   bake: string;
   handlers: SessionHandlers;
   sent: { type: string }[];
+  wanted: Look | null;
 }
 
 vi.mock("../src/net/session", () => ({
@@ -35,7 +37,8 @@ vi.mock("../src/net/session", () => ({
     }
     connect = () => undefined;
     close = () => undefined;
-    want = () => undefined;
+    wanted: Look | null = null;
+    want = ({ look }: { look: Look }) => void (this.wanted = look);
     send = (message: { type: string }) => (this.sent.push(message), true);
     sent: { type: string }[] = [];
     ask = () => true;
@@ -106,4 +109,13 @@ test("a new bake takes over when a view that is whole is shown alone", async () 
   shownViews.value = ["front"];
   viewName.value = "front";
   expect(bake.value).toBe("new");
+});
+
+test("a visitor without a look of their own is shown what a link brought with the first one", () => {
+  look.value = null;
+  const brought = { ...LOOK, display: { ...LOOK.display, exposure: 1 } };
+  const stop = look.subscribe((first) => first?.display.exposure === 0 && replaceLook("Shared look", brought));
+  const session = greet("first");
+  stop();
+  expect(session.wanted).toEqual(brought);
 });

@@ -41,19 +41,22 @@ export function whenCommented(take: typeof onComments): void {
   onComments = take;
 }
 
-/** The look from a server's first one: a look that was kept goes on, with what an older editor did not know of. */
-function takeUp(own: Look): Look {
-  if (!mayEdit.peek()) return (look.value = own);
+/** The look from a server's first one: a look that was kept goes on, with what an older editor did not know of. Who waited
+ * for a look, as a link does, may have changed it when this returns. */
+function takeUp(own: Look): void {
   const kept = look.peek();
-  if (kept !== null && Object.keys(own).every((section) => section in kept)) return kept;
-  return (look.value = { ...own, ...kept });
+  if (!mayEdit.peek()) look.value = own;
+  else if (kept === null || !Object.keys(own).every((section) => section in kept)) look.value = { ...own, ...kept };
 }
 
 /** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
 function welcome(of: BakeConnection, hello: HelloMessage): void {
   of.greeted(hello);
   defaultLook.value ??= (hello.room?.default ?? hello.look) as unknown as Look;
-  if (!comeIn(of, hello)) want(of, takeUp(hello.look as unknown as Look), performance.now());
+  if (!comeIn(of, hello)) {
+    takeUp(hello.look as unknown as Look);
+    want(of, look.peek() as Look, performance.now());
+  }
   tellViews(of, shownOf(hello), focusedView.peek());
   tellEyes(of, hello);
   tellRegions(of);
