@@ -222,11 +222,13 @@ export interface TouchMessage {
   parameter?: string | null;
 }
 
-/** Compare a look with brute force, in so many passes; figures come from the second on. `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone, which is sooner done. */
+/** Compare a look with brute force, in so many passes; figures come from the second on. `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone, which is sooner done. Where the eye moves: `camera`, from where it is seen, and `size` of the picture; by default as it was baked. */
 export interface TruthRequest {
   bake: string;
   view: string;
   look?: Record<string, unknown>;
+  camera?: CameraFrame | null;
+  size?: [number, number] | null;
   paths?: "all" | "method";
   passes?: number;
   dry_run?: boolean;

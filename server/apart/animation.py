@@ -1,4 +1,4 @@
-"""What each frame of a batch shows: from where, and under which look."""
+"""What each frame of a batch shows: from where, and under which look; and from where a comparison sees its view."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from relume.errors import ParameterError
 from relume.look import Look
 from relume.look.morph import morph, neighbours
 from relume.look.turned import with_turned_light, with_turned_sky
-from relume.picture.transfer import Eyes, Opened
+from relume.picture.transfer import AnyView, Eyes, Opened
 from relume.scene.placed_camera import placed_camera
+from server.wire.bodies import TruthRequest
 from server.wire.cameras import CameraFrame
 from server.wire.renders import Animation, EyePath, Keyframes, LooksRequest, Turntable
 
@@ -65,8 +66,15 @@ def eyes_of(request: Animation, name: str, transfer: Opened) -> Sequence[Camera 
     return along([_placed(view, eye) for eye in request.path.eyes], request.num_frames)
 
 
-def _placed(view: FreeView, eye: CameraFrame) -> Camera:
+def _placed(view: AnyView, eye: CameraFrame) -> Camera:
     return placed_camera(view.name, eye.to_world, eye.yfov).camera
+
+
+def compared_from(request: TruthRequest, transfer: Opened) -> tuple[Camera, tuple[int, int]]:
+    """From where a comparison sees its view, and how large its pictures are. Raises ParameterError for bad cameras."""
+    view = transfer.views[request.view]
+    camera = view.camera if request.camera is None else _placed(view, request.camera)
+    return camera, request.size or (view.width, view.height)
 
 
 def _start_of(path: Turntable, view: FreeView) -> Camera:

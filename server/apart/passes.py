@@ -21,9 +21,10 @@ from relume import look as looks
 from relume.code_version import truth_code
 from relume.imageio.files import write_image
 from relume.picture.jobs import Cancelled, Progress
-from relume.picture.transfer import Axis, Opened
+from relume.picture.transfer import Axis, Eyes, Opened
 from relume.reference.truth import Comparison, Estimate, compare, error_map
 from relume.replacing import replacing
+from server.apart.animation import compared_from
 from server.apart.step_timer import sampled
 from server.apart.workshop import Workshop
 from server.library.ports import F32
@@ -53,7 +54,8 @@ def make_frame(
     kept = _load(where)
     if kept is None:
         transfer = shop.transfer(asked.bake)
-        frame = shop.library.render(transfer, asked.view, _look(asked, transfer), cancelled=cancelled)
+        eye = compared_from(asked, transfer) if transfer.eyes is Eyes.FREE else None
+        frame = shop.library.render(transfer, asked.view, _look(asked, transfer), cancelled=cancelled, eye=eye)
         kept = frame, {paths: Estimate.nothing(*frame.shape[:2]) for paths in dict.fromkeys((asked.paths, "method"))}
         _keep(where, *kept)
     return {"passes": kept[1]["method"].passes}
@@ -93,9 +95,9 @@ def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: 
     """
     asked = TruthRequest.model_validate(request)
     transfer = shop.transfer(asked.bake)
-    look, view = _look(asked, transfer), transfer.views[asked.view]
-    size = max(1, view.width // _SAMPLE), max(1, view.height // _SAMPLE)
-    scale = view.width * view.height / (size[0] * size[1])
+    look, (_, (width, height)) = _look(asked, transfer), compared_from(asked, transfer)
+    size = max(1, width // _SAMPLE), max(1, height // _SAMPLE)
+    scale = width * height / (size[0] * size[1])
     return {"seconds": sampled(lambda told: _pass(shop, transfer, asked, look, size, 0, told, cancelled), scale)}
 
 
@@ -108,7 +110,7 @@ def _pass(
     cancelled: Any,
 ) -> Truth:  # fmt: skip
     return shop.library.reference(
-        scene_path(shop.data, transfer.scene_id), transfer.views[asked.view].camera, look, size, SPP, tell, cancelled,
+        scene_path(shop.data, transfer.scene_id), compared_from(asked, transfer)[0], look, size, SPP, tell, cancelled,
         index, reflects=Axis.BOUNCES in transfer.axes, is_whole=asked.paths == "all",
     )  # fmt: skip
 

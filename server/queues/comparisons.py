@@ -19,6 +19,7 @@ from server.wire.bodies import TruthFigures, TruthRequest
 from server.wire.body import Body
 
 Comparing = Work[TruthRequest]
+_Kind = tuple[str, str, tuple[int, int] | None, str]
 
 
 class Figures(Body):
@@ -42,7 +43,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
             run: does the steps. quota: how much may wait.
         """
         super().__init__(sessions, data / "truths", run, quota)
-        self._pass_s: dict[tuple[str, str, str], float] = {}  # of a bake's view, by the paths that are traced
+        self._pass_s: dict[_Kind, float] = {}
         self._sampling = threading.Lock()
 
     def steps(self, request: TruthRequest) -> int:
@@ -102,6 +103,6 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         return done
 
 
-def _kind(request: TruthRequest) -> tuple[str, str, str]:
-    """Passes of one kind take as long as each other."""
-    return request.bake, request.view, request.paths
+def _kind(request: TruthRequest) -> _Kind:
+    """Passes of one kind take about as long as each other, wherever an eye is that moves."""
+    return request.bake, request.view, request.size, request.paths

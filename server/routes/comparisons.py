@@ -8,12 +8,14 @@ from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
-from relume.picture.transfer import Opened
+from relume.errors import ParameterError
+from relume.picture.transfer import Eyes, Opened
 from server.access.roles import Who
+from server.apart.animation import compared_from
 from server.errors import NotReadyError
 from server.queues.comparisons import Comparing
 from server.routes.bakes import ready_bake
-from server.routes.renders import baked_view, check_display, check_look
+from server.routes.renders import baked_view, check_display, check_eye_size, check_look
 from server.services import Services, Shared
 from server.wire.bodies import TruthBody, TruthPlanBody, TruthRequest
 from server.wire.body import Id
@@ -41,6 +43,12 @@ async def submit_comparison(
 
 def _check(request: TruthRequest, transfer: Opened) -> None:
     baked_view(request.view, transfer)
+    if transfer.eyes is Eyes.FREE:
+        compared_from(request, transfer)
+        check_eye_size(request.size)
+    elif request.camera is not None or request.size is not None:
+        able = "none for this bake, whose eye does not move: it is compared as it was baked"
+        raise ParameterError("camera" if request.size is None else "size", "given", able)
     check_look(request.look, transfer, "/look")
     check_display(request.look, "/look")
 

@@ -115,6 +115,12 @@ def baked_view(name: str, transfer: Opened) -> Any:
     return transfer.views[name]
 
 
+def check_eye_size(size: tuple[int, int] | None) -> None:
+    """Whether pictures of a moving eye may be so large; None: as baked. Raises ParameterError."""
+    if size is not None and size[0] * size[1] > MAX_EYE_PIXELS:
+        raise ParameterError("size", list(size), f"at most {MAX_EYE_PIXELS} pixels in all")
+
+
 def check_look(partial: dict[str, Any], transfer: Opened, pointer: str) -> None:
     """A look that stands at `pointer` of a body. Raises ParameterError."""
     try:
@@ -149,9 +155,7 @@ def _check(request: RenderRequest, transfer: Opened) -> int:
     if request.format == "mp4":
         check_encoder()
     if transfer.eyes is Eyes.FREE:
-        width, height = request.size or (view.width, view.height)
-        if width * height > MAX_EYE_PIXELS:
-            raise ParameterError("size", [width, height], f"at most {MAX_EYE_PIXELS} pixels in all")
+        check_eye_size(request.size or (view.width, view.height))
     elif request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
         baked = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
         raise ParameterError("size", list(request.size), baked)

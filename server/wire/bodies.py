@@ -306,12 +306,15 @@ class TruthRequest(Body):
     """Compare a look with brute force, in so many passes; figures come from the second on.
 
     `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone,
-    which is sooner done.
+    which is sooner done. Where the eye moves: `camera`, from where it is seen, and `size` of the picture; by default as
+    it was baked.
     """
 
     bake: Id
     view: Name
     look: Annotated[dict[str, Any], Field(default_factory=dict)]
+    camera: CameraFrame | None = None
+    size: tuple[Side, Side] | None = None
     paths: Literal["all", "method"] = "all"
     passes: Annotated[int, Field(ge=2, le=1024)] = 16
     dry_run: bool = False

@@ -263,6 +263,8 @@ class Control:
     render_gate: threading.Event = field(default_factory=_open_gate)
     passes_asked: list[int] = field(default_factory=list)
     reflections_asked: list[bool] = field(default_factory=list)
+    frames_from: list[tuple[Camera, tuple[int, int]] | None] = field(default_factory=list)
+    passes_from: list[tuple[Camera, tuple[int, int]]] = field(default_factory=list)
 
     def open_library(self, cache_bytes: int, floor_bytes: int) -> Library:
         paint = self._open, self._open, self._picture, self._render, self._render_small, self._reference
@@ -293,16 +295,18 @@ class Control:
         progress: Callable[[float], object] = lambda share: None,
         cancelled: Callable[[], bool] = lambda: False,
         for_display: bool = False,
-        eye: None = None,
+        eye: tuple[Camera, tuple[int, int]] | None = None,
         exact: bool = True,
     ) -> np.ndarray:
         """It waits half way while `render_gate` is clear."""
+        self.frames_from.append(eye)
         progress(0.5)
         while not self.render_gate.wait(0.01):
             if cancelled():
                 raise CancelledError("stopped")
         progress(1.0)
-        shape = transfer.views[view].height, transfer.views[view].width, 3
+        width, height = (transfer.views[view].width, transfer.views[view].height) if eye is None else eye[1]
+        shape = height, width, 3
         return np.full(shape, exact_pixel(look), np.float32)
 
     def _render_small(self, transfer: FakeTransfer, view: str, look: Any, width: int) -> np.ndarray:
@@ -312,7 +316,7 @@ class Control:
     def _reference(
         self,
         scene: Path,
-        view: str,
+        camera: Camera,
         look: Any,
         size: tuple[int, int],
         spp: int,
@@ -327,6 +331,7 @@ class Control:
         if not scene.is_dir():
             raise FileNotFoundError(scene)
         self.passes_asked.append(pass_index)
+        self.passes_from.append((camera, size))
         self.reflections_asked.append(reflects)
         while not self.may_trace.wait(0.01):
             if cancelled():

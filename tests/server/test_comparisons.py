@@ -12,6 +12,7 @@ from PIL import Image
 from server_fakes import SIZE, BatchesHere, Control, FakeTransfer
 from session_client import Baked
 
+from relume.picture.transfer import Eyes
 from server.app import create_app
 from server.settings import Settings
 
@@ -32,7 +33,7 @@ def is_done(body: dict[str, Any]) -> bool:
     return body["state"] in ("ready", "failed")
 
 
-def submit(client: TestClient, baked: Baked, passes: int, **more: str) -> str:
+def submit(client: TestClient, baked: Baked, passes: int, **more: Any) -> str:
     queued = client.post("/api/truths", json={"bake": baked.bake, "view": "front", "passes": passes, **more})
     assert queued.status_code == 202, queued.text
     return str(queued.headers["location"])
@@ -164,6 +165,8 @@ def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control:
         ({"look": {"materials": {"Nobody": {"terms": []}}}}, 422),
         ({"spp": 5}, 422),
         ({"paths": "some"}, 422),
+        ({"camera": {"to_world": np.eye(4).ravel().tolist(), "yfov": 40}}, 422),  # its eye does not move
+        ({"size": [80, 60]}, 422),
     ],
 )
 def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[str, Any], status: int) -> None:
@@ -183,8 +186,33 @@ def test_brute_force_has_the_light_paths_of_the_bake(
     assert control.reflections_asked == [method == "gather"] * 2
 
 
-def _baked_by(method: str, init: Callable[..., None]) -> Callable[..., None]:
-    return lambda self, *args, **more: init(self, *args, **{**more, "method": method})
+def _baked_by(method: str, init: Callable[..., None], **also: Any) -> Callable[..., None]:
+    return lambda self, *args, **more: init(self, *args, **{**more, "method": method, **also})
+
+
+def test_a_moving_view_is_compared_from_where_its_eye_is(
+    client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FakeTransfer, "__init__", _baked_by("surface", FakeTransfer.__init__, eyes=Eyes.FREE))
+    control.may_trace.set()
+    to_world = np.array([[0, 0, 1, 4], [0, 1, 0, 2], [-1, 0, 0, 3], [0, 0, 0, 1]], float)
+    camera = {"to_world": to_world.ravel().tolist(), "yfov": 40.0}
+    url = submit(client, baked, 2, camera=camera, size=[40, 24])
+    assert wait_until(client, url, is_done)["state"] == "ready"
+    assert Image.open(io.BytesIO(client.get(f"{url}/error.png").content)).size == (40, 24)
+    (frame_from,) = [eye for eye in control.frames_from if eye is not None]
+    for seen_from, size in (frame_from, *control.passes_from):
+        assert size == (40, 24)
+        assert np.array_equal(seen_from.to_world, to_world)
+        assert seen_from.yfov == pytest.approx(np.radians(40))
+    request = {"bake": baked.bake, "view": "front", "camera": camera}
+    for change in (
+        {"size": [16384, 16384]},
+        {"camera": camera | {"yfov": 180.0}},
+        {"camera": camera | {"to_world": [0.0] * 16}},
+    ):
+        refused = client.post("/api/truths", json=request | change)
+        assert refused.status_code == 422, refused.text
 
 
 def test_an_estimate_does_not_wait_behind_another(client: TestClient, control: Control, baked: Baked) -> None:

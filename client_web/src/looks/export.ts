@@ -76,7 +76,7 @@ async function finished(what: string, render: RenderBody): Promise<RenderBody | 
 export const eyeNow = (): Frame | null => eyeOf(viewName.peek())?.frame ?? null;
 
 /** How large the pictures of the view in hand are, if its eye moves. */
-function sizeNow(): [number, number] | null {
+export function sizeNow(): [number, number] | null {
   const eye = eyeOf(viewName.peek());
   return eye === null ? null : eyeSize(...eye.size);
 }

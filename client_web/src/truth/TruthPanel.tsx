@@ -42,7 +42,7 @@ function Steps({ isOld }: { isOld: boolean }) {
     <div class="group" role="group" aria-label="Comparison">
       {isGoingOn(body) && <button onClick={() => void haltTruth()}>Stop</button>}
       {body.state === "stopped" && <button onClick={() => void goOnWithTruth()}>Go on</button>}
-      <button onClick={() => void askTruth()}>{isOld ? "Ask again for this look" : "Begin again"}</button>
+      <button onClick={() => void askTruth()}>{isOld ? "Ask again for this picture" : "Begin again"}</button>
     </div>
   );
 }
@@ -97,7 +97,7 @@ export function TruthPanel() {
           {body.found !== null && <Found body={body} />}
         </>
       )}
-      {isOld && <p class="truth-old">The look has changed since.</p>}
+      {isOld && <p class="truth-old">The picture has changed since.</p>}
       <Steps isOld={isOld} />
     </aside>
   );

@@ -1,5 +1,6 @@
 /** "How true is this?": one comparison of the picture with brute force, followed while its panel is open. */
 import { signal } from "@preact/signals";
+import { eyeNow, sizeNow } from "../looks/export";
 import { forgetTruth, getTruth, planTruth, resumeTruth, startTruth, stopTruth } from "../net/api";
 import type { TruthBody, TruthPlanBody, TruthRequest } from "../protocol";
 import { seenPaths } from "../seen/paths";
@@ -9,7 +10,7 @@ import { bake } from "../state/bakes";
 import { look } from "../state/look";
 import { truthOpen } from "../state/panels";
 import { togglePanel } from "../state/room";
-import { viewName } from "../state/views";
+import { viewName, views } from "../state/views";
 import { attempt } from "../ui/toasts";
 
 const POLL_MS = 1000;
@@ -19,10 +20,12 @@ export const truthPlan = signal<TruthPlanBody | "unknown" | null>(null);
 /** The comparison, and the look that it judges. */
 export const truth = signal<{ body: TruthBody; look: string } | null>(null);
 
-/** What the comparison depends on of the look: the display does not matter. */
+/** What the comparison depends on: the display of the look does not matter. */
 export function judged(): string {
   const seen = [seenPaths.value, soloLight.value];
-  return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: viewName.value, seen });
+  views.value; // the eye has moved
+  const eye = [eyeNow(), sizeNow()];
+  return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: viewName.value, seen, eye });
 }
 
 export function isGoingOn(body: TruthBody): boolean {
@@ -41,7 +44,8 @@ async function follow(id: string): Promise<void> {
 
 function asked(): TruthRequest | null {
   const [id, current] = [bake.value, look.value];
-  return id === null || current === null ? null : { bake: id, view: viewName.value, look: { ...seenOf(current) } };
+  if (id === null || current === null) return null;
+  return { bake: id, view: viewName.value, look: { ...seenOf(current) }, camera: eyeNow(), size: sizeNow() };
 }
 
 /** Say how long it would take; nothing begins. */
