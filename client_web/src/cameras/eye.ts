@@ -212,6 +212,32 @@ export function lookFrom(name: string, camera: Frame, size?: Size | null): void 
   eye?.change(() => orbitOf(camera, eye.bounds));
 }
 
+/** From where views are seen whose eyes move, by name, and how large somebody made their pictures. */
+export interface Seen {
+  eyes: Record<string, Frame>;
+  sizes: Record<string, Size>;
+}
+
+/** Of the shown views; those that were baked from one place have none. */
+export function seenNow(): Seen {
+  const [eyes, sizes]: [Record<string, Frame>, Record<string, Size>] = [{}, {}];
+  for (const name of shownViews.value) {
+    const [camera, size] = [cameraOf(name), eyeOf(name)?.chosen ?? null];
+    if (camera !== null) eyes[name] = camera;
+    if (size !== null) sizes[name] = size;
+  }
+  return { eyes, sizes };
+}
+
+/** See views from there; an eye that is there already stays as it is. */
+export function seeFrom({ eyes, sizes }: Seen): void {
+  const now = seenNow();
+  const of = (seen: Seen, name: string) => JSON.stringify([seen.eyes[name], seen.sizes[name]]);
+  for (const [name, camera] of Object.entries(eyes)) {
+    if (of({ eyes, sizes }, name) !== of(now, name)) lookFrom(name, camera, sizes[name] ?? null);
+  }
+}
+
 effect(() => {
   if (connection.value !== "open" || bake.value === null) return;
   for (const name of shownViews.value) eyeOf(name)?.tellAgain();

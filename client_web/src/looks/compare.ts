@@ -1,5 +1,6 @@
 /** A and B: A is a picture that was kept, B is the live one. */
 import { effect, signal } from "@preact/signals";
+import { seeFrom, seenNow, type Seen } from "../cameras/eye";
 import { isSame } from "../document/difference";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
@@ -19,8 +20,8 @@ import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
 import { addLook, keepThumbnail, unusedName } from "./shelf";
 
-/** The look whose picture is kept as A, and what it is called. */
-export const sideA = signal<{ look: Look; label: string } | null>(null);
+/** The look whose picture is kept as A, what it is called, and from where it was seen. */
+export const sideA = signal<{ look: Look; label: string; seen: Seen } | null>(null);
 
 /** The look that was saved last, while its name waits to be typed over. */
 export const justSaved = signal<string | null>(null);
@@ -45,7 +46,7 @@ export function completed(partial: Partial<Look>): Look {
 
 export function markA(): void {
   if (look.value === null || !stage.active.isThere) return;
-  sideA.value = { look: look.value, label: "kept" };
+  sideA.value = { look: look.value, label: "kept", seen: seenNow() };
   stage.keepReference();
   note("This picture is A now. W wipes between A and B, the live picture; C shows A while it is held.");
 }
@@ -54,19 +55,22 @@ export function markA(): void {
 export async function markLook(of: Look, label: string): Promise<void> {
   await attempt(async () => {
     await withPicturesOf(of, () => stage.keepReference());
-    sideA.value = { look: of, label };
+    sideA.value = { look: of, label, seen: seenNow() };
   });
 }
 
-/** The live look becomes A, and A becomes live. It is a way to compare, so it takes no undone steps away. */
+/** The live picture becomes A, and A becomes live, seen from where it was. It is a way to compare, so it takes no undone
+ * steps away. */
 export function swapA(): void {
   const [a, live] = [sideA.value, look.value];
   if (a === null || live === null) return;
+  const seen = seenNow();
   stage.keepReference();
   if (!isSame(live, a.look) && history.keepUndone())
     note("What you had undone is kept in the history, before the swap.");
   replaceLook("Swap A and B", a.look);
-  sideA.value = { look: live, label: "swapped" };
+  seeFrom(a.seen);
+  sideA.value = { look: live, label: "swapped", seen };
 }
 
 export function toggleWipe(): void {
@@ -91,7 +95,7 @@ effect(() => {
   const id = scene.value?.id ?? null;
   if (!exact.value || id === null || id === openedScene) return;
   openedScene = id;
-  sideA.value = { look: look.peek() as Look, label: "as opened" };
+  sideA.value = { look: look.peek() as Look, label: "as opened", seen: seenNow() };
   stage.keepReference();
 });
 

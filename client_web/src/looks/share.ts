@@ -1,7 +1,6 @@
 /** Links that carry the look: saved on the server, never changed, opened as a step that can be undone. */
 import { effect, signal } from "@preact/signals";
-import { cameraOf, eyeOf, lookFrom, type Size } from "../cameras/eye";
-import type { Frame } from "../cameras/orbit";
+import { lookFrom, seenNow } from "../cameras/eye";
 import { replaceLook } from "../edit/edit";
 import { history } from "../edit/history";
 import { getShare, makeShare } from "../net/api";
@@ -19,18 +18,6 @@ import { attempt, note } from "../ui/toasts";
 /** A link that the browser did not let us copy: it is shown to be copied by hand. */
 export const linkToCopy = signal<string | null>(null);
 
-/** Where the eyes of the shown views are, and how large somebody made their pictures; those that were baked from one place
- * have none. */
-function eyesNow(): { eyes: Record<string, Frame>; sizes: Record<string, Size> } {
-  const [eyes, sizes]: [Record<string, Frame>, Record<string, Size>] = [{}, {}];
-  for (const name of shownViews.value) {
-    const [camera, size] = [cameraOf(name), eyeOf(name)?.chosen ?? null];
-    if (camera !== null) eyes[name] = camera;
-    if (size !== null) sizes[name] = size;
-  }
-  return { eyes, sizes };
-}
-
 /** Save what is seen now. */
 export async function saveShare(): Promise<ShareEntry> {
   const [id, current] = [bake.value, look.value];
@@ -43,7 +30,7 @@ export async function saveShare(): Promise<ShareEntry> {
     solo: solo.value,
     solo_light: soloLight.value,
     paths: seenPaths.value,
-    ...eyesNow(),
+    ...seenNow(),
   });
 }
 

@@ -16,7 +16,7 @@ export function EditableName({ name, class: of, maximum, editing = false, onRena
   const [open, setOpen] = useState(editing);
   if (!open) {
     return (
-      <button class={of} title={`${name}: rename`} aria-label={`${name}: rename`} onClick={() => setOpen(true)}>
+      <button type="button" class={of} title={`${name}: rename`} aria-label={`${name}: rename`} onClick={() => setOpen(true)}>
         {name}
       </button>
     );

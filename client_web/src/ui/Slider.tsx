@@ -114,6 +114,7 @@ export function Slider(props: SliderProps) {
         />
       ) : (
         <button
+          type="button"
           class="value"
           title="Type a number"
           aria-label={`${label}: ${shown}; type a number`}

@@ -87,7 +87,7 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     moved(page, seen)  # a picture that comes after the refusal takes nothing of it away
     expect(dialog.get_by_role("alert")).to_contain_text("own cameras")
     dialog.get_by_label("Name").fill("Aside")
-    dialog.get_by_role("button", name="Keep camera").click()
+    dialog.get_by_label("Name").press("Enter")
     expect(dialog).to_be_hidden()
     expect(views.get_by_label("Aside", exact=True)).to_be_checked()
     before = placed(server.call(url))
