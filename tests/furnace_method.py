@@ -57,7 +57,7 @@ class FurnaceViews(BakedViews):
         receivers = view.receivers(material, self.glow(light), is_lit=False)
         return self.lights.none(), receivers
 
-    def some(self, view: View, material: int, chosen: np.ndarray) -> FewSamples:
+    def some(self, view: View, material: int, chosen: np.ndarray, *, reflects: bool) -> FewSamples:
         """A few samples, for previews."""
         return _FewGlowing(self, view, material, chosen)
 

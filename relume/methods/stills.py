@@ -22,7 +22,7 @@ from relume.bake import Recipe, StoreReader, Task
 from relume.errors import CancelledError
 from relume.methods.gather import GatherMethod
 from relume.methods.local_lights import LocalLights
-from relume.methods.opened.baked_views import BakedViews, FewSamples
+from relume.methods.opened.baked_views import FewSamples
 from relume.methods.opened.bounced_views import BouncedViews
 from relume.methods.reflected import Reflected
 from relume.operators.image_files import ImageFiles
@@ -100,9 +100,9 @@ class Still(BouncedViews):
         """Light that gather cells send out."""
         return self.lit.reflected
 
-    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
+    def some(self, view: View, material: int, chosen: NDArray[np.integer], *, reflects: bool) -> FewSamples:
         """Some of a material's samples, with what gather rays they have. See `Transfer`."""
-        return super().some(view, material, chosen) if self.reflects else BakedViews.some(self, view, material, chosen)
+        return super().some(view, material, chosen, reflects=reflects and self.reflects)
 
 
 class Tracing:

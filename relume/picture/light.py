@@ -85,7 +85,7 @@ def parts_of(light: Light) -> dict[Light, Rgb]:
     """
     parts = {}
     if light.shows_sky:
-        parts[_direct(of_source(light, None))] = light.environment_gain
+        parts[straight(of_source(light, None))] = light.environment_gain
     if light.paths.direct and light.local:
         parts[direct_from(light, light.local)] = _ONE
     if light.paths.reflect:
@@ -109,7 +109,7 @@ def vector_of(light: Light) -> Mapping[Light, Rgb]:
     for source, gain in sources.items():
         alone = of_source(light, source)
         if light.paths.direct:
-            vector[_direct(alone)] = gain
+            vector[straight(alone)] = gain
         if light.paths.reflect:
             vector[_reflected(alone)] = gain
     return MappingProxyType(vector)
@@ -123,7 +123,8 @@ def change_of(before: Light, after: Light) -> Mapping[Light, Rgb]:
     return MappingProxyType({element: gain for element, gain in change.items() if any(gain)})
 
 
-def _direct(light: Light) -> Light:
+def straight(light: Light) -> Light:
+    """What of a light comes straight from its sources."""
     return light._replace(paths=light.paths.without_reflections(), reflectances=())
 
 

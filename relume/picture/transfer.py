@@ -216,8 +216,13 @@ class Transfer(Opened, Protocol):
         """How much more flat mirrors throw after than before, in the same environment; None for nothing."""
         ...
 
-    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> Few:
-        """Some of a material's samples in a view; `chosen`, (k,), counts from the material's first."""
+    def some(self, view: View, material: int, chosen: NDArray[np.integer], *, reflects: bool) -> Few:
+        """Some of a material's samples.
+
+        Args:
+            view: whose samples. material: index of the material. chosen: counted from the material's first. (k,)
+            reflects: with light between surfaces, where that was baked; reading its rays takes longest.
+        """
         ...
 
     def open_sky(self, light: Light, points: Points, *, is_preview: bool) -> Arriving:

@@ -140,7 +140,9 @@ class Transition:
         if self._lacks_preview(hand):
             is_opening = all(place.live.is_blank for place in self._places())
             lacking = [place for place in self._unlit() if self._route(place, images.light) is None]
-            return Preview.of(images, lacking, "a preview" if is_opening else "the light")
+            whole = Preview.of(images, lacking, "a preview" if is_opening else "the light")
+            paths = images.light.paths
+            return whole.sooner() if is_opening and paths.direct and paths.reflect else whole
         outdated = [p for p in self._places() if p.live.shows_another and not images.is_at_hand(p.material, p.live)]
         if outdated and self._is_watched and can_preview(images):
             return Preview.of(images, outdated, "what was changed")

@@ -13,6 +13,7 @@ from relume.memory import Memory
 from relume.picture.picture import Picture
 from relume.picture.routes.preview import Preview
 from relume.picture.view_images import ViewImages
+from relume.views.view import View
 
 COLOURS = np.eye(3)
 
@@ -162,10 +163,39 @@ def test_opened_picture_is_whole_at_once_and_then_shaded(opened, maps, monkeypat
     assert isinstance(make_next(picture), Preview)
     whole = picture.advance(None)
     assert (whole.complete, whole.fidelity, whole.exact) == (True, "preview", False)
+    while isinstance(picture.next_job(), Preview):
+        make_next(picture)
     expected = exact_image(opened, look)
+    picture.advance(None)
     assert relative_rmse(picture.image(), expected) < 0.5
     assert picture.next_job().refines
     np.testing.assert_array_equal(settle(picture).image(), expected)
+
+
+def test_what_comes_straight_is_seen_before_light_between_surfaces_is_found(gathered, maps, monkeypatch):
+    monkeypatch.setattr("relume.picture.routes.preview._FEW_TO_SHADE", 100)
+    lit = lit_by(maps, 1, rotation=33.0)
+
+    def straight(document):
+        lit(document)
+        document["transport"] = {**document.get("transport", {}), "show": "direct"}
+
+    looks = look_of(gathered, straight), look_of(gathered, lit)
+    direct, all_light = (exact_image(gathered, look) for look in looks)
+    read, some_rays = [], View.some_gather_rays
+    monkeypatch.setattr(View, "some_gather_rays", lambda *given: read.append(given) or some_rays(*given))
+    first, of_direct = (start(gathered, look, is_watched=True) for look in reversed(looks))
+    for picture in (first, of_direct):
+        picture.advance(None)
+        assert isinstance(make_next(picture), Preview)
+        assert picture.advance(None).complete
+    assert not read
+    before = first.image()
+    np.testing.assert_array_equal(before, of_direct.image())
+    assert isinstance(make_next(first), Preview)
+    first.advance(None)
+    assert read
+    assert relative_rmse(first.image() - before, all_light - direct) < 0.4
 
 
 def test_curve_that_moves_meanwhile_does_not_wait_for_the_hand_to_rest(transfer, maps, monkeypatch):

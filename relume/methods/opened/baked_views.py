@@ -220,7 +220,7 @@ class BakedViews:
         """How much more flat mirrors throw after than before: nothing. See `Transfer`."""
         return None
 
-    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
+    def some(self, view: View, material: int, chosen: NDArray[np.integer], *, reflects: bool) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
         few = view.receivers(material, is_lit=False).places(chosen)
         visible = np.asarray(view.read_some("visibility", material, chosen), np.uint8)

@@ -117,8 +117,10 @@ class BouncedViews(BakedViews):
         """How much more flat mirrors throw after than before. See `Transfer`."""
         return None if self.thrown_light is None else self.thrown_light.more(before, after)
 
-    def some(self, view: View, material: int, chosen: NDArray[np.integer]) -> FewSamples:
+    def some(self, view: View, material: int, chosen: NDArray[np.integer], *, reflects: bool) -> FewSamples:
         """Some of a material's samples. See `Transfer`."""
-        few = super().some(view, material, chosen)
+        few = super().some(view, material, chosen, reflects=reflects)
+        if not reflects:
+            return few
         thrown = None if self.thrown is None else np.asarray(view.read_some("thrown", material, chosen), np.uint8)
         return replace(few, gathered=view.some_gather_rays(material, chosen, _NOTHING), thrown=thrown)

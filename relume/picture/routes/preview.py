@@ -24,7 +24,7 @@ from relume.operators.arrived import arrive, is_quick, sent_between
 from relume.operators.shade import Shaded, shade
 from relume.picture.fidelity import Fidelity
 from relume.picture.jobs import Cancelled, Place, Progress
-from relume.picture.light import Light
+from relume.picture.light import Light, straight
 from relume.picture.region import with_rows
 from relume.picture.shown import Shown
 from relume.picture.transfer import Few, Transfer
@@ -60,14 +60,14 @@ class Sparse:
         return int(self.few.num_bytes + weights.data.nbytes + weights.indices.nbytes + weights.indptr.nbytes)
 
 
-def choose_sparse(transfer: Transfer, view: View, material: int, detail: int = 0) -> Sparse:
+def choose_sparse(transfer: Transfer, view: View, material: int, detail: int = 0, *, reflects: bool = True) -> Sparse:
     """One sample of each square of pixels that a material is seen in; reads the store.
 
     Those between take the mean of the nearest, by place in the picture and by normal.
 
     Args:
         transfer: an opened bake. view: one of its views. material: index of the material.
-        detail: how often the samples are made more.
+        detail: how often the samples are made more. reflects: they are shaded with light between surfaces.
     """
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _num_shaded(detail)))))
     chosen = one_of_each_square(view, material, step)
@@ -75,25 +75,26 @@ def choose_sparse(transfer: Transfer, view: View, material: int, detail: int = 0
     first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(chosen))
     weights = csr_array((weight.ravel(), near.ravel(), first), shape=shape)
     weights.eliminate_zeros()
-    return Sparse(transfer.some(view, material, chosen), weights)
+    return Sparse(transfer.some(view, material, chosen, reflects=reflects), weights)
 
 
 def _num_shaded(detail: int) -> int:
     return _MOST_SHADED * int(_FINER**detail)
 
 
-def _sparse(images: ViewImages, material: int, detail: int) -> Sparse:
+def _sparse(images: ViewImages, material: int, light: Light, detail: int) -> Sparse:
     """Of a material of a view, kept in the cache with the operators; of finer previews for a while."""
+    reflects = light.paths.reflect
 
     def choose() -> Sparse:
-        return choose_sparse(images.transfer, images.view, material, detail)
+        return choose_sparse(images.transfer, images.view, material, detail, reflects=reflects)
 
     cache = images.cache.passing if detail else images.cache
-    return cache.get(_key(images, material, detail), Sparse, _bytes_of(images, material), choose)
+    return cache.get(_key(images, material, light, detail), Sparse, _bytes_of(images, material), choose)
 
 
-def _key(images: ViewImages, material: int, detail: int = 0) -> tuple[Hashable, ...]:
-    return images.transfer.key, *images.view.place(material), "sparse", detail
+def _key(images: ViewImages, material: int, light: Light, detail: int = 0) -> tuple[Hashable, ...]:
+    return images.transfer.key, *images.view.place(material), "sparse", light.paths.reflect, detail
 
 
 def _bytes_of(images: ViewImages, material: int) -> int:
@@ -121,7 +122,7 @@ def is_worth_finer(num_samples: int, detail: int) -> bool:
 def is_prepared(images: ViewImages) -> bool:
     """Whether the samples have been chosen: the first preview of a view takes a second more."""
     seen = {material.index for material, _ in images.terms()}
-    return all(images.cache.find(_key(images, index), Sparse) is not None for index in seen)
+    return all(images.cache.find(_key(images, index, images.light), Sparse) is not None for index in seen)
 
 
 @dataclass(frozen=True)
@@ -167,11 +168,15 @@ class Preview:
         """The same of more samples. refines: it can wait for hands."""
         return replace(self, key=(*self.key, detail), detail=detail, refines=refines)
 
+    def sooner(self) -> Preview:
+        """The same of what light comes straight: that between surfaces takes some seconds where it is not known."""
+        return replace(self, key=(*self.key, "straight"), light=straight(self.light))
+
     def make(self, progress: Progress, cancelled: Cancelled) -> list[F32]:
         """See `Job`. Returns images of all parts, (tiles, 3, samples) float32 each."""
         found = []
         for k, part in enumerate(self.parts):
-            sparse = _sparse(self.images, part.place.material.index, self.detail)
+            sparse = _sparse(self.images, part.place.material.index, self.light, self.detail)
             found.append(self._glimpsed(part, sparse, cancelled))
             progress((k + 1) / len(self.parts))
         return found
