@@ -12,9 +12,10 @@ from relume import look as looks
 from relume.errors import NotFoundError
 from relume.measured.asset_store import STORE as MEASURED
 from relume.picture.transfer import Opened
+from relume.scene.placed_camera import placed_camera
 from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
-from server.routes.renders import baked_view, check_look
+from server.routes.renders import baked_view, check_eye_size, check_look
 from server.services import Services, Shared
 from server.wire.bodies import ShareBody, ShareEntry, ShareRequest, moment
 from worker.scenes import get_scene
@@ -38,8 +39,12 @@ async def make_share(request: ShareRequest, services: Shared, response: Response
 
 def _complete(request: ShareRequest, transfer: Opened) -> dict[str, Any]:
     """The whole look, so that it stays what it is whatever defaults become."""
-    for name in {request.view, *request.views}:
+    for name in {request.view, *request.views, *request.eyes, *request.sizes}:
         baked_view(name, transfer)
+    for name, eye in request.eyes.items():
+        placed_camera(name, eye.to_world, eye.yfov)
+    for size in request.sizes.values():
+        check_eye_size(size)
     check_look(request.look, transfer, "/look")
     return looks.complete(request.look, transfer.default_look)
 

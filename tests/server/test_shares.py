@@ -46,8 +46,17 @@ def test_a_link_keeps_where_eyes_are(client: TestClient, baked: Baked) -> None:
     made = client.post("/api/shares", json=body(baked, eyes=eyes, sizes={"left": [90, 60]}))
     found = client.get(made.headers["location"]).json()
     assert (found["eyes"], found["sizes"]) == (eyes, {"left": [90, 60]})
-    assert client.post("/api/shares", json=body(baked, eyes={"left": {"to_world": [], "yfov": 1}})).status_code == 422
-    assert client.post("/api/shares", json=body(baked, sizes={"left": [10**6, 1]})).status_code == 422
+    mirrored = [-1.0, *eyes["left"]["to_world"][1:]]
+    for refused in (
+        {"eyes": {"left": {"to_world": [], "yfov": 1}}},
+        {"eyes": {"left": eyes["left"] | {"yfov": 180.0}}},
+        {"eyes": {"left": eyes["left"] | {"to_world": mirrored}}},
+        {"eyes": {"nobody": eyes["left"]}},
+        {"sizes": {"left": [10**6, 1]}},
+        {"sizes": {"left": [16384, 16384]}},
+        {"sizes": {"nobody": [90, 60]}},
+    ):
+        assert client.post("/api/shares", json=body(baked, **refused)).status_code == 422, refused
 
 
 def test_the_same_again_is_the_same_link_and_another_look_another(client: TestClient, baked: Baked) -> None:
