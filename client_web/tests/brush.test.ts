@@ -23,3 +23,18 @@ test("a stretch is asked about when the eye rests, and not at all where the poin
   vi.advanceTimersByTime(1000);
   expect(send.mock.calls).toEqual([[{ type: "brush", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }]]);
 });
+
+test("a stretch of a curve that is being frozen is asked about when it is there", async () => {
+  const [{ brush, clearBrush }, { fidelity }] = [await import("../src/curve/brush"), await import("../src/state/fidelity")];
+  const { freezing } = await import("../src/state/connection");
+  send.mockClear();
+  fidelity.value = "exact";
+  freezing.value = { state: "freezing", view: "front", what: "A, half angle", progress: 0.2 };
+  brush(3, 7);
+  vi.advanceTimersByTime(5000);
+  expect(send).not.toHaveBeenCalled();
+  freezing.value = null;
+  vi.advanceTimersByTime(1000);
+  expect(send).toHaveBeenCalledOnce();
+  clearBrush();
+});

@@ -1,6 +1,7 @@
 /** Curve → pixels: pointing at a stretch asks the server which pixels it lights. */
 import { send } from "../live/connections";
 import { stage } from "../picture/stage";
+import { freezing } from "../state/connection";
 import { brushed } from "../state/curveShape";
 import { fidelity } from "../state/fidelity";
 import { curvePath } from "../state/selection";
@@ -20,10 +21,13 @@ export function clearBrush(): void {
 }
 
 /** Whether the picture is of points, of which no curve is frozen: where the eye rests another takes its place. */
-const isOnItsWay = () => moves.peek() && (fidelity.peek() === "approximate" || fidelity.peek() === "preview");
+const isOfPoints = () => moves.peek() && (fidelity.peek() === "approximate" || fidelity.peek() === "preview");
 
-/** Ask for the pixels of a stretch; at first only when the pointer rests, then at most every `EVERY_MS`; of a view whose eye
- * moves when that has come to rest. */
+/** Whether what knows the pixels is on its way: a curve that was opened is frozen first. */
+const isOnItsWay = () => freezing.peek()?.state === "freezing" || isOfPoints();
+
+/** Ask for the pixels of a stretch; at first only when the pointer rests, then at most every `EVERY_MS`; when the curve is
+ * there, and of a view whose eye moves when that has come to rest. */
 export function brush(from: number, to: number): void {
   const curve = curvePath.peek();
   if (!lights.peek() || curve === null) return;

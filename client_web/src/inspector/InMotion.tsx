@@ -10,7 +10,7 @@ import { useTold } from "./useTold";
 function words({ functions, missed, needed, is_mirror }: InOutBody): string {
   const percent = missed < 0.01 ? "less than 1 %" : `${Math.round(100 * missed)} %`;
   if (is_mirror) return `While the eye moves: a blurred mirror. ${functions} terms would miss ${percent} of this highlight.`;
-  const enough = needed === null ? "" : needed === 1 ? "; one misses less than 5 %" : `; ${needed} miss less than 5 %`;
+  const enough = needed === null || needed === functions ? "" : needed === 1 ? "; one misses less than 5 %" : `; ${needed} miss less than 5 %`;
   return `While the eye moves: ${functions} terms, which miss ${percent}${enough}.`;
 }
 
