@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
         ParameterError: a setting cannot be what it is.
     """
     from pydantic import ValidationError
+    from pydantic_settings import SettingsError
 
     from relume.errors import ParameterError
     from relume.imageio.ocio.current import use
@@ -34,13 +36,24 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
         settings = Settings(**given)
     except ValidationError as error:
         first = error.errors()[0]
-        name = ".".join(map(str, first["loc"]))
-        raise ParameterError(name, first["input"], first["msg"].lower()) from None
+        field, *within = map(str, first["loc"])
+        name = ".".join((f"RELUME_{field.upper()}", *within))
+        raise ParameterError(name, first["input"], _allowed(first["msg"])) from None
+    except SettingsError as error:  # which tells the field in its words alone
+        variable = "RELUME_" + "".join(str(error).split('"')[1:2]).upper()
+        allowed = """JSON, as '["10.0.0.5"]' or '{"Ann": "edit"}', in quotes of the shell"""
+        raise ParameterError(variable, os.environ.get(variable), allowed) from None
     settings.data.mkdir(parents=True, exist_ok=True)
     for store, folder in shelves(settings.data):
         store.use(folder)
     use(settings.ocio, settings.ocio_space)
     return settings
+
+
+def _allowed(message: str) -> str:
+    """What pydantic says of a value, to stand behind "give"."""
+    said = message.removeprefix("Input should be ").removeprefix("Value error, ")
+    return said[:1].lower() + said[1:]
 
 
 def open_bakes(settings: Settings) -> BakeService:

@@ -30,6 +30,7 @@ def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, schedule
     from relume.imageio.ocio.current import current
     from server.app import serve as run_server
     from worker.database import open_database
+    from worker.storage.remote import configured
 
     is_url = data is not None and "://" in data
     folder = None if data is None or is_url else Path(data)
@@ -37,6 +38,7 @@ def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, schedule
     check_port(settings.host, settings.port)
     open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
     current()  # likewise
+    configured()  # likewise
     where = address(settings.host, settings.port)
     run_server(settings, tell_started=lambda: tell(f"relume listens on {where}", settings.log_format))
 

@@ -27,7 +27,10 @@ def _quarter_of_memory() -> int:
 
 
 def _check_network(text: str) -> str:
-    ip_network(text, strict=False)
+    try:
+        ip_network(text, strict=False)
+    except ValueError:
+        raise ValueError("an address such as 10.0.0.5, or a network such as 10.0.0.0/8") from None
     return text
 
 

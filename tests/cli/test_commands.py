@@ -258,6 +258,34 @@ def test_a_server_with_a_damaged_database_says_one_sentence(data: Path, capsys: 
     assert line.startswith("relume: the database is damaged")
 
 
+@pytest.mark.parametrize(
+    ("variable", "value", "said"),
+    [
+        ("RELUME_TURNS", "{bad", "RELUME_TURNS is '{bad'; give JSON"),
+        ("RELUME_TURNS", '{"Ann": -1}', "RELUME_TURNS.Ann is -1; give greater than 0"),
+        ("RELUME_TRUSTED_PROXIES", '["10.0.0.300"]', "RELUME_TRUSTED_PROXIES.0 is '10.0.0.300'; give an address"),
+        ("RELUME_LOG_LEVEL", "loud", "RELUME_LOG_LEVEL is 'loud'; give 'debug', 'info', "),
+        ("RELUME_STORAGE", "s3://", "RELUME_STORAGE is 's3://'; give one that can be used (Generic URL error: "),
+        ("RELUME_STORAGE", "ftp://x", "RELUME_STORAGE is 'ftp://x'; give a URL such as s3://bucket/prefix"),
+        ("RELUME_DATABASE", "postgresql://ann@127.0.0.1:9/x", "the database cannot be used (network error: "),
+    ],
+)
+def test_a_setting_that_cannot_be_is_one_sentence(
+    data: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    variable: str,
+    value: str,
+    said: str,
+) -> None:
+    monkeypatch.setenv(variable, value)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = str(probe.getsockname()[1])
+    assert main(["serve", "--data", str(data), "--port", port]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"relume: {said}")
+
+
 def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])

@@ -54,7 +54,8 @@ class Remote:
         try:
             self._store = from_url(url, **options)
         except (BaseError, ValueError, OSError) as error:
-            raise ParameterError("RELUME_STORAGE", url, f"one that can be used ({str(error)[:200]})") from None
+            why = str(error).partition("\n")[0][:200]  # what follows is the library's own
+            raise ParameterError("RELUME_STORAGE", url, f"one that can be used ({why})") from None
 
     def put(self, name: str, folder: Path, files: Sequence[str]) -> None:
         """Store a folder under a name, whole or not at all; what was there under it is replaced.
