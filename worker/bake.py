@@ -218,7 +218,10 @@ class BakeRunner:
         """A task is finished: its shards are stored, where others may go on with them, before it counts."""
         if self._parts is not None:
             self._parts.store((task.stage, task.index))
-        self._ask(self.ledger.finish_task, self.job.bake_id, task, cost, attempt)
+        try:
+            self._ask(self.ledger.finish_task, self.job.bake_id, task, cost, attempt)
+        except IntegrityError:
+            raise CancelledError("the bake was deleted") from None
 
     def _beat(self, progress: Progress, phase: Phase) -> None:
         """Record progress; raise CancelledError where somebody wants this run to end."""
@@ -241,7 +244,7 @@ class BakeRunner:
                 if not future.cancelled() and future.exception() is None:
                     try:
                         self._record(task, future.result(), attempt)
-                    except IntegrityError:  # the bake was deleted
+                    except CancelledError:
                         return
 
     def _ask(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:

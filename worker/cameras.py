@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from sqlalchemy import delete, func, select
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from relume.errors import NotFoundError, ParameterError
@@ -50,11 +51,17 @@ def keep_camera(ledger: Ledger, scene_id: str, camera: PlacedCamera) -> bool:
             many.
     """
     _refuse_own(get_scene(ledger, scene_id), camera.name)
-    with ledger.sessions.begin() as session:
-        row = session.get(CameraRow, (scene_id, camera.name))
-        if row is None and _count(session, scene_id) >= MAX_CAMERAS:
-            raise ParameterError("name", camera.name, f"the name of one of the {MAX_CAMERAS} cameras, or delete one")
-        session.merge(CameraRow(scene_id=scene_id, name=camera.name, document=json.dumps(camera.document())))
+    kept = CameraRow(scene_id=scene_id, name=camera.name, document=json.dumps(camera.document()))
+    try:
+        with ledger.sessions.begin() as session:
+            row = session.get(CameraRow, (scene_id, camera.name))
+            if row is None and _count(session, scene_id) >= MAX_CAMERAS:
+                allowed = f"the name of one of the {MAX_CAMERAS} cameras, or delete one"
+                raise ParameterError("name", camera.name, allowed)
+            session.merge(kept)
+    except IntegrityError:
+        get_scene(ledger, scene_id)  # it was deleted in this moment
+        return False  # or somebody else has kept one under this name
     return row is None
 
 

@@ -116,12 +116,21 @@ def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
     """
     get_scene(ledger, scene_id)
     delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
-    with ledger.sessions.begin() as session:
-        session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
-        if (row := session.get(SceneRow, scene_id)) is not None:
-            session.delete(row)
+    while not _strike_scene(ledger, scene_id):  # somebody has asked for a bake of it meanwhile
+        delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
     forget(scene_path(data_dir, scene_id))
     _remove(scene_path(data_dir, scene_id))
+
+
+def _strike_scene(ledger: Ledger, scene_id: str) -> bool:
+    """Whether a scene is in the ledger no more; false where there is a bake or a camera of it."""
+    try:
+        with ledger.sessions.begin() as session:
+            session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
+            session.execute(delete(SceneRow).where(SceneRow.id == scene_id))
+    except IntegrityError:
+        return False
+    return True
 
 
 def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sqlalchemy import delete
+from sqlalchemy.orm import Session
 from tiny_scenes import still_life
 
 from relume.bake import Recipe
@@ -17,6 +19,7 @@ from relume.store.publish import array_paths
 from worker import cameras
 from worker.cameras import chosen_views, delete_camera, keep_camera, kept_cameras, placed_names
 from worker.database import open_database
+from worker.database.models import SceneRow
 from worker.ledger import Ledger
 from worker.scenes import SceneRecord, delete_scene, get_scene, register_scene
 from worker.status import recipe_from_json, recipe_json
@@ -112,3 +115,18 @@ def test_view_of_a_placed_camera_is_what_the_scenes_own_gives_there(scene: Scene
 def test_view_of_a_camera_that_the_recipe_does_not_bring_is_refused(scene: Scene) -> None:
     with pytest.raises(PlanError, match="Hero"):
         METHOD.plan(scene, Recipe("direct", ("Hero",), (32, 24), 50))
+
+
+def test_a_camera_of_a_scene_that_is_deleted_in_this_moment_is_none(
+    tmp_path: Path, ledger: Ledger, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count = cameras._count
+
+    def deleted_meanwhile(session: Session, scene_id: str) -> int:
+        with session.bind.begin() as connection:  # type: ignore[union-attr]
+            connection.execute(delete(SceneRow).where(SceneRow.id == scene_id))
+        return count(session, scene_id)
+
+    monkeypatch.setattr(cameras, "_count", deleted_meanwhile)
+    with pytest.raises(NotFoundError):
+        keep_camera(ledger, scene.id, alike(scene, "Hero"))

@@ -4,6 +4,8 @@ import hashlib
 import re
 import threading
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,8 @@ from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
 from relume.store import bake_here, open_store
-from worker import lease
+from worker import lease, scenes
+from worker.ledger import Ledger
 from worker.paths import staging_path
 from worker.scenes import delete_scene, register_scene
 from worker.service import BakeService
@@ -335,6 +338,43 @@ def test_scene_deleted_during_its_bake_ends_it(tmp_path: Path) -> None:
             assert list(changes)[-1:] in ([], [changes.latest])
         register_scene(service.data_dir, service.ledger, SCENE)
         assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
+
+
+def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    finish, deleted = Ledger.finish_task, threading.Event()
+
+    def finish_deleted(ledger: Ledger, identity: str, *told: Any) -> None:
+        ledger.delete_bakes([identity])
+        deleted.set()
+        finish(ledger, identity, *told)
+
+    monkeypatch.setattr(Ledger, "finish_task", finish_deleted)
+    with open_service(tmp_path) as service:
+        service.submit(SCENE.id, RECIPE)
+        assert deleted.wait(30)
+    assert [record.message for record in caplog.records if "failed" in record.message] == []
+
+
+def test_bakes_that_are_asked_for_while_their_scene_is_deleted_go_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_service(tmp_path, delay_s=0.05) as service:
+        recipes = [replace(RECIPE, num_lights=RECIPE.num_lights + k) for k in range(3)]
+        struck = scenes.delete_bakes
+
+        def asked_again(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
+            struck(data_dir, ledger, ids)
+            if recipes:
+                service.submit(SCENE.id, recipes.pop())
+
+        monkeypatch.setattr(scenes, "delete_bakes", asked_again)
+        delete_scene(service.data_dir, service.ledger, SCENE.id)
+        assert recipes == []
+        assert service.bakes() == []
+        with pytest.raises(NotFoundError):
+            service.submit(SCENE.id, RECIPE)
 
 
 def test_stores_that_nobody_will_finish_are_removed_at_the_start(
