@@ -124,17 +124,17 @@ class BakeRunner:
     def _begin_or_go_on(self) -> None:
         """Keep what an earlier run has finished where it is here and of the same code; else start from nothing."""
         identity, staging = self.job.bake_id, self._staging
-        has_begun, run = staging.exists(), self._ask(self.ledger.run, identity)
-        is_here = has_begun and run_of(staging) == run
+        run = self._ask(self.ledger.run, identity)
+        is_here = staging.exists() and run_of(staging) == run
         finished = self._ask(self.ledger.finished_tasks, identity)
         if not is_here and run is not None and fetch_parts(staging, identity, run, finished):
-            has_begun = is_here = True
+            is_here = True
             name_run(staging, run)
         if is_here and code_of(staging) == self.job.code:
             self._parts = Parts(staging, identity, run, finished) if run is not None else None
             return
-        is_of_others = bool(finished) and not is_here
-        why = TAKEN_OVER if is_of_others else UPGRADED if has_begun else None
+        # where nothing is finished, what is here is left of one that was deleted
+        why = None if not finished else UPGRADED if is_here else TAKEN_OVER
         if why is not None:
             log.warning("bake %s: %s", identity, why, extra={"fields": {"bake": identity}})
         shutil.rmtree(staging, ignore_errors=True)

@@ -80,7 +80,8 @@ def _answer(shop: Any, message: dict[str, Any], stop: threading.Event, out: Any)
     except Exception as error:
         if not isinstance(error, RelumeError | OSError):
             log.exception("a %s failed", message["kind"])
-        return {"problem": problem_of(error).detail}
+        problem = problem_of(error)
+        return {"problem": problem.detail, "kind": problem.type.rpartition(":")[2]}
 
 
 if __name__ == "__main__":

@@ -16,12 +16,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from relume.errors import CancelledError, RelumeError
+from relume.errors import CancelledError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
 from relume.imageio.ocio.current import source
 from relume.resident import resident_bytes
 from server.apart.step import IsWanted, Step, Tell
 
 COMMAND = ["-m", "server.apart.main"]
+_KINDS: Mapping[str, type[RelumeError]] = {
+    "store-not-found": StoreNotFoundError,
+    "store": StoreError,
+    "not-found": NotFoundError,
+}
+"""What a step may meet that is no failure of its process, by the last part of the problem's type."""
 _ASK_S = 0.1
 _STOP_S = 1.0  # a kernel may be at work for longer than anybody wants to wait
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -125,6 +131,6 @@ def _answer(message: Mapping[str, Any]) -> Mapping[str, Any]:
     if "cancelled" in message:
         raise CancelledError("the step was stopped")
     if "problem" in message:
-        raise RelumeError(message["problem"])
+        raise _KINDS.get(message.get("kind", ""), RelumeError)(message["problem"])
     answer: Mapping[str, Any] = message["answer"]
     return answer

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from sqlalchemy import select, update
 
-from relume.errors import CancelledError, RelumeError
+from relume.errors import CancelledError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
 from relume.resident import resident_bytes
 from server.apart import process as processes
 from server.apart.pool import Pool
@@ -34,7 +34,7 @@ for line in sys.stdin:
     if kind == "grow":
         held = bytearray(1 << 28)
     if kind == "fail":
-        print(json.dumps({"problem": "no."}), flush=True)
+        print(json.dumps({"problem": "no.", **message["values"]}), flush=True)
         continue
     if kind == "hang":
         print(json.dumps({"share": 0.5}), flush=True)
@@ -71,6 +71,22 @@ def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: Poo
     assert pool.pids() == []
     assert resident_bytes(first) == 0
     assert pool.run(Step("work"), ignore, always)["pid"] != first
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"),
+    [
+        ({}, RelumeError),
+        ({"kind": "defect"}, RelumeError),
+        ({"kind": "store-not-found"}, StoreNotFoundError),
+        ({"kind": "store"}, StoreError),
+        ({"kind": "not-found"}, NotFoundError),
+    ],
+)
+def test_what_a_step_meets_is_what_its_process_met(pool: Pool, values: dict[str, str], kind: type[Exception]) -> None:
+    with pytest.raises(RelumeError, match="no") as met:
+        pool.run(Step("fail", values=values), ignore, always)
+    assert met.type is kind
 
 
 def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: Pool, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from worker.ledger import Ledger
 from worker.paths import staging_path
 from worker.scenes import delete_scene, register_scene
 from worker.service import BakeService
-from worker.status import BakeStatus
+from worker.status import BakeStatus, bake_id
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -355,6 +355,15 @@ def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
         service.submit(SCENE.id, RECIPE)
         assert deleted.wait(30)
     assert [record.message for record in caplog.records if "failed" in record.message] == []
+
+
+def test_what_is_left_of_a_deleted_bake_is_of_no_other_version(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with open_service(tmp_path) as service:
+        staging_path(service.data_dir, bake_id(SCENE.id, RECIPE)).mkdir(parents=True)
+        assert follow(service, service.submit(SCENE.id, RECIPE)).problem is None
+    assert "relume has changed" not in caplog.text
 
 
 def test_bakes_that_are_asked_for_while_their_scene_is_deleted_go_with_it(
