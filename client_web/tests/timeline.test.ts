@@ -22,7 +22,7 @@ import { look } from "../src/state/look";
 import { placedEye } from "../src/state/eyes";
 import { timelineOpen } from "../src/state/panels";
 import { shownViews, viewName, views } from "../src/state/views";
-import { at as place, frames, numFrames, pathOf, play, playing, seek } from "../src/timeline/play";
+import { at as place, frames, numFrames, pathOf, play, playing, seek, togglePlay } from "../src/timeline/play";
 import { LOOK, lookWith } from "./look";
 
 const EXPOSURE = "/display/exposure";
@@ -62,6 +62,22 @@ async function prepared(cameras: { to_world: number[]; yfov: number }[] | null =
   addKeyframe({ name: "Bright", look: BRIGHT });
   await vi.waitFor(() => expect(frames.value).not.toBeNull());
 }
+
+test("what is asked to be played while its frames are on their way is played when they are there", async () => {
+  const soon = prepared();
+  togglePlay();
+  expect(playing.value).toBe(false);
+  await soon;
+  expect(playing.value).toBe(true);
+  togglePlay();
+  expect(playing.value).toBe(false);
+  timelineOpen.value = false;
+  timelineOpen.value = true;
+  togglePlay();
+  togglePlay();
+  await vi.waitFor(() => expect(frames.value).not.toBeNull());
+  expect(playing.value).toBe(false);
+});
 
 test("what is shown in passing is no step, and is gone from without a trace", () => {
   showPassing("on the way", DARK);

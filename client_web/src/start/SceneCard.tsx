@@ -38,7 +38,7 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onGround, onReady }
       <div class="scene-text">
         <b title={scene.name}>{scene.name}</b>
         <small>
-          {formatCount(scene.triangles)}&nbsp;triangles · {scene.materials.length}&nbsp;
+          {formatCount(scene.triangles)}&nbsp;{scene.triangles === 1 ? "triangle" : "triangles"} · {scene.materials.length}&nbsp;
           {scene.materials.length === 1 ? "material" : "materials"} · {scene.views.length}&nbsp;
           {scene.views.length === 1 ? "view" : "views"}
         </small>

@@ -71,8 +71,11 @@ function tick(now: number): void {
   goOn();
 }
 
+let isAwaited = false; // somebody has asked to play what is on its way
+
 export function play(): void {
-  if (frames.peek() === null) return;
+  isAwaited = frames.peek() === null;
+  if (isAwaited) return;
   if (at.peek() >= 1) at.value = 0;
   show();
   playing.value = true;
@@ -82,6 +85,7 @@ export function play(): void {
 
 export function togglePlay(): void {
   if (playing.peek()) playing.value = false;
+  else if (isAwaited) isAwaited = false;
   else play();
 }
 
@@ -114,7 +118,7 @@ effect(() => {
   const asked = ++newest;
   frames.value = null;
   if (!timelineOpen.value || id === null || looks.length < fewestKeyframes.value) {
-    playing.value = false;
+    playing.value = isAwaited = false;
     return;
   }
   window.setTimeout(() => {
@@ -125,7 +129,8 @@ effect(() => {
       if (asked !== newest) return;
       cameras.value = way === "environment" ? null : found.cameras; // hands may move an eye that stays
       frames.value = found.looks as unknown as Look[];
-      if (passing.peek() !== null) show();
+      if (isAwaited) play();
+      else if (passing.peek() !== null) show();
     });
   }, ASK_MS);
 });
