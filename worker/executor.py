@@ -142,7 +142,8 @@ class Executors:
     def _start_cluster(self) -> Any:
         from distributed import LocalCluster
 
-        for name in ("distributed.scheduler", "distributed.nanny"):  # of a process that died the bake speaks itself
+        for name in ("distributed.scheduler", "distributed.nanny", "distributed.client"):
+            # of a process that died the bake speaks itself
             logging.getLogger(name).setLevel(logging.CRITICAL)
         with _without_interrupts():
             self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
