@@ -19,10 +19,10 @@ const latencies: Latency[] = [];
 
 declare global {
   interface Window {
-    relumeStats: { latencies: Latency[]; drawnHere: number };
+    relumeStats: { latencies: Latency[]; waiting: readonly { revision: number }[]; drawnHere: number };
   }
 }
-const stats = { latencies, drawnHere: 0 };
+const stats = { latencies, waiting, drawnHere: 0 };
 if (typeof window !== "undefined") window.relumeStats = stats;
 
 /** This browser has drawn a picture itself. */
