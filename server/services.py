@@ -184,7 +184,7 @@ class _Queues(NamedTuple):
 
 
 def _queues(settings: Settings, service: BakeService, batch: Batches, access: Access) -> _Queues:
-    sessions, quota = service.ledger.sessions, Quota(settings.max_queued, settings.max_queued_each, settings.turns)
+    sessions, quota = service.ledger.sessions, Quota(settings.max_queued, settings.most_queued_each, settings.turns)
 
     def scene_name(bake: str) -> str:
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name

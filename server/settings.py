@@ -70,7 +70,9 @@ class Settings(BaseSettings):
     batch_nice: int = Field(default=10, ge=0, le=19, description="how much they yield to all else, as nice(1) says")
     ahead: bool = Field(default=True, description="whether what a bake shows first is made before anybody opens it")
     max_queued: int = Field(default=100, ge=1, description="renders, and comparisons, that wait or run")
-    max_queued_each: int = Field(default=100, ge=1, description="of them, of one client")
+    max_queued_each: int | None = Field(
+        default=None, ge=1, description="of them, of one client; unset: a quarter where clients are known by name"
+    )
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest upload of a scene or of a BTF's images")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
@@ -119,6 +121,15 @@ class Settings(BaseSettings):
         default=["localhost", "127.0.0.1", "::1"],
         description='names by which clients reach the server, as JSON list; ["*"] for any',
     )
+
+    @property
+    def most_queued_each(self) -> int:
+        """How much work of a kind one client may have waiting: without a setting, what leaves room for three others.
+
+        Where nobody says who calls, all are one client, who may have all.
+        """
+        is_told_apart = self.login or bool(self.trusted_proxies)
+        return self.max_queued_each or (max(1, self.max_queued // 4) if is_told_apart else self.max_queued)
 
     @property
     def database_url(self) -> str:

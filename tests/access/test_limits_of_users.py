@@ -245,6 +245,29 @@ class TestBakes:
         assert client.post("/api/bakes", json=third, headers=ann).status_code == 202
 
 
+class TestQueues:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.max_queued = 8
+        return settings
+
+    def test_one_user_fills_a_quarter_of_a_queue(
+        self, client: TestClient, bearer: Bearer, baked: Baked, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(client.app.state.services.renders, "_next", lambda: None)  # all wait
+        request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "png"}
+        ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
+        answers = [client.post("/api/renders", json=request, headers=who) for who in (ann, ann, ann, bob)]
+        assert [answer.status_code for answer in answers] == [202, 202, 429, 202]
+        assert "may, 2; " in answers[2].json()["detail"]
+
+
+def test_without_names_all_are_one_client_who_may_fill_a_queue() -> None:
+    assert Settings(max_queued=8).most_queued_each == 8
+    assert Settings(max_queued=8, trusted_proxies=["10.0.0.5"]).most_queued_each == 2
+    assert Settings(max_queued=8, max_queued_each=3).most_queued_each == 3
+
+
 def test_each_change_is_a_line_and_nothing_else_is(client: TestClient, bearer: Bearer, baked: Baked) -> None:
     ann, root, viewer = bearer("edit", "Ann"), bearer("admin", "Root"), bearer("view")
     client.put("/api/looks/Red", json={}, headers={**ann, "X-Request-ID": "abc-1"})
