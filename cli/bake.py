@@ -80,7 +80,7 @@ def _recipe(
 ) -> Recipe:
     from relume.bake import Recipe
     from relume.errors import ParameterError
-    from worker.presets import PRESETS
+    from worker.presets import PRESETS, points_of
 
     if lights is not None and lights < 1:
         raise ParameterError("--lights", lights, "a number of at least 1")
@@ -88,7 +88,8 @@ def _recipe(
         raise ParameterError("--points", points, "a number of at least 1")
     preset, (names, cameras) = PRESETS["good"], views
     pixels = parse_size(size) if size else preset.size
-    return Recipe(method, names, pixels, lights or preset.num_lights, relightable, cameras, points or Recipe.num_points)
+    num_lights, num_points = lights or preset.num_lights, points_of(method, points)
+    return Recipe(method, names, pixels, num_lights, relightable, cameras, num_points)
 
 
 def _watch(service: BakeService, settings: Settings, identity: str, label: str) -> int:

@@ -1,9 +1,13 @@
-"""How fine a bake is, by name."""
+"""How fine a bake is, by name or by number."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
+
+from relume.bake import Recipe
+from relume.errors import PlanError
+from worker.status import MOVING
 
 PresetName = Literal["preview", "good", "final"]
 
@@ -21,3 +25,14 @@ PRESETS: dict[PresetName, Preset] = {
     "good": Preset((640, 480), 2000),
     "final": Preset((1024, 768), 4000),
 }
+
+
+def points_of(method: str, asked: int | None) -> int:
+    """The `num_points` of a recipe; as many as usual where no number is asked for.
+
+    Raises:
+        PlanError: a number is asked for, and the method's eyes do not move.
+    """
+    if asked is not None and method not in MOVING:
+        raise PlanError(f"{asked} points were asked for; method {method} has none, leave them out")
+    return asked or Recipe.num_points

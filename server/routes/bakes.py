@@ -27,9 +27,9 @@ from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, Reci
 from server.wire.body import Id
 from server.wire.cameras import CameraBody
 from worker.cameras import chosen_views
-from worker.presets import PRESETS
+from worker.presets import PRESETS, points_of
 from worker.scenes import get_scene
-from worker.status import BakeStatus, bake_id
+from worker.status import MOVING, BakeStatus, bake_id
 
 router = APIRouter(prefix="/api/bakes", tags=["bakes"])
 
@@ -152,7 +152,7 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
     views, cameras = chosen_views(ledger, get_scene(ledger, request.scene), wanted)
     preset = PRESETS[request.preset or "good"]
     lights = request.lights or preset.num_lights
-    points = request.points or Recipe.num_points
+    points = points_of(request.method, request.points)
     size, gathering = request.size or preset.size, (request.gather_samples, request.gather_rays)
     return Recipe(request.method, views, size, lights, request.relightable, cameras, points, *gathering)
 
@@ -170,7 +170,7 @@ def _recipe_body(recipe: Recipe) -> RecipeBody:
         views=list(recipe.views),
         size=recipe.size,
         lights=recipe.num_lights,
-        points=recipe.num_points,
+        points=recipe.num_points if recipe.method in MOVING else None,
         gather_samples=recipe.gather_samples,
         gather_rays=recipe.gather_rays,
         relightable=recipe.relightable,

@@ -174,7 +174,8 @@ class BakeRequest(Body):
     """What to bake. A preset gives size and lights; what is named beside it wins.
 
     `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
-    where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none.
+    where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none,
+    and a number of them is refused.
     `gather_samples`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point,
     that look for them; as many as fit the picture where they are not named (methods `gather` and `surface`).
     `relightable`: divide the light so that turning or exchanging the environment errs little.
@@ -204,14 +205,14 @@ class PlanBody(Body):
 
 
 class RecipeBody(Body):
-    """What was asked for, complete; `cameras` are those of the `views` that somebody placed. `gather_samples`,
-    `gather_rays`: null where the method chooses."""
+    """What was asked for, complete; `cameras` are those of the `views` that somebody placed. `points`: null where the
+    eye does not move. `gather_samples`, `gather_rays`: null where the method chooses."""
 
     method: str
     views: list[str]
     size: tuple[int, int]
     lights: int
-    points: int
+    points: int | None
     gather_samples: int | None
     gather_rays: int | None
     relightable: bool

@@ -229,6 +229,8 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     turntable = ["render", "quad", "--turntable", "3", "--look", str(look), "--output", str(folder)]
     assert main(turntable) == 1
     assert "--method surface" in capsys.readouterr().err
+    assert main(["bake", "quad", "--view", "front", "--points", "200", *TINY]) == 1
+    assert "method direct has none" in capsys.readouterr().err
     assert main(["bake", "quad", "--view", "front", "--method", "surface", "--points", "200", *TINY]) == 0
     assert main(turntable) == 0
     frames = [np.asarray(Image.open(folder / f"{k:04d}.png")) for k in range(3)]

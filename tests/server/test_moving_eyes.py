@@ -47,7 +47,8 @@ def bake(client: TestClient, scene: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize("method", ["gather", "surface"])
 def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dict[str, Any], method: str) -> None:
-    request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "points": 500, "dry_run": True}
+    request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "dry_run": True}
+    request |= {"points": 500} if method == "surface" else {}
     usual, asked = (
         client.post("/api/bakes", json=request | more).json()
         for more in ({}, {"gather_samples": 4000, "gather_rays": 1000})
@@ -64,6 +65,17 @@ def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dic
     ):
         refused = client.post("/api/bakes", json=request | bad)
         assert refused.status_code == 422, refused.text
+
+
+@pytest.mark.parametrize("method", ["direct", "gather"])
+def test_points_are_refused_where_no_eye_moves(client: TestClient, scene: dict[str, Any], method: str) -> None:
+    request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "dry_run": True}
+    recipe = client.post("/api/bakes", json=request).json()["recipe"]
+    assert recipe["points"] is None
+    assert client.post("/api/bakes", json=request | {"points": recipe["points"]}).json()["recipe"] == recipe
+    refused = client.post("/api/bakes", json=request | {"points": 777})
+    assert (refused.status_code, refused.json()["type"]) == (422, "urn:relume:problem:plan")
+    assert f"777 points were asked for; method {method} has none" in refused.json()["detail"]
 
 
 @pytest.fixture
