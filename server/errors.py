@@ -73,6 +73,14 @@ class ForbiddenOriginError(RelumeError):
     """A page of another site called."""
 
 
+class RangeError(RelumeError):
+    """The file has nothing of the bytes that are asked for; `has` says how many there are, as HTTP does."""
+
+    def __init__(self, has: str) -> None:
+        super().__init__(f"the file has {has.rpartition('/')[2]} bytes, and none of those; ask for fewer, or for all")
+        self.has = has
+
+
 class LoginError(RelumeError):
     """Who calls has to say who they are."""
 
@@ -131,6 +139,7 @@ TABLE: Sequence[tuple[type[Exception], Row]] = (
     (ForbiddenOriginError, Row(403, "forbidden-origin", "Origin not allowed", CLOSE_POLICY)),
     (LoginError, Row(401, "login", "Log in first", CLOSE_LOGIN)),
     (ForbiddenError, Row(403, "forbidden", "Not allowed to you", CLOSE_FORBIDDEN)),
+    (RangeError, Row(416, "range", "No such bytes", CLOSE_POLICY)),
     (QuotaError, Row(429, "quota", "As much as one may have", CLOSE_BUSY)),
     (RateError, Row(429, "rate", "Too many calls", CLOSE_BUSY)),
     (relume_errors.SceneError, Row(422, "scene", "Scene cannot be used", CLOSE_INTERNAL)),
@@ -193,6 +202,8 @@ def headers_of(error: Exception) -> dict[str, str]:
     """What HTTP wants said beside the body."""
     if isinstance(error, LoginError):
         return {"WWW-Authenticate": "Bearer"}
+    if isinstance(error, RangeError):
+        return {"Content-Range": error.has}
     return {"Retry-After": str(math.ceil(error.wait_s))} if isinstance(error, RateError) else {}
 
 

@@ -6,13 +6,13 @@ from typing import Literal
 
 from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse
 
 from relume.errors import ParameterError
 from relume.picture.transfer import Eyes, Opened
 from server.access.roles import Who
 from server.apart.animation import compared_from
 from server.errors import NotReadyError
+from server.files.downloads import Download
 from server.queues.comparisons import Comparing
 from server.routes.bakes import ready_bake
 from server.routes.renders import baked_view, check_display, check_eye_size, check_look
@@ -73,15 +73,15 @@ def resume_comparison(truth: Id, services: Shared) -> TruthBody:
     return _body(services.comparisons.get(truth), services)
 
 
-@router.get("/{truth}/{name}.png", response_class=FileResponse)
-def get_picture(truth: Id, name: Picture, services: Shared) -> FileResponse:
+@router.get("/{truth}/{name}.png", response_class=Download)
+def get_picture(truth: Id, name: Picture, services: Shared) -> Download:
     """Where the frame differs, or the brute force so far, by the paths that were asked for or by those that the bake's
     method follows; from the second pass on."""
     comparing = services.comparisons.get(truth)
     path = services.comparisons.picture_path(truth, name)
     if not path.exists():
         raise NotReadyError(f"two passes are needed, {comparing.done} are done; wait a little")
-    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-store"})
+    return Download(path, media_type="image/png", headers={"Cache-Control": "no-store"})
 
 
 def _body(comparing: Comparing, services: Services) -> TruthBody:

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse
 
 from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
@@ -20,6 +19,7 @@ from relume.picture.transfer import Axis, Eyes, Opened
 from server.access.roles import Caller, Who
 from server.apart.animation import check_animation, document_of, look_of, with_pivot
 from server.errors import NotReadyError
+from server.files.downloads import Download
 from server.files.video import check_encoder
 from server.queues.renders import Render, planned_bytes
 from server.queues.work_queue import new_id
@@ -183,8 +183,8 @@ def delete_render(render: Id, services: Shared) -> Response:
     return Response(status_code=204)
 
 
-@router.get("/{render}/frames/{index}", response_class=FileResponse)
-def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_FRAMES)], services: Shared) -> FileResponse:
+@router.get("/{render}/frames/{index}", response_class=Download)
+def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_FRAMES)], services: Shared) -> Download:
     """One finished picture, counted from 0."""
     found = services.renders.get(render)
     if index >= found.total:
@@ -193,11 +193,11 @@ def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_FRAMES)], serv
     if not path.exists():
         raise NotReadyError(f"frame {index} is not finished; {_state(found)}")
     name = services.renders.download_name(found, index)
-    return FileResponse(path, media_type=MEDIA_TYPES[found.request.picture_format], filename=name)
+    return Download(path, media_type=MEDIA_TYPES[found.request.picture_format], filename=name)
 
 
-@router.get("/{render}/video.mp4", response_class=FileResponse)
-def get_video(render: Id, services: Shared) -> FileResponse:
+@router.get("/{render}/video.mp4", response_class=Download)
+def get_video(render: Id, services: Shared) -> Download:
     """All pictures as a video, where one was asked for, when it is finished."""
     found = services.renders.get(render)
     if found.request.format != "mp4":
@@ -205,17 +205,17 @@ def get_video(render: Id, services: Shared) -> FileResponse:
     if found.state != "ready":
         raise NotReadyError(f"the batch is not finished; {_state(found)}")
     path = services.renders.video_path(found)
-    return FileResponse(path, media_type=MEDIA_TYPES["mp4"], filename=services.renders.video_name(found))
+    return Download(path, media_type=MEDIA_TYPES["mp4"], filename=services.renders.video_name(found))
 
 
-@router.get("/{render}/archive.zip", response_class=FileResponse)
-def get_archive(render: Id, services: Shared) -> FileResponse:
+@router.get("/{render}/archive.zip", response_class=Download)
+def get_archive(render: Id, services: Shared) -> Download:
     """All pictures in one file, when all are finished."""
     found = services.renders.get(render)
     if found.state != "ready":
         raise NotReadyError(f"the batch is not finished; {_state(found)}")
     path = services.renders.archive_path(found)
-    return FileResponse(path, media_type="application/zip", filename=services.renders.archive_name(found))
+    return Download(path, media_type="application/zip", filename=services.renders.archive_name(found))
 
 
 def _state(found: Render) -> str:

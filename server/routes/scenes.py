@@ -11,12 +11,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse
 
 from relume.errors import NotFoundError, ParameterError
 from relume.folders import folder_bytes
 from server.access.roles import Caller, Who
 from server.apart.bakes import MAX_WIDTH
+from server.files.downloads import Download
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.services import Services, Shared
@@ -141,15 +141,15 @@ def delete_one(scene: Id, services: Shared) -> Response:
     return Response(status_code=204)
 
 
-@router.get("/{scene}/thumbnail.webp", response_class=FileResponse)
-async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> FileResponse:
+@router.get("/{scene}/thumbnail.webp", response_class=Download)
+async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> Download:
     """The scene as a bake of it shows it, unedited; `bake` only makes the address change when it does."""
     statuses = await run_in_threadpool(services.bakes.bakes, scene)
     pictured = _pictured([status for status in statuses if bake in (None, status.id)])
     if pictured is None:
         raise NotFoundError("there is no picture of this scene; bake it first")
     path = await services.thumbnails.find(pictured)
-    return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "public, max-age=86400"})
+    return Download(path, media_type="image/webp", headers={"Cache-Control": "public, max-age=86400"})
 
 
 def _pictured(bakes: Sequence[BakeStatus]) -> str | None:

@@ -69,7 +69,10 @@ async def _having_room(services: Services, websocket: WebSocket) -> AsyncIterato
 
 async def _accept(services: Services, websocket: WebSocket, bake: str) -> None:
     is_ours = SUBPROTOCOL in websocket.scope["subprotocols"]
-    await websocket.accept(subprotocol=SUBPROTOCOL if is_ours else None)
+    try:
+        await websocket.accept(subprotocol=SUBPROTOCOL if is_ours else None)
+    except OSError:  # the client has left while it waited
+        return
     socket = ClientSocket(websocket, services.settings.ack_seconds)
     try:
         if not is_ours:
