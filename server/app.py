@@ -11,6 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from relume.imageio.ocio.current import current, using
+from relume.resident import share_arenas
 from server import errors
 from server.access.gate import Gate
 from server.guard import Guard
@@ -132,6 +133,7 @@ def create_app(
 def serve(settings: Settings, tell_started: Callable[[], object] = lambda: None) -> None:
     """Run the server until it is stopped, and tell once when it answers; blocks."""
     set_up(settings.log_format, settings.log_level)
+    share_arenas()
     stoppable(create_app(settings), settings, tell_started).run()
 
 
