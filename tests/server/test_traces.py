@@ -10,10 +10,12 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
 from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
 from server_fakes import Control
 from session_client import SIGMA, THETA_D, Baked, open_session
 
+from server.collector import Collector
 from server.settings import Settings
 
 
@@ -90,3 +92,19 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
     (refused,) = (span for span in spans if span.name == "edit" and span.status.code)
     assert "old revision" in refused.status.message
     assert {about(span)["relume.what"] for span in spans if span.name == "freeze"} == {status["what"]}
+
+
+def test_a_collector_that_is_away_is_said_once_and_that_it_is_back(
+    settings: Settings, sent: list[ExportTraceServiceRequest], caplog: pytest.LogCaptureFixture
+) -> None:
+    exporter = OTLPSpanExporter(timeout=1)
+    there, away = exporter._client._endpoint, "http://127.0.0.1:9/v1/traces"
+    collector = Collector(exporter)
+    for endpoint in (there, away, away, there):
+        exporter._client._endpoint = endpoint
+        collector.export(())
+    collector.shutdown()
+    (lost, found) = caplog.records
+    assert (lost.levelname, found.levelname) == ("ERROR", "WARNING")
+    assert "the collector of traces does not answer" in lost.getMessage()
+    assert len(sent) == 2
