@@ -16,16 +16,26 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from relume.errors import CancelledError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
+from relume.errors import CancelledError, DiskFullError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
 from relume.imageio.ocio.current import source
 from relume.resident import resident_bytes
 from server.apart.step import IsWanted, Step, Tell
 
 COMMAND = ["-m", "server.apart.main"]
+
+
+class _NoRoomError(DiskFullError):
+    """A step found the disk full, and has said of what."""
+
+    def __init__(self, message: str) -> None:
+        RelumeError.__init__(self, message)
+
+
 _KINDS: Mapping[str, type[RelumeError]] = {
     "store-not-found": StoreNotFoundError,
     "store": StoreError,
     "not-found": NotFoundError,
+    "disk": _NoRoomError,
 }
 """What a step may meet that is no failure of its process, by the last part of the problem's type."""
 _ASK_S = 0.1

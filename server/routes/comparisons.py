@@ -36,6 +36,7 @@ async def submit_comparison(
             response.status_code = 200
             seconds = await run_in_threadpool(services.comparisons.seconds, request)
             return TruthPlanBody(passes=request.passes, seconds=seconds)
+    await run_in_threadpool(services.access.quotas.check_room)
     identity = await run_in_threadpool(services.comparisons.submit, request, caller.name)
     response.headers["Location"] = f"/api/truths/{identity}"
     return await run_in_threadpool(lambda: _body(services.comparisons.get(identity), services))

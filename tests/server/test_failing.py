@@ -8,7 +8,8 @@ from typing import NamedTuple
 import pytest
 from fastapi.testclient import TestClient
 
-from relume.errors import DatabaseDamagedError, LedgerVersionError, SceneError, StorageError
+from relume.errors import DatabaseDamagedError, DiskFullError, LedgerVersionError, SceneError, StorageError
+from server.apart.process import _answer
 from server.errors import problem_of
 from server.files import importing
 from server.files.importing import ImportRequest, answer_of
@@ -58,6 +59,14 @@ def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
     assert len(said) == 2
     assert "12 MB left" in said[0]
     assert "room again" in said[1]
+
+
+@pytest.mark.parametrize("error", [DiskFullError("a.webp"), OSError(errno.ENOSPC, "No space left on device")])
+def test_a_disk_that_a_step_finds_full_is_no_failure_of_its_process(error: Exception) -> None:
+    problem = problem_of(error)
+    with pytest.raises(DiskFullError, match=r"disk is full; free some space") as found:
+        _answer({"problem": problem.detail, "kind": problem.type.rpartition(":")[2]})
+    assert problem_of(found.value) == problem.model_copy(update={"title": "Disk is full"})
 
 
 def test_probes_of_a_server_that_is_stopped_are_no_lines(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:

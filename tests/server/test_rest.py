@@ -151,6 +151,7 @@ def test_a_disk_that_is_nearly_full_takes_nothing_new_and_lets_go(
         client.post("/api/scenes", files={"scene": ("a.glb", b"")}),
         client.post("/api/images", **image),
         client.post("/api/bakes", json=bake),
+        client.post("/api/truths", json={"bake": baked.bake, "view": "front", "look": {}}),
         client.get("/readyz"),
     ):
         assert (refused.status_code, refused.json()["type"]) == (507, "urn:relume:problem:disk")
