@@ -19,7 +19,7 @@ def audit(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
 ) -> None:
     """Show what was changed, and by whom; the newest last."""
-    for entry in reversed(open_access(data).audit.list(last, who=who)):
+    for entry in reversed(open_access(data, is_used=True).audit.list(last, who=who)):
         if as_json:
             typer.echo(json.dumps(vars(entry)))
             continue

@@ -32,7 +32,7 @@ def token_add(name: Name, role: RoleOption = "view", days: Days = None, data: Da
 def token_list(data: Data = None) -> None:
     """List the tokens that were handed out."""
     now = datetime.now(UTC).timestamp()
-    for token in open_access(data).tokens.all():
+    for token in open_access(data, is_used=True).tokens.all():
         state = "valid" if token.is_valid(now) else "revoked" if token.revoked is not None else "run out"
         until = "" if token.expires is None else f"  until {_day(token.expires)}"
         typer.echo(f"{token.id}  {token.role.word:5}  {state:7}  {_day(token.created)}  {token.name}{until}")
@@ -47,14 +47,17 @@ def token_revoke(
     _write_down(access, "token revoke", name)
 
 
-def open_access(data: Path | None) -> Access:
-    """Tokens and audit of a data folder."""
+def open_access(data: Path | None, *, is_used: bool = False) -> Access:
+    """Tokens and audit of a data folder. Raises ParameterError where `is_used` is to be and nothing is there yet."""
     from cli.data_folder import open_settings
+    from relume.errors import ParameterError
     from server.access.access import Access
     from worker.database import open_database
     from worker.ledger import Ledger
 
     settings = open_settings(data)
+    if is_used and not settings.database and not (settings.data / "relume.db").exists():
+        raise ParameterError("--data", str(settings.data), "a folder that relume has used; this one is empty")
     return Access(Ledger(open_database(settings.database_url)).sessions, settings)
 
 

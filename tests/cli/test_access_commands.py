@@ -55,3 +55,13 @@ def test_what_cannot_be_is_one_line(
 ) -> None:
     code, text, said = run(capsys, tmp_path, "token", *words)
     assert (code, text, said) == (1, "", sentence)
+
+
+@pytest.mark.parametrize("command", [["audit"], ["token", "list"]])
+def test_a_folder_that_nobody_has_used_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    code, out, err = run(capsys, tmp_path / "mistyped", *command)
+    assert (code, out) == (1, "")
+    assert "a folder that relume has used" in err
+    assert not (tmp_path / "mistyped" / "relume.db").exists()
