@@ -21,7 +21,15 @@ from pathlib import Path
 from sqlalchemy.exc import IntegrityError
 
 from relume.bake import Task
-from relume.errors import CancelledError, ChunkDamagedError, DiskFullError, RelumeError, StorageError, is_no_room
+from relume.errors import (
+    CancelledError,
+    ChunkDamagedError,
+    DiskFullError,
+    NotFoundError,
+    RelumeError,
+    StorageError,
+    is_no_room,
+)
 from relume.folders import folder_bytes
 from relume.replacing import remove_folder
 from relume.scene.model import Scene
@@ -94,6 +102,8 @@ class BakeRunner:
             self._ask(self.ledger.release, identity, self.owner)
         except Exception as error:  # whatever a method raises must not end the service
             self._land()
+            if not self._is_there():  # deleted in the middle of a task, with what that wrote to
+                return
             if not isinstance(error, RelumeError | OSError):
                 log.exception("bake %s failed", identity, extra={"fields": {"bake": identity}})
             self._ask(self.ledger.finish, identity, self.owner, "failed", self._sentence(error))
@@ -250,6 +260,13 @@ class BakeRunner:
     def _ask(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
         """Call the ledger; one that is away for a while delays the bake and ends nothing."""
         return patiently(self.stopped, call, *args, **kwargs)
+
+    def _is_there(self) -> bool:
+        try:
+            self._ask(self.ledger.bake, self.job.bake_id)
+        except NotFoundError:
+            return False
+        return True
 
     def _sentence(self, error: Exception) -> str:
         """What went wrong and what to do, in one line."""

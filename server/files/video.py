@@ -55,4 +55,11 @@ def write_video(frames: Path, fps: int, target: Path, cancelled: Callable[[], bo
                         process.kill()
                         raise CancelledError("the video was cancelled") from None
         if process.returncode != 0:
-            raise RelumeError(f"ffmpeg could not make the video: {said.strip()[-_SAID:]}")
+            raise RelumeError(f"ffmpeg could not make the video: {_why(process.returncode, said)}")
+
+
+def _why(code: int, said: str) -> str:
+    """What a program says of its failure, or what becomes of it where it says nothing."""
+    if code < 0:
+        return f"it was ended by signal {-code}, perhaps for want of memory; free some, then ask again"
+    return said.strip()[-_SAID:] or f"it ended with {code} and said nothing; look into the disk's room, then ask again"

@@ -15,6 +15,7 @@ from shared_bakes import unmeasured
 from test_end_to_end import wait_until_done
 from test_moving_eyes import SIZE, bake, client, eye, scene
 
+from relume.errors import RelumeError
 from server.files.video import write_video
 
 __all__ = ["bake", "client", "scene", "unmeasured"]  # fixtures
@@ -195,6 +196,21 @@ def test_a_video_shows_the_colours_of_its_frames_and_says_by_which_matrix(tmp_pa
     assert "yuv420p(tv, bt709/bt709/iec61966-2-1" in done.stderr
     seen = np.asarray(Image.open(tmp_path / "seen.png"))[16, 16::33][: len(colours)]
     assert np.abs(seen.astype(int) - colours).max() <= 4
+
+
+@pytest.mark.parametrize(
+    ("does", "said"), [("kill -9 $$", "ended by signal 9"), ("exit 3", "ended with 3"), ("echo odd >&2; exit 1", "odd")]
+)
+def test_an_encoder_that_ends_early_leaves_no_video_and_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, does: str, said: str
+) -> None:
+    program = tmp_path / "ffmpeg"
+    program.write_text(f"#!/bin/sh\n{does}\n")
+    program.chmod(0o755)
+    monkeypatch.setattr("shutil.which", lambda name: str(program))
+    with pytest.raises(RelumeError, match=rf"^ffmpeg could not make the video: .*{said}"):
+        write_video(tmp_path, 25, tmp_path / "video.mp4", lambda: False)
+    assert list(tmp_path.iterdir()) == [program]
 
 
 def test_looks_of_frames_are_told_as_they_will_be_rendered(

@@ -13,14 +13,16 @@ import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
+from relume.bake import Task
 from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
 from relume.store import bake_here, open_store
 from worker import lease, scenes
 from worker.ledger import Ledger
 from worker.paths import staging_path
-from worker.scenes import delete_scene, register_scene
+from worker.scenes import delete_bakes, delete_scene, register_scene
 from worker.service import BakeService
-from worker.status import BakeStatus, bake_id
+from worker.status import BakeStatus, TaskCost, bake_id
+from worker.tasks import Job
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -354,6 +356,23 @@ def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
     with open_service(tmp_path) as service:
         service.submit(SCENE.id, RECIPE)
         assert deleted.wait(30)
+    assert [record.message for record in caplog.records if "failed" in record.message] == []
+
+
+def test_a_bake_that_is_deleted_in_the_middle_of_a_task_is_no_defect(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    met = threading.Event()
+
+    def run_deleted(job: Job, task: Task) -> TaskCost:
+        delete_bakes(service.data_dir, service.ledger, [job.bake_id])
+        met.set()
+        raise KeyError("lights/power")  # as zarr says of an array whose folder is gone
+
+    monkeypatch.setattr("worker.bake.run_task", run_deleted)
+    with open_service(tmp_path) as service:
+        service.submit(SCENE.id, RECIPE)
+        assert met.wait(30)
     assert [record.message for record in caplog.records if "failed" in record.message] == []
 
 
