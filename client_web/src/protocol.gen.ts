@@ -698,7 +698,7 @@ export interface RecipeBody {
   cameras: CameraBody[];
 }
 
-/** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. */
+/** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. `seconds_left`: null where it does not run or nothing was measured yet. */
 export interface RenderBody {
   id: string;
   bake: string;
@@ -709,6 +709,7 @@ export interface RenderBody {
   done: number;
   total: number;
   progress: number;
+  seconds_left: number | null;
   problem: string | null;
 }
 

@@ -127,7 +127,10 @@ class RenderRequest(Animation):
 
 
 class RenderBody(Body):
-    """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too."""
+    """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too.
+
+    `seconds_left`: null where it does not run or nothing was measured yet.
+    """
 
     id: str
     bake: str
@@ -138,4 +141,5 @@ class RenderBody(Body):
     done: int
     total: int
     progress: float
+    seconds_left: float | None
     problem: str | None

@@ -1,6 +1,7 @@
 /** Pictures to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
 import { useState } from "preact/hooks";
-import { exporting, exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
+import { exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
+import { exporting } from "../looks/rendering";
 import { stage } from "../picture/stage";
 import { lightLimitWords } from "../seen/limits";
 import { exrSpace, exrSpaceHere, spaces } from "../state/color";

@@ -1,7 +1,7 @@
 /** What is going on, in words: connection, latency, exactness, freezing, bakes, memory. */
 import { useComputed } from "@preact/signals";
 import { reconnectNow } from "../live/connections";
-import { exporting } from "../looks/export";
+import { exporting, exportingWords } from "../looks/rendering";
 import { cancelBake } from "../net/api";
 import { bakingWords, hasProgress, useElapsed } from "../scene/baking";
 import { limits } from "../seen/limits";
@@ -73,9 +73,11 @@ export function StatusBar() {
       <span class="spacer" />
       {exporting.value !== null && (
         <span class="bake">
-          {exporting.value.what} {Math.round(100 * exporting.value.progress)} %
+          {exportingWords(exporting.value)}
           <progress max={1} value={exporting.value.progress} aria-label={exporting.value.what} />
-          <button onClick={exporting.value.stop}>Stop</button>
+          <button disabled={exporting.value.stop === null} onClick={() => exporting.value?.stop?.()}>
+            Stop
+          </button>
         </span>
       )}
       {coming.value !== null && (

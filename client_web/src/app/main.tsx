@@ -2,6 +2,7 @@ import { render } from "preact";
 import { arrive } from "../account/account";
 import { Login } from "../account/Login";
 import { history } from "../edit/history";
+import { resumeRendering } from "../looks/rendering";
 import { openShare } from "../looks/share";
 import { followThumbnails } from "../looks/thumbnails";
 import { openScene } from "../scene/open";
@@ -15,6 +16,7 @@ import { followRoom } from "../state/room";
 import { me } from "../state/me";
 import { page } from "../state/scene";
 import { followName } from "../state/together";
+import { recallTruth } from "../truth/truth";
 import { Toasts } from "../ui/toasts";
 import { Editor } from "./Editor";
 import "../ui/base.css";
@@ -63,6 +65,8 @@ function open(): void {
   followRoom();
   followToneMap();
   followThumbnails();
+  void resumeRendering();
+  void recallTruth(place.bake);
   // one drag is one step, however long it rests on the way; once the hand has left the control, the next is another
   window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.hold(), { capture: true });
   for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.seal());

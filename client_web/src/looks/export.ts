@@ -6,9 +6,8 @@ import type { Frame } from "../cameras/orbit";
 import { eyeSize } from "../live/drawing";
 import { whenShown } from "../live/displayViews";
 import { whenExact } from "../live/exactness";
-import { deleteRender, getRender, problemText, startRender } from "../net/api";
 import { stage } from "../picture/stage";
-import type { Look, RenderBody, RenderRequest, Turntable } from "../protocol";
+import type { Look, RenderRequest, Turntable } from "../protocol";
 import { lightLimits, lightLimitWords } from "../seen/limits";
 import { seenOf } from "../seen/rendered";
 import { bake } from "../state/bakes";
@@ -16,13 +15,9 @@ import { exrSpaceHere } from "../state/color";
 import { look } from "../state/look";
 import { scene } from "../state/scene";
 import { viewName } from "../state/views";
-import { attempt, note } from "../ui/toasts";
+import { attempt } from "../ui/toasts";
 import { pngBlob } from "./image";
-
-const POLL_MS = 300;
-
-/** What the server renders now: how far it is, and a way to stop it. */
-export const exporting = signal<{ what: string; progress: number; stop(): void } | null>(null);
+import { download, renderAndSave } from "./rendering";
 
 /** As many characters as the server leaves of a name. */
 const LONGEST_STEM = 120;
@@ -33,13 +28,6 @@ export function fileStem(space = ""): string {
   const limits = lightLimits.value.map((limit) => limit.words);
   const words = [scene.value?.name ?? "picture", viewName.value, ...limits, space].join(" ").trim();
   return [...words.replace(/[^\p{L}\p{N}._-]+/gu, "-")].slice(0, LONGEST_STEM).join("");
-}
-
-function download(href: string, name: string): void {
-  const link = document.createElement("a");
-  link.href = href;
-  link.download = name;
-  link.click();
 }
 
 export async function exportPng(): Promise<void> {
@@ -54,24 +42,6 @@ export async function exportPng(): Promise<void> {
   });
 }
 
-/** Follow a render to its end; null where it was stopped on the way. */
-async function finished(what: string, render: RenderBody): Promise<RenderBody | null> {
-  let [state, isStopped] = [render, false];
-  const stop = () => {
-    isStopped = true;
-    exporting.value = null;
-    void attempt(() => deleteRender(render.id));
-  };
-  while (!isStopped && (state.state === "queued" || state.state === "running")) {
-    exporting.value = { what, progress: state.progress, stop };
-    await new Promise((done) => setTimeout(done, POLL_MS));
-    if (!isStopped) state = await getRender(render.id);
-  }
-  if (isStopped) return null;
-  if (state.state === "failed") throw new Error(`The ${what} could not be rendered: ${problemText(state.problem)}`);
-  return state;
-}
-
 /** Where the view in hand is seen from, if its eye moves. */
 export const eyeNow = (): Frame | null => eyeOf(viewName.peek())?.frame ?? null;
 
@@ -84,15 +54,10 @@ export function sizeNow(): [number, number] | null {
 /** Have the server render the look that is seen, or others in the same light; `fetchFrom` is the file of the finished batch. */
 export async function render(what: string, fetchFrom: string, more: Pick<RenderRequest, "format"> & Partial<RenderRequest>) {
   const [id, current] = [bake.value, look.value];
-  if (id === null || current === null || exporting.value !== null) return;
-  await attempt(async () => {
-    const looks = (more.looks as Look[] | undefined) ?? [current];
-    note(`Rendering the ${what} on the server${lightLimitWords()}…`);
-    const seen = looks.map((of) => ({ ...seenOf(of) }));
-    const asked = await startRender({ bake: id, view: viewName.value, name: fileStem(), size: sizeNow(), ...more, looks: seen });
-    const done = await finished(what, asked);
-    if (done !== null) download(`/api/renders/${encodeURIComponent(done.id)}/${fetchFrom}`, "");
-  }).finally(() => (exporting.value = null));
+  if (id === null || current === null) return;
+  const looks = ((more.looks as Look[] | undefined) ?? [current]).map((of) => ({ ...seenOf(of) }));
+  const asked = { bake: id, view: viewName.value, name: fileStem(), size: sizeNow(), ...more, looks };
+  await renderAndSave(what, fetchFrom, asked, lightLimitWords());
 }
 
 /** With layers: one for each light and each kind of light path, where there are several; or both of each light. */

@@ -81,6 +81,16 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
   throw error;
 }
 
+const AWAY = [0, 502, 503, 504];
+
+/** What the server answers; null where it is away, or a proxy says so: it goes on with its work when it is back. */
+export async function unlessAway<T>(answer: Promise<T>): Promise<T | null> {
+  return answer.catch((error: unknown) => {
+    if (error instanceof ApiError && AWAY.includes(error.status)) return null;
+    throw error;
+  });
+}
+
 export function json(method: string, body: unknown, headers: Record<string, string> = {}): RequestInit {
   return { method, headers: { "content-type": "application/json", ...headers }, body: JSON.stringify(body) };
 }

@@ -1,7 +1,8 @@
 /** Looks as keyframes: played in the picture, gone through by hand, rendered as numbered frames or a video. */
 import { passing } from "../edit/edit";
 import { completed } from "../looks/compare";
-import { exporting, eyeNow } from "../looks/export";
+import { eyeNow } from "../looks/export";
+import { exporting } from "../looks/rendering";
 import { shelf } from "../looks/shelf";
 import { look } from "../state/look";
 import { timelineOpen } from "../state/panels";

@@ -1,7 +1,8 @@
-/** "How true is this?": one comparison of the picture with brute force, followed while its panel is open. */
-import { signal } from "@preact/signals";
+/** "How true is this?": one comparison of the picture with brute force, followed while its panel is open, over reloads of
+ * the page and while the server is away. */
+import { effect, signal } from "@preact/signals";
 import { eyeNow, sizeNow } from "../looks/export";
-import { forgetTruth, getTruth, planTruth, resumeTruth, startTruth, stopTruth } from "../net/api";
+import { forgetTruth, getTruth, planTruth, resumeTruth, startTruth, stopTruth, unlessAway } from "../net/api";
 import type { TruthBody, TruthPlanBody, TruthRequest } from "../protocol";
 import { seenPaths } from "../seen/paths";
 import { seenOf } from "../seen/rendered";
@@ -10,10 +11,12 @@ import { bake } from "../state/bakes";
 import { look } from "../state/look";
 import { truthOpen } from "../state/panels";
 import { togglePanel } from "../state/room";
+import { keepInTab, keptInTab } from "../state/tab";
 import { viewName, views } from "../state/views";
 import { attempt } from "../ui/toasts";
 
 const POLL_MS = 1000;
+const KEY = "relume.truth";
 
 /** What a comparison would take; null while that is being found out. */
 export const truthPlan = signal<TruthPlanBody | "unknown" | null>(null);
@@ -37,7 +40,7 @@ async function follow(id: string): Promise<void> {
     await new Promise((done) => setTimeout(done, POLL_MS));
     const current = truth.value;
     if (current?.body.id !== id || !isGoingOn(current.body)) return;
-    const body = await getTruth(id);
+    const body = (await unlessAway(getTruth(id))) ?? current.body;
     if (truth.value?.body.id === id) truth.value = { ...truth.value, body };
   }
 }
@@ -46,6 +49,23 @@ function asked(): TruthRequest | null {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null) return null;
   return { bake: id, view: viewName.value, look: { ...seenOf(current) }, camera: eyeNow(), size: sizeNow() };
+}
+
+/** Keep it for a reload, as long as there is one. */
+function followTruth(): void {
+  effect(() => keepInTab(KEY, truth.value && { id: truth.value.body.id, look: truth.value.look }));
+}
+
+/** Go on with the comparison of a bake that was looked at when the page was reloaded. */
+export async function recallTruth(of: string | null): Promise<void> {
+  const kept = keptInTab<{ id: string; look: string }>(KEY);
+  const body = kept === null ? null : await getTruth(kept.id).catch(() => null);
+  followTruth();
+  if (kept === null || body === null || truth.peek() !== null) return;
+  if (body.bake !== of) return void forgetTruth(kept.id).catch(() => undefined);
+  truth.value = { body, look: kept.look };
+  if (!truthOpen.peek()) togglePanel("truth");
+  await attempt(() => follow(body.id));
 }
 
 /** Say how long it would take; nothing begins. */

@@ -1,0 +1,19 @@
+/** What a tab keeps over a reload of its page. */
+
+export function keepInTab(key: string, value: unknown): void {
+  try {
+    if (value === null) sessionStorage.removeItem(key);
+    else sessionStorage.setItem(key, JSON.stringify(value));
+  } catch {
+    // full or forbidden: a reload forgets it
+  }
+}
+
+/** Null where nothing was kept. */
+export function keptInTab<T>(key: string): T | null {
+  try {
+    return JSON.parse(sessionStorage.getItem(key) ?? "null") as T | null;
+  } catch {
+    return null;
+  }
+}
