@@ -2,6 +2,7 @@
 import { beforeEach, expect, test, vi } from "vitest";
 import { bakedError, fidelity, movingError } from "../src/state/fidelity";
 import { shownViews, viewName, views } from "../src/state/views";
+import { playing } from "../src/timeline/play";
 import { marks } from "../src/viewport/fidelityMarks";
 
 beforeEach(() => {
@@ -25,4 +26,15 @@ test("until the eye has rested it is what the bake has measured, with its standa
   movingError.value = 0.217;
   expect(words()).toContain("Moving view, about 22 % off");
   expect(marks()[0]?.title).toContain("3.1 ± 0.2 %");
+});
+
+test("while a time line plays it is said to play, whichever way its frames come", () => {
+  playing.value = true;
+  for (const rough of ["preview", "approximate", "followed"] as const) {
+    fidelity.value = rough;
+    vi.advanceTimersByTime(1000);
+    expect(words()).toEqual(["Playing"]);
+  }
+  playing.value = false;
+  expect(words()).toEqual(["Followed closely"]);
 });

@@ -13,6 +13,7 @@ import { bakedLight, look } from "../state/look";
 import { shownPanels } from "../state/room";
 import { companyWords } from "../state/together";
 import { moves } from "../state/views";
+import { playing } from "../timeline/play";
 import { toggleTruth } from "../truth/truth";
 import { formatBytes } from "../ui/scale";
 import { attempt } from "../ui/toasts";
@@ -23,6 +24,7 @@ function pictureWords(): string {
   if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
   if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
   if (look.value === null || connection.value !== "open") return "";
+  if (!settled.value && playing.value) return "playing";
   if (!settled.value) return moves.value ? "approximate until the eye rests" : "refining…";
   return bakedLight.value ? "exact ✓" : "exact for this bake ✓";
 }

@@ -37,6 +37,7 @@ import "../together/together.css";
 import "../comments/comments.css";
 import "./layout.css";
 import "./bars.css";
+import "../ui/adapting.css"; // after all that it adapts
 
 function App() {
   return (

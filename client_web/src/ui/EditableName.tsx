@@ -1,5 +1,5 @@
 /** A name that a press turns into a field: Enter or leaving takes what was typed, Escape leaves it as it was. */
-import { useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 
 interface Props {
   name: string;
@@ -14,9 +14,15 @@ interface Props {
 
 export function EditableName({ name, class: of, maximum, editing = false, onRename, onDone }: Props) {
   const [open, setOpen] = useState(editing);
+  const button = useRef<HTMLButtonElement>(null);
+  const byKey = useRef(false);
+  useLayoutEffect(() => {
+    if (byKey.current) button.current?.focus(); // the field had it
+    byKey.current = false;
+  }, [open]);
   if (!open) {
     return (
-      <button type="button" class={of} title={`${name}: rename`} aria-label={`${name}: rename`} onClick={() => setOpen(true)}>
+      <button ref={button} type="button" class={of} title={`${name}: rename`} aria-label={`${name}: rename`} onClick={() => setOpen(true)}>
         {name}
       </button>
     );
@@ -41,11 +47,11 @@ export function EditableName({ name, class: of, maximum, editing = false, onRena
       onBlur={(event) => take(event.currentTarget.value)}
       onKeyDown={(event) => {
         event.stopPropagation();
-        if (event.key === "Enter") event.currentTarget.blur();
-        if (event.key === "Escape") {
-          event.currentTarget.value = name;
-          event.currentTarget.blur();
-        }
+        if (event.key === "Escape") event.currentTarget.value = name;
+        if (event.key !== "Enter" && event.key !== "Escape") return;
+        event.preventDefault(); // else the button, which has the focus by then, is pressed
+        byKey.current = true;
+        event.currentTarget.blur();
       }}
     />
   );

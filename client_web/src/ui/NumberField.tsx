@@ -15,13 +15,15 @@ interface Props {
   /** What has been typed already, before the field was there. */
   begun?: string;
   onChange(value: number): void;
-  onDone?(): void;
+  /** It is left; `byKey`: with Enter or Escape, so that the focus is free. */
+  onDone?(byKey: boolean): void;
 }
 
 export function NumberField({ value, label, minimum, maximum, step, whole = false, autoFocus, begun, onChange, onDone }: Props) {
   const input = useRef<HTMLInputElement>(null);
   const [draft, setDraft] = useState<string | null>(begun ?? null);
   const refused = useRef(false);
+  const byKey = useRef(false);
   const wrong = draft !== null && parseNumber(draft) === null;
   useLayoutEffect(() => {
     if (!autoFocus) return;
@@ -48,6 +50,7 @@ export function NumberField({ value, label, minimum, maximum, step, whole = fals
     // the field is left, so that the next key is the page's again
     if (event.key === "Enter" || event.key === "Escape") {
       refused.current = event.key === "Escape";
+      byKey.current = true;
       input.current?.blur();
     } else if (event.key === "ArrowUp" || event.key === "ArrowDown") {
       event.preventDefault();
@@ -71,7 +74,8 @@ export function NumberField({ value, label, minimum, maximum, step, whole = fals
       onInput={(event) => setDraft(event.currentTarget.value)}
       onBlur={() => {
         take();
-        onDone?.();
+        onDone?.(byKey.current);
+        byKey.current = false;
       }}
       onKeyDown={key}
     />

@@ -36,6 +36,7 @@ export function Slider(props: SliderProps) {
   const { label, value, unit = "", initial, tint, onChange } = props;
   const drag = useRef({ x: 0, at: 0, width: 1 });
   const [typing, setTyping] = useState<{ begun?: string } | null>(null);
+  const track = useRef<HTMLDivElement>(null);
   const at = toFraction(props, value);
 
   const set = (fraction: number) => {
@@ -80,6 +81,7 @@ export function Slider(props: SliderProps) {
   return (
     <div class="slider">
       <div
+        ref={track}
         class="track"
         role="slider"
         tabIndex={0}
@@ -110,7 +112,10 @@ export function Slider(props: SliderProps) {
           autoFocus
           {...typing}
           onChange={(next) => onChange(snap(props, next))}
-          onDone={() => setTyping(null)}
+          onDone={(byKey) => {
+            setTyping(null);
+            if (byKey) track.current?.focus();
+          }}
         />
       ) : (
         <button

@@ -5,6 +5,7 @@ import type { Fidelity } from "../protocol";
 import { bakedError, fidelity, movingError, settled } from "../state/fidelity";
 import { bakedLight } from "../state/look";
 import { moves } from "../state/views";
+import { playing } from "../timeline/play";
 
 export interface Mark {
   words: string;
@@ -20,6 +21,11 @@ const MARKS: Record<Exclude<Fidelity, "exact">, Mark> = {
 const OTHER_LIGHT: Mark = {
   words: "Baked for other light",
   title: "Shadows were baked before this light was known: those of small lamps are approximate. A new bake mends it.",
+};
+
+const PLAYING: Mark = {
+  words: "Playing",
+  title: "Frames of the time line, as near to it as each comes in time. Exact where it is paused.",
 };
 
 const WHY_MOVING = "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer.";
@@ -60,9 +66,12 @@ effect(() => {
   return () => clearTimeout(timer);
 });
 
+function markOf(now: Exclude<Fidelity, "exact">): Mark {
+  return moves.value && now === "approximate" ? movingMark() : MARKS[now];
+}
+
 /** What is said now: of the picture, and of what its bake cannot know. */
 export function marks(): Mark[] {
-  const isMoving = moves.value && rough.value === "approximate";
-  const ofPicture = rough.value === null ? [] : [isMoving ? movingMark() : MARKS[rough.value]];
+  const ofPicture = rough.value === null ? [] : [playing.value ? PLAYING : markOf(rough.value)];
   return bakedLight.value ? ofPicture : [...ofPicture, OTHER_LIGHT];
 }

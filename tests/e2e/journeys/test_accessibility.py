@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from editor_page import NAMELESS, WAIT_MS, Editor
+from editor_page import NAMELESS, VIEWPORT, WAIT_MS, Editor
 from editor_server import Server
 from playwright.sync_api import Browser, Page
 
@@ -35,6 +35,15 @@ CONTRAST = """(e) => {
   const [dark, bright] = [light(front), light(back)].sort((a, b) => a - b);
   return (bright + 0.05) / (dark + 0.05);
 }"""
+
+SMALL_TARGETS = """() => "button,select,input:not([type=file]),[role=slider],[role=separator]".split(",")
+  .flatMap((kind) => [...document.querySelectorAll(kind)])
+  .filter((e) => e.checkVisibility() && !(e instanceof SVGElement))
+  .filter((e) => {
+    const [box, more] = [e.getBoundingClientRect(), getComputedStyle(e, "::after")];
+    const beyond = more.content === "none" ? 0 : -2 * (parseFloat(more.left) || 0);
+    return Math.max(box.width, box.width + beyond) < 24 || box.height < 24;
+  }).map((e) => e.outerHTML.slice(0, 160))"""
 
 
 def assert_focus_is_visible(page: Page, num_stops: int) -> None:
@@ -84,3 +93,36 @@ def test_start_page_has_names_and_visible_focus(server: Server, browser: Browser
     assert page.evaluate(NAMELESS) == []
     assert_focus_is_visible(page, 5)
     page.close()
+
+
+def test_the_focus_comes_back_from_a_field_that_a_key_has_closed(editor: Editor) -> None:
+    page = editor.page
+    slider = page.get_by_role("slider", name="Environment brightness")
+    for key in ("Enter", "Escape"):
+        slider.focus()
+        page.keyboard.press("5")
+        page.get_by_role("textbox", name="Environment brightness, as a number").wait_for()
+        page.keyboard.press(key)
+        assert slider.evaluate("e => e === document.activeElement"), key
+    page.get_by_role("button", name="Save look").click()
+    page.get_by_role("textbox", name="New name of").wait_for()
+    page.keyboard.press("Enter")
+    name = page.get_by_role("button", name="rename").first
+    for key in ("Enter", "Escape"):
+        name.focus()
+        page.keyboard.press("Enter")
+        page.get_by_role("textbox", name="New name of").wait_for()
+        page.keyboard.press(key)
+        assert name.evaluate("e => e === document.activeElement"), key
+
+
+def test_a_finger_finds_what_it_presses(server: Server, browser: Browser) -> None:
+    """Targets of at least 24 × 24 CSS pixels, WCAG 2.2's criterion 2.5.8; what reaches past its box counts whole."""
+    (scene,) = server.call("/api/scenes")
+    with browser.new_context(has_touch=True, viewport=VIEWPORT) as context:
+        page = context.new_page()
+        page.goto(f"{server.url}/?scene={scene['id']}")
+        Editor(page).wait_until_exact()
+        page.get_by_role("listbox", name="Materials").get_by_role("option").first.tap()
+        page.get_by_role("separator").first.wait_for()
+        assert page.evaluate(SMALL_TARGETS) == []
