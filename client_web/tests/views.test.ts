@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
-import { availableOf, sideBySideOf } from "../src/state/views";
+import { eyeWords } from "../src/cameras/EyeBar";
+import { availableOf, shownViews, sideBySideOf, viewName } from "../src/state/views";
 import { columnsFor } from "../src/viewport/grid";
 
 describe("views side by side", () => {
@@ -33,4 +34,12 @@ describe("arrangement", () => {
   ])("%s", (_, count, width, height, aspect, columns) => {
     expect(columnsFor(count, width, height, aspect)).toBe(columns);
   });
+});
+
+test("of several views the buttons of the eye say whose they are", () => {
+  viewName.value = "left";
+  shownViews.value = ["left"];
+  expect(eyeWords.value).toBe("Eye");
+  shownViews.value = ["front", "left"];
+  expect(eyeWords.value).toBe("Eye of left");
 });

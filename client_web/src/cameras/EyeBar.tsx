@@ -1,9 +1,10 @@
 /** Over a picture whose eye moves: what hands can do, as buttons, who draws, and the camera. */
+import { computed } from "@preact/signals";
 import { useState } from "preact/hooks";
 import { chooseDrawnBy, drawnBy, drawsHere, type Draws } from "../live/drawing";
 import { hasTexels } from "../state/look";
 import { scene } from "../state/scene";
-import { viewName, views } from "../state/views";
+import { sideBySide, viewName, views } from "../state/views";
 import { CameraMenu } from "./CameraMenu";
 import { eyeOf } from "./eye";
 import { STEPS } from "./steps";
@@ -31,6 +32,9 @@ function DrawnBy() {
   );
 }
 
+/** Whose eye it is: of several views one is in hand. */
+export const eyeWords = computed(() => (sideBySide.value ? `Eye of ${viewName.value}` : "Eye"));
+
 export function EyeBar() {
   const [open, setOpen] = useState(true);
   const name = viewName.value;
@@ -41,7 +45,7 @@ export function EyeBar() {
   return (
     <div class="eye-bar" role="group" aria-label="Move the eye">
       <button aria-expanded={open} title="Drag turns, Shift or the right button slides, the wheel goes nearer" onClick={() => setOpen(!open)}>
-        Eye {open ? "▾" : "▸"}
+        {eyeWords} {open ? "▾" : "▸"}
       </button>
       {open && (
         <>
