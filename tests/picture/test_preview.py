@@ -97,7 +97,7 @@ def test_where_memory_is_short_there_is_no_glimpse(transfer):
 def test_samples_between_are_means_of_their_neighbours(transfer):
     view = transfer.views["front"]
     for material in range(len(transfer.material_names)):
-        sparse, rows = choose_sparse(transfer, view, material), view.rows(material)
+        sparse, rows = choose_sparse(transfer, view, material, 0, reflects=True), view.rows(material)
         num_samples, num_shaded = sparse.weights.shape
         assert num_samples == rows.stop - rows.start
         assert 0 < num_shaded < num_samples

@@ -60,7 +60,7 @@ class Sparse:
         return int(self.few.num_bytes + weights.data.nbytes + weights.indices.nbytes + weights.indptr.nbytes)
 
 
-def choose_sparse(transfer: Transfer, view: View, material: int, detail: int = 0, *, reflects: bool = True) -> Sparse:
+def choose_sparse(transfer: Transfer, view: View, material: int, detail: int, *, reflects: bool) -> Sparse:
     """One sample of each square of pixels that a material is seen in; reads the store.
 
     Those between take the mean of the nearest, by place in the picture and by normal.
