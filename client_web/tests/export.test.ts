@@ -21,3 +21,8 @@ test("long names are cut between characters, far below what the server takes", (
   expect(called("x".repeat(256), "front")).toBe("x".repeat(120));
   expect(called(`x${"𠀀".repeat(200)}`, "front")).toBe(`x${"𠀀".repeat(119)}`);
 });
+
+test("what is no single picture is told from it", () => {
+  called("still life", "front");
+  expect(fileStem("light groups", "ACEScg")).toBe("still-life-front-light-groups-ACEScg");
+});

@@ -22,11 +22,11 @@ import { download, renderAndSave } from "./rendering";
 /** As many characters as the server leaves of a name. */
 const LONGEST_STEM = 120;
 
-/** What a picture's file is called, without what it ends with: the scene, the view, which light is missing, and which
- * colour space it is in. */
-export function fileStem(space = ""): string {
+/** What a picture's file is called, without what it ends with: the scene, the view, what it is where it is no single picture
+ * (a turntable), which light is missing, and which colour space it is in. */
+export function fileStem(kind = "", space = ""): string {
   const limits = lightLimits.value.map((limit) => limit.words);
-  const words = [scene.value?.name ?? "picture", viewName.value, ...limits, space].join(" ").trim();
+  const words = [scene.value?.name ?? "picture", viewName.value, kind, ...limits, space].join(" ").trim();
   return [...words.replace(/[^\p{L}\p{N}._-]+/gu, "-")].slice(0, LONGEST_STEM).join("");
 }
 
@@ -56,9 +56,11 @@ export async function render(what: string, fetchFrom: string, more: Pick<RenderR
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null) return;
   const looks = ((more.looks as Look[] | undefined) ?? [current]).map((of) => ({ ...seenOf(of) }));
-  const asked = { bake: id, view: viewName.value, name: fileStem(), size: sizeNow(), ...more, looks };
+  const asked = { bake: id, view: viewName.value, name: fileStem(what), size: sizeNow(), ...more, looks };
   await renderAndSave(what, fetchFrom, asked, lightLimitWords());
 }
+
+const KINDS = new Map<boolean | "light_groups", string>([[false, "flat"], ["light_groups", "light groups"]]);
 
 /** With layers: one for each light and each kind of light path, where there are several; or both of each light. */
 export function exportExr(layers: boolean | "light_groups"): Promise<void> {
@@ -67,7 +69,7 @@ export function exportExr(layers: boolean | "light_groups"): Promise<void> {
     format: "exr",
     layers,
     color_space: exrSpaceHere.value,
-    name: fileStem(exrSpaceHere.value ?? ""),
+    name: fileStem(KINDS.get(layers), exrSpaceHere.value ?? ""),
     path: eye === null ? null : { eyes: [eye] },
   });
 }
