@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from editor_page import NAMELESS, VIEWPORT, WAIT_MS, Editor
 from editor_server import Server
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 FOCUSED = """() => {
   const e = document.activeElement;
@@ -114,6 +114,8 @@ def test_the_focus_comes_back_from_a_field_that_a_key_has_closed(editor: Editor)
         page.get_by_role("textbox", name="New name of").wait_for()
         page.keyboard.press(key)
         assert name.evaluate("e => e === document.activeElement"), key
+    page.keyboard.press("Control+z")
+    expect(page.locator(".tiles.saved .tile")).to_have_count(0)
 
 
 def test_a_finger_finds_what_it_presses(server: Server, browser: Browser) -> None:
