@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,21 +31,23 @@ def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[Edit
         yield editor
 
 
+def wait_until(holds: Callable[[], bool], else_words: str) -> None:
+    """Until something holds of the picture; fails with the words where it does not come to it."""
+    deadline = time.monotonic() + MOVED_S
+    while not holds():
+        assert time.monotonic() < deadline, else_words
+        time.sleep(0.1)
+
+
 def differs(editor: Editor, before: NDArray[np.int16], least: float = 0.02) -> None:
     """Wait until the picture is another one, and the exact one of where the eye rests."""
-    deadline = time.monotonic() + MOVED_S
-    while changed(before, editor.pixels_now()) < least:
-        assert time.monotonic() < deadline, "the picture stays as it was"
-        time.sleep(0.1)
+    wait_until(lambda: changed(before, editor.pixels_now()) >= least, "the picture stays as it was")
     editor.wait_until_exact()
 
 
 def comes_back(editor: Editor, before: NDArray[np.int16], left: int = 0) -> None:
     """Wait until the picture is the one that was, right of a menu of that many pixels."""
-    deadline = time.monotonic() + MOVED_S
-    while changed(before[:, left:], editor.pixels()[:, left:]) >= 0.02:
-        assert time.monotonic() < deadline, "the picture is not what it was"
-        time.sleep(0.1)
+    wait_until(lambda: changed(before[:, left:], editor.pixels()[:, left:]) < 0.02, "the picture is not what it was")
 
 
 def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
