@@ -38,7 +38,7 @@ from server.queues.btfs import BtfQueue
 from server.queues.comparisons import ComparisonQueue
 from server.queues.counting import count_work
 from server.queues.renders import RenderQueue
-from server.queues.work_queue import Quota
+from server.queues.work import Quota
 from server.records.comments import CommentStore
 from server.records.looks import LookStore
 from server.records.room_leases import RoomLeases

@@ -18,8 +18,6 @@ from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 
-from sqlalchemy.exc import IntegrityError
-
 from relume.bake import Task
 from relume.errors import (
     CancelledError,
@@ -36,7 +34,7 @@ from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
 from worker.budget import check_room
 from worker.database.patience import Given, Result, patiently
-from worker.lease import HEARTBEAT_S, LeaseKeeper
+from worker.lease import HEARTBEAT_S, LeaseKeeper, log_lost
 from worker.ledger import Ledger
 from worker.notes import forget_note, read_note
 from worker.paths import bake_path, staging_path
@@ -94,21 +92,33 @@ class BakeRunner:
         try:
             num_bytes = self._bake()
             push(self._target)
+            self._hold()
             forget_run(self._staging)
             with suppress(StorageError):  # the bake is there; what is left over is deleted with its scene
                 forget_parts(identity)
         except CancelledError:
             self._land()
-            self._ask(self.ledger.release, identity, self.owner)
+            is_held = self._ask(self.ledger.release, identity, self.owner)
         except Exception as error:  # whatever a method raises must not end the service
             self._land()
             if not self._is_there():  # deleted in the middle of a task, with what that wrote to
                 return
             if not isinstance(error, RelumeError | OSError):
                 log.exception("bake %s failed", identity, extra={"fields": {"bake": identity}})
-            self._ask(self.ledger.finish, identity, self.owner, "failed", self._sentence(error))
+            is_held = self._ask(self.ledger.finish, identity, self.owner, "failed", self._sentence(error))
         else:
-            self._ask(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
+            is_held = self._ask(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
+        if not is_held and self._is_there():
+            log_lost("bake", identity)
+
+    def _hold(self) -> None:
+        """Renew the lease before files are changed that another process, if it has the bake now, goes on with.
+
+        Raises:
+            CancelledError: it has.
+        """
+        if not self._ask(self.ledger.keep_lease, self.job.bake_id, self.owner):
+            raise CancelledError("another process has the bake")
 
     def _bake(self) -> int:
         job, target, staging = self.job, self._target, self._staging
@@ -125,10 +135,10 @@ class BakeRunner:
             self._run_stage(scene, stage, progress)
         self._beat(progress, "publishing")
         try:
-            return publish(staging, target)
+            return publish(staging, target, self._hold)
         except ChunkDamagedError:
-            shutil.rmtree(staging, ignore_errors=True)
-            self._ask(self.ledger.forget_tasks, job.bake_id)
+            if self._ask(self.ledger.forget_tasks, job.bake_id, self.owner):
+                shutil.rmtree(staging, ignore_errors=True)
             raise
 
     def _begin_or_go_on(self) -> None:
@@ -147,9 +157,11 @@ class BakeRunner:
         why = None if not finished else UPGRADED if is_here else TAKEN_OVER
         if why is not None:
             log.warning("bake %s: %s", identity, why, extra={"fields": {"bake": identity}})
+        self._hold()
         shutil.rmtree(staging, ignore_errors=True)
         run = begin_run(staging)
-        self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, run, why)
+        if not self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, run, why):
+            raise CancelledError("the bake was stopped")
         self._parts = Parts(staging, identity, run, ())
 
     def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
@@ -228,10 +240,8 @@ class BakeRunner:
         """A task is finished: its shards are stored, where others may go on with them, before it counts."""
         if self._parts is not None:
             self._parts.store((task.stage, task.index))
-        try:
-            self._ask(self.ledger.finish_task, self.job.bake_id, task, cost, attempt)
-        except IntegrityError:
-            raise CancelledError("the bake was deleted") from None
+        if not self._ask(self.ledger.finish_task, self.job.bake_id, self.owner, task, cost, attempt):
+            raise CancelledError("the bake was deleted, or another process has it")
 
     def _beat(self, progress: Progress, phase: Phase) -> None:
         """Record progress; raise CancelledError where somebody wants this run to end."""

@@ -1,8 +1,9 @@
 """Who runs a bake, or a step of another work. Several services may share one ledger; a lease keeps each with one
 of them.
 
-An owner is named host/process/nonce/number. Its lease ends when it stops renewing it, and at once when it ran on this
-host and its process is gone, so that a restart after a crash does not wait.
+An owner is named place/process/nonce/number. Its lease ends when it stops renewing it, and at once when it ran in this
+place and its process is gone, so that a restart after a crash does not wait. A place is where a process number means
+one process: host names alone do not say that, because two machines or containers may have the same.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import socket
 import threading
 import uuid
 from collections.abc import Callable
+from pathlib import Path
 
 from worker.database.faults import AWAY, Complaint
 
@@ -26,9 +28,46 @@ _NONCE = uuid.uuid4().hex
 _numbers = itertools.count()
 
 
+def _place_of_this_process() -> str:
+    """The host's name, for people, and what makes it unique: this start of the kernel and the namespace of process
+    numbers; the network card's address on systems that say neither."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        namespace = os.readlink("/proc/self/ns/pid")
+    except OSError:
+        boot, namespace = f"{uuid.getnode():x}", ""
+    return f"{socket.gethostname()}:{boot}:{namespace}".replace("/", "-")
+
+
+_PLACE = _place_of_this_process()
+
+
 def new_owner() -> str:
     """A name for a service of this process that no other has."""
-    return f"{socket.gethostname()}/{os.getpid()}/{_NONCE}/{next(_numbers)}"
+    return f"{_PLACE}/{os.getpid()}/{_NONCE}/{next(_numbers)}"
+
+
+def owner_text(owner: str) -> str:
+    """An owner as logs name it: host and process."""
+    place, pid, *_ = owner.split("/")
+    return f"{place.split(':')[0]}, process {pid}"
+
+
+def log_taken_over(noun: str, identity: str, before: str) -> None:
+    """Say that this process goes on with what another has left. noun, identity: the work; before: its last owner."""
+    log.warning(
+        "%s %s is taken over from %s, which renews its lease no more", noun, identity, owner_text(before),
+        extra={"fields": {noun.lower(): identity}},
+    )  # fmt: skip
+
+
+def log_lost(noun: str, identity: str) -> None:
+    """Say that this process was paused, or cut off from the database, for longer than its lease. noun, identity: the
+    work that it was at."""
+    log.warning(
+        "%s %s was taken over by another process while this one stood still: what it was doing here is dropped",
+        noun, identity, extra={"fields": {noun.lower(): identity}},
+    )  # fmt: skip
 
 
 def is_alive(owner: str, heartbeat: float, now: float) -> bool:
@@ -41,9 +80,9 @@ def is_alive(owner: str, heartbeat: float, now: float) -> bool:
 
 
 def may_run(owner: str) -> bool:
-    """Whether an owner is there, as far as can be known from here: of other machines nothing can."""
-    host, pid, nonce, _ = owner.split("/")
-    if host != socket.gethostname():
+    """Whether an owner is there, as far as can be known from here: of other machines and containers nothing can."""
+    place, pid, nonce, _ = owner.split("/")
+    if place != _PLACE:
         return True
     if int(pid) == os.getpid():
         return nonce == _NONCE
@@ -63,7 +102,7 @@ class LeaseKeeper:
     The work and its owner are those that the ledger knows.
     """
 
-    def __init__(self, renew: Callable[[str, str], None], work_id: str, owner: str) -> None:
+    def __init__(self, renew: Callable[[str, str], object], work_id: str, owner: str) -> None:
         self._renew, self._work_id, self._owner = renew, work_id, owner
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._run, name="relume-lease", daemon=True)

@@ -27,7 +27,7 @@ from worker.database.clock import epoch_s
 from worker.database.models import BakeRow, TaskRow
 from worker.estimate import Finished, crowding, load_of_machine
 from worker.executor import is_tiny
-from worker.lease import is_alive
+from worker.lease import is_alive, log_taken_over
 from worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
 from worker.turns import Waiting
 
@@ -135,7 +135,7 @@ class Ledger:
             return False
         row = found[0]
         unchanged = or_(BakeRow.owner.is_(None), BakeRow.owner == row.owner)
-        return self._change(
+        is_claimed = self._change(
             identity,
             ("queued", "running"),
             unchanged,
@@ -145,19 +145,22 @@ class Ledger:
             phase=None,
             seconds_left=None,
         )
+        if is_claimed and row.owner not in (None, owner):
+            log_taken_over("bake", identity, str(row.owner))
+        return is_claimed
 
     def beat(self, identity: str, owner: str, **progress: float | str | None) -> bool:
         """Record progress. False where the bake was cancelled or taken over: stop."""
         mine = BakeRow.owner == owner
         return self._change(identity, ("running",), mine, heartbeat=epoch_s(), **progress)
 
-    def keep_lease(self, identity: str, owner: str) -> None:
-        """Renew the lease of a bake in whatever state it is."""
-        self._change(identity, None, BakeRow.owner == owner, heartbeat=epoch_s())
+    def keep_lease(self, identity: str, owner: str) -> bool:
+        """Renew the lease of a bake in whatever state it is. False where somebody else holds it."""
+        return self._change(identity, None, BakeRow.owner == owner, heartbeat=epoch_s())
 
     def finish(
         self, identity: str, owner: str, state: BakeState, problem: str | None = None, num_bytes: int = 0
-    ) -> None:
+    ) -> bool:
         """Give up the lease; a bake that is still running becomes `state`, a cancelled one stays cancelled.
 
         Args:
@@ -165,16 +168,19 @@ class Ledger:
             state: that it ends in.
             problem: a sentence for people, where it has failed.
             num_bytes: of the store, where it is ready.
+        Returns:
+            As `release`.
         """
         mine = BakeRow.owner == owner
         done = {"progress": 1.0, "crowding": crowding(load_of_machine())} if state == "ready" else {}
         ended = {"problem": problem, "bytes": num_bytes, "seconds_left": None, "phase": None, **done}
         self._change(identity, ("running",), mine, state=state, **ended)
-        self.release(identity, owner)
+        return self.release(identity, owner)
 
-    def release(self, identity: str, owner: str) -> None:
-        """Give up the lease and leave the state as it is: whoever comes next may claim the bake at once."""
-        self._change(identity, None, BakeRow.owner == owner, owner=None)
+    def release(self, identity: str, owner: str) -> bool:
+        """Give up the lease and leave the state as it is: whoever comes next may claim the bake at once. False where it
+        was lost before."""
+        return self._change(identity, None, BakeRow.owner == owner, owner=None)
 
     def delete_bakes(self, ids: Sequence[str]) -> None:
         """Forget bakes, in whatever states they are."""
@@ -188,39 +194,57 @@ class Ledger:
             rows = session.scalars(select(TaskRow).where(TaskRow.bake_id == identity))
             return {(row.stage, row.index): TaskCost(row.rays, row.trace_s, row.seconds) for row in rows}
 
-    def finish_task(self, identity: str, task: Task, cost: TaskCost, attempts: int) -> None:
+    def finish_task(self, identity: str, owner: str, task: Task, cost: TaskCost, attempts: int) -> bool:
         """Record that a task's shards are on disk; once more changes nothing.
 
         Args:
-            identity: of the bake. task: that is done.
+            identity: of the bake. owner: who holds its lease. task: that is done.
             cost: seconds and rays of it.
             attempts: how often it was begun, this time included.
+        Returns:
+            False where somebody else holds the lease, whose unfinished store may be another, or the bake is deleted:
+            nothing is recorded.
         """
         row = TaskRow(bake_id=identity, stage=task.stage, index=task.index, attempts=attempts, **asdict(cost))
         with self.sessions.begin() as session:
+            if not _renew(session, identity, owner):
+                return False
             session.merge(row)
+        return True
 
-    def forget_tasks(self, identity: str) -> None:
-        """Start a bake from nothing: its unfinished store is gone or damaged."""
+    def forget_tasks(self, identity: str, owner: str | None = None) -> bool:
+        """Start a bake from nothing: its unfinished store is gone or damaged.
+
+        Args:
+            identity: of the bake. owner: who holds its lease; None: nobody runs it.
+        Returns:
+            False where somebody else holds the lease: nothing is forgotten.
+        """
         with self.sessions.begin() as session:
+            if owner is not None and not _renew(session, identity, owner):
+                return False
             session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
             session.execute(update(BakeRow).where(BakeRow.id == identity).values(progress=0.0))
+        return True
 
     def run(self, identity: str) -> str | None:
         """The name of a bake's beginning."""
         row = self._get(identity)
         return None if row is None else row.run
 
-    def begin_anew(self, identity: str, owner: str, code: str, run: str, why: str | None) -> None:
+    def begin_anew(self, identity: str, owner: str, code: str, run: str, why: str | None) -> bool:
         """Start a bake from nothing, under this code.
 
         Args:
             identity: of the bake. owner: the process that runs it. code: that will make all of it.
             run: names this beginning.
             why: one sentence for people where it had been begun before.
+        Returns:
+            False where somebody else holds the lease, or it was cancelled.
         """
-        self.forget_tasks(identity)
-        self._change(identity, ("running",), BakeRow.owner == owner, code=code, run=run, problem=why)
+        if not self.forget_tasks(identity, owner):
+            return False
+        return self._change(identity, ("running",), BakeRow.owner == owner, code=code, run=run, problem=why)
 
     def finished_bakes(self, limit: int) -> list[Finished]:
         """What the newest ready bakes took."""
@@ -270,6 +294,12 @@ class Ledger:
             statement = statement.where(BakeRow.state.in_(states))
         with self.sessions.begin() as session:
             return cast("CursorResult[Any]", _execute(session, statement)).rowcount == 1
+
+
+def _renew(session: Session, identity: str, owner: str) -> bool:
+    """Whether an owner holds the lease of a bake until the transaction ends."""
+    statement = update(BakeRow).where(BakeRow.id == identity, BakeRow.owner == owner).values(heartbeat=epoch_s())
+    return cast("CursorResult[Any]", _execute(session, statement)).rowcount == 1
 
 
 def _execute(session: Session, statement: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import zarr
@@ -17,7 +18,7 @@ from relume.store.reader import Reader, open_staging, rows_per_shard
 from relume.store.schema import MANIFEST_NAME, SCHEMA_VERSION
 
 
-def publish(staging: Path, target: Path) -> int:
+def publish(staging: Path, target: Path, check: Callable[[], object] = lambda: None) -> int:
     """Make a staging store public, whole or not at all.
 
     Every chunk is read back first. Files that interrupted writes left behind are removed, so that the same bake gives
@@ -26,6 +27,7 @@ def publish(staging: Path, target: Path) -> int:
     Args:
         staging: the finished store, same file system as `target`.
         target: where readers look for it; an older store there is replaced.
+        check: called after what takes long; raises where the store is not to be published any more.
     Returns:
         Size of the store in bytes.
     Raises:
@@ -36,11 +38,13 @@ def publish(staging: Path, target: Path) -> int:
     reader = open_staging(staging)
     for path in array_paths(staging):
         _verify(reader, path)
+    check()
     with warnings.catch_warnings():
         # Zarr warns that consolidated metadata is an extension; readers that do not know it fall back.
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(LocalStore(staging))
     num_bytes = _write_manifest(staging)
+    check()
     target.parent.mkdir(parents=True, exist_ok=True)
     if target.exists():
         remove_folder(target)

@@ -19,6 +19,7 @@ from PIL import Image
 
 from relume import look as looks
 from relume.code_version import truth_code
+from relume.errors import CancelledError
 from relume.imageio.files import write_image
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.transfer import Axis, Eyes, Opened
@@ -79,6 +80,8 @@ def make_pass(
     transfer = shop.transfer(asked.bake)
     look, size = _look(asked, transfer), (frame.shape[1], frame.shape[0])
     truth = _pass(shop, transfer, asked, look, size, before["method"].passes, tell, cancelled)
+    if cancelled():  # brute force does not ask at its end, and the sums may be another server's now
+        raise CancelledError("the pass is not wanted any more")
     after = {paths: estimate.add(truth.pictures[paths]) for paths, estimate in before.items()}
     _keep(where, frame, after)
     _judge(where, frame, after, asked.paths, truth, look.display)

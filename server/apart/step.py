@@ -18,11 +18,13 @@ class Step:
         kind: a name in `server.apart.steps.STEPS`.
         is_first: somebody waits for it; it goes before what takes its time.
         values: what the step of this kind is called with; JSON.
+        claim: folder and owner of the work whose step it is, see `server.apart.claim`; None: it is of no work.
     """
 
     kind: str
     is_first: bool = False
     values: Mapping[str, Any] = field(default_factory=dict)
+    claim: tuple[str, str] | None = None
 
 
 class RunStep(Protocol):

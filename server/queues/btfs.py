@@ -13,7 +13,8 @@ from relume.folders import folder_bytes
 from server.apart.btfs import FOUND, SENT
 from server.apart.step import RunStep
 from server.apart.step_timer import StepTimer
-from server.queues.work_queue import Quota, Work, WorkQueue
+from server.queues.work import Quota, Work
+from server.queues.work_queue import WorkQueue
 from server.records.tables import BtfRow
 from server.wire.btfs import BtfRequest
 from worker.paths import btfs_path
@@ -25,6 +26,7 @@ class BtfQueue(WorkQueue[BtfRequest]):
     """BTFs in the database, what is found so far in `data`/btf-works/<id>/; all of one is a step, done in turns."""
 
     row, noun, request_type = BtfRow, "BTF", BtfRequest
+    resumable = ("stopped",)
 
     def __init__(
         self,
@@ -69,10 +71,14 @@ class BtfQueue(WorkQueue[BtfRequest]):
         values = {"request": work.request.model_dump(mode="json"), "folder": str(folder)}
         if not self.run_apart(work, "BTF", values, timer.tell)["is_done"]:
             return 0
+        self.note(work.id, 0)  # the lease may be lost since
         if (material := self.material(work.id)) is not None:
             self._kept(work.id, material, folder_bytes(self._btfs / material))
-        (folder / SENT).unlink(missing_ok=True)
         return 1
+
+    def is_ready(self, work: BtfWork) -> None:
+        """Let go what was sent: the material is there."""
+        (self.folder / work.id / SENT).unlink(missing_ok=True)
 
     def has_failed(self, work: BtfWork) -> None:
         """Let go what was sent: nobody can go on with it."""

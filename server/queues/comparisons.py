@@ -13,7 +13,8 @@ from server.apart.passes import FIGURES
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
 from server.errors import BusyError
-from server.queues.work_queue import Quota, Work, WorkQueue
+from server.queues.work import Quota, Work
+from server.queues.work_queue import WorkQueue
 from server.records.tables import ComparisonRow
 from server.wire.bodies import TruthFigures, TruthRequest
 from server.wire.body import Body

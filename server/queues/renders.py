@@ -11,7 +11,8 @@ from relume.folders import folder_bytes
 from server.apart.step import RunStep
 from server.apart.step_timer import StepTimer
 from server.files.downloads import safe_stem
-from server.queues.work_queue import Quota, Work, WorkQueue
+from server.queues.work import Quota, Work
+from server.queues.work_queue import WorkQueue
 from server.records.tables import RenderRow
 from server.wire.renders import RenderRequest
 
@@ -80,18 +81,35 @@ class RenderQueue(WorkQueue[RenderRequest]):
         """A single picture does not wait behind animations."""
         return request.num_frames == 1
 
+    def missing(self, render: Render) -> list[int]:
+        """Which pictures are not painted yet."""
+        return [index for index in range(render.total) if not self.frame_path(render, index).exists()]
+
+    def retry(self, render: Render, index: int) -> None:
+        """Paint one picture again, and pack all anew.
+
+        Raises:
+            NotReadyError: the batch waits or runs. BusyError, QuotaError: as `submit`.
+        """
+
+        def forget() -> None:
+            for path in (self.frame_path(render, index), self.archive_path(render), self.video_path(render)):
+                path.unlink(missing_ok=True)
+
+        self.requeue(render, ("ready", "failed"), forget)
+
     def step(self, work: Render, timer: StepTimer) -> int:
-        """Paint the next picture that is missing, or pack them."""
-        request, done = work.request.model_dump(mode="json"), work.done
-        while done < work.total and self.frame_path(work, done).exists():
-            done += 1
+        """Paint the first picture that is missing, or pack them."""
+        missing = self.missing(work)
+        done = work.total - len(missing)
         self.note(work.id, min(done, work.total - 1))
-        if done < work.total:
-            values = {"request": request, "index": done, "path": str(self.frame_path(work, done))}
-            values["scene_name"] = self._scene_name(work.request.bake)
+        if missing:
+            index = missing[0]
+            values = {"request": work.request.model_dump(mode="json"), "index": index}
+            values |= {"path": str(self.frame_path(work, index)), "scene_name": self._scene_name(work.request.bake)}
             self.run_apart(work, "frame of a batch", values, timer.tell)
             timer.next_step()
-            return done + 1 if done + 1 < work.total else self._packed(work)
+            return done + 1 if len(missing) > 1 else self._packed(work)
         return self._packed(work)
 
     def _packed(self, work: Render) -> int:
@@ -99,6 +117,7 @@ class RenderQueue(WorkQueue[RenderRequest]):
         video = str(self.video_path(work)) if work.request.format == "mp4" else None
         values = {"frames": frames, "archive": str(self.archive_path(work)), "video": video, "fps": work.request.fps}
         self.run_apart(work, "pack of a batch", values, lambda share: None)
+        self.note(work.id, work.total - 1)  # the lease may be lost since
         self._measured(work.id, folder_bytes(self.folder / work.id))
         return work.total
 

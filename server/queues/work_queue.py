@@ -11,79 +11,37 @@ every hand that drags, and a server needs nothing beside its database.
 
 from __future__ import annotations
 
+import json
 import logging
-import secrets
 import shutil
 import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar, cast
+from typing import Any, ClassVar, Generic, cast
 
-from pydantic import BaseModel
-from sqlalchemy import CursorResult, or_, select, update
+from sqlalchemy import CursorResult, Select, and_, func, or_, select, update
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import CancelledError, NotFoundError, RelumeError
+from server.apart.claim import claim
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
-from server.errors import BusyError, QuotaError, problem_of
+from server.errors import BusyError, NotReadyError, QuotaError, problem_of
+from server.queues.work import ACTIVE, STATES, Quota, Request, Work, WorkFilter, new_id
 from server.records.tables import WorkRow
 from worker.database.clock import epoch_s
 from worker.database.faults import Complaint
-from worker.lease import LeaseKeeper, is_alive, new_owner
+from worker.lease import LeaseKeeper, is_alive, log_lost, log_taken_over, new_owner
 from worker.turns import Turns, Waiting
 
 log = logging.getLogger(__name__)
 _LOOK_AGAIN_S = 2.0
 _ASK_AGAIN_S = 0.1
-_ACTIVE = ("queued", "running")
-_STATES = (*_ACTIVE, "ready", "failed", "stopped")
 
-Request = TypeVar("Request", bound=BaseModel)
-
-
-@dataclass(frozen=True)
-class Quota:
-    """How much work of one kind may wait or run: of all clients together, and of each; and whose turns are how many.
-
-    Attributes:
-        shares: see `worker.turns.Turns`.
-    """
-
-    of_all: int
-    of_each: int
-    shares: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Work(Generic[Request]):
-    """One row at one moment.
-
-    Attributes:
-        request: the body of the call that asked for it.
-        done, total: steps. progress: 0…1; what is done of the step at hand counts too.
-        seconds_left: None where the work does not run, or nothing was measured yet.
-        problem: why it failed, one sentence.
-    """
-
-    id: str
-    request: Request
-    state: str
-    done: int
-    total: int
-    progress: float
-    seconds_left: float | None
-    problem: str | None
-
-
-def new_id() -> str:
-    """A name for a work."""
-    return secrets.token_hex(8)
 
 
 class WorkQueue(ABC, Generic[Request]):
@@ -91,11 +49,16 @@ class WorkQueue(ABC, Generic[Request]):
 
     A kind says which table its rows are in, what people call one of them, what a request is, how many steps it takes,
     which go first, and how a step is done.
+
+    Only who holds the lease of a row changes its state, its files and its quota. A server that was paused for longer
+    than the lease finds that out by its next statement on the row, and drops what it was doing.
     """
 
     row: ClassVar[type[WorkRow]]
     noun: ClassVar[str]
     request_type: type[Request]
+    resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
+    """States from which it can go on: its files are still there."""
 
     def __init__(self, sessions: sessionmaker[Session], folder: Path, run: RunStep, quota: Quota) -> None:
         """
@@ -108,7 +71,7 @@ class WorkQueue(ABC, Generic[Request]):
         self._turns, self._timers = Turns(quota.shares), dict[str, StepTimer]()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._wanted: tuple[str, float] = "", 0.0
-        self._complaint = Complaint(log, f"the queue of {self.noun}s cannot be read")
+        self._complaint = Complaint(log, f"the queue of {self.noun}s cannot be read or written")
         self._thread = threading.Thread(target=self._run, name=f"relume-{self.noun}s", daemon=True)
 
     @abstractmethod
@@ -134,7 +97,10 @@ class WorkQueue(ABC, Generic[Request]):
         """
 
     def has_failed(self, work: Work[Request]) -> None:
-        """Called before a row says that it has failed, for good: most kinds keep what they have."""
+        """Called when the row says so, of whoever held the lease: most kinds keep what they have."""
+
+    def is_ready(self, work: Work[Request]) -> None:
+        """Called when the row says so, of whoever held the lease: most kinds keep what they have."""
 
     def run_apart(
         self, work: Work[Request], kind: str, values: Mapping[str, Any], tell: Callable[[float], object]
@@ -144,7 +110,7 @@ class WorkQueue(ABC, Generic[Request]):
         Args:
             work: whose step it is. kind, values: of the step. tell: called with the share done.
         """
-        step = Step(kind, self.is_first(work.request), values)
+        step = Step(kind, self.is_first(work.request), values, (str(self.folder / work.id), self._owner))
         return self.run(step, tell, lambda: self.is_wanted(work.id))
 
     def start(self) -> None:
@@ -175,15 +141,9 @@ class WorkQueue(ABC, Generic[Request]):
         Raises:
             BusyError, QuotaError: enough waits or runs already, of all or of this client.
         """
-        identity, row, quota = identity or new_id(), self.row, self._quota
+        identity, row = identity or new_id(), self.row
         with self._sessions.begin() as session:
-            waiting = session.scalars(select(row.client).where(row.state.in_(_ACTIVE))).all()
-            if len(waiting) >= quota.of_all:
-                text = f"as many {self.noun}s wait or run as may, {quota.of_all}; try again when some are done"
-                raise BusyError(f"{text} (RELUME_MAX_QUEUED)")
-            if sum((other or "") == client for other in waiting) >= quota.of_each:
-                text = f"as many {self.noun}s of yours wait or run as may, {quota.of_each}; wait, or stop one"
-                raise QuotaError(f"{text} (RELUME_MAX_QUEUED_EACH)")
+            self._check_quota(session, client)
             if prepare is not None:
                 (self.folder / identity).mkdir(parents=True)
                 prepare(self.folder / identity)
@@ -194,6 +154,17 @@ class WorkQueue(ABC, Generic[Request]):
             )  # fmt: skip
         self._wake.set()
         return identity
+
+    def _check_quota(self, session: Session, client: str) -> None:
+        """Whether one more of a client may wait. Raises BusyError, QuotaError."""
+        quota = self._quota
+        waiting = session.scalars(select(self.row.client).where(self.row.state.in_(ACTIVE))).all()
+        if len(waiting) >= quota.of_all:
+            text = f"as many {self.noun}s wait or run as may, {quota.of_all}; try again when some are done"
+            raise BusyError(f"{text} (RELUME_MAX_QUEUED)")
+        if sum((other or "") == client for other in waiting) >= quota.of_each:
+            text = f"as many {self.noun}s of yours wait or run as may, {quota.of_each}; wait, or stop one"
+            raise QuotaError(f"{text} (RELUME_MAX_QUEUED_EACH)")
 
     def get(self, identity: str) -> Work[Request]:
         """A row. Raises NotFoundError."""
@@ -208,17 +179,31 @@ class WorkQueue(ABC, Generic[Request]):
         total, timer = self.steps(request), self._timers.get(row.id) if row.state == "running" else None
         progress = min(1.0, (row.done + (timer.share if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
-        return Work(row.id, request, row.state, row.done, total, progress, seconds_left, row.problem)
+        ended = row.problem, row.created, row.started, row.ended
+        return Work(row.id, request, row.client or "", row.state, row.done, total, progress, seconds_left, *ended)
 
-    def all(self) -> list[Work[Request]]:
-        """All rows, oldest first."""
+    def page(
+        self, which: WorkFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
+    ) -> list[Work[Request]]:
+        """Rows, newest first or last.
+
+        Args:
+            which: are listed. limit: at most so many.
+            after: time of creation and id of the row after which the list begins; None: with the first.
+        """
+        row = self.row
+        query = _where(select(row), row, which).limit(limit)
+        created = row.created.desc() if newest_first else row.created
+        if after is not None:
+            is_later = row.created < after[0] if newest_first else row.created > after[0]
+            query = query.where(or_(is_later, and_(row.created == after[0], row.id > after[1])))
         with self._sessions() as session:
-            return [self._work(row) for row in session.scalars(select(self.row).order_by(self.row.created))]
+            return [self._work(each) for each in session.scalars(query.order_by(created, row.id))]
 
     def naming(self, text: str) -> list[str]:
         """Ids of work that waits or goes on whose request holds a text, oldest first."""
         row = self.row
-        asked = select(row.id).where(row.state.in_(_ACTIVE), row.request.contains(text, autoescape=True))
+        asked = select(row.id).where(row.state.in_(ACTIVE), row.request.contains(text, autoescape=True))
         with self._sessions() as session:
             return list(session.scalars(asked.order_by(row.created)))
 
@@ -233,12 +218,39 @@ class WorkQueue(ABC, Generic[Request]):
     def stop(self, identity: str) -> None:
         """End work that waits or goes on; its files stay, `resume` goes on with them. Raises NotFoundError."""
         self.get(identity)
-        self._update(identity, _ACTIVE, state="stopped")
+        self._update(identity, ACTIVE, state="stopped", ended=time.time())
 
     def resume(self, identity: str) -> None:
-        """Queue what was stopped again. Raises NotFoundError."""
-        self.get(identity)
-        self._update(identity, ("stopped",), state="queued")
+        """Queue what was stopped or has failed again; what waits or runs stays as it is.
+
+        Raises:
+            NotFoundError. NotReadyError: it is ready, or its files are gone. BusyError, QuotaError: as `submit`.
+        """
+        work = self.get(identity)
+        if work.state not in ACTIVE:
+            self.requeue(work, self.resumable)
+
+    def requeue(
+        self, work: Work[Request], states: Sequence[str], prepare: Callable[[], object] = lambda: None
+    ) -> None:
+        """Queue a work that is in one of some states again.
+
+        Args:
+            work: as it was found. states: from which it may be queued.
+            prepare: called before anybody can begin with it.
+        Raises:
+            NotReadyError: it is in another state. BusyError, QuotaError: as `submit`.
+        """
+        row = self.row
+        values = {"state": "queued", "problem": None, "ended": None}
+        statement = update(row).where(row.id == work.id, row.state.in_(states)).values(values)
+        with self._sessions.begin() as session:
+            self._check_quota(session, work.user)
+            if _num_changed(session, statement) == 0:
+                state = session.scalar(select(row.state).where(row.id == work.id))
+                able = f"only one that is {' or '.join(states)} can be queued again"
+                raise NotReadyError(f"the {self.noun} is {state or 'deleted'}; {able}")
+            prepare()
         self._wake.set()
 
     def note(self, identity: str, done: int) -> None:
@@ -252,27 +264,27 @@ class WorkQueue(ABC, Generic[Request]):
         return self._closing.is_set()
 
     def is_wanted(self, identity: str) -> bool:
-        """Whether nobody has stopped the work or deleted its row, some moments ago, and the server goes on."""
+        """Whether nobody had stopped the work, deleted its row or taken it over some moments ago, and the server goes
+        on."""
         if self.is_closing:
             return False
         if self._wanted[0] == identity and time.monotonic() < self._wanted[1]:
             return True  # work asks thousands of times a second
         with self._sessions() as session:
             row = session.get(self.row, identity)
-            is_wanted = row is not None and row.state in _ACTIVE
+            is_wanted = row is not None and row.state in ACTIVE and row.owner == self._owner
         self._wanted = identity if is_wanted else "", time.monotonic() + _ASK_AGAIN_S
         return is_wanted
 
     def _update_own(self, identity: str, **values: Any) -> bool:
         """Change a row that is under way, and whose lease is here. False where it is not any more."""
-        return self._update(identity, _ACTIVE, self.row.owner == self._owner, **values)
+        return self._update(identity, ACTIVE, self.row.owner == self._owner, **values)
 
     def _update(self, identity: str, states: Sequence[str], *conditions: Any, **values: Any) -> bool:
         row = self.row
         statement = update(row).where(row.id == identity, row.state.in_(states), *conditions).values(**values)
-        statement = statement.execution_options(synchronize_session=False)
         with self._sessions.begin() as session:
-            return cast("CursorResult[Any]", session.execute(statement)).rowcount > 0
+            return _num_changed(session, statement) > 0
 
     def _run(self) -> None:
         while not self._closing.is_set():
@@ -292,45 +304,59 @@ class WorkQueue(ABC, Generic[Request]):
         """Take the lease of the row whose turn it is, of those that nobody works on; None where there is none."""
         row = self.row
         columns = row.id, row.client, row.is_first, row.created, row.owner, row.heartbeat  # requests may be large
-        query = select(*columns, epoch_s().label("now")).where(row.state.in_(_ACTIVE))
+        query = select(*columns, epoch_s().label("now")).where(row.state.in_(ACTIVE))
         with self._sessions() as session:
             found = [one for one in session.execute(query) if not self._is_others(one.owner, one.heartbeat, one.now)]
         owners = {one.id: one.owner for one in found}
         waiting = [Waiting(one.id, one.client or "", bool(one.is_first), one.created) for one in found]
         self._timers = {one.id: self._timers[one.id] for one in waiting if one.id in self._timers}
         for work in self._turns.order(waiting):
-            unchanged = or_(row.owner.is_(None), row.owner == owners[work.id])
-            if self._update(work.id, _ACTIVE, unchanged, owner=self._owner, heartbeat=epoch_s()):
+            before = owners[work.id]
+            unchanged = or_(row.owner.is_(None), row.owner == before)
+            started = func.coalesce(row.started, time.time())
+            if self._update(work.id, ACTIVE, unchanged, owner=self._owner, heartbeat=epoch_s(), started=started):
+                if before not in (None, self._owner):
+                    log_taken_over(self.noun, work.id, str(before))
                 self._turns.take(work.client)
                 return work.id
         return None
 
     def _keep(self, identity: str, owner: str) -> None:
-        self._update(identity, _STATES, self.row.owner == owner, heartbeat=epoch_s())
+        self._update(identity, STATES, self.row.owner == owner, heartbeat=epoch_s())
 
     def _do(self, work: Work[Request]) -> None:
         """A step of one row; every failure ends in it as a sentence."""
-        folder, row = self.folder / work.id, self.row
+        folder = self.folder / work.id
         timer = self._timers.setdefault(work.id, StepTimer(self.step_s(work.request)))
         timer.begin()
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            claim(folder, self._owner)
             with LeaseKeeper(self._keep, work.id, self._owner):
                 done = self.step(work, timer)
-            self._update_own(work.id, done=done, **({"state": "ready"} if done >= work.total else {}))
-        except CancelledError:  # closing, stopped, or deleted
+            self._has_done(work, done)
+        except CancelledError:  # closing, stopped, deleted, or taken over
             pass
         except OperationalError:  # the database is away: the step is done again, and finds what is on the disk
             raise
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
                 log.exception("%s %s failed", self.noun, work.id, extra={"fields": {self.noun.lower(): work.id}})
-            self.has_failed(work)
-            self._update_own(work.id, state="failed", problem=problem_of(error).detail)
+            if self._update_own(work.id, state="failed", problem=problem_of(error).detail, ended=time.time()):
+                self.has_failed(work)
         finally:
-            self._update(work.id, _STATES, row.owner == self._owner, owner=None)
+            is_held = self._update(work.id, STATES, self.row.owner == self._owner, owner=None)
         if not self._is_there(work.id):
             shutil.rmtree(folder, ignore_errors=True)
+        elif not is_held:
+            log_lost(self.noun, work.id)
+
+    def _has_done(self, work: Work[Request], done: int) -> None:
+        """A step has ended; so many are done now."""
+        if done < work.total:
+            self._update_own(work.id, done=done)
+        elif self._update_own(work.id, done=done, state="ready", ended=time.time()):
+            self.is_ready(work)
 
     def _is_there(self, identity: str) -> bool:
         with self._sessions() as session:
@@ -338,3 +364,21 @@ class WorkQueue(ABC, Generic[Request]):
 
     def _is_others(self, owner: str | None, heartbeat: float | None, now: float) -> bool:
         return owner not in (None, self._owner) and is_alive(str(owner), heartbeat or 0.0, now)
+
+
+def _num_changed(session: Session, statement: Any) -> int:
+    result = session.execute(statement, execution_options={"synchronize_session": False})
+    return cast("CursorResult[Any]", result).rowcount
+
+
+def _where(query: Select[Any], row: type[WorkRow], which: WorkFilter) -> Select[Any]:
+    """A query of the rows that a list shows; requests are JSON without blanks."""
+    if which.state is not None:
+        query = query.where(row.state == which.state)
+    if which.user is not None:
+        query = query.where(func.coalesce(row.client, "") == which.user)
+    for key, value in (("bake", which.bake), ("name", which.name)):
+        if value is not None:
+            said = f'"{key}":{json.dumps(value, ensure_ascii=False)}'
+            query = query.where(row.request.contains(said, autoescape=True))
+    return query

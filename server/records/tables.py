@@ -35,6 +35,7 @@ class WorkRow(Base):
 
     `client` asked for it and `is_first` says that it goes before others; rows of an older relume have neither. Whoever
     does a step of it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the database's clock).
+    `started` and `ended` are seconds since 1970; None: not yet, or in a row of an older relume.
     """
 
     __abstract__ = True
@@ -49,6 +50,8 @@ class WorkRow(Base):
     is_first: Mapped[bool | None]
     owner: Mapped[str | None] = mapped_column(default=None)
     heartbeat: Mapped[float | None] = mapped_column(default=None)
+    started: Mapped[float | None] = mapped_column(default=None)
+    ended: Mapped[float | None] = mapped_column(default=None)
 
 
 class RenderRow(WorkRow):
@@ -104,3 +107,25 @@ class CommentRow(Base):
     picture: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     has_picture: Mapped[bool]
     num_bytes: Mapped[int]
+
+
+class IdempotencyRow(Base):
+    """A call that made something, and its answer, see `server.records.idempotency`.
+
+    Attributes:
+        client, key: whose call it is, and how they call it. digest: of all that was sent.
+        owner: the process that answers it; see `worker.lease`. created: seconds since 1970 by the database's clock.
+        status: of the answer; None: there is none yet. location, media_type, body: of the answer.
+    """
+
+    __tablename__ = "idempotency"
+
+    client: Mapped[str] = mapped_column(primary_key=True)
+    key: Mapped[str] = mapped_column(primary_key=True)
+    digest: Mapped[str]
+    owner: Mapped[str]
+    created: Mapped[float] = mapped_column(index=True)
+    status: Mapped[int | None]
+    location: Mapped[str | None] = mapped_column(Text)
+    media_type: Mapped[str | None]
+    body: Mapped[bytes | None] = mapped_column(LargeBinary)

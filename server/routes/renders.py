@@ -22,7 +22,7 @@ from server.errors import NotReadyError
 from server.files.downloads import Download
 from server.files.video import check_encoder
 from server.queues.renders import Render, planned_bytes
-from server.queues.work_queue import new_id
+from server.queues.work import new_id
 from server.routes.bakes import ready_bake
 from server.services import Services, Shared
 from server.wire.body import MAX_NAME, Id

@@ -1,6 +1,5 @@
 """Processes that do steps: killed, stopped, exchanged; and whose turn it is."""
 
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,10 +16,12 @@ from server.apart import process as processes
 from server.apart.pool import Pool
 from server.apart.step import Step
 from server.errors import BusyError, QuotaError
-from server.queues.work_queue import Quota, WorkQueue
+from server.queues.work import Quota
+from server.queues.work_queue import WorkQueue
 from server.records.tables import RenderRow
 from server.wire.renders import RenderRequest
 from worker.database import open_database
+from worker.lease import new_owner
 from worker.ledger import Ledger
 from worker.turns import Turns, Waiting
 
@@ -252,7 +253,7 @@ def test_two_servers_do_no_step_twice_and_go_on_with_what_one_left(tmp_path: Pat
             name: queues[0].submit(RenderRequest.model_validate({**asked, "looks": [{}] * 4, "name": name}))
             for name in "abc"
         }
-        gone = f"{socket.gethostname()}/{2**22 + 1}/nobody/0"  # no process has this number
+        gone = f"{new_owner().split('/')[0]}/{2**22 + 1}/nobody/0"  # no process has this number
         with ledger.sessions.begin() as session:
             session.execute(update(RenderRow).values(owner=gone, heartbeat=time.time(), state="running"))
         for queue in queues:

@@ -105,10 +105,41 @@ def test_lease_of_a_dead_process_ends_at_once() -> None:
     assert not lease.is_alive(f"{host}/{pid}/another-run-of-this-container/0", 100.0, 101.0)
 
 
+def test_places_are_told_apart_by_more_than_a_host_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    place, _, nonce, number = lease.new_owner().split("/")
+    host, rest = place.split(":", 1)
+    gone = 2**22 + 1
+    assert not lease.may_run(f"{place}/{gone}/{nonce}/{number}")
+    assert lease.may_run(f"{host}/{gone}/{nonce}/{number}"), "another machine may have the same name"
+    assert lease.may_run(f"{host}:another-start{rest}/{gone}/{nonce}/{number}")
+    assert lease.owner_text(lease.new_owner()).startswith(f"{host}, process ")
+
+
+def test_who_has_lost_the_lease_of_a_bake_records_and_forgets_nothing(
+    ledger: Ledger, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner(), lease.new_owner()
+    task, cost = Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2)
+    ledger.claim(identity, first)
+    assert ledger.finish_task(identity, first, task, cost, 1)
+    monkeypatch.setattr(lease, "LEASE_S", -1.0)
+    assert ledger.claim(identity, second)
+    assert "is taken over from" in caplog.text
+    assert not ledger.keep_lease(identity, first)
+    assert not ledger.finish_task(identity, first, Task(0, 2, "left", 8, 16), cost, 1)
+    assert not ledger.forget_tasks(identity, first)
+    assert not ledger.begin_anew(identity, first, "code", "run", None)
+    assert not ledger.finish(identity, first, "failed", "a problem")
+    assert ledger.finished_tasks(identity) == {(0, 1): cost}
+    status = ledger.bake(identity)
+    assert (status.state, status.problem) == ("running", None)
+    assert ledger.finish(identity, second, "ready")
+
+
 def test_cancelled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) -> None:
     identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
     ledger.claim(identity, owner)
-    ledger.finish_task(identity, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
+    assert ledger.finish_task(identity, owner, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
     assert ledger.cancel(identity)
     assert not ledger.beat(identity, owner)
     ledger.finish(identity, owner, "ready")
@@ -135,8 +166,9 @@ def test_scenes_are_listed_and_deleted_with_their_bakes(tmp_path: Path, ledger: 
     record = get_scene(ledger, SCENE.id)
     assert (record.name, record.views, record.num_triangles) == ("triangle", ("front", "left"), 1)
     assert record.materials[0]["terms"][0]["model"] == "lambert"
-    identity = ledger.submit(SCENE.id, RECIPE, PLAN)
-    ledger.finish_task(identity, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
+    identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
+    ledger.claim(identity, owner)
+    assert ledger.finish_task(identity, owner, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
     delete_scene(tmp_path, ledger, SCENE.id)
     assert [record.id for record in list_scenes(ledger)] == [other]
     assert ledger.bakes() == []

@@ -115,7 +115,7 @@ def test_stages_are_known_from_bakes_of_the_same_scene_where_there_are_any(tmp_p
         identity = service.ledger.submit(scene.id, RECIPE, Plan(1, LARGE, 1, 1))
         service.ledger.claim(identity, "host/1/nonce/1")
         for task in (Task(0, 0, "front", 0, 1), Task(1, 0, "front", 0, 1), Task(1, 1, "front", 1, 2)):
-            service.ledger.finish_task(identity, task, TaskCost(1, seconds, seconds), 1)
+            service.ledger.finish_task(identity, "host/1/nonce/1", task, TaskCost(1, seconds, seconds), 1)
         service.ledger.finish(identity, "host/1/nonce/1", "ready")
     known = [service.ledger.stage_seconds(scene.id, "fake", 2, 8) for scene in scenes]
     assert known == [{0: 3.0, 1: 3.0}, {0: 5.0, 1: 5.0}, {0: 8.0, 1: 8.0}]

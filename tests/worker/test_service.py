@@ -347,10 +347,10 @@ def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
 ) -> None:
     finish, deleted = Ledger.finish_task, threading.Event()
 
-    def finish_deleted(ledger: Ledger, identity: str, *told: Any) -> None:
+    def finish_deleted(ledger: Ledger, identity: str, *told: Any) -> bool:
         ledger.delete_bakes([identity])
         deleted.set()
-        finish(ledger, identity, *told)
+        return finish(ledger, identity, *told)
 
     monkeypatch.setattr(Ledger, "finish_task", finish_deleted)
     with open_service(tmp_path) as service:

@@ -19,7 +19,7 @@ from server.apart.btfs import SENT
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.queues.btfs import BtfWork
-from server.queues.work_queue import new_id
+from server.queues.work import new_id
 from server.services import Services, Shared
 from server.wire.body import Id
 from server.wire.btfs import BOUND, TEXELS, Bound, BtfRequest, BtfWorkBody, Period, SyntheticBtfRequest, Texels
