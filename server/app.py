@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from importlib.metadata import version
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 
 from relume.imageio.ocio.current import current, using
 from relume.resident import share_arenas
@@ -39,6 +39,7 @@ from server.routes import (
     shares,
     surface,
 )
+from server.routes.paging import check_query
 from server.routes.shelves import btf_works, btfs, environments, images, library, materials
 from server.running.leave import Leave
 from server.running.process import Process
@@ -125,7 +126,8 @@ def create_app(
     )
     app.add_middleware(RequestIds)
     for group in ROUTE_GROUPS:
-        app.include_router(group.router)
+        takes_any = group in (session, health)  # what a session's address may say it checks itself
+        app.include_router(group.router, dependencies=[] if takes_any else [Depends(check_query)])
     app.router.default = client.Client(settings.client)  # not a mount, which would hide a call's 405
     return app
 

@@ -346,5 +346,6 @@ def _status(row: BakeRow, ahead: Mapping[str, int]) -> BakeStatus:
         recipe=recipe_from_json(row.recipe),
         plan=_plan(row.plan),
         created=row.created,
+        client=row.client or "",
         code=row.code,
     )

@@ -42,6 +42,7 @@ class BakeStatus:
         problem: one sentence with what to do about it, or why it has started again; None where all is well.
         code: names the code that makes or made it; None where that was not written down yet.
         created: seconds since 1970.
+        client: who asked for it first; "" where that was not written down, or nobody logs in.
     """
 
     id: str
@@ -59,6 +60,7 @@ class BakeStatus:
     plan: Plan
     created: float
     code: str | None
+    client: str = ""
 
     @property
     def is_current(self) -> bool:

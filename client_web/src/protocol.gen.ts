@@ -269,9 +269,11 @@ export interface ArrayInfo {
   shape: [number, number];
 }
 
-/** A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again. `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for. `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might come out otherwise if it were baked again. */
+/** A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again. `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for. `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might come out otherwise if it were baked again. `user` asked for it first, `created` says when. */
 export interface BakeBody {
   id: string;
+  user: string;
+  created: string;
   scene: string;
   state: "queued" | "running" | "ready" | "failed" | "cancelled";
   progress: number;
@@ -316,12 +318,16 @@ export interface BtfBody {
   ratio: number;
 }
 
-/** A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. */
+/** A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. */
 export interface BtfWorkBody {
   id: string;
   name: string;
+  user: string;
   geometry: "weave" | "pebbles" | "corduroy" | "mesh" | null;
   state: "queued" | "running" | "ready" | "failed" | "stopped";
+  created: string;
+  started: string | null;
+  ended: string | null;
   progress: number;
   seconds_left: number | null;
   material: string | null;
@@ -698,14 +704,19 @@ export interface RecipeBody {
   cameras: CameraBody[];
 }
 
-/** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. `seconds_left`: null where it does not run or nothing was measured yet. */
+/** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs in. `created`, `started` and `ended` are times; null: not yet. */
 export interface RenderBody {
   id: string;
+  name: string | null;
+  user: string;
   bake: string;
   view: string;
   format: "exr" | "png" | "webp" | "mp4";
   size: [number, number] | null;
-  state: "queued" | "running" | "ready" | "failed";
+  state: "queued" | "running" | "ready" | "failed" | "stopped";
+  created: string;
+  started: string | null;
+  ended: string | null;
   done: number;
   total: number;
   progress: number;
@@ -860,12 +871,16 @@ export interface TablesInfo {
   arrays: ArrayInfo[];
 }
 
-/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
+/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
 export interface TruthBody {
   id: string;
+  user: string;
   bake: string;
   view: string;
   state: "queued" | "running" | "ready" | "failed" | "stopped";
+  created: string;
+  started: string | null;
+  ended: string | null;
   passes: number;
   total: number;
   progress: number;

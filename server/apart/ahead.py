@@ -64,7 +64,7 @@ class Ahead:
                 with self._turn() as is_ours:
                     if is_ours:
                         self._go_round(known)
-                self._complaint.well()
+                        self._complaint.well()  # where another server has the turn nothing was asked
             except Exception as error:  # the database may be away for a while; the thread must outlive that
                 self._complaint.meet(error)
 

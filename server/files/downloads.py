@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import re
+import zipfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, StreamingResponse
 from starlette.datastructures import Headers
 from starlette.types import Message, Receive, Scope, Send
 
 from server.errors import RangeError
 
 _LONGEST = 120
+_PART_BYTES = 1 << 18
 _RANGES = re.compile(
     rb"bytes=\s*(\d{1,99}-\d{0,99}|-\d{1,99})(\s*,\s*(\d{1,99}-\d{0,99}|-\d{1,99}))*\s*", re.IGNORECASE
 )
@@ -33,6 +40,58 @@ class Download(FileResponse):
 
         headers = [(name, value) for name, value in scope["headers"] if name != b"range" or _are_ranges(value)]
         await super().__call__({**scope, "headers": headers}, receive, send_unless_refused)
+
+
+class ZipStream(StreamingResponse):
+    """Files packed while they are sent: nothing of the archive is on the disk, and little of it in memory."""
+
+    media_type = "application/zip"
+
+    def __init__(self, files: Sequence[tuple[Path, str]], name: str) -> None:
+        """
+        Args:
+            files: each with its name in the archive; one that is deleted meanwhile is left out.
+            name: of the archive where it is saved.
+        """
+        called = f"attachment; filename*=utf-8''{quote(name)}"
+        super().__init__(_zipped(files), headers={"Content-Disposition": called, "Cache-Control": "no-store"})
+
+
+class _Sent(io.RawIOBase):
+    """What was written and not taken yet."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
+
+    def write(self, part: Any) -> int:
+        """Add some."""
+        self._parts.append(bytes(part))
+        return len(self._parts[-1])
+
+    def take(self) -> bytes:
+        """Take all."""
+        taken, self._parts = b"".join(self._parts), []
+        return taken
+
+
+def _zipped(files: Sequence[tuple[Path, str]]) -> Iterator[bytes]:
+    sent = _Sent()
+    with zipfile.ZipFile(sent, "w", zipfile.ZIP_STORED) as packed:
+        for path, name in files:
+            try:
+                file = path.open("rb")
+            except FileNotFoundError:
+                continue
+            with file, packed.open(zipfile.ZipInfo(name), "w", force_zip64=True) as entry:
+                while part := file.read(_PART_BYTES):
+                    entry.write(part)
+                    yield sent.take()
+            yield sent.take()
+    yield sent.take()
 
 
 def _are_ranges(value: bytes) -> bool:

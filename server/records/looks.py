@@ -6,6 +6,7 @@ import hashlib
 import json
 import time
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn, cast
 
@@ -31,6 +32,16 @@ class SavedLook:
     document: str
     etag: str
     modified: float
+
+
+@dataclass(frozen=True)
+class ListedLook:
+    """What a list says of a look; `num_bytes` of its document."""
+
+    name: str
+    etag: str
+    modified: float
+    num_bytes: int
 
 
 def check_name(name: str) -> str:
@@ -69,11 +80,12 @@ class LookStore:
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions = sessions
 
-    def list(self) -> list[SavedLook]:
-        """All of them, newest first."""
+    def list(self) -> Sequence[ListedLook]:
+        """All of them, newest first, without their documents: these may take gigabytes."""
+        columns = LookRow.name, LookRow.etag, LookRow.modified, func.length(LookRow.document)  # which is ASCII
         with self._sessions() as session:
-            rows = session.scalars(select(LookRow).order_by(LookRow.modified.desc(), LookRow.name))
-            return [_saved(row) for row in rows]
+            rows = session.execute(select(*columns).order_by(LookRow.modified.desc(), LookRow.name))
+            return [ListedLook(*row) for row in rows]
 
     def get(self, name: str) -> SavedLook:
         """One look. Raises NotFoundError."""

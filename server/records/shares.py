@@ -9,7 +9,7 @@ import base64
 import hashlib
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +33,15 @@ class Share:
     id: str
     document: dict[str, Any]
     created: float
+
+
+@dataclass(frozen=True)
+class ListedShare:
+    """What a list says of a link: its content has so many bytes."""
+
+    id: str
+    created: float
+    bytes: int
 
 
 class ShareStore:
@@ -64,6 +73,13 @@ class ShareStore:
         if row is None:
             raise NotFoundError(f"there is no shared look {identity[:40]}; ask who sent the link to share it again")
         return Share(row.id, json.loads(row.document), row.created)
+
+    def list(self, text: str = "") -> Sequence[ListedShare]:
+        """All links, or those whose contents hold a text."""
+        query = select(ShareRow.id, ShareRow.created, ShareRow.bytes)
+        with self._sessions() as session:
+            found = session.execute(query.where(ShareRow.document.contains(text, autoescape=True)))
+            return [ListedShare(*row) for row in found]
 
     def naming(self, text: str) -> tuple[str, ...]:
         """Ids of links whose contents hold a text, sorted; of wildcards none are known."""

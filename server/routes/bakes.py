@@ -22,14 +22,15 @@ from relume.scene.placed_camera import placed_camera
 from server.access.roles import Caller, Who
 from server.errors import NotReadyError
 from server.files.png import FOREVER, PngResponse
+from server.routes.paging import Paged, newest
 from server.services import Services, Shared
-from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, RecipeBody
+from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, RecipeBody, moment
 from server.wire.body import Id
 from server.wire.cameras import CameraBody
 from worker.cameras import chosen_views
 from worker.presets import PRESETS, points_of
 from worker.scenes import get_scene
-from worker.status import MOVING, BakeStatus, bake_id
+from worker.status import MOVING, BakeState, BakeStatus, bake_id
 
 router = APIRouter(prefix="/api/bakes", tags=["bakes"])
 
@@ -68,9 +69,21 @@ def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services
 
 
 @router.get("")
-def list_bakes(services: Shared, scene: Annotated[Id | None, Query()] = None) -> list[BakeBody]:
-    """All bakes, or those of a scene; newest first."""
-    return [bake_body(status, services) for status in services.bakes.bakes(scene)]
+def list_bakes(
+    services: Shared,
+    page: Paged,
+    scene: Annotated[Id | None, Query()] = None,
+    state: Annotated[BakeState | None, Query()] = None,
+    user: Annotated[str | None, Query(max_length=80)] = None,
+) -> list[BakeBody]:
+    """Bakes, newest first, those of a scene, a state or a user."""
+    found = [
+        status
+        for status in services.bakes.bakes(scene)
+        if state in (None, status.state) and user in (None, status.client)
+    ]
+    found = page.cut(found, lambda status: newest(status.created, status.id))
+    return [bake_body(status, services) for status in found]
 
 
 @router.get("/{bake}")
@@ -161,7 +174,8 @@ def bake_body(status: BakeStatus, services: Services) -> BakeBody:
     """A bake as the API shows it."""
     seconds = None if status.phase_since is None else max(0.0, round(time.time() - status.phase_since, 1))
     plan = _plan(status.plan, services)
-    return BakeBody.of(status, recipe=_recipe_body(status.recipe), plan=plan, phase_seconds=seconds)
+    more = {"plan": plan, "phase_seconds": seconds, "created": moment(status.created), "user": status.client}
+    return BakeBody.of(status, recipe=_recipe_body(status.recipe), **more)
 
 
 def _recipe_body(recipe: Recipe) -> RecipeBody:

@@ -11,6 +11,7 @@ from relume.errors import NotFoundError
 from relume.scene.built_in import BUILT_IN
 from server.access.roles import Who
 from server.files.importing import ImportRequest
+from server.routes.paging import Paged
 from server.routes.scenes import get_one, own_scene
 from server.services import Shared
 from server.wire.bodies import BuiltInBody, SceneBody
@@ -20,11 +21,11 @@ BuiltInName = Annotated[str, Path(max_length=256)]
 
 
 @router.get("")
-def get_all() -> list[BuiltInBody]:
+def get_all(page: Paged) -> list[BuiltInBody]:
     """All of them, in the order in which they are shown."""
     return [
         BuiltInBody(name=name, label=each.label, description=each.description, size=each.size, method=each.method)
-        for name, each in BUILT_IN.items()
+        for name, each in page.in_order(BUILT_IN.items())
     ]
 
 

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Path, Response
 from relume.errors import NotFoundError
 from relume.scene.archive import load_cameras
 from relume.scene.placed_camera import placed_camera
+from server.routes.paging import Paged
 from server.services import Services, Shared
 from server.wire.body import MAX_NAME, Id
 from server.wire.cameras import CameraEntry, CameraFrame
@@ -23,9 +24,9 @@ CameraName = Annotated[str, Path(min_length=1, max_length=MAX_NAME)]
 
 
 @router.get("")
-def get_cameras(scene: Id, services: Shared) -> list[CameraEntry]:
+def get_cameras(scene: Id, services: Shared, page: Paged) -> list[CameraEntry]:
     """The cameras that came with the scene, then those that were placed, by name."""
-    return _entries(scene, services)
+    return page.in_order(_entries(scene, services))
 
 
 @router.get("/{name}")

@@ -15,6 +15,7 @@ from server.files.png import A_DAY
 from server.live.rooms.door import check_person
 from server.records.comments import Comment, check_text
 from server.routes.bakes import ready_bake
+from server.routes.paging import Paged
 from server.services import Services, Shared
 from server.wire.bodies import moment
 from server.wire.body import Id
@@ -26,10 +27,11 @@ CommentId = Annotated[str, Path(min_length=16, max_length=16, pattern=r"^[0-9a-f
 
 
 @router.get("")
-def list_comments(scene: Id, services: Shared) -> list[CommentBody]:
-    """Of a scene, oldest first."""
+def list_comments(scene: Id, services: Shared, page: Paged, resolved: bool | None = None) -> list[CommentBody]:
+    """Of a scene, oldest first; those that are resolved, or that are not."""
     get_scene(services.bakes.ledger, scene)
-    return [_body(scene, comment) for comment in services.comments.list(scene)]
+    found = [each for each in services.comments.list(scene) if resolved in (None, each.resolved is not None)]
+    return [_body(scene, comment) for comment in page.cut(found, lambda each: (each.created, each.id))]
 
 
 @router.post("", status_code=201)

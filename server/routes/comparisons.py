@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import ParameterError
@@ -14,11 +14,14 @@ from server.apart.animation import compared_from
 from server.errors import NotReadyError
 from server.files.downloads import Download
 from server.queues.comparisons import Comparing
+from server.queues.work import WorkFilter
 from server.routes.bakes import ready_bake
+from server.routes.paging import Paged
 from server.routes.renders import baked_view, check_display, check_eye_size, check_look
+from server.routes.works import UserName, moments, work_page
 from server.services import Services, Shared
 from server.wire.bodies import TruthBody, TruthPlanBody, TruthRequest
-from server.wire.body import Id
+from server.wire.body import Id, WorkState
 
 router = APIRouter(prefix="/api/truths", tags=["truths"])
 Picture = Literal["error", "reference", "method-error", "method-reference"]
@@ -54,6 +57,19 @@ def _check(request: TruthRequest, transfer: Opened) -> None:
     check_display(request.look, "/look")
 
 
+@router.get("")
+def list_comparisons(
+    services: Shared,
+    page: Paged,
+    state: Annotated[WorkState | None, Query()] = None,
+    bake: Annotated[Id | None, Query()] = None,
+    user: Annotated[UserName | None, Query()] = None,
+) -> list[TruthBody]:
+    """Comparisons, newest first, those of a state, a bake or a user; 100 where no `limit` is given."""
+    which = WorkFilter(state, user, bake)
+    return [_body(comparing, services) for comparing in work_page(services.comparisons, which, page)]
+
+
 @router.get("/{truth}")
 def get_comparison(truth: Id, services: Shared) -> TruthBody:
     """State, progress, and what was found so far."""
@@ -69,15 +85,17 @@ def stop_comparison(truth: Id, services: Shared, forget: bool = False) -> Respon
 
 @router.post("/{truth}/resume", status_code=202)
 def resume_comparison(truth: Id, services: Shared) -> TruthBody:
-    """Go on with a comparison that was stopped, after its last finished pass."""
+    """Go on with a comparison that was stopped or has failed, after its last finished pass."""
     services.comparisons.resume(truth)
     return _body(services.comparisons.get(truth), services)
 
 
 @router.get("/{truth}/{name}.png", response_class=Download)
-def get_picture(truth: Id, name: Picture, services: Shared) -> Download:
+def get_picture(
+    truth: Id, name: Picture, services: Shared, passes: Annotated[int | None, Query(ge=0)] = None
+) -> Download:
     """Where the frame differs, or the brute force so far, by the paths that were asked for or by those that the bake's
-    method follows; from the second pass on."""
+    method follows; from the second pass on. `passes` only makes the address change when the picture does."""
     comparing = services.comparisons.get(truth)
     path = services.comparisons.picture_path(truth, name)
     if not path.exists():
@@ -89,5 +107,6 @@ def _body(comparing: Comparing, services: Services) -> TruthBody:
     request = comparing.request
     figures = dict(services.comparisons.figures(comparing.id))
     return TruthBody.of(
-        comparing, bake=request.bake, view=request.view, paths=request.paths, passes=comparing.done, **figures
-    )
+        comparing, bake=request.bake, view=request.view, paths=request.paths, passes=comparing.done,
+        **moments(comparing), **figures,
+    )  # fmt: skip

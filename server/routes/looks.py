@@ -9,6 +9,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import ParameterError
 from server.records.looks import SavedLook, check_name, parse_document
+from server.routes.paging import Paged, newest
 from server.services import Shared
 from server.wire.bodies import LookEntry, moment
 
@@ -18,17 +19,10 @@ LOOK_BODY = {"requestBody": {"required": True, "content": {"application/json": {
 
 
 @router.get("")
-def list_looks(services: Shared) -> list[LookEntry]:
+def list_looks(services: Shared, page: Paged) -> list[LookEntry]:
     """Names and versions, newest first."""
-    return [
-        LookEntry(
-            name=look.name,
-            etag=look.etag,
-            modified=moment(look.modified),
-            bytes=len(look.document.encode()),
-        )
-        for look in services.looks.list()
-    ]
+    looks = page.cut(services.looks.list(), lambda look: newest(look.modified, look.name))
+    return [LookEntry.of(look, modified=moment(look.modified), bytes=look.num_bytes) for look in looks]
 
 
 @router.get("/{name}", responses={200: {"content": {"application/json": {"schema": {"type": "object"}}}}, 304: {}})

@@ -13,15 +13,17 @@ from relume.brdf import registry
 from relume.brdf.albedo import directional_albedo, reflectance
 from relume.brdf.document import complete_term
 from relume.brdf.mirror import mirrors_below
+from server.routes.paging import Paged
 from server.wire.models import AlbedoBody, InOutBody, ModelBody, TermsRequest
 
 router = APIRouter(prefix="/api/models", tags=["models"])
 
 
 @router.get("")
-def list_models() -> list[ModelBody]:
+def list_models(page: Paged) -> list[ModelBody]:
     """Every BRDF term."""
-    return [ModelBody(**term, mirrors_below=mirrors_below(term["model"])) for term in registry.describe()]
+    terms = page.in_order(registry.describe())
+    return [ModelBody(**term, mirrors_below=mirrors_below(term["model"])) for term in terms]
 
 
 @router.post("/in-out")

@@ -6,7 +6,7 @@ import json
 import math
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume import look as looks
@@ -19,13 +19,15 @@ from relume.picture.transfer import Axis, Eyes, Opened
 from server.access.roles import Caller, Who
 from server.apart.animation import check_animation, document_of, look_of, with_pivot
 from server.errors import NotReadyError
-from server.files.downloads import Download
+from server.files.downloads import Download, ZipStream
 from server.files.video import check_encoder
 from server.queues.renders import Render, planned_bytes
-from server.queues.work import new_id
+from server.queues.work import WorkFilter, new_id
 from server.routes.bakes import ready_bake
+from server.routes.paging import Paged
+from server.routes.works import UserName, moments, work_page
 from server.services import Services, Shared
-from server.wire.body import MAX_NAME, Id
+from server.wire.body import MAX_NAME, Id, Name, WorkState
 from server.wire.cameras import CameraFrame
 from server.wire.protocol import MAX_EYE_PIXELS
 from server.wire.renders import (
@@ -41,6 +43,7 @@ from server.wire.renders import (
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
+FrameIndex = Annotated[int, Path(ge=0, lt=MAX_FRAMES)]
 MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
 
 
@@ -169,6 +172,20 @@ def _check(request: RenderRequest, transfer: Opened) -> int:
     return planned_bytes(request, request.size or (view.width, view.height), 1 + len(layers))
 
 
+@router.get("")
+def list_renders(
+    services: Shared,
+    page: Paged,
+    state: Annotated[WorkState | None, Query()] = None,
+    bake: Annotated[Id | None, Query()] = None,
+    name: Annotated[Name | None, Query()] = None,
+    user: Annotated[UserName | None, Query()] = None,
+) -> list[RenderBody]:
+    """Batches, newest first, those of a state, a bake, a name or a user; 100 where no `limit` is given."""
+    which = WorkFilter(state, user, bake, name)
+    return [_body(render) for render in work_page(services.renders, which, page)]
+
+
 @router.get("/{render}")
 def get_render(render: Id, services: Shared) -> RenderBody:
     """State and progress."""
@@ -183,12 +200,33 @@ def delete_render(render: Id, services: Shared) -> Response:
     return Response(status_code=204)
 
 
+@router.post("/{render}/resume", status_code=202)
+def resume_render(render: Id, services: Shared) -> RenderBody:
+    """Go on with a batch that has failed; pictures that are there stay."""
+    services.access.quotas.check_room()
+    services.renders.resume(render)
+    return _body(services.renders.get(render))
+
+
+@router.post("/{render}/frames/{index}/retry", status_code=202)
+def retry_frame(render: Id, index: FrameIndex, services: Shared) -> RenderBody:
+    """Paint one picture of a batch that is ready or has failed again, and what else is missing."""
+    services.access.quotas.check_room()
+    services.renders.retry(_with_frame(render, index, services), index)
+    return _body(services.renders.get(render))
+
+
+def _with_frame(identity: str, index: int, services: Services) -> Render:
+    render = services.renders.get(identity)
+    if index >= render.total:
+        raise NotFoundError(f"this batch has {render.total} frames, counted from 0")
+    return render
+
+
 @router.get("/{render}/frames/{index}", response_class=Download)
-def get_frame(render: Id, index: Annotated[int, Path(ge=0, lt=MAX_FRAMES)], services: Shared) -> Download:
+def get_frame(render: Id, index: FrameIndex, services: Shared) -> Download:
     """One finished picture, counted from 0."""
-    found = services.renders.get(render)
-    if index >= found.total:
-        raise NotFoundError(f"this batch has {found.total} frames, counted from 0")
+    found = _with_frame(render, index, services)
     path = services.renders.frame_path(found, index)
     if not path.exists():
         raise NotReadyError(f"frame {index} is not finished; {_state(found)}")
@@ -209,19 +247,34 @@ def get_video(render: Id, services: Shared) -> Download:
 
 
 @router.get("/{render}/archive.zip", response_class=Download)
-def get_archive(render: Id, services: Shared) -> Download:
-    """All pictures in one file, when all are finished."""
+def get_archive(render: Id, services: Shared, partial: bool = False) -> Response:
+    """All pictures in one file, when all are finished; with `partial` those that are, before."""
     found = services.renders.get(render)
     if found.state != "ready":
-        raise NotReadyError(f"the batch is not finished; {_state(found)}")
+        if not partial:
+            raise NotReadyError(f"the batch is not finished; {_state(found)}; ?partial=true has what is there")
+        return _partial_archive(found, services)
     path = services.renders.archive_path(found)
     return Download(path, media_type="application/zip", filename=services.renders.archive_name(found))
 
 
+def _partial_archive(found: Render, services: Services) -> Response:
+    missing = set(services.renders.missing(found))
+    painted = [index for index in range(found.total) if index not in missing]
+    if not painted:
+        raise NotReadyError(f"no frame is finished; {_state(found)}")
+    files = [(services.renders.frame_path(found, k), services.renders.download_name(found, k)) for k in painted]
+    name = services.renders.archive_name(found).removesuffix(".zip") + "-partial.zip"
+    return ZipStream(files, name)
+
+
 def _state(found: Render) -> str:
-    return f"it failed: {found.problem}" if found.problem else f"it is {found.state}, wait a little"
+    if found.state == "failed":
+        return f"it failed: {found.problem}"
+    return f"it is {found.state}, wait a little"
 
 
 def _body(render: Render) -> RenderBody:
     request = render.request
-    return RenderBody.of(render, bake=request.bake, view=request.view, format=request.format, size=request.size)
+    asked = {name: getattr(request, name) for name in ("bake", "view", "name", "format", "size")}
+    return RenderBody.of(render, **asked, **moments(render))

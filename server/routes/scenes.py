@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi import APIRouter, File, Form, Query, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError, ParameterError
@@ -19,6 +19,7 @@ from server.apart.bakes import MAX_WIDTH
 from server.files.downloads import Download
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
+from server.routes.paging import Paged, newest
 from server.services import Services, Shared
 from server.wire.bodies import SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
 from server.wire.body import Id
@@ -114,13 +115,17 @@ async def add_ground(scene: Id, services: Shared, caller: Who, response: Respons
 
 
 @router.get("")
-def get_all(services: Shared) -> list[SceneBody]:
-    """All scenes, newest first."""
+def get_all(
+    services: Shared, page: Paged, name: Annotated[str | None, Query(max_length=200)] = None
+) -> list[SceneBody]:
+    """Scenes, newest first, or those of a name."""
+    records = [record for record in list_scenes(services.bakes.ledger) if name in (None, record.name)]
+    records = page.cut(records, lambda record: newest(record.created, record.id))
     bakes: dict[str, list[BakeStatus]] = defaultdict(list)
     for status in services.bakes.bakes():
         bakes[status.scene].append(status)
     placed = placed_names(services.bakes.ledger)
-    return [_body(record, bakes[record.id], placed[record.id]) for record in list_scenes(services.bakes.ledger)]
+    return [_body(record, bakes[record.id], placed[record.id]) for record in records]
 
 
 @router.get("/{scene}")

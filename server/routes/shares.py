@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume import environments
@@ -15,9 +15,11 @@ from relume.picture.transfer import Opened
 from relume.scene.placed_camera import placed_camera
 from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
+from server.routes.paging import Paged, newest
 from server.routes.renders import baked_view, check_eye_size, check_look
 from server.services import Services, Shared
-from server.wire.bodies import ShareBody, ShareEntry, ShareRequest, moment
+from server.wire.bodies import ShareBody, ShareEntry, ShareListEntry, ShareRequest, moment
+from server.wire.body import Id
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/shares", tags=["shares"])
@@ -47,6 +49,14 @@ def _complete(request: ShareRequest, transfer: Opened) -> dict[str, Any]:
         check_eye_size(size)
     check_look(request.look, transfer, "/look")
     return looks.complete(request.look, transfer.default_look)
+
+
+@router.get("")
+def list_shares(services: Shared, page: Paged, bake: Annotated[Id | None, Query()] = None) -> list[ShareListEntry]:
+    """Links, newest first, or those of a bake."""
+    links = services.shares.list("" if bake is None else f'"bake":"{bake}"')
+    links = page.cut(links, lambda link: newest(link.created, link.id))
+    return [ShareListEntry.of(link, url=f"/?share={link.id}", created=moment(link.created)) for link in links]
 
 
 @router.get("/{share}")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 from numpy.typing import NDArray
 
@@ -21,6 +21,9 @@ from server.wire.surface import SurfaceBody
 router = APIRouter(prefix="/api/bakes", tags=["bakes"])
 
 
+Layout = Annotated[int | None, Query(description="only makes the address change when a release has other arrays")]
+
+
 class ArrayResponse(Response):
     """Numbers, little-endian, row-major."""
 
@@ -28,7 +31,7 @@ class ArrayResponse(Response):
 
 
 @router.get("/{bake}/surface")
-async def describe_surface(bake: Id, services: Shared, response: Response) -> SurfaceBody:
+async def describe_surface(bake: Id, services: Shared, response: Response, layout: Layout = None) -> SurfaceBody:
     """Of a moving view: what its shaders are written from, and the names of the arrays that they keep."""
     await run_in_threadpool(ready_bake, services, bake)
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
@@ -38,7 +41,9 @@ async def describe_surface(bake: Id, services: Shared, response: Response) -> Su
 
 
 @router.get("/{bake}/surface/{array}", response_class=ArrayResponse)
-async def surface_array(bake: Id, array: Annotated[str, Path(max_length=64)], services: Shared) -> ArrayResponse:
+async def surface_array(
+    bake: Id, array: Annotated[str, Path(max_length=64)], services: Shared, layout: Layout = None
+) -> ArrayResponse:
     """One of them: so many texels of 1, 2 or 4 numbers (docs/api.md)."""
     await run_in_threadpool(ready_bake, services, bake)
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:

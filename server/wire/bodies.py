@@ -10,7 +10,7 @@ from pydantic import Field
 from relume.look.document import MAX_BOUNCES
 from relume.look.model import Show
 from relume.remarks import Effect
-from server.wire.body import Body, Id, Name
+from server.wire.body import Body, Id, Name, WorkState
 from server.wire.cameras import CameraBody, CameraFrame
 from server.wire.protocol import MAX_VIEWS_SHOWN
 from server.wire.renders import Side
@@ -224,10 +224,12 @@ class BakeBody(Body):
 
     `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for.
     `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might
-    come out otherwise if it were baked again.
+    come out otherwise if it were baked again. `user` asked for it first, `created` says when.
     """
 
     id: str
+    user: str
+    created: str
     scene: str
     state: Literal["queued", "running", "ready", "failed", "cancelled"]
     progress: float
@@ -294,6 +296,13 @@ class ShareEntry(Body):
     url: str
 
 
+class ShareListEntry(ShareEntry):
+    """A link in the list of them; what it shows takes so many bytes."""
+
+    created: str
+    bytes: int
+
+
 class ShareBody(ShareRequest):
     """What a link shows; `lacking`: what of it is not here any more, one sentence each."""
 
@@ -345,7 +354,8 @@ class TruthFigures(Body):
 
 
 class TruthBody(Body):
-    """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet.
+    """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `user`
+    asked for it; `created`, `started` and `ended` are times; null: not yet.
 
     `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method
     follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves
@@ -353,9 +363,13 @@ class TruthBody(Body):
     """
 
     id: str
+    user: str
     bake: str
     view: str
-    state: Literal["queued", "running", "ready", "failed", "stopped"]
+    state: WorkState
+    created: str
+    started: str | None
+    ended: str | None
     passes: int
     total: int
     progress: float

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.wire.body import Body, Id, Name
+from server.wire.body import Body, Id, Name, WorkState
 
 Geometry = Literal["weave", "pebbles", "corduroy"]
 Made = Literal[Geometry, "mesh"]
@@ -37,12 +37,17 @@ class BtfRequest(Body):
 
 
 class BtfWorkBody(Body):
-    """A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent."""
+    """A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. `user` asked
+    for it; `created`, `started` and `ended` are times; null: not yet."""
 
     id: Id
     name: str
+    user: str
     geometry: Made | None
-    state: Literal["queued", "running", "ready", "failed", "stopped"]
+    state: WorkState
+    created: str
+    started: str | None
+    ended: str | None
     progress: float
     seconds_left: float | None
     material: Id | None

@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag
 
 from relume.exr.layers import Layering
 from relume.look.morph import Way
-from server.wire.body import Body, Id, Name
+from server.wire.body import Body, Id, Name, WorkState
 from server.wire.cameras import CameraFrame
 
 Side = Annotated[int, Field(ge=1, le=16384)]
@@ -129,15 +129,21 @@ class RenderRequest(Animation):
 class RenderBody(Body):
     """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too.
 
-    `seconds_left`: null where it does not run or nothing was measured yet.
+    `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs
+    in. `created`, `started` and `ended` are times; null: not yet.
     """
 
     id: str
+    name: str | None
+    user: str
     bake: str
     view: str
     format: ImageFormat | Literal["mp4"]
     size: tuple[int, int] | None
-    state: Literal["queued", "running", "ready", "failed"]
+    state: WorkState
+    created: str
+    started: str | None
+    ended: str | None
     done: int
     total: int
     progress: float

@@ -1,13 +1,19 @@
 """What a new bake shows first is made before anybody opens it, by one server, and never against somebody's hand."""
 
+import fcntl
+import logging
+import os
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pg8000
 import pytest
 from server_fakes import BatchesHere
+from sqlalchemy.exc import OperationalError
 from tiny_scenes import still_life
 
 from relume.bake import Recipe
@@ -20,11 +26,14 @@ from server.apart.step import IsWanted, Step, Tell
 from server.apart.thumbnails import Thumbnails
 from server.library.opening import open_library
 from server.settings import Settings
+from worker.database.faults import Complaint, database_away
 from worker.paths import bake_path
 from worker.scenes import register_scene
 from worker.service import BakeService
+from worker.storage.locks import open_locked
 
 SIZE = (24, 16)
+AWAY = pg8000.InterfaceError("refused")
 
 
 class Steps:
@@ -131,6 +140,43 @@ def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> N
     assert asked.wait(60)
     ahead.close()
     assert kept(bakes, identity) == {}
+
+
+def test_who_has_not_the_turn_says_nothing_of_the_database(
+    bakes: BakeService, caplog: pytest.LogCaptureFixture
+) -> None:
+    lock, steps, rounds = bakes.data_dir / module._LOCK, Steps(bakes.data_dir), threading.Semaphore(0)
+    ahead = looking(bakes, steps)
+    turn = ahead._turn
+
+    @contextmanager
+    def counted() -> Iterator[bool]:
+        rounds.release()
+        with turn() as is_ours:
+            yield is_ours
+
+    ahead._turn = counted  # type: ignore[method-assign]
+    with caplog.at_level(logging.WARNING, "worker.database.faults"):
+        Complaint(logging.getLogger("loop"), "it cannot be read").meet(OperationalError("SELECT 1", {}, AWAY))
+        with closing_lock(lock):
+            ahead.start()
+            for _ in range(3):
+                assert rounds.acquire(timeout=60)
+        ahead.close()
+        said = [record.getMessage() for record in caplog.records]
+        assert [line.split(" (")[0] for line in said] == ["the database does not answer"]
+        database_away.well()
+        assert "that is over" in caplog.text
+
+
+@contextmanager
+def closing_lock(path: Path) -> Iterator[None]:
+    """Another server has it meanwhile."""
+    lock = open_locked(path, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        os.close(lock)
 
 
 def test_one_server_of_several_does_it(bakes: BakeService) -> None:

@@ -112,6 +112,8 @@ class Remote:
         Raises:
             StorageError: the storage does not answer, or refuses.
         """
+        if not files:  # nothing is asked, so that nothing can be said of the storage
+            return
         with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
             list(threads.map(lambda file: obstore.put(self._store, f"{name}/{file}", folder / file), files))
 

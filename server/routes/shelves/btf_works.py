@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi import APIRouter, File, Form, Query, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
 from relume.asset_store import check_name
@@ -19,9 +19,11 @@ from server.apart.btfs import SENT
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.queues.btfs import BtfWork
-from server.queues.work import new_id
+from server.queues.work import WorkFilter, new_id
+from server.routes.paging import Paged
+from server.routes.works import UserName, moments, work_page
 from server.services import Services, Shared
-from server.wire.body import Id
+from server.wire.body import Id, WorkState
 from server.wire.btfs import BOUND, TEXELS, Bound, BtfRequest, BtfWorkBody, Period, SyntheticBtfRequest, Texels
 
 PREFIX = "/api/materials/btf-works"
@@ -124,9 +126,15 @@ def _answer(identity: str, services: Services, response: Response) -> BtfWorkBod
 
 
 @router.get("")
-def list_btf_works(services: Shared) -> list[BtfWorkBody]:
-    """All that were asked for and not forgotten, oldest first."""
-    return [_body(work, services) for work in services.btfs.all()]
+def list_btf_works(
+    services: Shared,
+    page: Paged,
+    state: Annotated[WorkState | None, Query()] = None,
+    user: Annotated[UserName | None, Query()] = None,
+) -> list[BtfWorkBody]:
+    """Those that were asked for and not forgotten, oldest first; 100 where no `limit` is given."""
+    works = work_page(services.btfs, WorkFilter(state, user), page, newest_first=False)
+    return [_body(work, services) for work in works]
 
 
 @router.get("/{work}")
@@ -154,4 +162,4 @@ def resume_btf_work(work: Id, services: Shared) -> BtfWorkBody:
 def _body(work: BtfWork, services: Services) -> BtfWorkBody:
     request = work.request
     material = services.btfs.material(work.id) if work.state == "ready" else None
-    return BtfWorkBody.of(work, name=request.name, geometry=request.geometry, material=material)
+    return BtfWorkBody.of(work, name=request.name, geometry=request.geometry, material=material, **moments(work))

@@ -7,6 +7,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.btf.shelf import STORE, BtfRecord, get_record, records
 from server.files.png import A_DAY, PngResponse
+from server.routes.paging import NameFilter, Paged, records_page
 from server.routes.shelves.in_use import remove_unused
 from server.routes.shelves.materials import terms_of, thumbnail_of
 from server.services import Shared
@@ -18,9 +19,9 @@ router = APIRouter(prefix="/api/materials/btf", tags=["materials"])
 
 
 @router.get("")
-def list_btfs(services: Shared) -> list[BtfBody]:
-    """All BTFs, newest first."""
-    return [_body(record) for record in records(btfs_path(services.settings.data))]
+def list_btfs(services: Shared, page: Paged, name: NameFilter = None) -> list[BtfBody]:
+    """BTFs, newest first, or those of a name."""
+    return [_body(record) for record in records_page(records(btfs_path(services.settings.data)), name, page)]
 
 
 @router.get("/{material}")

@@ -14,6 +14,7 @@ from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.thumbnail import thumbnail
 from server.access.roles import Who
 from server.files.png import A_DAY, PngResponse
+from server.routes.paging import NameFilter, Paged
 from server.routes.shelves.sending import import_apart, take_in
 from server.services import Shared
 from server.wire.bodies import EnvironmentBody, moment
@@ -39,10 +40,13 @@ async def import_environment(
 
 
 @router.get("")
-def list_environments(services: Shared) -> list[EnvironmentBody]:
-    """The built-in ones, then the imported ones, newest first."""
+def list_environments(services: Shared, page: Paged, name: NameFilter = None) -> list[EnvironmentBody]:
+    """The built-in ones, then the imported ones, newest first; or those of a name."""
+    listed = [((0.0, float(index), one), _built_in_body(one)) for index, one in enumerate(BUILT_IN)]
     imported = records(environments_path(services.settings.data))
-    return [*map(_built_in_body, BUILT_IN), *map(_body, imported)]
+    listed += [((1.0, -record.created, record.id), _body(record)) for record in imported]
+    named = [(key, body) for key, body in listed if name in (None, body.name)]
+    return [body for _, body in page.cut(named, lambda keyed: keyed[0])]
 
 
 @router.get("/{environment}")

@@ -18,6 +18,7 @@ from relume.scene.archive import load_material
 from relume.scene.model import Material
 from server.access.roles import Caller, Who
 from server.files.png import FOREVER, PngResponse
+from server.routes.paging import NameFilter, Paged, records_page
 from server.routes.shelves.in_use import remove_unused
 from server.routes.shelves.sending import import_apart, take_in
 from server.services import Services, Shared
@@ -44,9 +45,9 @@ async def send_image(
 
 
 @router.get("")
-def list_images(services: Shared) -> list[ImageBody]:
-    """All of them, newest first."""
-    return [_body(record) for record in records(images_path(services.settings.data))]
+def list_images(services: Shared, page: Paged, name: NameFilter = None) -> list[ImageBody]:
+    """Images, newest first, or those of a name."""
+    return [_body(record) for record in records_page(records(images_path(services.settings.data)), name, page)]
 
 
 @router.get("/{image}")

@@ -11,6 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 from relume.errors import NotFoundError
 from relume.look.library import navigation_map, presets
 from server.files.png import A_DAY, PngResponse
+from server.routes.paging import Paged
 from server.wire.bodies import MapPoint, MaterialBody, MaterialMapBody
 
 router = APIRouter(prefix="/api/materials", tags=["materials"])
@@ -18,9 +19,9 @@ Part = Annotated[str, Path(max_length=100)]
 
 
 @router.get("")
-def list_materials() -> list[MaterialBody]:
+def list_materials(page: Paged) -> list[MaterialBody]:
     """The library: fitted materials under every model that was fitted to them."""
-    return [MaterialBody(**asdict(preset)) for preset in presets()]
+    return [MaterialBody(**asdict(preset)) for preset in page.in_order(presets())]
 
 
 @router.get("/map")

@@ -18,6 +18,7 @@ from server.access.roles import Who
 from server.files.importing import UPLOAD_PREFIX
 from server.files.png import A_DAY, PngResponse
 from server.files.uploads import keep_upload, plain_stem
+from server.routes.paging import NameFilter, Paged, records_page
 from server.routes.shelves.in_use import remove_unused
 from server.routes.shelves.sending import take_in
 from server.services import Services, Shared
@@ -49,9 +50,9 @@ def _import(material: UploadFile, name: str, services: Services) -> str:
 
 
 @router.get("")
-def list_measured(services: Shared) -> list[MeasuredBody]:
-    """All measured materials, newest first."""
-    return [_body(record) for record in records(materials_path(services.settings.data))]
+def list_measured(services: Shared, page: Paged, name: NameFilter = None) -> list[MeasuredBody]:
+    """Measured materials, newest first, or those of a name."""
+    return [_body(record) for record in records_page(records(materials_path(services.settings.data)), name, page)]
 
 
 @router.get("/{material}")
