@@ -5,6 +5,16 @@ from __future__ import annotations
 import errno
 
 
+def bytes_text(num_bytes: float) -> str:
+    """A number of bytes for people, to two or three digits: 34 kB, 1.2 GB."""
+    size, unit = float(num_bytes), "bytes"
+    for larger in ("kB", "MB", "GB", "TB"):
+        if abs(size) < 999.5:
+            break
+        size, unit = size / 1000, larger
+    return f"{size:.0f} {unit}" if unit == "bytes" or size >= 99.5 else f"{size:.2g} {unit}"
+
+
 class RelumeError(Exception):
     """The root of all of them; anything else that escapes is a defect."""
 
@@ -35,7 +45,7 @@ class ParameterError(RelumeError, ValueError):
     """
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
-        shown = repr(value)
+        shown = "nothing" if value is None else repr(value)
         if len(shown) > 80:
             shown = shown[:77] + "..."
         super().__init__(f"{name} is {shown}; give {allowed}")
@@ -54,9 +64,8 @@ class BudgetError(PlanError):
     """A plan needs more than the budget allows; refused before anything is computed."""
 
     def __init__(self, what: str, needed_bytes: int, allowed_bytes: int, remedy: str) -> None:
-        super().__init__(
-            f"{what} needs {needed_bytes / 1e6:,.0f} MB and {allowed_bytes / 1e6:,.0f} MB are allowed; {remedy}"
-        )
+        needed, allowed = bytes_text(needed_bytes), bytes_text(allowed_bytes)
+        super().__init__(f"{what} needs {needed}, and may take at most {allowed}; {remedy}")
         self.needed_bytes, self.allowed_bytes = needed_bytes, allowed_bytes
 
 

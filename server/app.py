@@ -14,6 +14,7 @@ from relume.imageio.ocio.current import current, using
 from relume.resident import share_arenas
 from server import errors
 from server.access.gate import Gate
+from server.access.rules import methods_at
 from server.guard import Guard
 from server.library.opening import open_library
 from server.library.shelves import shelves_at
@@ -113,7 +114,7 @@ def create_app(
         responses=errors.OPENAPI_RESPONSES,
     )
     app.state.leave = leave
-    errors.install(app)
+    errors.install(app, methods_at)
     # the last that is added is the first that a request passes
     app.add_middleware(Gate, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import logging
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
@@ -19,11 +20,14 @@ from starlette.exceptions import HTTPException
 
 from relume import errors as relume_errors
 from relume.errors import ProtocolError, RelumeError, is_no_room
+from server.form_errors import places_of
 from server.wire.protocol import Problem
 from worker.database.faults import database_away, is_away, told
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
+_MOST_SAID = 3
+_FIELD = re.compile(r"/.*|[a-z_]+(/\w+)*")
 
 CLOSE_NORMAL = 1000
 CLOSE_GOING_AWAY = 1001
@@ -185,6 +189,8 @@ def problem_of(error: Exception) -> Problem:
     extra: dict[str, Any] = {}
     if isinstance(error, relume_errors.ParameterError):
         extra = {"parameter": error.name, "allowed": error.allowed}
+        if _FIELD.fullmatch(error.name):
+            extra["errors"] = [{"pointer": "/" + error.name.removeprefix("/"), "detail": str(error)}]
     if isinstance(error, RelumeError):
         detail = str(error)
     elif isinstance(error, OperationalError | PoolTimeoutError):
@@ -207,31 +213,29 @@ def headers_of(error: Exception) -> dict[str, str]:
     return {"Retry-After": str(math.ceil(error.wait_s))} if isinstance(error, RateError) else {}
 
 
-def validation_problem(errors: Sequence[Any], status: int = 422) -> Problem:
-    """The body for a request or message that does not have the declared form."""
-    places = [
-        {"pointer": "/" + "/".join(str(part) for part in error["loc"]), "detail": _told(str(error["msg"]))}
-        for error in errors[:20]
-    ]
-    detail = "; ".join(f"{place['pointer']}: {place['detail']}" for place in places[:3])
+def validation_problem(
+    errors: Sequence[Any], sent: object = None, status: int = 422, *, is_message: bool = False
+) -> Problem:
+    """The body for a request or message that does not have the declared form; arguments as of `places_of`."""
+    places = places_of(errors, sent, is_message=is_message)
+    more = f"; and {len(places) - _MOST_SAID} more" if len(places) > _MOST_SAID else ""
+    detail = "; ".join(place["detail"] for place in places[:_MOST_SAID]) + more
     return Problem(
         type="urn:relume:problem:form", title="Not of the declared form", status=status, detail=detail, errors=places
     )
 
 
-def _told(message: str) -> str:
-    """What is not as declared, in words for who has sent it."""
-    is_text = message.startswith("Value error, Expected UploadFile")
-    return "Input should be a file, with a file name in its part of the form" if is_text else message[:200]
+def http_problem(error: HTTPException, method: str, able: Sequence[str]) -> Problem:
+    """The body for what the framework refuses before a route has it: no such call, or a body that is none.
 
-
-def http_problem(error: HTTPException) -> Problem:
-    """The body for what the framework refuses before a route has it: no such call, or a body that is none."""
+    Args:
+        method: of the call. able: methods that its address takes.
+    """
     status, detail = error.status_code, str(error.detail)
     if status == HTTPStatus.BAD_REQUEST:
         detail = f"the body cannot be read ({detail.rstrip('.')}); send what /api/openapi.json describes"
     if status == HTTPStatus.METHOD_NOT_ALLOWED:
-        detail = f"this address takes {(error.headers or {}).get('Allow', 'other calls')} alone"
+        detail = f"{method} is not taken at this address; use {' or '.join(able) or 'another'}"
     slug = {400: "form", 405: "method"}.get(status, "not-found")
     title = HTTPStatus(status).phrase
     return Problem(type=f"urn:relume:problem:{slug}", title=title, status=status, detail=detail)
@@ -243,9 +247,13 @@ def problem_response(problem: Problem, headers: Mapping[str, str] | None = None)
     return Response(document.encode(errors="backslashreplace"), problem.status, dict(headers or {}), MEDIA_TYPE)
 
 
-def message_problem(error: ValidationError) -> Problem:
-    """The body for a session message that does not have the declared form."""
-    return validation_problem(error.errors(include_url=False, include_context=False, include_input=False), status=400)
+def message_problem(error: ValidationError, text: str) -> Problem:
+    """The body for a session message that does not have the declared form. text: of the message."""
+    try:
+        sent = json.loads(text)
+    except (ValueError, RecursionError):
+        sent = None
+    return validation_problem(error.errors(include_url=False), sent, 400, is_message=True)
 
 
 OPENAPI_RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -254,8 +262,12 @@ OPENAPI_RESPONSES: dict[int | str, dict[str, Any]] = {
 }
 
 
-def install(app: FastAPI) -> None:
-    """Make every failure of the app an `application/problem+json` response."""
+def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
+    """Make every failure of the app an `application/problem+json` response.
+
+    Args:
+        methods_at: what a path takes.
+    """
 
     async def on_known(_: Request, error: Exception) -> Response:
         if is_away(error):
@@ -267,13 +279,15 @@ def install(app: FastAPI) -> None:
     async def on_defect(_: Request, error: Exception) -> Response:
         return problem_response(problem_of(error))
 
-    async def on_http(_: Request, error: Exception) -> Response:
+    async def on_http(request: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
-        return problem_response(http_problem(error), error.headers)
+        able = methods_at(request.url.path)
+        headers = {"Allow": ", ".join(able)} if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED else error.headers
+        return problem_response(http_problem(error, request.method, able), headers)
 
     async def on_validation(_: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
-        return problem_response(validation_problem(error.errors()))
+        return problem_response(validation_problem(error.errors(), error.body))
 
     for kind in (RelumeError, OperationalError, PoolTimeoutError, OSError):
         app.add_exception_handler(kind, on_known)

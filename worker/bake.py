@@ -26,6 +26,7 @@ from relume.errors import (
     NotFoundError,
     RelumeError,
     StorageError,
+    bytes_text,
     is_no_room,
 )
 from relume.folders import folder_bytes
@@ -282,8 +283,8 @@ class BakeRunner:
         """What went wrong and what to do, in one line."""
         if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_no_room(error)):
             needed = self._ask(self.ledger.bake, self.job.bake_id).plan.store_bytes
-            missing = max(1, needed - folder_bytes(self._staging)) / 1e6
-            return f"disk full; free {missing:,.0f} MB, then bake again; finished parts are kept"
+            missing = bytes_text(max(1_000_000, needed - folder_bytes(self._staging)))
+            return f"disk full; free {missing}, then bake again; finished parts are kept"
         if isinstance(error, RelumeError):
             return " ".join(str(error).split())
         if type(error).__name__ == "CommClosedError":  # submitting met a closed connection

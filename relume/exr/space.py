@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError
-from relume.imageio.ocio.current import needed
+from relume.imageio.ocio.current import current
 from relume.imageio.primaries import KNOWN, REC_709, Chromaticities, chromaticities_of, known_as
 
 F32 = NDArray[np.float32]
@@ -52,7 +52,9 @@ def space_called(name: str | None) -> Space:
     """
     if name is None:
         return OURS
-    config = needed()
+    config = current()
+    if config is None:
+        raise ParameterError("color_space", name, "none: there is no OpenColorIO config here (RELUME_OCIO)")
     found = config.space_of(name)
     try:
         matrix = config.primaries(found)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from sqlalchemy import delete, func, select, update
 from sqlalchemy.orm import Session, sessionmaker
 
+from relume.errors import bytes_text
 from server.access.tables import OwnedRow
 from server.errors import BusyError, NearlyFullError, QuotaError
 from server.library.disk import free_bytes
@@ -75,11 +76,11 @@ class Quotas:
         with self._lock:
             was_full, self._is_full = self._is_full, is_full
         if is_full and not was_full:
-            log.error("the disk of the data directory has %s MB left: nothing new is taken", f"{free / 1e6:,.0f}")
+            log.error("the disk of the data directory has %s left: nothing new is taken", bytes_text(free))
         elif was_full and not is_full:
             log.warning("the disk of the data directory has room again")
         if is_full:
-            raise NearlyFullError(f"the disk of the data directory has {free / 1e6:,.0f} MB left; free some space")
+            raise NearlyFullError(f"the disk of the data directory has {bytes_text(free)} left; free some space")
 
     def check_bytes(self, who: str, more: int) -> None:
         """Raises QuotaError where somebody would have too much with so many bytes more; and as `check_room` does."""
@@ -90,7 +91,7 @@ class Quotas:
         used = self.used_bytes(who)
         if used + more > most:
             raise QuotaError(
-                f"you have {used / 1e6:,.1f} MB of at most {most / 1e6:,.1f} MB, and this takes {more / 1e6:,.1f} MB; "
+                f"you have {bytes_text(used)} of at most {bytes_text(most)}, and this takes {bytes_text(more)}; "
                 "delete a scene, a bake, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
             )
 

@@ -128,6 +128,11 @@ def needed(method: str, path: str) -> Role:
     return ANYONE if is_file else ADMIN
 
 
+def methods_at(path: str) -> list[str]:
+    """What a path takes; routes of one path know each only their own method."""
+    return sorted({method for pattern, roles in _COMPILED if pattern.match(path) for method in roles} - {SOCKET})
+
+
 def is_comment(method: str, path: str) -> bool:
     """Whether a call writes a comment, which settings may let viewers do."""
     return method == "POST" and _COMMENTS.match(path) is not None

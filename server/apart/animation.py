@@ -34,14 +34,18 @@ def check_animation(request: Animation, view: str, transfer: Opened) -> Sequence
     """
     path, num = request.path, request.num_frames
     if path is not None and transfer.eyes is not Eyes.FREE and not _needs_no_eye(path):
-        able = "none that needs an eye: that of this bake does not move; bake by method surface"
-        raise ParameterError("path", "a path", able)
+        able = "no path, or bake by method surface: this bake is seen from where it was baked alone"
+        raise ParameterError("path", _path_text(path), able)
     if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
         raise ParameterError("frames", request.frames, f"{path.turntable}, as the turntable says, or nothing")
     num_eyes = 0 if path is None or isinstance(path, Turntable) else len(path.eyes)
     if num_eyes > num:
         raise ParameterError("path/eyes", f"{num_eyes} keyframes", f"at most as many as frames, {num}")
     return eyes_of(request, view, transfer)
+
+
+def _path_text(path: Turntable | EyePath) -> str:
+    return f"turntable {path.turntable}" if isinstance(path, Turntable) else f"{len(path.eyes)} cameras"
 
 
 def _needs_no_eye(path: Turntable | EyePath) -> bool:

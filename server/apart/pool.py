@@ -56,7 +56,7 @@ class Pool:
                 self._num_places += 1
                 self._changed.notify_all()
         raise RelumeError(
-            f"the process that did the {step.kind} was ended twice, perhaps for want of memory; make the picture "
+            f"the process that did the {step.kind} was killed twice, perhaps for want of memory; make the picture "
             "smaller, or free memory and try again"
         )
 

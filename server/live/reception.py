@@ -52,7 +52,7 @@ class Reception:
             try:
                 message = protocol.CLIENT_MESSAGE.validate_json(text)
             except ValidationError as error:
-                await self._bad(message_problem(error))
+                await self._bad(message_problem(error, text))
                 continue
             try:
                 self._take(message, received_s)

@@ -62,9 +62,11 @@ def parse_document(body: bytes) -> str:
         text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
         raise ParameterError("look", "not JSON", "a look document as JSON, every number finite") from None
-    if not isinstance(document, dict) or not set(document) <= set(PARTS):
+    if not isinstance(document, dict):
         raise ParameterError("look", document, "an object with some of " + ", ".join(PARTS))
     for part, value in document.items():
+        if part not in PARTS:
+            raise ParameterError(f"/{part[:80]}", value, "nothing of that name: a look has " + ", ".join(PARTS))
         if not isinstance(value, dict):
             raise ParameterError(f"/{part}", value, "an object")
     return text

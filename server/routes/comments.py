@@ -23,7 +23,7 @@ from server.wire.comments import CommentBody, CommentChange, CommentRequest
 from worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/scenes/{scene}/comments", tags=["comments"])
-CommentId = Annotated[str, Path(min_length=16, max_length=16, pattern=r"^[0-9a-f]+$")]
+CommentId = Annotated[Id, Path()]
 
 
 @router.get("")

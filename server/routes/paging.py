@@ -119,7 +119,7 @@ def _refuse(name: str) -> float:
 
 
 def _no_cursor(cursor: str) -> ParameterError:
-    return ParameterError("after", cursor, "what the header Link of this list's part before says")
+    return ParameterError("query parameter after", cursor, "what the header Link of this list's part before says")
 
 
 def newest(created: float, identity: str) -> Key:

@@ -13,7 +13,7 @@ from relume import look as looks
 from relume.errors import NotFoundError, ParameterError
 from relume.exr.layers import layers_for
 from relume.exr.space import space_called
-from relume.imageio.ocio.current import needed
+from relume.imageio.ocio.current import current
 from relume.imageio.ocio.view import OcioView
 from relume.picture.transfer import Axis, Eyes, Opened
 from server.access.roles import Caller, Who
@@ -137,8 +137,12 @@ def check_display(partial: dict[str, Any], pointer: str) -> None:
     tone_map = partial.get("display", {}).get("tone_map")
     if not isinstance(tone_map, dict):
         return
+    config = current()
+    if config is None:
+        able = "one of relume's own: there is no OpenColorIO config here (RELUME_OCIO)"
+        raise ParameterError(f"{pointer}/display/tone_map", tone_map, able)
     try:
-        needed().check_view(OcioView(**tone_map))
+        config.check_view(OcioView(**tone_map))
     except ParameterError as error:
         raise ParameterError(f"{pointer}/display/tone_map", error.value, error.allowed) from None
 

@@ -103,7 +103,7 @@ def test_a_mesh_that_is_sent_is_rendered_with_its_period(
     [
         (SQUARE.replace("-2", "-3"), {}, "2 × 3 metres"),
         (SQUARE, {"period": "nan"}, "finite"),
-        (SQUARE, {"period": -1}, "greater than 0"),
+        (SQUARE, {"period": -1}, "more than 0"),
         (SQUARE, {"size": 10**9}, "256"),
     ],
 )

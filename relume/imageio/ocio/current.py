@@ -46,5 +46,5 @@ def needed() -> Config:
     """The config in use. Raises ParameterError where there is none."""
     config = current()
     if config is None:
-        raise ParameterError("RELUME_OCIO", None, "an OpenColorIO config: there is none here, and this needs one")
+        raise ParameterError("RELUME_OCIO", "not set", "an OpenColorIO config, which this needs")
     return config

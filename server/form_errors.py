@@ -1,0 +1,188 @@
+"""What of a body, a query or a message is not as declared: pydantic's errors in the sentences that all else speaks.
+
+Each says which field by a JSON pointer, what was given, and what is allowed. Where a field may be of several forms,
+pydantic has an error for each of them and names the form in its place; here that is one sentence, of the field alone.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+MOST = 20
+_SHOWN = 80
+_QUOTED = re.compile(r"'((?:[^'\\]|\\.)*)'")
+_Error = Mapping[str, Any]
+
+_ALLOWED: Mapping[str, str] = {
+    "bool_parsing": "true or false",
+    "bool_type": "true or false",
+    "dict_type": "an object",
+    "finite_number": "a finite number",
+    "float_parsing": "a number",
+    "float_type": "a number",
+    "greater_than": "more than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a smaller number",
+    "int_type": "a whole number",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "list_type": "a list",
+    "model_attributes_type": "an object",
+    "model_type": "an object",
+    "string_too_long": "at most {max_length} characters",
+    "string_too_short": "at least {min_length} characters",
+    "string_type": "a text",
+    "too_long": "at most {max_length} entries",
+    "too_short": "at least {min_length} entries",
+    "tuple_type": "a list",
+}
+_PATTERNS = {
+    "^[0-9a-f]{16}$": "its id, 16 hexadecimal digits",
+    "^[a-z2-7]+$": "the id of a link",
+    "^/": "a JSON pointer, which begins with /",
+}
+_LISTS = {"size": "[width, height] in pixels", "to_world": "16 numbers, by row", "about": "[x, y, z] in metres"}
+
+
+class _Placed(NamedTuple):
+    """An error, the part of the call that it is in, its path there, and whether it is of one of several forms."""
+
+    part: str
+    path: tuple[str | int, ...]
+    is_of_a_form: bool
+    error: _Error
+
+
+def places_of(errors: Sequence[_Error], sent: object, *, is_message: bool = False) -> list[dict[str, str]]:
+    """One entry for each field that is not as declared: `pointer` into the body, or `parameter` of the query, the path
+    or the headers, and `detail`, a sentence.
+
+    Args:
+        errors: of pydantic. sent: the body or message as it was parsed. is_message: it is one of a session.
+    """
+    fields: dict[tuple[str, tuple[str | int, ...]], list[_Error]] = defaultdict(list)
+    placed = [_place(error, sent, is_message) for error in errors]
+    for each in placed:
+        is_outdone = each.is_of_a_form and any(
+            other.part == each.part and len(other.path) > len(each.path) and other.path[: len(each.path)] == each.path
+            for other in placed
+        )
+        if not is_outdone:  # another of the forms was meant, which has an error farther in
+            fields[each.part, each.path].append(each.error)
+    return [_said(part, path, found) for (part, path), found in list(fields.items())[:MOST]]
+
+
+def _place(error: _Error, sent: object, is_message: bool) -> _Placed:
+    path = tuple(error["loc"])
+    part = "message" if is_message else str(path[0]) if path else "body"
+    path = path if is_message else path[1:]
+    if error["type"] == "json_invalid":
+        return _Placed(part, (), False, error)
+    if part not in ("body", "message"):
+        return _Placed(part, path, False, error)
+    is_absent = error["type"] in ("missing", "extra_forbidden", "union_tag_not_found")
+    known = _known(path, sent if is_message or not hasattr(sent, "multi_items") else dict(sent), is_absent)  # type: ignore[call-overload]
+    if error["type"].startswith("union_tag") and (name := _QUOTED.search(error["ctx"]["discriminator"])):
+        known = (*known, name[1])
+    return _Placed(part, known, len(known) < len(path), error)
+
+
+def _known(path: Sequence[str | int], value: object, is_absent: bool) -> tuple[str | int, ...]:
+    """The longest path of fields that are there; what is no field names one of several forms."""
+    if not path:
+        return ()
+    first, rest = path[0], path[1:]
+    without = _known(rest, value, is_absent)
+    is_entry = isinstance(value, list | tuple) and isinstance(first, int) and first < len(value)
+    if is_entry or (isinstance(value, Mapping) and first in value):
+        inner = value[first]  # type: ignore[index]
+    elif not rest and is_absent and isinstance(value, Mapping):
+        return (first,)
+    else:
+        return without
+    within = (first, *_known(rest, inner, is_absent))
+    return within if len(within) >= len(without) else without
+
+
+def _said(part: str, path: tuple[str | int, ...], errors: Sequence[_Error]) -> dict[str, str]:
+    if part in ("body", "message"):
+        pointer = "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in path)
+        return {"pointer": pointer, "detail": _sentence(pointer or f"the {part}", path, errors)}
+    name = str(path[0]) if path else part
+    return {"parameter": name, "detail": _sentence(name, path, errors)}
+
+
+def _sentence(name: str, path: Sequence[str | int], errors: Sequence[_Error]) -> str:
+    first = errors[0]
+    if first["type"] == "json_invalid":
+        reason = first.get("ctx", {}).get("error", "")
+        at = f", character {first['loc'][-1]}" if first["loc"] and isinstance(first["loc"][-1], int) else ""
+        return f"{name} is not JSON ({reason}{at}); send JSON"
+    if first["type"] in ("missing", "union_tag_not_found"):
+        return f"{name} is missing; it is needed" if path else f"{name} is missing; send JSON"
+    if first["type"] == "extra_forbidden":
+        return f"{name} is not known here; leave it out"
+    if first["type"].startswith("model_") and not path:
+        return f"{name} is no JSON object; send one, with Content-Type: application/json"
+    if first["type"] in ("value_error", "assertion_error"):
+        return _of_a_check(name, str(first["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, "))
+    return f"{name} is {shown(first['input'])}; give {_allowed(path, errors)}"
+
+
+def _of_a_check(name: str, message: str) -> str:
+    if message.startswith("Expected UploadFile"):
+        return f"{name} is a text; give a file, with a file name in its part of the form"
+    return f"{name}: {message[:300]}"
+
+
+def _allowed(path: Sequence[str | int], errors: Sequence[_Error]) -> str:
+    """What the forms that a field may have allow together."""
+    choices = [choice for error in errors for choice in _choices(error)]
+    others = [_allowed_by(error, path) for error in errors if not _choices(error)]
+    listed = [_or([f"'{choice}'" for choice in dict.fromkeys(choices)])] if choices else []
+    return ", or ".join(dict.fromkeys([*listed, *others]))
+
+
+def _choices(error: _Error) -> list[str]:
+    context = error.get("ctx", {})
+    said = {"literal_error": "expected", "enum": "expected", "union_tag_invalid": "expected_tags"}.get(error["type"])
+    return _QUOTED.findall(str(context[said])) if said in context else []
+
+
+def _allowed_by(error: _Error, path: Sequence[str | int]) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    if kind in ("tuple_type", "list_type", "too_short", "too_long") and path and path[-1] in _LISTS:
+        return _LISTS[str(path[-1])]
+    if kind == "string_pattern_mismatch":
+        return _PATTERNS.get(context["pattern"], f"a text of the form {context['pattern']}")
+    if kind in _ALLOWED:
+        return _ALLOWED[kind].format(**{name: _plain(value) for name, value in context.items()})
+    message = str(error["msg"])
+    return message.removeprefix("Input should be ").removeprefix("Value error, ")[:200]
+
+
+def _plain(value: object) -> object:
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _or(words: Sequence[str]) -> str:
+    return " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+
+
+def shown(value: object) -> str:
+    """A value as a sentence repeats it, at most 80 characters."""
+    if isinstance(value, str):
+        text = repr(value[: 2 * _SHOWN])
+    elif value is None or isinstance(value, bool | int | float):
+        text = json.dumps(value)
+    elif isinstance(value, Mapping | list | tuple):
+        text = "an object" if isinstance(value, Mapping) else f"a list of {len(value)}"
+    else:
+        text = "a file" if hasattr(value, "filename") else "of another kind"
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
