@@ -15,7 +15,9 @@ from relume.resident import share_arenas
 from server import errors
 from server.access.gate import Gate
 from server.access.rules import methods_at
+from server.conditional import Conditional
 from server.guard import Guard
+from server.idempotency import Idempotency
 from server.library.opening import open_library
 from server.library.shelves import shelves_at
 from server.logs.requests import RequestIds
@@ -116,7 +118,9 @@ def create_app(
     app.state.leave = leave
     errors.install(app, methods_at)
     # the last that is added is the first that a request passes
+    app.add_middleware(Idempotency, store=lambda: app.state.services.idempotency)
     app.add_middleware(Gate, settings=settings, access=lambda: app.state.services.access, clock=clock)
+    app.add_middleware(Conditional)
     app.add_middleware(
         Guard,
         allowed_hosts=[*settings.allowed_hosts, settings.host],

@@ -105,6 +105,14 @@ class ElsewhereError(RelumeError):
     """Another server has the room; a balancer finds it by trying one after the other."""
 
 
+class InProgressError(RelumeError):
+    """The same call came before, and is not answered yet."""
+
+
+class KeyReusedError(RelumeError):
+    """Another call had the same key."""
+
+
 class RateError(RelumeError):
     """Who calls calls too often; `wait_s` from now there is room."""
 
@@ -132,6 +140,8 @@ class Row:
 TABLE: Sequence[tuple[type[Exception], Row]] = (
     (relume_errors.NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
     (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
+    (InProgressError, Row(409, "in-progress", "Not answered yet", CLOSE_POLICY)),
+    (KeyReusedError, Row(422, "key-reused", "Key of another call", CLOSE_POLICY)),
     (InUseError, Row(409, "in-use", "In use", CLOSE_NOT_READY)),
     (LeavingError, Row(503, "leaving", "Being stopped", CLOSE_RESTART)),
     (ElsewhereError, Row(404, "elsewhere", "On another server", CLOSE_RESTART)),
@@ -208,6 +218,8 @@ def headers_of(error: Exception) -> dict[str, str]:
     """What HTTP wants said beside the body."""
     if isinstance(error, LoginError):
         return {"WWW-Authenticate": "Bearer"}
+    if isinstance(error, InProgressError):
+        return {"Retry-After": "1"}
     if isinstance(error, RangeError):
         return {"Content-Range": error.has}
     return {"Retry-After": str(math.ceil(error.wait_s))} if isinstance(error, RateError) else {}
@@ -282,7 +294,8 @@ def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
     async def on_http(request: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
         able = methods_at(request.url.path)
-        headers = {"Allow": ", ".join(able)} if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED else error.headers
+        allowed = ", ".join([*able, "HEAD"] if "GET" in able else able)
+        headers = {"Allow": allowed} if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED else error.headers
         return problem_response(http_problem(error, request.method, able), headers)
 
     async def on_validation(_: Request, error: Exception) -> Response:

@@ -40,6 +40,7 @@ from server.queues.counting import count_work
 from server.queues.renders import RenderQueue
 from server.queues.work import Quota
 from server.records.comments import CommentStore
+from server.records.idempotency import IdempotencyStore
 from server.records.looks import LookStore
 from server.records.room_leases import RoomLeases
 from server.records.shares import ShareStore
@@ -70,6 +71,7 @@ class Services:
     looks: LookStore
     shares: ShareStore
     comments: CommentStore
+    idempotency: IdempotencyStore
     renders: RenderQueue
     comparisons: ComparisonQueue
     btfs: BtfQueue
@@ -164,6 +166,7 @@ async def open_services(
             looks=LookStore(sessions),
             shares=ShareStore(sessions),
             comments=comments,
+            idempotency=IdempotencyStore(sessions),
             **queues._asdict(),
             threads=threads,
             transfers=transfers,

@@ -117,8 +117,10 @@ class Gate:
 
         async def audited(message: Message) -> None:
             if message["type"] == "http.response.start":
-                status, made = message["status"], Headers(raw=message["headers"]).get("location", "")
-                if _UNCHANGED < status < 300:  # what is sent to another address changes nothing yet
+                headers = Headers(raw=message["headers"])
+                status, made = message["status"], headers.get("location", "")
+                is_new = "idempotency-replayed" not in headers
+                if is_new and _UNCHANGED < status < 300:  # what is sent to another address changes nothing yet
                     what = f"{scope['method']} {scope['path']}"
                     change = Change.by(caller, what, made or scope["path"], status)
                     await run_sync(self._access().audit.add, change)

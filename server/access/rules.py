@@ -19,10 +19,10 @@ SOCKET = "WEBSOCKET"
 """Stands for a method where a live session is opened."""
 
 RULES: Mapping[str, Mapping[str, Role]] = {
-    "/livez": {"GET": ANYONE, "HEAD": ANYONE},
-    "/readyz": {"GET": ANYONE, "HEAD": ANYONE},
+    "/livez": {"GET": ANYONE},
+    "/readyz": {"GET": ANYONE},
     "/metrics": {"GET": VIEW},
-    "/api/openapi.json": {"GET": ANYONE, "HEAD": ANYONE},
+    "/api/openapi.json": {"GET": ANYONE},
     "/api/me": {"GET": ANYONE},
     "/api/login": {"POST": ANYONE},
     "/api/logout": {"POST": ANYONE},

@@ -12,14 +12,12 @@ from worker.database.models import BakeRow
 router = APIRouter(tags=["health"])
 
 
-@router.head("/livez")
 @router.get("/livez")
 async def livez() -> dict[str, str]:
     """The process answers."""
     return {"status": "alive"}
 
 
-@router.head("/readyz")
 @router.get("/readyz")
 def readyz(services: Shared) -> dict[str, str]:
     """The database can be read, the data directory has room, and the server is not being stopped."""

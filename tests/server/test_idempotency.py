@@ -1,0 +1,189 @@
+"""A call with a key makes something once, whoever asks again and whatever answers."""
+
+import threading
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from problems import problem_of
+from session_client import Baked
+from sqlalchemy import func, select, update
+
+from server.access.tables import AuditRow
+from server.idempotency import _Digest
+from server.records import idempotency
+from server.records.idempotency import Answer, IdempotencyStore
+from server.records.tables import IdempotencyRow
+from worker.database.clock import epoch_s
+
+OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def keyed(key: str) -> dict[str, str]:
+    return {"Idempotency-Key": key}
+
+
+@pytest.fixture
+def render(baked: Baked) -> dict[str, Any]:
+    return {"bake": baked.bake, "view": "front", "format": "png", "looks": [{}]}
+
+
+def test_the_same_call_again_is_answered_as_before(client: TestClient, render: dict[str, Any]) -> None:
+    first, again = (client.post("/api/renders", json=render, headers=keyed("one")) for _ in range(2))
+    assert (again.status_code, again.content, again.headers["location"]) == (
+        first.status_code, first.content, first.headers["location"],
+    )  # fmt: skip
+    assert again.headers["content-type"] == "application/json"
+    assert "idempotency-replayed" not in first.headers
+    assert again.headers["idempotency-replayed"] == "true"
+    assert len(client.get("/api/renders").json()) == 1
+    other = client.post("/api/renders", json=render, headers=keyed("two"))
+    assert other.headers["location"] != first.headers["location"]
+    assert client.post("/api/renders", json=render).status_code == 202
+    assert len(client.get("/api/renders").json()) == 3
+    with client.app.state.services.bakes.ledger.sessions() as session:
+        lines = session.scalar(select(func.count()).select_from(AuditRow).where(AuditRow.what == "POST /api/renders"))
+    assert lines == 3
+
+
+def test_another_call_with_the_key_is_refused(client: TestClient, render: dict[str, Any], baked: Baked) -> None:
+    assert client.post("/api/renders", json=render, headers=keyed("one")).status_code == 202
+    other = client.post("/api/renders", json={**render, "format": "exr"}, headers=keyed("one"))
+    assert other.status_code == 422
+    assert problem_of(other)["type"].endswith("key-reused")
+    elsewhere = client.post("/api/truths", json=render, headers=keyed("one"))
+    assert problem_of(elsewhere)["type"].endswith("key-reused")
+    assert client.get("/api/truths").json() == []
+
+
+def test_what_was_refused_may_be_tried_again(client: TestClient, render: dict[str, Any]) -> None:
+    wrong = {**render, "view": "back"}
+    assert client.post("/api/renders", json=wrong, headers=keyed("one")).status_code == 422
+    assert client.post("/api/renders", json=render, headers=keyed("one")).status_code == 202
+
+
+@pytest.mark.parametrize("key", ["", "with blank", "x" * 201, "\xe9"])
+def test_keys_that_are_none_are_refused(client: TestClient, render: dict[str, Any], key: str) -> None:
+    answer = client.post("/api/renders", json=render, headers={"Idempotency-Key": key.encode("latin-1")})
+    assert answer.status_code == 422
+    assert problem_of(answer)["detail"].startswith("Idempotency-Key is ")
+    assert client.get("/api/renders").json() == []
+
+
+def test_forms_are_the_same_whatever_stands_between_their_parts(client: TestClient) -> None:
+    def send(content: bytes, boundary: str) -> Any:
+        head = f'--{boundary}\r\nContent-Disposition: form-data; name="scene"; filename="a.obj"\r\n\r\n'
+        body = head.encode() + content + f"\r\n--{boundary}--\r\n".encode()
+        kind = {"Content-Type": f"multipart/form-data; boundary={boundary}"}
+        return client.post("/api/scenes", content=body, headers={**kind, **keyed("a-scene")})
+
+    first, again = send(OBJ, "one"), send(OBJ, "another")
+    assert first.status_code == again.status_code == 201, first.text
+    assert again.headers["idempotency-replayed"] == "true"
+    assert again.json() == first.json()
+    assert len(client.get("/api/scenes").json()) == 1
+    assert send(OBJ + b"v 2 2 2\n", "another").status_code == 422
+
+
+def test_calls_without_a_body_and_with_one_that_nobody_reads(client: TestClient, baked: Baked) -> None:
+    for body in (None, b"{}"):
+        url, key = f"/api/scenes/{baked.scene}/comments", keyed(f"a comment {body is None}".replace(" ", "-"))
+        pin = {"bake": baked.bake, "view": "front", "x": 1, "y": 2, "size": [160, 96], "text": "a"}
+        answers = [client.post(url, json=pin, headers=key) for _ in range(2)]
+        assert [answer.status_code for answer in answers] == [201, 201]
+        assert answers[0].json()["id"] == answers[1].json()["id"]
+        resumed = [client.post("/api/renders/0123456789abcdef/resume", content=body, headers=key) for _ in range(2)]
+        assert all(problem_of(answer)["type"].endswith("key-reused") for answer in resumed)
+
+
+def test_a_call_that_is_not_answered_yet_is_not_made_twice(
+    client: TestClient, render: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    renders, is_at_it, may_go_on = client.app.state.services.renders, threading.Event(), threading.Event()
+    submit = renders.submit
+
+    def slow(*told: Any, **named: Any) -> str:
+        is_at_it.set()
+        assert may_go_on.wait(30)
+        return str(submit(*told, **named))
+
+    monkeypatch.setattr(renders, "submit", slow)
+    answers: list[Any] = []
+    first = threading.Thread(
+        target=lambda: answers.append(client.post("/api/renders", json=render, headers=keyed("one")))
+    )
+    first.start()
+    assert is_at_it.wait(30)
+    meanwhile = client.post("/api/renders", json=render, headers=keyed("one"))
+    assert meanwhile.status_code == 409
+    assert (problem_of(meanwhile)["type"][-11:], meanwhile.headers["retry-after"]) == ("in-progress", "1")
+    may_go_on.set()
+    first.join(30)
+    assert answers[0].status_code == 202
+    again = client.post("/api/renders", json=render, headers=keyed("one"))
+    assert again.json()["id"] == answers[0].json()["id"]
+
+
+@pytest.fixture
+def store(client: TestClient) -> IdempotencyStore:
+    found: IdempotencyStore = client.app.state.services.idempotency
+    return found
+
+
+ANSWER = Answer(201, "/api/scenes/0", "application/json", b"{}")
+
+
+def test_keys_are_each_clients_own_and_run_out(client: TestClient, store: IdempotencyStore) -> None:
+    assert store.begin("ann", "one", "a") is None
+    store.end("ann", "one", ANSWER)
+    assert store.begin("bob", "one", "b") is None
+    before = store.begin("ann", "one", "a")
+    assert before is not None
+    assert before.answer == ANSWER
+    with client.app.state.services.bakes.ledger.sessions.begin() as session:
+        session.execute(update(IdempotencyRow).values(created=epoch_s() - idempotency.KEPT_S - 1))
+    assert store.begin("ann", "one", "a") is None
+
+
+def test_a_call_whose_server_has_died_is_made_again(client: TestClient, store: IdempotencyStore) -> None:
+    assert store.begin("ann", "one", "a") is None
+    with client.app.state.services.bakes.ledger.sessions.begin() as session:
+        place, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).one().split("/")
+        session.execute(update(IdempotencyRow).values(owner=f"{place}/{2**22 + 1}/{nonce}/{number}"))
+    assert store.begin("ann", "one", "a") is None
+    with client.app.state.services.bakes.ledger.sessions.begin() as session:
+        session.execute(update(IdempotencyRow).values(created=epoch_s() - idempotency.ABANDONED_S - 1))
+    assert store.begin("ann", "one", "a") is None
+
+
+def test_of_too_many_answers_the_oldest_go_and_large_ones_become_the_way_to_what_was_made(
+    client: TestClient, store: IdempotencyStore, monkeypatch: pytest.MonkeyPatch, render: dict[str, Any]
+) -> None:
+    monkeypatch.setattr(idempotency, "MAX_EACH", 3)
+    for key in "abcde":
+        assert store.begin("ann", key, key) is None
+        store.end("ann", key, ANSWER)
+    assert store.begin("ann", "e", "e") is not None
+    assert store.begin("ann", "a", "a") is None
+    monkeypatch.setattr(idempotency, "MAX_BODY_BYTES", 10)
+    first, again = (
+        client.post("/api/renders", json=render, headers=keyed("one"), follow_redirects=False) for _ in range(2)
+    )
+    assert (again.status_code, again.headers["location"]) == (303, first.headers["location"])
+
+
+def test_a_forms_digest_is_the_same_however_its_bytes_come() -> None:
+    def digest(boundary: bytes, *parts: bytes) -> str:
+        found = _Digest(boundary)
+        for part in parts:
+            found.add(part)
+        return found.hex()
+
+    def body(boundary: bytes, text: bytes = b"text") -> bytes:
+        return b"--" + boundary + b"\r\na\r\n--" + boundary + text + b"\r\n--" + boundary + b"--"
+
+    whole = digest(b"xyz", body(b"xyz"))
+    for at in range(len(body(b"xyz"))):
+        assert digest(b"xyz", body(b"xyz")[:at], body(b"xyz")[at:]) == whole
+    assert digest(b"other", *(bytes([byte]) for byte in body(b"other"))) == whole
+    assert digest(b"xyz", body(b"xyz", b"texts")) != whole
