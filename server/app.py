@@ -12,7 +12,7 @@ from fastapi import Depends, FastAPI
 
 from relume.imageio.ocio.current import current, using
 from relume.resident import share_arenas
-from server import errors
+from server import errors, openapi
 from server.access.gate import Gate
 from server.access.rules import methods_at
 from server.conditional import Conditional
@@ -114,7 +114,9 @@ def create_app(
         redoc_url=None,
         lifespan=lifespan,
         responses=errors.OPENAPI_RESPONSES,
+        generate_unique_id_function=lambda route: route.name,
     )
+    openapi.install(app)
     app.state.leave = leave
     errors.install(app, methods_at)
     # the last that is added is the first that a request passes

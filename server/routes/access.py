@@ -20,7 +20,7 @@ router = APIRouter(prefix="/api", tags=["access"])
 COOKIE_SECONDS = 30 * 86_400
 
 
-@router.get("/me")
+@router.get("/me", name="get_me")
 async def me(caller: Who, services: Shared, response: Response) -> MeBody:
     """Who calls, and what they may do."""
     response.headers["Cache-Control"] = "no-store"

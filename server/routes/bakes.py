@@ -92,7 +92,10 @@ def get_bake(bake: Id, services: Shared) -> BakeBody:
     return bake_body(services.bakes.get(bake), services)
 
 
-@router.get("/{bake}/events", response_class=EventSourceResponse)
+@router.get(
+    "/{bake}/events", response_class=EventSourceResponse,
+    name="bake_events", responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
+)
 async def bake_events(bake: Id, services: Shared) -> EventSourceResponse:
     """Every change as a server-sent event `bake` with the same body as GET; ends with the bake."""
     await run_in_threadpool(services.bakes.get, bake)
@@ -124,7 +127,7 @@ def cancel_bake(bake: Id, services: Shared, forget: bool = False) -> Response:
     return Response(status_code=204)
 
 
-@router.get("/{bake}/views/{view}/materials.png", response_class=PngResponse)
+@router.get("/{bake}/views/{view}/materials.png", response_class=PngResponse, name="get_material_ids")
 async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: Shared) -> PngResponse:
     """16-bit grey PNG: which material each pixel shows, in the scene's order; 65535 is background."""
     await run_in_threadpool(ready_bake, services, bake)
@@ -138,7 +141,7 @@ async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], ser
     return PngResponse(png, headers=FOREVER)
 
 
-@router.get("/{bake}/environment.png", response_class=PngResponse)
+@router.get("/{bake}/environment.png", response_class=PngResponse, name="get_own_environment")
 async def own_environment(bake: Id, services: Shared) -> PngResponse:
     """The light that the scene came with, as small as those of /api/environments."""
     await run_in_threadpool(ready_bake, services, bake)

@@ -20,7 +20,7 @@ router = APIRouter(prefix="/api/built-ins", tags=["scenes"])
 BuiltInName = Annotated[str, Path(max_length=256)]
 
 
-@router.get("")
+@router.get("", name="list_built_ins")
 def get_all(page: Paged) -> list[BuiltInBody]:
     """All of them, in the order in which they are shown."""
     return [
@@ -29,7 +29,7 @@ def get_all(page: Paged) -> list[BuiltInBody]:
     ]
 
 
-@router.post("/{name}", status_code=201)
+@router.post("/{name}", status_code=201, name="take_built_in")
 async def take_one(name: BuiltInName, services: Shared, caller: Who, response: Response) -> SceneBody:
     """Make it and register it like an imported one; a second time it is the same scene."""
     if name not in BUILT_IN:

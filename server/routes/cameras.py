@@ -23,7 +23,7 @@ router = APIRouter(prefix="/api/scenes/{scene}/cameras", tags=["scenes"])
 CameraName = Annotated[str, Path(min_length=1, max_length=MAX_NAME)]
 
 
-@router.get("")
+@router.get("", name="list_cameras")
 def get_cameras(scene: Id, services: Shared, page: Paged) -> list[CameraEntry]:
     """The cameras that came with the scene, then those that were placed, by name."""
     return page.in_order(_entries(scene, services))
@@ -45,7 +45,7 @@ def put_camera(scene: Id, name: CameraName, frame: CameraFrame, services: Shared
     return Response(status_code=201 if is_new else 204)
 
 
-@router.delete("/{name}", status_code=204)
+@router.delete("/{name}", status_code=204, name="delete_camera")
 def delete_one(scene: Id, name: CameraName, services: Shared) -> Response:
     """Forget a camera that was placed; bakes of it stay."""
     delete_camera(services.bakes.ledger, scene, name)

@@ -13,6 +13,7 @@ from server.access.roles import Caller, Who
 from server.files.moments import small_picture
 from server.files.png import A_DAY
 from server.live.rooms.door import check_person
+from server.openapi import files
 from server.records.comments import Comment, check_text
 from server.routes.bakes import ready_bake
 from server.routes.paging import Paged
@@ -84,7 +85,8 @@ async def delete_comment(scene: Id, comment: CommentId, services: Shared) -> Res
 @router.get(
     "/{comment}/picture.webp",
     response_class=Response,
-    responses={200: {"content": {"image/webp": {}}}},
+    responses=files("image/webp"),
+    name="get_comment_picture",
 )
 def get_picture(scene: Id, comment: CommentId, services: Shared) -> Response:
     """The picture of the moment, at most 320 pixels a side."""

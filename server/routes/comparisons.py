@@ -13,6 +13,7 @@ from server.access.roles import Who
 from server.apart.animation import compared_from
 from server.errors import NotReadyError
 from server.files.downloads import Download
+from server.openapi import files
 from server.queues.comparisons import Comparing
 from server.queues.work import WorkFilter
 from server.routes.bakes import ready_bake
@@ -90,7 +91,10 @@ def resume_comparison(truth: Id, services: Shared) -> TruthBody:
     return _body(services.comparisons.get(truth), services)
 
 
-@router.get("/{truth}/{name}.png", response_class=Download)
+@router.get(
+    "/{truth}/{name}.png", response_class=Download,
+    name="get_comparison_picture", responses=files("image/png"),
+)
 def get_picture(
     truth: Id, name: Picture, services: Shared, passes: Annotated[int | None, Query(ge=0)] = None
 ) -> Download:

@@ -38,7 +38,7 @@ async def get_finder(scene: Id, services: Shared) -> FinderBody:
     return FinderBody(lowest=finder.lowest.tolist(), highest=finder.highest.tolist(), framing=frame)
 
 
-@router.post("", response_class=JpegResponse)
+@router.post("", response_class=JpegResponse, name="draw_finder")
 async def picture(scene: Id, view: FinderView, services: Shared) -> JpegResponse:
     """What a camera would see, in plain colours."""
     camera, finder = _camera(view), await _finder(scene, services)
@@ -51,7 +51,7 @@ async def picture(scene: Id, view: FinderView, services: Shared) -> JpegResponse
     return JpegResponse(await run_in_threadpool(drawn), headers={"Cache-Control": "no-store"})
 
 
-@router.post("/place")
+@router.post("/place", name="place_in_finder")
 async def place(scene: Id, pixel: FinderPixel, services: Shared) -> PlaceBody:
     """What a position of that picture shows."""
     camera, finder = _camera(pixel), await _finder(scene, services)

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import ParameterError
+from server.openapi import LOOK
 from server.records.looks import SavedLook, check_name, parse_document
 from server.routes.paging import Paged, newest
 from server.services import Shared
@@ -15,7 +16,8 @@ from server.wire.bodies import LookEntry, moment
 
 router = APIRouter(prefix="/api/looks", tags=["looks"])
 Etags = Annotated[str | None, Header(max_length=4096)]
-LOOK_BODY = {"requestBody": {"required": True, "content": {"application/json": {"schema": {"type": "object"}}}}}
+LOOK_CONTENT = {"application/json": {"schema": {"$ref": LOOK}}}
+LOOK_BODY = {"requestBody": {"required": True, "content": LOOK_CONTENT}}
 
 
 @router.get("")
@@ -25,7 +27,7 @@ def list_looks(services: Shared, page: Paged) -> list[LookEntry]:
     return [LookEntry.of(look, modified=moment(look.modified), bytes=look.num_bytes) for look in looks]
 
 
-@router.get("/{name}", responses={200: {"content": {"application/json": {"schema": {"type": "object"}}}}})
+@router.get("/{name}", responses={200: {"content": LOOK_CONTENT}})
 def get_look(name: str, services: Shared) -> Response:
     """One look, with its version as ETag."""
     look = services.looks.get(check_name(name))

@@ -21,6 +21,7 @@ from server.apart.animation import check_animation, document_of, look_of, with_p
 from server.errors import NotReadyError
 from server.files.downloads import Download, ZipStream
 from server.files.video import check_encoder
+from server.openapi import files
 from server.queues.renders import Render, planned_bytes
 from server.queues.work import WorkFilter, new_id
 from server.routes.bakes import ready_bake
@@ -227,7 +228,10 @@ def _with_frame(identity: str, index: int, services: Services) -> Render:
     return render
 
 
-@router.get("/{render}/frames/{index}", response_class=Download)
+@router.get(
+    "/{render}/frames/{index}", response_class=Download,
+    name="get_frame", responses=files("image/x-exr", "image/png", "image/webp"),
+)
 def get_frame(render: Id, index: FrameIndex, services: Shared) -> Download:
     """One finished picture, counted from 0."""
     found = _with_frame(render, index, services)
@@ -238,7 +242,7 @@ def get_frame(render: Id, index: FrameIndex, services: Shared) -> Download:
     return Download(path, media_type=MEDIA_TYPES[found.request.picture_format], filename=name)
 
 
-@router.get("/{render}/video.mp4", response_class=Download)
+@router.get("/{render}/video.mp4", response_class=Download, name="get_video", responses=files("video/mp4"))
 def get_video(render: Id, services: Shared) -> Download:
     """All pictures as a video, where one was asked for, when it is finished."""
     found = services.renders.get(render)
@@ -250,7 +254,7 @@ def get_video(render: Id, services: Shared) -> Download:
     return Download(path, media_type=MEDIA_TYPES["mp4"], filename=services.renders.video_name(found))
 
 
-@router.get("/{render}/archive.zip", response_class=Download)
+@router.get("/{render}/archive.zip", response_class=Download, name="get_archive", responses=files("application/zip"))
 def get_archive(render: Id, services: Shared, partial: bool = False) -> Response:
     """All pictures in one file, when all are finished; with `partial` those that are, before."""
     found = services.renders.get(render)

@@ -19,6 +19,7 @@ from server.apart.bakes import MAX_WIDTH
 from server.files.downloads import Download
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
+from server.openapi import files
 from server.routes.paging import Paged, newest
 from server.services import Services, Shared
 from server.wire.bodies import SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
@@ -114,7 +115,7 @@ async def add_ground(scene: Id, services: Shared, caller: Who, response: Respons
     return await run_in_threadpool(get_one, identity, services)
 
 
-@router.get("")
+@router.get("", name="list_scenes")
 def get_all(
     services: Shared, page: Paged, name: Annotated[str | None, Query(max_length=200)] = None
 ) -> list[SceneBody]:
@@ -128,14 +129,14 @@ def get_all(
     return [_body(record, bakes[record.id], placed[record.id]) for record in records]
 
 
-@router.get("/{scene}")
+@router.get("/{scene}", name="get_scene")
 def get_one(scene: Id, services: Shared) -> SceneBody:
     """One scene."""
     placed = [camera.name for camera in kept_cameras(services.bakes.ledger, scene)]
     return _body(get_scene(services.bakes.ledger, scene), services.bakes.bakes(scene), placed)
 
 
-@router.delete("/{scene}", status_code=204)
+@router.delete("/{scene}", status_code=204, name="delete_scene")
 def delete_one(scene: Id, services: Shared) -> Response:
     """Delete a scene and its bakes."""
     bakes = [status.id for status in services.bakes.bakes(scene)]
@@ -146,7 +147,10 @@ def delete_one(scene: Id, services: Shared) -> Response:
     return Response(status_code=204)
 
 
-@router.get("/{scene}/thumbnail.webp", response_class=Download)
+@router.get(
+    "/{scene}/thumbnail.webp", response_class=Download,
+    name="get_scene_thumbnail", responses=files("image/webp"),
+)
 async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> Download:
     """The scene as a bake of it shows it, unedited; `bake` only makes the address change when it does."""
     statuses = await run_in_threadpool(services.bakes.bakes, scene)

@@ -13,6 +13,7 @@ from server.wire.cameras import CameraFrame
 
 Side = Annotated[int, Field(ge=1, le=16384)]
 ImageFormat = Literal["exr", "png", "webp"]
+RenderFormat = Literal["exr", "png", "webp", "mp4"]
 MAX_LOOKS = 1000
 MAX_FRAMES = 3600
 MAX_TOLD = 600  # frames whose looks are told at once
@@ -111,7 +112,7 @@ class RenderRequest(Animation):
     """
 
     view: Name
-    format: ImageFormat | Literal["mp4"]
+    format: RenderFormat
     size: tuple[Side, Side] | None = None
     name: Name | None = None
     layers: Layering = False
@@ -138,7 +139,7 @@ class RenderBody(Body):
     user: str
     bake: str
     view: str
-    format: ImageFormat | Literal["mp4"]
+    format: RenderFormat
     size: tuple[int, int] | None
     state: WorkState
     created: str

@@ -57,7 +57,7 @@ def get_environment(environment: AnyId, services: Shared) -> EnvironmentBody:
     return _body(get_record(environments_path(services.settings.data), environment))
 
 
-@router.get("/{environment}/thumbnail.png", response_class=PngResponse)
+@router.get("/{environment}/thumbnail.png", response_class=PngResponse, name="get_environment_thumbnail")
 def get_thumbnail(environment: AnyId, services: Shared) -> PngResponse:
     """A small tone-mapped picture, 192 × 96."""
     if environment in BUILT_IN:

@@ -45,7 +45,7 @@ def material_at(
     return navigation_map().at(f0, sigma)
 
 
-@router.get("/{table}/{material}/thumbnail.png", response_class=PngResponse)
+@router.get("/{table}/{material}/thumbnail.png", response_class=PngResponse, name="get_material_thumbnail")
 async def thumbnail(table: Part, material: Part) -> PngResponse:
     """A ball of a library material."""
     png = await run_in_threadpool(_thumbnail, f"{table}/{material}")

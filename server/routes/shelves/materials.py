@@ -61,7 +61,7 @@ def get_measured(material: Id, services: Shared) -> MeasuredBody:
     return _body(get_record(materials_path(services.settings.data), material))
 
 
-@router.get("/{material}/thumbnail.png", response_class=PngResponse)
+@router.get("/{material}/thumbnail.png", response_class=PngResponse, name="get_measured_thumbnail")
 async def get_thumbnail(material: Id, services: Shared) -> PngResponse:
     """A ball of the material."""
     record = get_record(materials_path(services.settings.data), material)
