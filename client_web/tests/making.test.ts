@@ -6,6 +6,10 @@ import { libraryOpen } from "../src/state/panels";
 const work = (id: string, changes: Partial<BtfWorkBody> = {}): BtfWorkBody => ({
   id,
   name: `Felt ${id}`,
+  user: "",
+  created: "2026-01-01T00:00:00+00:00",
+  started: null,
+  ended: null,
   geometry: null,
   state: "running",
   progress: 0.5,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter
+from fastapi.responses import PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from sqlalchemy import select
 
@@ -28,7 +29,7 @@ def readyz(services: Shared) -> dict[str, str]:
     return {"status": "ready"}
 
 
-@router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}})
-def metrics(services: Shared) -> Response:
+@router.get("/metrics", response_class=PlainTextResponse)
+def metrics(services: Shared) -> PlainTextResponse:
     """Prometheus text."""
-    return Response(generate_latest(services.metrics.registry), headers={"Content-Type": CONTENT_TYPE_LATEST})
+    return PlainTextResponse(generate_latest(services.metrics.registry), headers={"Content-Type": CONTENT_TYPE_LATEST})

@@ -16,9 +16,9 @@ UserName = Annotated[str, Field(max_length=80)]
 
 
 def work_page(
-    queue: WorkQueue[Request], which: WorkFilter, page: Page, *, newest_first: bool = True
+    queue: WorkQueue[Request], which: WorkFilter, page: Page, most: int = MAX_LONG, *, newest_first: bool = True
 ) -> list[Work[Request]]:
-    """A part of a queue's list, at most `MAX_LONG` where nobody says how long it is to be."""
+    """A part of a queue's list. most: how long it is at most where nobody says that."""
 
     def key(work: Work[Request]) -> Key:
         return newest(work.created, work.id) if newest_first else (work.created, work.id)
@@ -28,7 +28,7 @@ def work_page(
     if page.after is not None:
         created, identity = float(page.after[0]), str(page.after[1])
         after = -created if newest_first else created, identity
-    works = queue.page(which, page.at_most(MAX_LONG) + 1, after, newest_first=newest_first)
+    works = queue.page(which, page.at_most(most) + 1, after, newest_first=newest_first)
     return page.cut(works, key)
 
 

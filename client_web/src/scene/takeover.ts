@@ -4,7 +4,7 @@ import { whenBakeIsReady } from "../live/handlers";
 import * as api from "../net/api";
 import { bakeEnd, followBake } from "../net/events";
 import type { BakeBody, SceneBody } from "../protocol";
-import { bake, coming } from "../state/bakes";
+import { bake, bakes, coming } from "../state/bakes";
 import { page } from "../state/scene";
 import { attempt, showError } from "../ui/toasts";
 import { fineness, type BakeChoice } from "./bakeChoice";
@@ -41,10 +41,12 @@ export function stopFollowing(): void {
   stop();
 }
 
-// somebody else's bake of this scene takes over only where it is finer, of the same light
+// a bake of this scene that comes to be ready takes over only where it is finer, of the same light; one that was ready when
+// the scene was opened does not: the address, or whoever chose, named the one that is shown
 whenBakeIsReady((id) => {
   const current = bake.peek();
   if (current === null || id === current) return;
+  if (bakes.peek().some((each) => each.id === id && each.state === "ready")) return;
   void attempt(async () => {
     const [other, shown] = await Promise.all([api.getBake(id), api.getBake(current)]);
     if (other.recipe.method === shown.recipe.method && fineness(other) > fineness(shown)) swapTo(id);

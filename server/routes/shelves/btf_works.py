@@ -20,7 +20,7 @@ from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.queues.btfs import BtfWork
 from server.queues.work import WorkFilter, new_id
-from server.routes.paging import Paged
+from server.routes.paging import MAX_LISTED, Paged
 from server.routes.works import UserName, moments, work_page
 from server.services import Services, Shared
 from server.wire.body import Id, WorkState
@@ -132,8 +132,8 @@ def list_btf_works(
     state: Annotated[WorkState | None, Query()] = None,
     user: Annotated[UserName | None, Query()] = None,
 ) -> list[BtfWorkBody]:
-    """Those that were asked for and not forgotten, oldest first; 100 where no `limit` is given."""
-    works = work_page(services.btfs, WorkFilter(state, user), page, newest_first=False)
+    """Those that were asked for and not forgotten, oldest first."""
+    works = work_page(services.btfs, WorkFilter(state, user), page, MAX_LISTED, newest_first=False)
     return [_body(work, services) for work in works]
 
 

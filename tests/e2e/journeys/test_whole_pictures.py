@@ -90,8 +90,8 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, s
         server.kill()
 
 
-def bake(server: Server, scene: str, size: tuple[int, int]) -> None:
-    """Bake two views and wait."""
+def bake(server: Server, scene: str, size: tuple[int, int]) -> str:
+    """Bake two views, wait, and say its id."""
     made = server.call("/api/bakes", {"scene": scene, "views": ["front", "left"], "size": size, "lights": 200})
     deadline = time.monotonic() + WAIT_MS / 1e3
     while made["state"] != "ready":
@@ -99,12 +99,39 @@ def bake(server: Server, scene: str, size: tuple[int, int]) -> None:
         assert made["state"] in ("queued", "running"), made["problem"]
         time.sleep(0.1)
         made = server.call(f"/api/bakes/{made['id']}")
+    return str(made["id"])
 
 
 def darkest(drawn: list[dict[str, float]]) -> float:
     """Mean of the darkest picture, in units of that of the last."""
     means = np.array([each["mean"] for each in drawn])
     return float(means.min() / means[-1])
+
+
+def test_the_bake_that_an_address_names_stays_where_finer_ones_are_ready(
+    coarse: tuple[Server, str], browser: Browser
+) -> None:
+    server, scene = coarse
+    named, finer = (bake(server, scene, size) for size in ((96, 72), (120, 90)))
+    page: Any = browser.new_page(viewport={"width": 1280, "height": 800})
+    try:
+        editor = Editor(page)
+
+        def is_news(text: str | bytes) -> bool:
+            return isinstance(text, str) and '"type":"bake"' in text.replace(" ", "") and finer in text
+
+        with page.expect_websocket() as opened:
+            page.goto(f"{server.url}/?scene={scene}&bake={named}")
+        with opened.value.expect_event("framereceived", is_news):
+            pass
+        editor.wait_until_exact()
+        assert f"bake={named}" in page.url
+        expect(page.get_by_text("The new bake is in place.")).to_have_count(0)
+        with page.expect_websocket() as opened:
+            bake(server, scene, (140, 105))
+        page.get_by_text("The new bake is in place.").wait_for(timeout=WAIT_MS)
+    finally:
+        page.close()
 
 
 def test_finer_bake_and_other_view_come_when_they_are_whole(coarse: tuple[Server, str], browser: Browser) -> None:
