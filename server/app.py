@@ -14,6 +14,7 @@ from relume.imageio.ocio.current import current, using
 from relume.resident import share_arenas
 from server import errors, openapi
 from server.access.gate import Gate
+from server.access.openness import check_openness
 from server.access.rules import methods_at
 from server.conditional import Conditional
 from server.guard import Guard
@@ -44,6 +45,7 @@ from server.routes import (
 )
 from server.routes.paging import check_query
 from server.routes.shelves import btf_works, btfs, environments, images, library, materials
+from server.running.connection import Connection
 from server.running.leave import Leave
 from server.running.process import Process
 from server.running.sockets import Socket
@@ -129,6 +131,7 @@ def create_app(
         allowed_origins=settings.allowed_origins,
         max_body_bytes=settings.max_body_bytes,
         max_upload_bytes=settings.max_upload_bytes,
+        https_only=settings.https_only,
         count=metrics.count_request,
     )
     app.add_middleware(RequestIds)
@@ -141,6 +144,7 @@ def create_app(
 
 def serve(settings: Settings, tell_started: Callable[[], object] = lambda: None) -> None:
     """Run the server until it is stopped, and tell once when it answers; blocks."""
+    check_openness(settings)
     set_up(settings.log_format, settings.log_level)
     share_arenas()
     stoppable(create_app(settings), settings, tell_started).run()
@@ -165,6 +169,7 @@ def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
         host=settings.host,
         port=settings.port,
         loop="uvloop",
+        http=Connection,
         ws=Socket,
         ws_max_size=MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves

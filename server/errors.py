@@ -113,6 +113,10 @@ class KeyReusedError(RelumeError):
     """Another call had the same key."""
 
 
+class OpennessError(RelumeError):
+    """A server would let in more people than its settings sound like."""
+
+
 class RateError(RelumeError):
     """Who calls calls too often; `wait_s` from now there is room."""
 

@@ -25,6 +25,14 @@ from server.errors import ForbiddenOriginError, TooLargeError, problem_of, probl
 # as large as the settings allow
 UPLOADS = ("/api/scenes", "/api/materials/btf-works", "/api/materials/btf-works/geometry")
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
+# images, environments, and documents with many looks: as large as the settings allow for those
+LARGER = ("/api/environments", "/api/images", "/api/renders", "/api/renders/looks")
+MAX_JSON_BYTES = 1024**2
+"""Of any other body. JSON is read on the event loop, some 40 MB a second, while nobody else is served."""
+MAX_LOGIN_BYTES = 4 * 1024
+LOGINS = ("/api/login", "/api/logout")
+PRIVATE = ("/api/", "/metrics")
+HTTPS_ONLY = {"Strict-Transport-Security": "max-age=31536000"}
 _NULL = re.compile(rb"%00|\0")  # no name has it, and PostgreSQL takes no text with it
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 SECURITY_HEADERS = {
@@ -65,11 +73,13 @@ class Guard:
         allowed_origins: Sequence[str],
         max_body_bytes: int,
         max_upload_bytes: int,
+        https_only: bool,
         count: Callable[[str, int, float], None],
     ) -> None:
         self._app, self._count = app, count
         self._allowed_hosts, self._allowed_origins = allowed_hosts, allowed_origins
         self._max_body_bytes, self._max_upload_bytes = max_body_bytes, max_upload_bytes
+        self._headers = SECURITY_HEADERS | (HTTPS_ONLY if https_only else {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or hand on with counted body and safe headers."""
@@ -112,16 +122,23 @@ class Guard:
             if message["type"] == "http.response.start":
                 self._count(scope["method"], message["status"], time.perf_counter() - start_s)
                 headers = MutableHeaders(scope=message)
-                for name, value in SECURITY_HEADERS.items():
+                for name, value in self._headers.items():
                     headers.setdefault(name, value)
+                if scope["path"].startswith(PRIVATE):  # a cache between hands it to nobody else
+                    headers.setdefault("Cache-Control", "private")
+                    headers.add_vary_header("Cookie, Authorization")
             await send(message)
 
         return dressed
 
     def _limit(self, scope: Scope) -> int:
-        if scope["path"] in UPLOADS:
+        path = scope["path"]
+        if path in UPLOADS:
             return self._max_upload_bytes
-        return MAX_MATERIAL_BYTES if scope["path"] == "/api/materials/measured" else self._max_body_bytes
+        if path == "/api/materials/measured":
+            return MAX_MATERIAL_BYTES
+        most = self._max_body_bytes if path in LARGER else MAX_LOGIN_BYTES if path in LOGINS else MAX_JSON_BYTES
+        return min(most, self._max_body_bytes)
 
     def _too_large(self, scope: Scope) -> TooLargeError:
         return TooLargeError(f"the request is larger than {self._limit(scope):,} bytes; send less")

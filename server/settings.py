@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Literal
@@ -26,16 +27,21 @@ def _quarter_of_memory() -> int:
     return min(total_bytes // 4, 6 * GIB)
 
 
-def _check_network(text: str) -> str:
+_HOST_NAME = re.compile(r"(?=.*[A-Za-z])[A-Za-z0-9_]([A-Za-z0-9_.-]{0,251}[A-Za-z0-9_])?")
+
+
+def _check_proxy(text: str) -> str:
     try:
         ip_network(text, strict=False)
     except ValueError:
-        raise ValueError("an address such as 10.0.0.5, or a network such as 10.0.0.0/8") from None
+        if _HOST_NAME.fullmatch(text) is None:
+            allowed = "an address such as 10.0.0.5, a network such as 10.0.0.0/8, or a host name such as proxy"
+            raise ValueError(allowed) from None
     return text
 
 
-Network = Annotated[str, AfterValidator(_check_network)]
-"""An IP address, or a network as 10.0.0.0/8."""
+ProxyPlace = Annotated[str, AfterValidator(_check_proxy)]
+"""An IP address, a network as 10.0.0.0/8, or a name that is looked up."""
 
 
 Config = Annotated[str | None, AfterValidator(lambda text: None if text == "none" else text)]
@@ -91,10 +97,13 @@ class Settings(BaseSettings):
     ack_seconds: float = Field(default=30.0, gt=0, description="how long a client may leave frames unacknowledged")
     resume_seconds: float = Field(default=600.0, gt=0, description="how long a lost session can be resumed")
     login: bool = Field(default=False, description="whether people log in; without it, whoever reaches the port is in")
-    trusted_proxies: list[Network] = Field(
-        default=[], description="addresses or networks of proxies that say who calls, as JSON list"
+    https_only: bool = Field(
+        default=False, description="whether people reach it by https alone: Secure cookies, Strict-Transport-Security"
     )
-    user_header: str = Field(default="X-Forwarded-User", min_length=1, description="in which they say it")
+    trusted_proxies: list[ProxyPlace] = Field(
+        default=[], description="addresses, networks or names of proxies that say where a call comes from, as JSON list"
+    )
+    user_header: str = Field(default="", description="header in which they say who calls; empty: they say it of nobody")
     proxy_role: RoleName = Field(default="view", description="role of those whom a proxy names")
     proxy_roles: dict[str, RoleName] = Field(default={}, description="roles of some of them by name, as JSON object")
     viewers_comment: bool = Field(default=False, description="whether the role view, too, may write comments")
@@ -126,10 +135,9 @@ class Settings(BaseSettings):
     def most_queued_each(self) -> int:
         """How much work of a kind one client may have waiting: without a setting, what leaves room for three others.
 
-        Where nobody says who calls, all are one client, who may have all.
+        Where nobody logs in, all are one client, who may have all.
         """
-        is_told_apart = self.login or bool(self.trusted_proxies)
-        return self.max_queued_each or (max(1, self.max_queued // 4) if is_told_apart else self.max_queued)
+        return self.max_queued_each or (max(1, self.max_queued // 4) if self.login else self.max_queued)
 
     @property
     def database_url(self) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from anyio.to_thread import run_sync
 from sqlalchemy.orm import Session, sessionmaker
 
-from server.access.audit import Audit
+from server.access.audit import Audit, Change
 from server.access.identity import Identity
 from server.access.quotas import Quotas
 from server.access.roles import Caller
@@ -27,6 +27,10 @@ class Access:
         self.tokens, self.identity = TokenStore(sessions), Identity(settings)
         self.quotas = Quotas(sessions, settings)
         self.audit = Audit(sessions, settings.audit_lines)
+
+    async def note(self, change: Change) -> None:
+        """Write a line of the audit, beside the event loop."""
+        await run_sync(self.audit.add, change)
 
     async def until_revoked(self, caller: Caller) -> None:
         """Wait for as long as a caller may stay.

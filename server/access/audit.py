@@ -1,4 +1,6 @@
-"""The audit: a line for each change, who made it and when, in the database. Lines are only added; the oldest go."""
+"""The audit: a line for each change, login and refusal, who and when, in the database. Lines are only added; the oldest
+go.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session, sessionmaker
 
 from server.access.roles import Caller
@@ -17,6 +19,8 @@ from worker.database.faults import AWAY, told
 
 log = logging.getLogger(__name__)
 _TRIM_EVERY = 100
+_REFUSED = (401, 403)
+_REFUSED_SHARE = 10
 MAX_LISTED = 1_000
 
 
@@ -54,7 +58,10 @@ class Entry(Change):
 
 
 class Audit:
-    """Lines of the audit, the newest `most` of them; may be used from any thread."""
+    """Lines of the audit, the newest `most` of them; may be used from any thread.
+
+    Of refusals a tenth as many, beside them: whoever tries to get in again and again pushes no change out.
+    """
 
     def __init__(self, sessions: sessionmaker[Session], most: int) -> None:
         self._sessions, self._most = sessions, most
@@ -91,5 +98,11 @@ class Audit:
 
     def _trim(self) -> None:
         with self._sessions.begin() as session:
-            newest = session.scalar(select(func.max(AuditRow.number))) or 0
-            session.execute(delete(AuditRow).where(AuditRow.number <= newest - self._most))
+            for are, most in (
+                (AuditRow.status.not_in(_REFUSED), self._most),
+                (AuditRow.status.in_(_REFUSED), max(1, self._most // _REFUSED_SHARE)),
+            ):
+                numbers = select(AuditRow.number).where(are).order_by(AuditRow.number.desc())
+                oldest = session.scalar(numbers.offset(most - 1).limit(1))
+                if oldest is not None:
+                    session.execute(delete(AuditRow).where(are, AuditRow.number < oldest))

@@ -6,11 +6,26 @@ lines, and stands where all requests pass.
 
 from __future__ import annotations
 
+import ipaddress
 import math
 from collections import OrderedDict
 from collections.abc import Callable
 
 MAX_BUCKETS = 10_000
+IPV6_BITS = 64
+"""Of an address of IPv6, those that tell one customer from another: who has a network has all addresses in it."""
+
+
+def bucket_of(address: str) -> str:
+    """Name of the bucket of an address: IPv6 counts by networks of /64."""
+    try:
+        known = ipaddress.ip_address(address.partition("%")[0])
+    except ValueError:  # what a proxy said, a socket file, or a test
+        return address
+    if known.version == 4:
+        return str(known)
+    mapped = known.ipv4_mapped
+    return str(mapped or ipaddress.ip_network((known, IPV6_BITS), strict=False))
 
 
 class Buckets:
@@ -37,6 +52,10 @@ class Buckets:
             if len(self._levels) > MAX_BUCKETS:
                 self._levels.popitem(last=False)
         return wait_s
+
+    def give_back(self, name: str) -> None:
+        """What was taken last did not count after all."""
+        self._levels[name] = min(self._burst, self._level(name) + 1.0), self._clock()
 
     def _level(self, name: str) -> float:
         level, at_s = self._levels.get(name, (self._burst, -math.inf))

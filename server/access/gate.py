@@ -10,13 +10,12 @@ import logging
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from anyio.to_thread import run_sync
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.access.access import Access
 from server.access.audit import Change
-from server.access.buckets import Buckets
+from server.access.buckets import Buckets, bucket_of
 from server.access.roles import KEY, Caller, Role
 from server.access.rules import SOCKET, is_change, is_comment, needed
 from server.errors import (
@@ -29,6 +28,7 @@ from server.errors import (
     problem_response,
 )
 from server.logs.context import USER
+from server.logs.requests import quoted
 from server.wire.protocol import SUBPROTOCOL
 from worker.database.faults import AWAY, database_away, is_away, told
 
@@ -70,6 +70,7 @@ class Gate:
             USER.set(caller.name)
             self._check(caller, self._needed(method, scope["path"]))
         except (LoginError, ForbiddenError, RateError) as error:
+            await self._write_down(error, scope)
             await self._refuse(error, scope, receive, send)
             return
         except AWAY as error:
@@ -89,10 +90,20 @@ class Gate:
         try:
             caller = await access.identity.caller(scope, access.tokens)
         except LoginError:
-            self._count(access.identity.address(scope))
+            scope[KEY] = Caller("", Role.ANYONE, access.identity.address(scope), "nobody")
+            self._count(_bucket(scope[KEY]))
             raise
-        self._count(caller.shown)
+        self._count(_bucket(caller))
         return caller
+
+    async def _write_down(self, error: Exception, scope: Scope) -> None:
+        """A line of the audit about who is refused for what they are; a call without any token is no try to get in."""
+        caller: Caller | None = scope.get(KEY)
+        is_try = Headers(scope=scope).get("authorization", "").lower().startswith("bearer ")
+        if caller is not None and (isinstance(error, ForbiddenError) or (isinstance(error, LoginError) and is_try)):
+            path = quoted(scope["path"])
+            what = f"{scope.get('method', SOCKET)} {path}"
+            await self._access().note(Change.by(caller, what, path, problem_of(error).status))
 
     def _count(self, name: str) -> None:
         wait_s = 0.0 if self._buckets is None else self._buckets.take(name)
@@ -123,7 +134,7 @@ class Gate:
                 if is_new and _UNCHANGED < status < 300:  # what is sent to another address changes nothing yet
                     what = f"{scope['method']} {scope['path']}"
                     change = Change.by(caller, what, made or scope["path"], status)
-                    await run_sync(self._access().audit.add, change)
+                    await self._access().note(change)
             await send(message)
 
         return audited
@@ -139,6 +150,11 @@ class Gate:
         subprotocol = SUBPROTOCOL if SUBPROTOCOL in scope["subprotocols"] else None
         await send({"type": "websocket.accept", "subprotocol": subprotocol, "headers": []})
         await send({"type": "websocket.close", "code": close_code_of(error), "reason": _short(problem.detail)})
+
+
+def _bucket(caller: Caller) -> str:
+    """Who is counted: a user, by how they are known, else an address; a token may be called as an address is."""
+    return f"{caller.by} {caller.name}" if caller.name else f"address {bucket_of(caller.address)}"
 
 
 def _short(text: str) -> str:

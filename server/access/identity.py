@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ipaddress
+import time
 from typing import TYPE_CHECKING
 
 from anyio.to_thread import run_sync
@@ -10,9 +10,11 @@ from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
 from starlette.types import Scope
 
-from server.access.roles import ROLES, Caller, Role
+from server.access.buckets import Buckets, bucket_of
+from server.access.proxies import Proxies
+from server.access.roles import PROXY, ROLES, Caller, Role
 from server.access.tokens import TokenStore
-from server.errors import LoginError
+from server.errors import LoginError, RateError
 
 if TYPE_CHECKING:
     from server.settings import Settings
@@ -20,70 +22,91 @@ if TYPE_CHECKING:
 COOKIE = "relume_token"
 MAX_NAME = 80
 OPENS_NOTHING = "this token opens nothing: it is misspelt, has run out or was revoked; ask for another"
+UNKNOWN_PER_SECOND = 20.0
+"""How many tokens that are not known to be right are looked up for an address, where the settings do not say."""
 
 
 class Identity:
-    """Tells who calls, as the settings say."""
+    """Tells who calls, as the settings say; on the event loop."""
 
     def __init__(self, settings: Settings) -> None:
         self._is_asked = settings.login
         self._header, self._roles, self._role = settings.user_header, settings.proxy_roles, settings.proxy_role
-        self._proxies = [ipaddress.ip_network(each, strict=False) for each in settings.trusted_proxies]
+        self._proxies = Proxies(settings.trusted_proxies, time.monotonic)
+        rate = settings.requests_per_second or UNKNOWN_PER_SECOND
+        self._unknown = Buckets(rate, settings.requests_at_once, time.monotonic)
 
     async def caller(self, scope: Scope, tokens: TokenStore) -> Caller:
         """Who calls. A token in the header goes before what a proxy says, and that before a cookie.
 
         Raises:
             LoginError: a token was sent in the header that opens nothing.
+            RateError: too many such were sent from there.
         """
+        await self._proxies.look_up(_peer(scope))
         headers, address = Headers(scope=scope), self.address(scope)
         if not self._is_asked:
             return Caller("", Role.ADMIN, address, "open")
         scheme, _, sent = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
-            found = await self._by_token(sent.strip(), address, tokens)
+            found = await self.by_token(sent.strip(), address, tokens)
             if found is None:
                 raise LoginError(OPENS_NOTHING)
             return found
-        if self._is_trusted(_peer(scope)) and (named := self._by_proxy(headers, address)) is not None:
+        if self._proxies.has(_peer(scope)) and (named := self._by_proxy(headers, address)) is not None:
             return named
-        if (cookie := cookie_of(headers)) and (found := await self._by_token(cookie, address, tokens)) is not None:
+        if (cookie := cookie_of(headers)) and (found := await self.by_token(cookie, address, tokens)) is not None:
             return found
         return Caller("", Role.ANYONE, address, "nobody")
 
     def address(self, scope: Scope) -> str:
         """Of the client: who has connected, or where that is a trusted proxy whom it has added last."""
-        peer = _peer(scope)
-        told = Headers(scope=scope).get("x-forwarded-for", "") if self._is_trusted(peer) else ""
-        return told.split(",")[-1].strip()[:64] or peer
+        return self._of_proxy(scope, "x-forwarded-for").split(",")[-1].strip()[:64] or _peer(scope)
 
     def is_secure(self, scope: Scope) -> bool:
         """Whether the browser speaks TLS, to the server or to a trusted proxy."""
-        told = Headers(scope=scope).get("x-forwarded-proto", "") if self._is_trusted(_peer(scope)) else ""
-        return "https" in (scope["scheme"], told.split(",")[-1].strip())
+        return "https" in (scope["scheme"], self._of_proxy(scope, "x-forwarded-proto").split(",")[-1].strip())
 
-    async def _by_token(self, text: str, address: str, tokens: TokenStore) -> Caller | None:
+    async def by_token(self, text: str, address: str, tokens: TokenStore) -> Caller | None:
+        """Whose token a text is; asks the database, unless it has just done so.
+
+        Only so many guesses of an address are looked up: whoever may guess at will keeps the database busy for all. Who
+        has shown a right token before is not held up by others' guesses from there.
+
+        Raises:
+            RateError: enough have been looked up for now.
+        """
+        is_guess, bucket = not tokens.knows(text), bucket_of(address)
+        wait_s = self._unknown.take(bucket) if is_guess else 0.0
+        if wait_s > 0.0:
+            raise RateError(f"too many wrong tokens; wait {max(wait_s, 0.1):.1f} s, then send a right one", wait_s)
         token = await run_sync(tokens.find, text)
-        return None if token is None else Caller(token.name, token.role, address, "token", token.id)
+        if token is None:
+            return None
+        if is_guess:
+            self._unknown.give_back(bucket)
+        return Caller(token.name, token.role, address, "token", token.id)
 
     def _by_proxy(self, headers: Headers, address: str) -> Caller | None:
-        """Whom the proxy names; a name that is none is nobody's."""
-        name = _as_utf8(headers.get(self._header, "")).strip()
-        if not name or not name.isprintable() or len(name) > MAX_NAME:
+        """Whom the proxy names, where it may; a name that is none is nobody's."""
+        name = _as_utf8(_last(headers, self._header)).strip() if self._header else ""
+        if not name or not name.isprintable() or len(PROXY + name) > MAX_NAME:
             return None
-        return Caller(name, ROLES[self._roles.get(name, self._role)], address, "proxy")
+        return Caller(PROXY + name, ROLES[self._roles.get(name, self._role)], address, "proxy")
 
-    def _is_trusted(self, peer: str) -> bool:
-        try:
-            address = ipaddress.ip_address(peer)
-        except ValueError:  # a socket file, or a test
-            return False
-        return any(address in network for network in self._proxies)
+    def _of_proxy(self, scope: Scope, name: str) -> str:
+        """What a trusted proxy says in a header; empty where nobody is trusted."""
+        return _last(Headers(scope=scope), name) if self._proxies.has(_peer(scope)) else ""
 
 
 def _peer(scope: Scope) -> str:
     """Address of whoever has connected; empty where it has none."""
     return scope["client"][0] if scope.get("client") else ""
+
+
+def _last(headers: Headers, name: str) -> str:
+    """The last line of a header, which the proxy has added where it adds lines; those before may be the client's."""
+    return (headers.getlist(name) or [""])[-1]
 
 
 def _as_utf8(value: str) -> str:

@@ -27,12 +27,16 @@ class Role(IntEnum):
 ROLES: dict[str, Role] = {"view": Role.VIEW, "edit": Role.EDIT, "admin": Role.ADMIN}
 
 
+PROXY = "proxy:"
+
+
 @dataclass(frozen=True)
 class Caller:
     """Whoever sent a request.
 
     Attributes:
-        name: by which quotas, turns and the audit know them; empty where nobody logs in.
+        name: by which quotas, turns and the audit know them; empty where nobody logs in. Names that proxies say begin
+            with `PROXY`, which no token's name does: whom a proxy calls Ann is not who has Ann's token.
         role: what they may do. address: where the request came from.
         by: how they are known: no login is asked for, they have not logged in, a token, a proxy.
         token: id of the token. watches: they have come by a link that lets nobody edit.
@@ -53,6 +57,11 @@ class Caller:
     def may_edit(self) -> bool:
         """Whether they may change what others see."""
         return self.role >= Role.EDIT
+
+    @property
+    def person(self) -> str:
+        """As other people read it in a room and beside a comment; empty where nobody logs in."""
+        return self.name.removeprefix(PROXY) if self.by == "proxy" else self.name
 
     @property
     def shown(self) -> str:

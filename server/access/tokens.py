@@ -9,16 +9,19 @@ import hashlib
 import hmac
 import secrets
 import time
+from collections import OrderedDict
 from dataclasses import dataclass
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import NotFoundError, ParameterError
-from server.access.roles import ROLES, Role
+from server.access.roles import PROXY, ROLES, Role
 from server.access.tables import TokenRow
 
 MAX_TOKENS = 10_000
+MAX_MISSED = 10_000
+"""Ids of which it is remembered that there is no such token."""
 REMEMBERED_S = 2.0
 """How long a token that was revoked elsewhere may still be taken."""
 _ID_DIGITS, _MAX_LENGTH = 12, 120
@@ -46,6 +49,7 @@ class TokenStore:
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions = sessions
         self._remembered: dict[str, tuple[float, Token, str]] = {}
+        self._missed: OrderedDict[str, float] = OrderedDict()
 
     def add(self, name: str, role: str, days: float | None = None) -> str:
         """Hand out a token; the text is told this once.
@@ -57,6 +61,8 @@ class TokenStore:
             raise ParameterError("role", role, ", ".join(ROLES))
         if not (name.isprintable() and name == name.strip() and 1 <= len(name) <= 80):
             raise ParameterError("name", name, "1 to 80 printable characters")
+        if name.startswith(PROXY):
+            raise ParameterError("name", name, f"one that does not begin with {PROXY}, as names from proxies do")
         if days is not None and not 0 < days <= 36_500:
             raise ParameterError("days", days, "more than 0, at most 36500")
         now, known = time.time(), self.all()
@@ -92,13 +98,16 @@ class TokenStore:
 
     def find(self, text: str) -> Token | None:
         """The valid token that a text is; asks the database, unless it has just done so."""
-        parts = text.split("_", 2)
-        if len(text) > _MAX_LENGTH or len(parts) != 3 or parts[0] != "relume" or len(parts[1]) != _ID_DIGITS:
-            return None
-        known = self._known(parts[1])
-        digest = known[1] if known is not None else ""
-        is_right = hmac.compare_digest(digest.encode(), _digest(parts[2]).encode())
+        identity, secret = _parts(text)
+        known = self._known(identity) if identity else None
+        is_right = known is not None and _is_secret(secret, known[1])
         return known[0] if known is not None and is_right and known[0].is_valid(time.time()) else None
+
+    def knows(self, text: str) -> bool:
+        """Whether a text was a right token when it was looked up last, however long ago; asks no database."""
+        identity, secret = _parts(text)
+        remembered = self._remembered.get(identity)
+        return remembered is not None and _is_secret(secret, remembered[2])
 
     def is_valid(self, identity: str) -> bool:
         """Whether the token of that id still opens what it opened."""
@@ -109,12 +118,29 @@ class TokenStore:
         now_s, remembered = time.monotonic(), self._remembered.get(identity)
         if remembered is not None and now_s < remembered[0]:
             return remembered[1:]
+        if now_s < self._missed.get(identity, 0.0):
+            return None
         with self._sessions() as session:
             row = session.get(TokenRow, identity)
         if row is None:
+            self._missed[identity] = now_s + REMEMBERED_S
+            if len(self._missed) > MAX_MISSED:
+                self._missed.popitem(last=False)
             return None
         self._remembered[identity] = now_s + REMEMBERED_S, _token(row), row.digest
         return _token(row), row.digest
+
+
+def _parts(text: str) -> tuple[str, str]:
+    """Id and secret of a token; both empty where it is none."""
+    parts = text.split("_", 2)
+    if len(text) > _MAX_LENGTH or len(parts) != 3 or parts[0] != "relume" or len(parts[1]) != _ID_DIGITS:
+        return "", ""
+    return parts[1], parts[2]
+
+
+def _is_secret(secret: str, digest: str) -> bool:
+    return hmac.compare_digest(digest.encode(), _digest(secret).encode())
 
 
 def _digest(secret: str) -> str:

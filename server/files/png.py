@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fastapi import Response
 
-A_DAY = {"Cache-Control": "public, max-age=86400"}
-FOREVER = {"Cache-Control": "public, max-age=31536000, immutable"}
+A_DAY = {"Cache-Control": "private, max-age=86400"}
+FOREVER = {"Cache-Control": "private, max-age=31536000, immutable"}
 
 
 class PngResponse(Response):

@@ -103,7 +103,7 @@ class Reception:
     def _present(self, message: PresenceMessage) -> None:
         if self._guest is None:
             raise ProtocolError("nobody shares this session; open it with ?room=… to work together", CLOSE_POLICY)
-        self._guest.present(message, self._caller.name)
+        self._guest.present(message, self._caller.person)
 
     def _touch(self, message: protocol.TouchMessage) -> None:
         if message.curve is not None:

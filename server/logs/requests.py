@@ -9,6 +9,7 @@ import logging
 import re
 import secrets
 import time
+from urllib.parse import quote
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -18,6 +19,11 @@ from server.logs.context import REQUEST
 log = logging.getLogger(__name__)
 HEADER = "X-Request-ID"
 _FORM = re.compile(r"[A-Za-z0-9._:-]{1,64}")
+
+
+def quoted(path: str) -> str:
+    """A path as it is safe to show: whoever calls chooses it, line breaks and codes for terminals in it as well."""
+    return quote(path, safe="/:@!$&'()*+,;=~")
 
 
 class RequestIds:
@@ -47,6 +53,6 @@ class RequestIds:
         finally:
             seconds = time.perf_counter() - start_s
             method = scope.get("method", "WEBSOCKET")
-            fields = {"method": method, "path": scope["path"], "status": status, "seconds": round(seconds, 4)}
+            fields = {"method": method, "path": quoted(scope["path"]), "status": status, "seconds": round(seconds, 4)}
             log.info("%s %s %d in %.4f s", *fields.values(), extra={"fields": fields})
             REQUEST.reset(named)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 
-from server.access.audit import MAX_LISTED
+from server.access.audit import MAX_LISTED, Change
 from server.access.identity import COOKIE, OPENS_NOTHING
-from server.access.roles import Who
+from server.access.roles import Caller, Who
 from server.errors import LoginError
 from server.services import Shared
 from server.wire.access import AuditEntry, LoginRequest, MeBody
@@ -26,22 +25,28 @@ async def me(caller: Who, services: Shared, response: Response) -> MeBody:
     response.headers["Cache-Control"] = "no-store"
     settings, role = services.settings, caller.role.word
     return MeBody(
-        login=settings.login, name=caller.name, role=role, by=caller.by, viewers_comment=settings.viewers_comment
+        login=settings.login, name=caller.person, role=role, by=caller.by, viewers_comment=settings.viewers_comment
     )
 
 
 @router.post("/login", status_code=204)
-async def login(sent: LoginRequest, request: Request, services: Shared) -> Response:
+async def login(sent: LoginRequest, request: Request, services: Shared, caller: Who) -> Response:
     """Keep a token in a cookie that no script of a page can read, and no other site can send."""
     access = services.access
-    if await run_in_threadpool(access.tokens.find, sent.token) is None:
+    found = await access.identity.by_token(sent.token, caller.address, access.tokens)
+    await access.note(_line(found or caller, 401 if found is None else 204))
+    if found is None:
         raise LoginError(OPENS_NOTHING)
     response = Response(status_code=204)
-    secure = access.identity.is_secure(request.scope)
+    secure = services.settings.https_only or access.identity.is_secure(request.scope)
     response.set_cookie(
         COOKIE, sent.token, max_age=COOKIE_SECONDS, path="/", secure=secure, httponly=True, samesite="strict"
     )
     return response
+
+
+def _line(caller: Caller, status: int) -> Change:
+    return Change.by(caller, "POST /api/login", "", status)
 
 
 @router.post("/logout", status_code=204)

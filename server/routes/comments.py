@@ -59,7 +59,7 @@ def _add(services: Services, scene: str, request: CommentRequest, caller: Caller
         placed_camera("eye", request.camera.to_world, request.camera.yfov)
     picture = None if request.picture is None else small_picture(request.picture)
     pin = request.model_dump(include={"bake", "view", "x", "y", "size", "camera"})
-    author = caller.name or check_person(request.author or "Guest")
+    author = caller.person or check_person(request.author or "Guest")
     return services.comments.add(scene, pin, check_text(request.text), author, picture)
 
 
@@ -68,7 +68,7 @@ async def settle_comment(
     scene: Id, comment: CommentId, change: CommentChange, services: Shared, caller: Who
 ) -> Response:
     """Settle a comment, or open it again."""
-    who = (caller.name or "somebody") if change.resolved else None
+    who = (caller.person or "somebody") if change.resolved else None
     await run_in_threadpool(services.comments.settle, scene, comment, who)
     services.live.rooms.commented(scene)
     return Response(status_code=204)

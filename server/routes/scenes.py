@@ -158,7 +158,7 @@ async def get_thumbnail(scene: Id, services: Shared, bake: Id | None = None) -> 
     if pictured is None:
         raise NotFoundError("there is no picture of this scene; bake it first")
     path = await services.thumbnails.find(pictured)
-    return Download(path, media_type="image/webp", headers={"Cache-Control": "public, max-age=86400"})
+    return Download(path, media_type="image/webp", headers={"Cache-Control": "private, max-age=86400"})
 
 
 def _pictured(bakes: Sequence[BakeStatus]) -> str | None:

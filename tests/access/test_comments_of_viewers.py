@@ -32,4 +32,5 @@ def test_viewers_write_under_their_name_and_change_nothing_else(
     one = f"{path}/{made.json()['id']}"
     assert client.patch(one, json={"resolved": True}, headers=vera).status_code == 403
     assert client.delete(one, headers=vera).status_code == 403
-    assert [(line.who, line.what) for line in access.audit.list()] == [("Vera", f"POST {path}")]
+    changes = [(line.who, line.what) for line in access.audit.list() if line.status < 300]
+    assert changes == [("Vera", f"POST {path}")]

@@ -162,6 +162,7 @@ class TestProxy:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
         settings.trusted_proxies, settings.proxy_roles = ["10.0.0.0/8"], {"Ann": "edit"}
+        settings.user_header = "X-Forwarded-User"
         return settings
 
     def at(self, client: TestClient, address: str) -> TestClient:

@@ -78,7 +78,7 @@ class Room:
         self._num_come += 1
         taken = {seat.color for seat in self._seats.values()}
         color = next((color for color in COLORS if color not in taken), COLORS[self._num_come % len(COLORS)])
-        name = caller.name or door.name or f"Guest {self._num_come}"
+        name = caller.person or door.name or f"Guest {self._num_come}"
         seat = Seat(secrets.token_urlsafe(24), self._num_come, color, name, caller.role)
         self._seats[seat.token] = seat
         return seat

@@ -1,0 +1,141 @@
+"""What trying to get in costs and leaves behind: guesses of tokens, logins and refusals in the audit, cookies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.access.access import Access
+from server.access.audit import Audit, Change
+from server.access.buckets import bucket_of
+from server.access.tokens import TokenStore
+from server.settings import Settings
+
+Bearer = Callable[..., dict[str, str]]
+GUESS = "relume_{:012x}_x"
+
+
+@pytest.fixture
+def settings(settings: Settings) -> Settings:
+    settings.requests_at_once = 4  # and no RELUME_REQUESTS_PER_SECOND: calls are not counted
+    return settings
+
+
+@pytest.fixture
+def looked_up(client: TestClient, access: Access, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Has an entry for each question to the database about a token."""
+    asked: list[int] = []
+    sessions = access.tokens._sessions
+
+    def counted() -> object:
+        asked.append(1)
+        return sessions()
+
+    monkeypatch.setattr(access.tokens, "_sessions", counted)
+    return asked
+
+
+def test_guesses_are_looked_up_so_often_and_no_more(client: TestClient, looked_up: list[int]) -> None:
+    answers = [client.get("/api/scenes", headers={"Authorization": f"Bearer {GUESS.format(k)}"}) for k in range(8)]
+    assert [answer.status_code for answer in answers[:4]] == [401] * 4
+    assert answers[-1].status_code == 429
+    assert "too many wrong tokens; wait" in answers[-1].json()["detail"]
+    assert len(looked_up) < 8
+    before = len(looked_up)
+    for k in range(10):
+        client.post("/api/login", json={"token": GUESS.format(100 + k)})
+    assert len(looked_up) < before + 10
+
+
+def test_who_is_known_is_not_held_up_by_guesses_from_the_same_address(
+    client: TestClient, bearer: Bearer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ann = bearer("view", "Ann")
+    assert client.get("/api/scenes", headers=ann).status_code == 200
+    for k in range(8):
+        client.get("/api/scenes", headers={"Authorization": f"Bearer {GUESS.format(k)}"})
+    monkeypatch.setattr("server.access.tokens.REMEMBERED_S", -1.0)  # each call is looked up
+    assert [client.get("/api/scenes", headers=ann).status_code for _ in range(8)] == [200] * 8
+
+
+def test_that_there_is_no_such_token_is_remembered_for_so_many(
+    access: Access, looked_up: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.access.tokens.MAX_MISSED", 2)
+    for k in (0, 0, 1, 2):
+        assert access.tokens.find(GUESS.format(k)) is None
+    assert len(looked_up) == 3
+    assert len(access.tokens._missed) == 2
+
+
+def test_a_right_id_with_a_wrong_secret_is_a_guess(access: Access) -> None:
+    tokens: TokenStore = access.tokens
+    right = tokens.add("Ann", "view")
+    assert not tokens.knows(right)
+    assert tokens.find(right) is not None
+    assert tokens.knows(right)
+    assert not tokens.knows(right[:-1] + ("a" if right[-1] != "a" else "b"))
+
+
+@pytest.mark.parametrize(
+    ("address", "bucket"),
+    [
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2::ffff", "2001:db8:1:2::/64"),
+        ("fe80::1%eth0", "fe80::/64"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("192.0.2.7", "192.0.2.7"),
+        ("somewhere", "somewhere"),
+    ],
+)
+def test_ipv6_counts_by_network(address: str, bucket: str) -> None:
+    assert bucket_of(address) == bucket
+
+
+class TestAudit:
+    def test_logins_wrong_tokens_and_refusals_are_lines(
+        self, client: TestClient, bearer: Bearer, access: Access
+    ) -> None:
+        token = access.tokens.add("Ann", "edit")
+        assert client.post("/api/login", json={"token": token}).status_code == 204
+        client.cookies.clear()
+        assert client.post("/api/login", json={"token": GUESS.format(1)}).status_code == 401
+        wrong = {"Authorization": f"Bearer {GUESS.format(2)}"}
+        assert client.get("/api/scenes", headers=wrong).status_code == 401
+        assert client.put("/api/looks/a%1b[2Jb", json={}, headers=bearer("view", "Vera")).status_code == 403
+        assert client.get("/api/scenes").status_code == 401  # no try to get in
+        lines = [(line.who, line.role, line.what, line.status) for line in reversed(access.audit.list())]
+        assert lines == [
+            ("Ann", "edit", "POST /api/login", 204),
+            ("testclient", "anyone", "POST /api/login", 401),
+            ("testclient", "anyone", "GET /api/scenes", 401),
+            ("Vera", "view", "PUT /api/looks/a%1B%5B2Jb", 403),
+        ]
+        assert token not in str(access.audit.list())
+
+    def test_refusals_push_no_change_out(self, access: Access) -> None:
+        audit = Audit(access.tokens._sessions, 20)
+        audit.add(Change("Ann", "edit", "::1", "PUT /api/looks/Red", "/api/looks/Red", 201, "r1"))
+        for _ in range(210):
+            audit.add(Change("192.0.2.7", "anyone", "192.0.2.7", "POST /api/login", "", 401, "r2"))
+        lines = audit.list(1000)
+        assert [line.who for line in lines if line.status == 201] == ["Ann"]
+        assert 2 <= len(lines) < 110
+
+
+class TestHttpsOnly:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.https_only = True
+        return settings
+
+    def test_cookies_are_secure_and_browsers_keep_to_it(self, client: TestClient, access: Access) -> None:
+        answer = client.post("/api/login", json={"token": access.tokens.add("Ann", "edit")})
+        assert "; secure" in answer.headers["set-cookie"].lower()
+        assert answer.headers["strict-transport-security"] == "max-age=31536000"
+
+
+def test_otherwise_browsers_may_come_by_http(client: TestClient) -> None:
+    assert "strict-transport-security" not in client.get("/livez").headers
