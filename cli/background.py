@@ -1,7 +1,8 @@
-"""Goes on with one bake without a terminal: python -m cli.background DATA DATABASE_URL SCHEDULER BAKE."""
+"""Goes on with one bake without a terminal: RELUME_DATABASE=URL python -m cli.background DATA SCHEDULER BAKE."""
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -10,8 +11,10 @@ from worker.service import BakeService
 
 def main() -> None:
     """Bake until that bake has ended, whoever ends it."""
-    data, database_url, scheduler, identity = sys.argv[1:]
-    with BakeService(Path(data), database_url, scheduler or None) as service, service.subscribe(identity) as changes:
+    os.umask(0o077)
+    data, scheduler, identity = sys.argv[1:]
+    bakes = BakeService(Path(data), os.environ["RELUME_DATABASE"], scheduler or None)
+    with bakes as service, service.subscribe(identity) as changes:
         for _ in changes:
             pass
 

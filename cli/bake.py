@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -154,9 +155,10 @@ def _interrupted(service: BakeService, settings: Settings, identity: str) -> int
         typer.echo("cancelled; finished parts are kept, the same command goes on with them", err=True)
         return 130
     service.close()
-    command = [sys.executable, "-m", "cli.background", str(settings.data), settings.database_url]
+    command = [sys.executable, "-m", "cli.background", str(settings.data)]
     subprocess.Popen(  # noqa: S603
         [*command, settings.scheduler or "", identity],
+        env={**os.environ, "RELUME_DATABASE": settings.database_url},  # arguments are read by everybody on the machine
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

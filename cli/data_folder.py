@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +26,8 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
     Raises:
         ParameterError: a setting cannot be what it is.
     """
+    if data is not None and re.match(r"[A-Za-z0-9+]+:/", str(data)):
+        _refuse_url()
     from pydantic import ValidationError
     from pydantic_settings import SettingsError
 
@@ -43,11 +48,28 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
         variable = "RELUME_" + "".join(str(error).split('"')[1:2]).upper()
         allowed = """JSON, as '["10.0.0.5"]' or '{"Ann": "edit"}', in quotes of the shell"""
         raise ParameterError(variable, os.environ.get(variable), allowed) from None
-    settings.data.mkdir(parents=True, exist_ok=True)
+    settings.data.mkdir(mode=0o700, parents=True, exist_ok=True)
     for store, folder in shelves(settings.data):
         store.use(folder)
     use(settings.ocio, settings.ocio_space)
     return settings
+
+
+def _refuse_url() -> None:
+    """Raise ParameterError: everybody on the machine reads the arguments of a process, and a URL has a password."""
+    from relume.errors import ParameterError
+
+    raise ParameterError("--data", "a URL", "a folder; the database's URL goes into the variable RELUME_DATABASE")
+
+
+@contextmanager
+def private_files() -> Iterator[None]:
+    """What is written inside, by processes that are started as well, is for this user alone."""
+    before = os.umask(0o077)
+    try:
+        yield
+    finally:
+        os.umask(before)
 
 
 def _allowed(message: str) -> str:

@@ -24,15 +24,18 @@ def demo(
     browser: Annotated[bool, typer.Option(help="Open the editor in a browser.")] = True,
 ) -> None:
     """Bake the built-in scene if it is not there, serve it, and open the editor."""
-    from cli.data_folder import open_settings
+    from cli.data_folder import open_settings, private_files
     from relume.imageio.ocio.current import current
+    from server.access.openness import check_openness
     from server.app import serve
 
     settings = open_settings(data, port=port)
+    check_openness(settings)
     check_port(settings.host, settings.port)
     current()  # what is wrong with a config is said before anything runs
     threading.Thread(target=_bake, args=(settings, browser), name="relume-demo", daemon=True).start()
-    serve(settings)
+    with private_files():
+        serve(settings)
 
 
 def _bake(settings: Settings, browser: bool) -> None:

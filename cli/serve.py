@@ -4,43 +4,35 @@ from __future__ import annotations
 
 import logging
 import socket
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cli.options import Scheduler
+from cli.options import Data, Scheduler
 
 log = logging.getLogger(__name__)
-DataOrUrl = Annotated[
-    str | None,
-    typer.Option(
-        "--data",
-        metavar="DIR|URL",
-        help="Data folder; or the SQLAlchemy URL of the database, the folder then being RELUME_DATA.",
-    ),
-]
 Host = Annotated[str | None, typer.Option(help="Address to listen on. [default: 127.0.0.1]")]
 Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Port to listen on. [default: 8420]")]
 
 
-def serve(data: DataOrUrl = None, host: Host = None, port: Port = None, scheduler: Scheduler = None) -> None:
+def serve(data: Data = None, host: Host = None, port: Port = None, scheduler: Scheduler = None) -> None:
     """Serve the editor and the API, with an embedded worker unless --scheduler names a cluster."""
-    from cli.data_folder import open_settings
+    from cli.data_folder import open_settings, private_files
     from relume.imageio.ocio.current import current
+    from server.access.openness import check_openness
     from server.app import serve as run_server
     from worker.database import open_database
     from worker.storage.remote import configured
 
-    is_url = data is not None and "://" in data
-    folder = None if data is None or is_url else Path(data)
-    settings = open_settings(folder, database=data if is_url else None, host=host, port=port, scheduler=scheduler)
+    settings = open_settings(data, host=host, port=port, scheduler=scheduler)
+    check_openness(settings)
     check_port(settings.host, settings.port)
-    open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
-    current()  # likewise
-    configured()  # likewise
-    where = address(settings.host, settings.port)
-    run_server(settings, tell_started=lambda: tell(f"relume listens on {where}", settings.log_format))
+    with private_files():
+        open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
+        current()  # likewise
+        configured()  # likewise
+        where = address(settings.host, settings.port)
+        run_server(settings, tell_started=lambda: tell(f"relume listens on {where}", settings.log_format))
 
 
 def tell(line: str, log_format: str) -> None:

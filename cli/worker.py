@@ -28,7 +28,7 @@ def worker(
         from worker.cluster import join
 
         return join(scheduler, processes)
-    from cli.data_folder import open_settings
+    from cli.data_folder import open_settings, private_files
     from server.logs.setting_up import set_up
     from worker.service import BakeService
 
@@ -36,7 +36,8 @@ def worker(
     set_up(settings.log_format, settings.log_level)
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: asked.set())
-    with BakeService(settings.data, settings.database_url, num_workers=processes, shares=settings.turns):
+    more = {"num_workers": processes, "shares": settings.turns}
+    with private_files(), BakeService(settings.data, settings.database_url, **more):
         typer.echo("waiting for bakes", err=True)
         asked.wait()
     return 0

@@ -14,7 +14,6 @@ from relume.imageio.ocio.current import current, using
 from relume.resident import share_arenas
 from server import errors, openapi
 from server.access.gate import Gate
-from server.access.openness import check_openness
 from server.access.rules import methods_at
 from server.conditional import Conditional
 from server.guard import Guard
@@ -144,7 +143,6 @@ def create_app(
 
 def serve(settings: Settings, tell_started: Callable[[], object] = lambda: None) -> None:
     """Run the server until it is stopped, and tell once when it answers; blocks."""
-    check_openness(settings)
     set_up(settings.log_format, settings.log_level)
     share_arenas()
     stoppable(create_app(settings), settings, tell_started).run()

@@ -114,7 +114,7 @@ async def open_services(
     clock: Callable[[], float],
 ) -> AsyncIterator[Services]:
     """Open everything; close it in the reverse order, what there is of it where something cannot be opened."""
-    settings.data.mkdir(parents=True, exist_ok=True)
+    settings.data.mkdir(mode=0o700, parents=True, exist_ok=True)
     remove_strays(settings.data, older_than_s=2 * settings.import_seconds)
     async with AsyncExitStack() as ends:
 

@@ -70,7 +70,7 @@ class BakeService:
         configured()  # what is wrong with its address is said before anything runs
         bake_code()  # of what runs now: its files may be exchanged while it does
         self.data_dir = data_dir.resolve()
-        self.data_dir.mkdir(parents=True, exist_ok=True)
+        self.data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
         refuse_unfinished(self.data_dir)
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
         self._methods = methods

@@ -24,7 +24,7 @@ def backup(
 
     The first time copies all, later ones what is new. An interrupted backup is none; run it again, and it goes on.
     """
-    from cli.data_folder import open_settings
+    from cli.data_folder import open_settings, private_files
     from cli.keeping.transfer_bar import transfer_bar
     from worker.backup.restore import refuse_unfinished
     from worker.backup.shelf import Shelf
@@ -38,7 +38,7 @@ def backup(
     refuse_unfinished(settings.data)
     ledger = open_database(settings.database_url)
     try:
-        with transfer_bar("backing up") as begin:
+        with transfer_bar("backing up") as begin, private_files():
             snapshot = back_up(settings.data.resolve(), ledger, shelf, begin)
     finally:
         ledger.dispose()

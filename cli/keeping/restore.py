@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import time
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.keeping.backup import BackupFolder
 from cli.options import Data
+from cli.tokens import open_access
+
+if TYPE_CHECKING:
+    from server.access.access import Access
 
 
 def restore(
     folder: BackupFolder,
     snapshot: Annotated[str | None, typer.Option(metavar="NAME", help="Which one; else the newest.")] = None,
+    revoke_tokens: Annotated[
+        bool, typer.Option("--revoke-tokens", help="Revoke all tokens in it; some were revoked since.")
+    ] = False,
     data: Data = None,
 ) -> int:
     """Restore a backup into an empty data folder and an empty ledger, of SQLite or PostgreSQL, all of it checked.
 
     An interrupted one is gone on with by the same command; until it is finished nothing works on the folder.
     """
-    from cli.data_folder import open_settings
+    from cli.data_folder import open_settings, private_files
     from cli.keeping.transfer_bar import transfer_bar
     from worker.backup.restore import restore as restore_into
     from worker.backup.shelf import Shelf
 
     settings = open_settings(data)
-    with transfer_bar("restoring") as begin:
+    with transfer_bar("restoring") as begin, private_files():
         done, damaged = restore_into(Shelf(folder), snapshot, settings.data.resolve(), settings.database_url, begin)
     typer.echo(done.name)
     typer.echo(f"{len(done.files):,} files, {sum(kept.num_bytes for kept in done.all) / 1e6:,.1f} MB", err=True)
@@ -33,4 +41,16 @@ def restore(
         typer.echo(f"was left out: {sentence}", err=True)
     for sentence in damaged:
         typer.echo(f"left out: {sentence}", err=True)
+    _report_tokens(open_access(data), revoke_tokens)
     return 1 if damaged else 0
+
+
+def _report_tokens(access: Access, is_to_revoke: bool) -> None:
+    """Say which tokens open something now: those that were revoked after the backup do again."""
+    now = time.time()
+    for token in access.tokens.all():
+        if not token.is_valid(now):
+            continue
+        if is_to_revoke:
+            access.tokens.revoke(token.id)
+        typer.echo(f"{'revoked' if is_to_revoke else 'valid'}: token {token.name}, {token.role.word}", err=True)

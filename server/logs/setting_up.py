@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 from server.logs.context import current
 
@@ -31,7 +31,11 @@ class JsonFormatter(logging.Formatter):
 
 
 class PlainFormatter(logging.Formatter):
-    """A line of text; what it is about stands at its end."""
+    """A line of text; what it is about stands at its end.
+
+    What clients chose is in it: line breaks and codes for terminals are shown, so that nobody writes lines of their
+    own, and lines of a trace are set in.
+    """
 
     def __init__(self) -> None:
         super().__init__("%(levelname)s %(name)s: %(message)s")
@@ -39,7 +43,16 @@ class PlainFormatter(logging.Formatter):
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  (of the base class)
         """See `logging.Formatter`."""
         about = " ".join(f"{name}={value}" for name, value in getattr(record, "about", {}).items())
-        return super().formatMessage(record) + (f" [{about}]" if about else "")
+        return _shown(super().formatMessage(record).rstrip()) + (f" [{_shown(about)}]" if about else "")
+
+    def formatException(self, exc_info: Any) -> str:  # noqa: N802  (of the base class)
+        """See `logging.Formatter`."""
+        return "\n".join(f"    {_shown(line)}" for line in super().formatException(exc_info).split("\n"))
+
+
+def _shown(text: str) -> str:
+    """A text with what cannot be printed as Python writes it."""
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
 def _note(record: logging.LogRecord) -> bool:

@@ -10,17 +10,22 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from cli import background
+from cli.bake import _interrupted
 from cli.interrupts import noted_interrupts
 from cli.main import main
 from relume.environments.model import Environment
 from relume.scene.archive import make_scene
 from relume.scene.built_in import BUILT_IN, built_in
 from relume.scene.model import Camera, Material, Mesh
+from server.settings import Settings
 from worker.database import open_database
 from worker.ledger import Ledger
 from worker.scenes import register_scene
@@ -107,6 +112,9 @@ def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.Cap
         (["reference", "quad", "--spp", "0", "--output", "x.exr"], "spp"),
         (["worker", "--scheduler", "nonsense"], "tcp://"),
         (["serve", "--port", "0"], "port"),
+        (["serve", "--data", "postgresql://ann:secret@db/relume"], "RELUME_DATABASE"),
+        (["worker", "--data", "sqlite:////tmp/relume.db"], "RELUME_DATABASE"),
+        (["serve", "--host", "0.0.0.0"], "RELUME_LOGIN=true"),
     ],
 )
 def test_failure_is_one_line_on_stderr(
@@ -119,6 +127,7 @@ def test_failure_is_one_line_on_stderr(
     assert err.startswith("relume: ")
     assert words in err
     assert "Traceback" not in err
+    assert "secret" not in err
 
 
 def test_verbose_shows_the_trace(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -341,6 +350,29 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
     again = subprocess.run([*RELUME, *LONG], capture_output=True, check=False, text=True)
     assert again.returncode == 0, again.stderr
     assert only_bake(data).state == "ready"
+
+
+def test_a_bake_in_the_background_has_no_password_among_its_arguments(
+    data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: dict[str, Any] = {}
+    monkeypatch.setattr("cli.bake.subprocess.Popen", lambda arguments, **more: begun.update(more, arguments=arguments))
+    monkeypatch.setattr("cli.bake.sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("cli.bake.typer.confirm", lambda *_, **__: True)
+    settings = Settings(data=data, database="postgresql://ann:secret@db/relume")
+    assert _interrupted(MagicMock(), settings, "0123456789abcdef") == 0
+    assert "secret" not in " ".join(begun["arguments"])
+    assert begun["env"]["RELUME_DATABASE"] == settings.database
+    monkeypatch.setattr("cli.background.BakeService", MagicMock(side_effect=[RuntimeError("begun")]))
+    monkeypatch.setattr("sys.argv", begun["arguments"][2:])
+    monkeypatch.setenv("RELUME_DATABASE", begun["env"]["RELUME_DATABASE"])
+    before = os.umask(0o022)
+    try:
+        with pytest.raises(RuntimeError, match="begun"):
+            background.main()
+    finally:
+        os.umask(before)
+    background.BakeService.assert_called_once_with(data, settings.database, None)
 
 
 @pytest.mark.slow

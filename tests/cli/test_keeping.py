@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
+import stat
 import subprocess
 import sys
 import time
@@ -12,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from cli.main import main
+from cli.tokens import open_access
 from worker.database import open_database
 from worker.database.upgrading import newest_revision
 from worker.ledger import Ledger
@@ -52,6 +55,39 @@ def test_a_backup_says_what_is_not_in_it_and_comes_back(
     assert main(["restore", backups, "--snapshot", said.out.strip(), "--data", str(tmp_path / "new")]) == 0
     with closing(sqlite3.connect(tmp_path / "new" / "relume.db")) as connection:
         assert connection.execute("SELECT name FROM looks").fetchall() == [("red",)]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"), [([], "valid: token Ann, edit"), (["--revoke-tokens"], "revoked: token Ann, edit")]
+)
+def test_tokens_that_a_backup_brings_back_are_said_or_revoked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], said: str
+) -> None:
+    old, backups, new = (str(tmp_path / name) for name in ("old", "backups", "new"))
+    assert main(["token", "add", "Ann", "--role", "edit", "--data", old]) == 0
+    token = capsys.readouterr().out.strip()
+    assert main(["backup", backups, "--data", old]) == 0
+    assert main(["token", "revoke", "Ann", "--data", old]) == 0
+    assert main(["restore", backups, "--data", new, *more]) == 0
+    assert said in capsys.readouterr().err
+    assert (open_access(Path(new)).tokens.find(token) is None) == bool(more)
+
+
+def test_what_is_kept_is_for_its_own_user_alone(tmp_path: Path) -> None:
+    data, backups = tmp_path / "data", tmp_path / "backups"
+    before = os.umask(0o022)
+    try:
+        assert main(["token", "add", "Ann", "--data", str(data)]) == 0
+        assert main(["backup", str(backups), "--data", str(data)]) == 0
+        assert main(["restore", str(backups), "--data", str(tmp_path / "new")]) == 0
+        assert os.umask(0o022) == 0o022  # what else a shell's command writes is as the user wants it
+    finally:
+        os.umask(before)
+    folders = [data, backups, tmp_path / "new"]
+    kept = [*backups.rglob("*"), *(tmp_path / "new").rglob("*")]
+    assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
+    assert kept
+    assert {stat.S_IMODE(path.stat().st_mode) & 0o077 for path in kept} == {0}
 
 
 def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -69,6 +69,27 @@ def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> 
     assert said == "WARNING server.somewhere: nothing is known\nWARNING server.somewhere: the user is [user=Ann]\n"
 
 
+def test_nobody_writes_lines_of_their_own(client: TestClient, capsys: pytest.CaptureFixture[str]) -> None:
+    set_up("plain", "info")
+    client.get("/%0aERROR%20server%3a%20all%20is%20lost%1b[2J%e2%80%ae")
+    said = [line for line in capsys.readouterr().err.splitlines() if "all" in line]
+    assert said
+    assert all(line.startswith("INFO ") and line.isprintable() for line in said)
+
+
+def test_a_trace_shows_what_is_in_it_and_is_set_in(capsys: pytest.CaptureFixture[str]) -> None:
+    def say() -> None:
+        try:
+            raise ValueError("why\nERROR server: all is lost\x1b[2J")
+        except ValueError:
+            log.exception("it failed\r\nERROR server: so did this")
+
+    first, *trace = logged(capsys, "plain", say).splitlines()
+    assert first == r"ERROR server.somewhere: it failed\r\nERROR server: so did this"
+    assert all(line.startswith("    ") and line.isprintable() for line in trace)
+    assert r"    ERROR server: all is lost\x1b[2J" in trace
+
+
 def test_warnings_of_libraries_are_lines_like_others(capsys: pytest.CaptureFixture[str]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("always")

@@ -73,7 +73,7 @@ def restore(
 
 def _mark(shelf: Shelf, snapshot: Snapshot, data_dir: Path, ledger_url: str) -> None:
     """Say in the data directory what is restored into it; refuse where something else is."""
-    data_dir.mkdir(parents=True, exist_ok=True)
+    data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
     mark, document = data_dir / MARK, {"from": str(shelf.folder.resolve()), "snapshot": snapshot.name}
     if mark.exists():
         begun = json.loads(mark.read_text(encoding="utf-8"))

@@ -86,8 +86,9 @@ class Shelf:
             return
         if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
             raise BackupError(f"{self.folder} holds something else than backups of relume; name an empty folder")
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         for part in ("files", "snapshots"):
-            (self.folder / part).mkdir(parents=True, exist_ok=True)
+            (self.folder / part).mkdir(exist_ok=True)
         with replacing(self.folder / MARK) as unfinished:
             unfinished.write_text(json.dumps({"format": FORMAT}))
 

@@ -47,7 +47,7 @@ def connect(url: str) -> Engine:
         event.listen(engine, "do_connect", connect_postgresql)
     else:
         if parsed.database:
-            Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+            Path(parsed.database).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         # of connections beside the five that are kept SQLite keeps the file open: its locks are of the process
         engine = create_engine(parsed)
         event.listen(engine, "connect", _set_up_sqlite)
