@@ -19,7 +19,9 @@ SECRET = ["--set", "database.secretName=relume-database"]
 FULL = [
     *SECRET,
     "--set=server.replicas=3,storage.url=s3://a/b,storage.secretName=aws,ingress.enabled=true",
-    "--set=ingress.host=relight.example.org,ingress.tlsSecret=tls,server.environment.RELUME_TRACES=true",
+    "--set=ingress.host=relight.example.org,ingress.tlsSecret=tls",
+    "--set-string=server.environment.RELUME_TRACES=true",
+    "--set=proxy.realIpFrom={10.0.0.0/8},networkPolicy.from[0].podSelector.matchLabels.app=prometheus",
 ]
 
 
@@ -44,6 +46,23 @@ def test_nginx_is_the_one_that_is_tried() -> None:
     assert len(re.findall(pattern.replace("\\n", "\n"), (CHART / "nginx.conf").read_text())) == 1
 
 
+def test_servers_believe_the_proxys_pods_and_hear_nobody_else() -> None:
+    server, policy, proxy = (TEMPLATES[name] for name in ("server.yaml", "policy.yaml", "proxy.yaml"))
+    assert re.search(r'RELUME_TRUSTED_PROXIES\n +value: {{ list \(printf "%s-proxy.%s.svc"', server)
+    (headless,) = [part for part in proxy.split("\n---\n") if "clusterIP: None" in part]
+    assert "name: {{ $name }}-proxy" in headless  # so that the name has the addresses of the pods
+    assert "kind: NetworkPolicy" in policy
+    assert "app.kubernetes.io/component: proxy" in policy
+    values = yaml.safe_load((CHART / "values.yaml").read_text())
+    assert "trustedProxies" not in values
+    assert values["networkPolicy"]["from"] == values["proxy"]["realIpFrom"] == []
+
+
+def test_addresses_of_clients_come_through_the_ingress() -> None:
+    (place,) = re.findall(r'replace "([^"]+)"', TEMPLATES["proxy.yaml"])
+    assert (CHART / "nginx.conf").read_text().count(place) == 1
+
+
 @pytest.mark.parametrize("options", [SECRET, FULL])
 def test_helm_has_nothing_to_say(options: list[str]) -> None:
     helm = shutil.which("helm")
@@ -52,4 +71,7 @@ def test_helm_has_nothing_to_say(options: list[str]) -> None:
     subprocess.run([helm, "lint", "--strict", str(CHART), *options], check=True)
     told = subprocess.run([helm, "template", str(CHART), *options], check=True, capture_output=True, text=True).stdout
     kinds = [document["kind"] for document in yaml.safe_load_all(told) if document]
-    assert {"StatefulSet", "Deployment", "ConfigMap", "Service"} <= set(kinds)
+    assert {"StatefulSet", "Deployment", "ConfigMap", "Service", "NetworkPolicy"} <= set(kinds)
+    is_full = options == FULL
+    assert ("set_real_ip_from 10.0.0.0/8;" in told) == is_full
+    assert ("RELUME_HTTPS_ONLY" in told) == is_full

@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -99,41 +98,3 @@ def test_pages_name_metrics_that_are_there(names: set[str], registry: CollectorR
     named = set(re.findall(r"`((?:relume|process)_[a-z_]+)", text))
     assert named
     assert named <= names | {family.name for family in registry.collect()}
-
-
-def compose(name: str) -> dict[str, Any]:
-    class Loader(yaml.SafeLoader):
-        """Knows what Compose adds to YAML."""
-
-    Loader.add_constructor("!reset", lambda loader, node: [])
-    loaded: dict[str, Any] = yaml.load((ROOT / "docker" / name).read_text(), Loader)
-    return loaded
-
-
-def test_the_overlay_sets_what_there_is_and_gives_time_to_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    server, plain = (compose(name)["services"]["server"] for name in ("compose.production.yml", "compose.yml"))
-    assert {name.removeprefix("RELUME_").lower() for name in server["environment"]} <= set(Settings.model_fields)
-    for name, value in server["environment"].items():
-        monkeypatch.setenv(name, re.sub(r"\$\{(\w+)[^}]*\}", "relight.example.org", value))
-    settings = Settings(data=tmp_path)
-    assert settings.login
-    assert "relight.example.org" in settings.allowed_hosts
-    assert settings.drain_seconds + settings.stop_seconds < float(plain["stop_grace_period"].removesuffix("s"))
-
-
-def test_the_overlay_of_several_servers_sets_what_there_is() -> None:
-    services = compose("compose.replicas.yml")["services"]
-    environment = services["server"]["environment"]
-    assert {name.removeprefix("RELUME_").lower() for name in environment} <= set(Settings.model_fields)
-    (network,) = compose("compose.replicas.yml")["networks"]["replicas"]["ipam"]["config"]
-    assert network["subnet"] in environment["RELUME_TRUSTED_PROXIES"]
-    assert services["proxy"]["networks"] == ["replicas"]  # servers would not trust it in another one that they share
-    assert "replicas" in services["server"]["networks"]
-
-
-@pytest.mark.parametrize("name", ["compose.production.yml", "compose.replicas.yml"])
-def test_files_that_the_overlay_mounts_are_there(name: str) -> None:
-    for service in compose(name)["services"].values():
-        for volume in service.get("volumes", ()):
-            if volume.startswith("./"):
-                assert (ROOT / "docker" / volume.split(":")[0]).is_file(), volume
