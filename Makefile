@@ -18,6 +18,7 @@ KERNEL_SOURCES := $(shell grep -rlE '^(import|from) numba' relume --include='*.p
 TESTS_STAMP := $(VENV)/.stamp-tests
 CLIENT_SOURCES := $(shell find client_web -type f -not -path '*/node_modules/*' -not -path '*/dist/*' 2>/dev/null)
 LOCK_TOOLS := build/lock-tools
+AUDIT_TOOLS := build/audit-tools
 
 # Everything that is not slow; browser tests only where there is a browser.
 CHROMIUM := $(firstword $(foreach name,chromium chromium-browser google-chrome,$(shell command -v $(name) 2>/dev/null)))
@@ -32,7 +33,7 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1
 # Bytecode is kept, whatever the shell says: tests start hundreds of processes, each of which would compile all sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-slow bench soak lint lock clean client-check
+.PHONY: help setup demo test test-slow bench soak lint audit lock clean client-check
 
 help:  ## what each target does
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-12s %s\n", $$1, $$2}'
@@ -64,6 +65,12 @@ lint: $(PROJECT_STAMP)  ## style and types
 client-check: $(CLIENT_STAMP)
 	cd client_web && npm run --silent check && npm test --silent
 
+# Both ask services of the package registries, and fail where those do not answer or do not know a package.
+audit: $(AUDIT_TOOLS)/bin/pip-audit  ## known holes in the packages that the locks name
+	$(AUDIT_TOOLS)/bin/pip-audit --strict --progress-spinner off --disable-pip --require-hashes \
+		-r requirements.lock -r docker/requirements.lock
+	cd client_web && npm audit
+
 lock: $(LOCK_TOOLS)/bin/uv  ## choose package versions again
 	@printf '$(BUILD_NEEDS)' | $(UV) --extra dev pyproject.toml - -o requirements.lock
 	@printf '$(BUILD_NEEDS)' | $(UV) --constraint requirements.lock pyproject.toml - -o docker/requirements.lock
@@ -82,6 +89,10 @@ UV := $(LOCK_TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11
 $(LOCK_TOOLS)/bin/uv:
 	@python="$$(.ci/find-python)" && "$$python" -m venv $(LOCK_TOOLS)
 	@$(LOCK_TOOLS)/bin/pip install --quiet uv
+
+$(AUDIT_TOOLS)/bin/pip-audit:
+	@python="$$(.ci/find-python)" && "$$python" -m venv $(AUDIT_TOOLS)
+	@$(AUDIT_TOOLS)/bin/pip install --quiet pip-audit
 
 # The lock names all that is needed, so nothing is looked for; what is imported is compiled then, a part of all there is.
 $(PYTHON_STAMP): requirements.lock
