@@ -31,7 +31,8 @@ log = logging.getLogger(__name__)
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 1 << 20
-_ID = re.compile(r"[0-9a-f]{16}")
+ID_DIGITS = 16
+_ID = re.compile(rf"[0-9a-f]{{{ID_DIGITS}}}")
 
 
 class Dated(Protocol):
@@ -52,6 +53,11 @@ def check_name(name: str) -> str:
     if not name.isprintable() or not 1 <= len(name) <= 80:
         raise ParameterError("name", name, "1 to 80 printable characters")
     return name
+
+
+def _digest(source: Path) -> str:
+    with source.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @dataclass(frozen=True)
@@ -87,8 +93,7 @@ class AssetStore:
     @staticmethod
     def identity_of(source: Path) -> str:
         """The id of what a file holds."""
-        with source.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        return _digest(source)[:ID_DIGITS]
 
     def keep(self, folder: Path, source: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> str:
         """Keep what a file holds under the file's hash, and return its id; what is here already takes the new name.
@@ -98,15 +103,19 @@ class AssetStore:
             name: that people read.
             fill: writes the kind's files into an empty folder, and returns what the record says besides.
         Raises:
-            self.problem: the store is full. And what `fill` raises; then nothing is kept.
+            self.problem: the store is full, or what is here under the id came from another file. And what `fill`
+                raises; then nothing is kept.
         """
-        identity = self.identity_of(source)
+        digest = _digest(source)
+        identity = digest[:ID_DIGITS]
         target = folder / identity
         if not target.exists():
             if len(self.paths(folder)) >= self.max_entries:
                 raise self.problem(f"{self.max_entries} {self.what}s are kept already; delete one first")
-            self._make(folder, target, name, fill)
+            self._make(folder, target, name, lambda made: {"sha256": digest, **fill(made)})
         document = self.read(target)
+        if document.get("sha256", digest) != digest:  # two files were made for that: it takes billions of tries
+            raise self.problem(f"another file is the {self.what} {identity}; delete that one first, if it is not yours")
         if document["name"] != name:
             with replacing(target / self.record) as unfinished:
                 unfinished.write_text(json.dumps({**document, "name": name}))

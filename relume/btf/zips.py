@@ -5,7 +5,6 @@ Never unpacked; sizes are bounded before anything is decoded.
 
 from __future__ import annotations
 
-import io
 import re
 import zipfile
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.archives.bounded import LongDirectoryError, open_bounded
 from relume.btf.compress import most_texels
 from relume.btf.found import found_rings, nowhere
 from relume.btf.photographs import SUFFIXES, read_photograph, reduced
@@ -90,25 +90,16 @@ class ZippedBtf:
         return read_photograph(data, f"the image {_shown(entry.filename)}")
 
 
-class _Bounded(io.FileIO):
-    """A file of which no more is read at once than a list of entries may take: one of millions takes gigabytes."""
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        if size is not None and size > _MOST_DIRECTORY_BYTES:
-            raise MaterialError(_TOO_MANY)
-        return super().read(size)
-
-
 def _opened(path: Path) -> zipfile.ZipFile:
     with path.open("rb") as file:
         if file.read(len(_ZIP)) != _ZIP:
             raise MaterialError(_WRONG)
     try:
-        with _Bounded(path) as bounded, zipfile.ZipFile(bounded):
+        with path.open("rb") as file, open_bounded(file, _MOST_DIRECTORY_BYTES):
             pass
         return zipfile.ZipFile(path)
-    except MaterialError:
-        raise
+    except LongDirectoryError:
+        raise MaterialError(_TOO_MANY) from None
     except Exception as error:  # zipfile raises many kinds for damaged data
         raise MaterialError(_DAMAGED) from error
 

@@ -62,7 +62,12 @@ def make_scene(
 
 
 def scene_id(document: dict[str, Any], arrays: Arrays) -> str:
-    """First 16 hexadecimal digits of SHA-256 over all arrays and all that stands in the document but warnings."""
+    """First 16 hexadecimal digits of `scene_digest`."""
+    return scene_digest(document, arrays)[:16]
+
+
+def scene_digest(document: dict[str, Any], arrays: Arrays) -> str:
+    """SHA-256 over all arrays and all that stands in the document but warnings, in hexadecimal digits."""
     digest = hashlib.sha256()
     content = {key: value for key, value in document.items() if key not in ("id", "warnings")}
     digest.update(json.dumps(content, sort_keys=True, allow_nan=False).encode())
@@ -70,19 +75,34 @@ def scene_id(document: dict[str, Any], arrays: Arrays) -> str:
         array = np.ascontiguousarray(arrays[key])
         digest.update(f"{key} {array.dtype.str} {array.shape}".encode())
         digest.update(array.data)
-    return digest.hexdigest()[:16]
+    return digest.hexdigest()
 
 
 def save_scene(scene: Scene, folder: str | Path) -> None:
-    """Writes the scene into `folder` (made where missing); readers see the old files or the new, never half of one."""
+    """Writes the scene into `folder` (made where missing); readers see the old files or the new, never half of one.
+
+    Raises:
+        SceneError: the folder has a scene of the same id and other content.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     document, arrays = _describe(scene)
-    document["id"] = scene.id
+    document |= {"id": scene.id, "sha256": scene_digest(document, arrays)}
+    if _digest_in(folder, scene.id) not in (None, document["sha256"]):  # made for that: it takes billions of tries
+        raise SceneError(f"another scene is here as {scene.id}; delete that one first, if it is not yours")
     with replacing(folder / "arrays.npz") as unfinished:
         np.savez(unfinished, allow_pickle=False, **arrays)
     with replacing(folder / "scene.json") as unfinished:
         unfinished.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
+
+
+def _digest_in(folder: Path, identity: str) -> str | None:
+    """Of the scene of that id in a folder; None where there is none, it cannot be read, or it was saved without."""
+    try:
+        document = _read_document(folder / "scene.json")
+        return document.get("sha256") if document.get("id") == identity else None
+    except (OSError, ValueError, RecursionError, AttributeError):
+        return None
 
 
 def load_scene(folder: str | Path) -> Scene:

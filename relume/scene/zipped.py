@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import io
 import posixpath
-import struct
 import zipfile
 
+from relume.archives.bounded import LongDirectoryError, open_bounded
 from relume.errors import SceneError
 from relume.scene.companions import MAX_BYTES, Archive, read_entry
 
 MAX_ENTRIES = 1_000
 MAX_DIRECTORY_BYTES = 1 << 20
 SCENE_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
-END_RECORD = struct.Struct("<4s4H2LH")
+TOO_MANY = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
 
 
 def open_zip(data: bytes) -> tuple[bytes, Archive]:
@@ -22,9 +22,12 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
     Raises:
         SceneError: the archive is damaged, encrypted, too large, or holds no scene file or several.
     """
-    _check_directory(data)
+    if b"PK\5\6" not in data:
+        raise SceneError("the .zip file is truncated; download or pack it again")
     try:
-        archive = zipfile.ZipFile(io.BytesIO(data))
+        archive = open_bounded(io.BytesIO(data), MAX_DIRECTORY_BYTES)
+    except LongDirectoryError:
+        raise SceneError(TOO_MANY) from None
     except Exception:  # zipfile raises many kinds for damaged data
         raise SceneError("the .zip file is damaged; pack it again") from None
     entries = [entry for entry in archive.infolist() if not entry.is_dir() and not _is_litter(entry.filename)]
@@ -36,19 +39,9 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
     return read_entry(archive, scenes[0]), Archive(archive, folder)
 
 
-def _check_directory(data: bytes) -> None:
-    """The list of entries is read whole when an archive is opened: its length is bounded before."""
-    place = data.rfind(b"PK\5\6")
-    if place < 0 or place + END_RECORD.size > len(data):
-        raise SceneError("the .zip file is truncated; download or pack it again")
-    _, _, _, _, num_entries, directory_bytes, _, _ = END_RECORD.unpack_from(data, place)
-    if num_entries > MAX_ENTRIES or directory_bytes > MAX_DIRECTORY_BYTES:
-        raise SceneError(f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs")
-
-
 def _check_entries(entries: list[zipfile.ZipInfo]) -> None:
     if len(entries) > MAX_ENTRIES:
-        raise SceneError(f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs")
+        raise SceneError(TOO_MANY)
     if sum(entry.file_size for entry in entries) > MAX_BYTES:
         raise SceneError(f"the .zip file unpacks to more than {MAX_BYTES >> 20} MB; scale it down")
     for entry in entries:

@@ -7,6 +7,7 @@ import io
 import struct
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -172,6 +173,12 @@ def test_ply_files_that_are_wrong_are_refused(data: bytes) -> None:
     refused(data)
 
 
+@pytest.mark.filterwarnings("default::DeprecationWarning")  # as where no test runs
+@pytest.mark.parametrize("more", [b"x\n", b"1 2 3 and so on\n", b"\x00", b"0x10"])
+def test_a_ply_with_words_behind_its_numbers_is_refused_outside_of_tests_too(more: bytes) -> None:
+    assert "words where numbers should be" in refused(text() + more)
+
+
 def test_archives_that_are_wrong_are_refused() -> None:
     good = packed({"a.obj": OBJ})
     for length in (2, 10, len(good) // 2, len(good) - 1):
@@ -193,9 +200,40 @@ def test_bombs_are_refused_before_they_are_unpacked() -> None:
     place = data.index(b"PK\1\2")
     struct.pack_into("<I", data, place + 24, 1 << 30)  # what it claims to unpack to
     assert "unpacks to more" in refused(bytes(data))
-    many = bytearray(packed({"a.obj": OBJ}))
-    struct.pack_into("<H", many, many.index(b"PK\5\6") + 10, 60_000)
-    assert "entries" in refused(bytes(many))
+
+
+def with_zip64_end(archive: bytes) -> bytes:
+    """The same, with a ZIP64 record that tells the list's length, and a plain one that tells of one short entry."""
+    place = archive.rindex(b"PK\5\6")
+    num_entries, num_bytes, start = struct.unpack_from("<HII", archive, place + 10)
+    record = struct.pack("<4sQHHIIQQQQ", b"PK\6\6", 44, 45, 45, 0, 0, num_entries, num_entries, num_bytes, start)
+    locator = struct.pack("<4sIQI", b"PK\6\7", 0, place, 1)
+    plain = bytearray(archive[place:])
+    struct.pack_into("<HHII", plain, 8, 1, 1, 60, start)
+    return archive[:place] + record + locator + bytes(plain)
+
+
+def test_a_long_list_of_entries_is_not_read_whatever_the_records_at_the_end_say(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    archives = [packed({f"{k:05}" + "x" * 60: b"" for k in range(12_000)})]
+    archives.append(with_zip64_end(archives[0]))
+    num_read = 0
+
+    class Counted(zipfile.ZipInfo):
+        def __init__(self, *args: Any) -> None:
+            nonlocal num_read
+            num_read += 1
+            super().__init__(*args)
+
+    monkeypatch.setattr(zipfile, "ZipInfo", Counted)
+    for archive in archives:
+        assert "more than 1,000 entries" in refused(archive)
+    assert num_read == 0
+
+
+def test_an_archive_with_zip64_records_is_read() -> None:
+    import_scene(with_zip64_end(packed({"a.obj": OBJ})), "test", LIGHT)
 
 
 def test_an_empty_file_is_called_empty() -> None:

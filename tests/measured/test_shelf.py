@@ -47,6 +47,21 @@ def test_the_same_file_again_is_the_same_material_under_its_newest_name(copied):
     assert (record.id, record.name, record.created) == (identity, "Renamed", created)
 
 
+def test_another_file_of_the_same_id_is_not_taken_for_it(copied, planes, tmp_path):
+    folder, identity = copied
+    record = folder / identity / STORE.record
+    kept = json.loads(record.read_text())
+    write_merl(tmp_path / "a.binary", planes)
+    assert kept["sha256"][:16] == identity
+    record.write_text(json.dumps({**kept, "sha256": identity + "0" * 48}))
+    with pytest.raises(MaterialError, match=f"another file is the measured material {identity}; delete that one first"):
+        keep(folder, tmp_path / "a.binary", "Mine")
+    assert get_record(folder, identity).name == kept["name"]
+    del kept["sha256"]  # as it was kept before
+    record.write_text(json.dumps(kept))
+    keep(folder, tmp_path / "a.binary", "Mine")
+
+
 def test_a_bad_file_leaves_nothing_behind(tmp_path):
     (tmp_path / "bad.binary").write_bytes(b"no")
     with pytest.raises(MaterialError):

@@ -17,6 +17,22 @@ from relume.scene.archive import load_scene, make_scene, save_scene
 from relume.scene.model import Camera, Coding, Glass, Light, Material, Mesh, Opacity, Scene, Texture
 
 
+def test_another_scene_of_the_same_id_is_not_written_over_the_first(tmp_path: Path) -> None:
+    scene = small_scene()
+    save_scene(scene, tmp_path)
+    save_scene(scene, tmp_path)
+    white = Environment("sky", np.ones((2, 4, 3), np.float32))
+    other = dataclasses.replace(small_scene(environment=white), id=scene.id)
+    with pytest.raises(SceneError, match=f"another scene is here as {scene.id}; delete that one first"):
+        save_scene(other, tmp_path)
+    assert load_scene(tmp_path).id == scene.id
+    document = json.loads((tmp_path / "scene.json").read_text())
+    assert document.pop("sha256")[:16] == scene.id
+    (tmp_path / "scene.json").write_text(json.dumps(document))  # as it was saved before
+    save_scene(scene, tmp_path)
+    load_scene(tmp_path)
+
+
 def small_scene(**changes: object) -> Scene:
     rng = np.random.default_rng(5)
     mesh = Mesh(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -58,7 +59,9 @@ class TextRows:
 
     def __init__(self, body: memoryview) -> None:
         try:
-            self._numbers = np.fromstring(bytes(body).decode("ascii"), np.float64, sep=" ")
+            with warnings.catch_warnings():  # by which alone NumPy before 2.3 says that it stopped at a word
+                warnings.simplefilter("error", DeprecationWarning)
+                self._numbers = np.fromstring(bytes(body).decode("ascii"), np.float64, sep=" ")
         except (ValueError, DeprecationWarning):
             raise SceneError("the .ply file has words where numbers should be; export it again") from None
         self._place = 0
