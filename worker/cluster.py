@@ -13,7 +13,7 @@ import dask
 from distributed import Nanny
 
 from relume.errors import ParameterError, PlanError
-from worker.executor import DASK_CONFIG, ONE_THREAD, num_cores
+from worker.executor import DASK_CONFIG, ONE_THREAD, check_certificates, num_cores
 
 log = logging.getLogger(__name__)
 
@@ -29,11 +29,12 @@ def join(scheduler: str, num_processes: int | None = None) -> int:
     Returns:
         The exit code: 0 where it was asked to end, 1 where the scheduler went away.
     Raises:
-        ParameterError: the address is malformed. PlanError: nobody answers there.
+        ParameterError: the address is malformed. PlanError: nobody answers there, or there are no certificates.
     """
     address = urlsplit(scheduler)
     if address.scheme not in ("tcp", "tls") or not address.hostname:
         raise ParameterError("--scheduler", scheduler, "an address such as tcp://scheduler:8786")
+    check_certificates(scheduler)
     with dask.config.set(DASK_CONFIG):
         return asyncio.run(_join(scheduler, num_processes or num_cores()))
 

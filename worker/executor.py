@@ -45,6 +45,8 @@ DASK_CONFIG: dict[str, Any] = {
     "distributed.worker.memory.pause": False,
     "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
 }
+# Pages that tell whoever connects what runs here.
+NO_PAGES: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
 
 
 def is_tiny(plan: Plan) -> bool:
@@ -131,6 +133,7 @@ class Executors:
 
         logging.getLogger("distributed").setLevel(logging.WARNING)  # which sets its own when it is imported
         with dask.config.set(DASK_CONFIG):
+            check_certificates(self.scheduler)
             address = self.scheduler or self._start_cluster()
             try:
                 return Client(address, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
@@ -140,23 +143,40 @@ class Executors:
                 ) from None
 
     def _start_cluster(self) -> Any:
+        """Processes of this machine. Every local account reaches its ports, and whoever speaks to Dask runs what they
+        like: so each start has a key of its own, which never leaves the memory of these processes."""
+        import dask
         from distributed import LocalCluster
+        from distributed.security import Security
 
         for name in ("distributed.scheduler", "distributed.nanny", "distributed.client"):
             # of a process that died the bake speaks itself
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        with _without_interrupts():
+        with _without_interrupts(), dask.config.set(NO_PAGES):
             self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=self.num_workers,
                 threads_per_worker=1,
                 processes=True,
                 host="127.0.0.1",
+                security=Security.temporary(),  # type: ignore[no-untyped-call]
+                scheduler_kwargs={"dashboard": False},
                 dashboard_address="127.0.0.1:0",  # None would take Dask's usual port, and warn where it is taken
                 local_directory=tempfile.gettempdir(),
                 silence_logs=logging.ERROR,
                 env=ONE_THREAD,
             )
         return self._cluster
+
+
+def check_certificates(scheduler: str | None) -> None:
+    """Raises PlanError where a scheduler speaks TLS and Dask has no certificates to show."""
+    import dask
+
+    if (scheduler or "").startswith("tls:") and not dask.config.get("distributed.comm.tls.ca-file", None):
+        raise PlanError(
+            f"the scheduler {scheduler} speaks TLS, and no certificates are set here; set "
+            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and the certificates and keys beside it (docs/operations.md)"
+        )
 
 
 def _attempt(stop: Callable[..., object], *args: object, **kwargs: object) -> None:

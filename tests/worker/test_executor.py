@@ -4,12 +4,17 @@ import asyncio
 import concurrent.futures
 import errno
 import logging
+import subprocess
+import sys
+import urllib.error
+import urllib.request
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 
+from relume.errors import PlanError
 from worker.dask_executor import DaskExecutor
 from worker.executor import Executors
 
@@ -117,3 +122,41 @@ def test_cluster_that_does_not_close_in_order_loses_its_processes_and_stops_nobo
     assert "can only join a started process" in caplog.text
     executors.close()  # nothing is left to stop
     assert clusters[0].log.count("close") == 1
+
+
+ASK = """
+import sys
+from distributed import Client
+
+try:
+    Client(sys.argv[1], timeout=5).run_on_scheduler(print, "it runs what it is sent")
+finally:
+    print("asked", flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_the_cluster_of_this_machine_runs_nothing_for_who_has_no_key_of_it() -> None:
+    """Every local account reaches its ports; each of them, of the scheduler and of the workers, asks for the key."""
+    executors = Executors(num_workers=1)
+    try:
+        assert executors.cluster().submit(sum, [1, 2]).result() == 3
+        cluster = executors._cluster
+        addresses = [cluster.scheduler_address, *(nanny.worker_address for nanny in cluster.workers.values())]
+        addresses += [nanny.address for nanny in cluster.workers.values()]
+        assert all(address.startswith("tls://127.0.0.1:") for address in addresses)
+        for address in addresses:
+            for asked in (address, address.replace("tls:", "tcp:")):
+                said = subprocess.run([sys.executable, "-c", ASK, asked], capture_output=True, text=True, check=False)
+                assert (said.returncode, said.stdout) == (1, "asked\n"), said.stderr
+        port = cluster.scheduler.http_server.port
+        for page in ("info/main/workers.html", "json/counts.json", "metrics"):
+            with pytest.raises(urllib.error.HTTPError, match="404"):
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/{page}")
+    finally:
+        executors.close()
+
+
+def test_a_cluster_of_somebody_else_says_what_it_lacks_where_tls_is_not_set_up() -> None:
+    with pytest.raises(PlanError, match="DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
+        Executors("tls://127.0.0.1:1").cluster()

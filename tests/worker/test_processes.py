@@ -12,16 +12,20 @@ import sys
 import time
 import warnings
 from collections import Counter
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import dask
 import pytest
+from distributed.security import Security
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
+from relume.errors import PlanError
 from relume.store import bake_here
 from worker.database import open_database
-from worker.executor import TINY_BAKE_RAYS
+from worker.executor import TINY_BAKE_RAYS, Executors
 from worker.ledger import Ledger
 from worker.paths import bake_path
 from worker.scenes import register_scene
@@ -31,6 +35,7 @@ from worker.status import bake_id
 IDENTITY = bake_id(tiny_scene().id, RECIPE)
 LARGE = TINY_BAKE_RAYS + 1
 NUM_TASKS = 2 + 2 * 9
+COMM = "DASK_DISTRIBUTED__COMM__"
 PROGRAM = Path(__file__).with_name("bake_process.py")
 
 
@@ -174,13 +179,35 @@ def test_scheduler_is_disposable(tmp_path: Path, expected: str, monkeypatch: pyt
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
 
 
+@pytest.mark.slow
+def test_a_cluster_of_ones_own_speaks_tls_with_certificates_by_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Security.temporary()
+    for name, text in (("ca.pem", made.tls_ca_file), ("key.pem", made.tls_client_key)):
+        (tmp_path / name).write_text(text)
+    cert, key = str(tmp_path / "ca.pem"), str(tmp_path / "key.pem")
+    settings = {"require-encryption": "true", "tls.ca-file": cert}
+    for role in ("scheduler", "worker", "client"):
+        settings |= {f"tls.{role}.cert": cert, f"tls.{role}.key": key}
+    for name, value in settings.items():
+        monkeypatch.setenv(COMM + name.upper().replace(".", "__").replace("-", "_"), value)
+    with Cluster("tls") as cluster:
+        executors = Executors(cluster.address)
+        ours = {f"distributed.comm.{name}": value for name, value in settings.items()}  # this process runs already
+        with dask.config.set(ours), closing(executors):
+            assert executors.cluster().submit(sum, [1, 2]).result(60) == 3
+        with pytest.raises(PlanError, match=f"{COMM}TLS__CA_FILE"):
+            Executors(cluster.address).cluster()
+
+
 class Cluster:
     """A scheduler and a `relume worker` that joins it, as processes."""
 
-    def __init__(self) -> None:
+    def __init__(self, scheme: str = "tcp") -> None:
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = free.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.address = f"{scheme}://127.0.0.1:{self.port}"
         self.processes: list[subprocess.Popen[bytes]] = []
 
     def start(self) -> None:
