@@ -110,16 +110,38 @@ class AssetStore:
         identity = digest[:ID_DIGITS]
         target = folder / identity
         if not target.exists():
-            if len(self.paths(folder)) >= self.max_entries:
-                raise self.problem(f"{self.max_entries} {self.what}s are kept already; delete one first")
+            self._check_room(folder)
             self._make(folder, target, name, lambda made: {"sha256": digest, **fill(made)})
+        self._call(target, name, digest)
+        return identity
+
+    def adopt(self, folder: Path, made: Path) -> None:
+        """Take over a thing that was kept in a folder on the same disk; what is here already takes its name.
+
+        Args:
+            folder: where things of this kind are kept. made: the thing's own folder.
+        Raises:
+            self.problem: the store is full, it is damaged, or what is here under the id came from another file.
+        """
+        record, target = self.read(made), folder / made.name
+        if not target.exists():
+            self._check_room(folder)
+            folder.mkdir(parents=True, exist_ok=True)
+            _name(made, target)
+        self._call(target, record["name"], record.get("sha256"))
+
+    def _check_room(self, folder: Path) -> None:
+        if len(self.paths(folder)) >= self.max_entries:
+            raise self.problem(f"{self.max_entries} {self.what}s are kept already; delete one first")
+
+    def _call(self, target: Path, name: str, digest: str | None) -> None:
+        """Give a thing that is here its newest name, if it came from the same file."""
         document = self.read(target)
         if document.get("sha256", digest) != digest:  # two files were made for that: it takes billions of tries
-            raise self.problem(f"another file is the {self.what} {identity}; delete that one first, if it is not yours")
+            raise self.problem(f"another file is the {self.what} {target.name}; delete that one first, if it is not yours")
         if document["name"] != name:
             with replacing(target / self.record) as unfinished:
                 unfinished.write_text(json.dumps({**document, "name": name}))
-        return identity
 
     def _make(self, folder: Path, target: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> None:
         """Write a thing's folder, and give it its name when it is complete."""
@@ -130,11 +152,7 @@ class AssetStore:
             made = Path(staging) / target.name
             made.mkdir()
             (made / self.record).write_text(json.dumps({**document, **fill(made)}))
-            try:
-                os.rename(made, target)
-            except OSError:
-                if not target.exists():  # somebody else has imported it in the meantime
-                    raise
+            _name(made, target)
 
     def paths(self, folder: Path) -> list[Path]:
         """Folders of all things in a folder."""
@@ -218,3 +236,12 @@ class AssetStore:
         if identity == name or not _ID.fullmatch(identity):
             return None
         return next((folder / identity for folder in reversed(self._folders) if (folder / identity).is_dir()), None)
+
+
+def _name(made: Path, target: Path) -> None:
+    """Give a folder that is complete its name."""
+    try:
+        os.rename(made, target)
+    except OSError:
+        if not target.exists():  # somebody else has imported it in the meantime
+            raise

@@ -148,3 +148,10 @@ def use_kernel_cache() -> None:
     numba = sys.modules.get("numba")
     if numba is not None:
         numba.config.CACHE_LOCATOR_CLASSES = locators
+
+
+def keep_no_kernels() -> None:
+    """Have Numba store nothing that this process compiles from now on: other processes would run it."""
+    from numba.core.caching import Cache
+
+    Cache.save_overload = lambda self, sig, data: None

@@ -16,6 +16,7 @@ from server import errors, openapi
 from server.access.gate import Gate
 from server.access.rules import methods_at
 from server.conditional import Conditional
+from server.files.door import UPLOADS_AT_ONCE, UPLOADS_EACH, Door
 from server.guard import Guard
 from server.idempotency import Idempotency
 from server.library.opening import open_library
@@ -122,6 +123,12 @@ def create_app(
     errors.install(app, methods_at)
     # the last that is added is the first that a request passes
     app.add_middleware(Idempotency, store=lambda: app.state.services.idempotency)
+    app.add_middleware(
+        Door,
+        access=lambda: app.state.services.access,
+        each=UPLOADS_EACH if settings.login else UPLOADS_AT_ONCE,
+        shares=settings.turns,
+    )
     app.add_middleware(Gate, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(Conditional)
     app.add_middleware(

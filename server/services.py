@@ -22,6 +22,7 @@ from server.apart.step import Batches
 from server.apart.thumbnails import Thumbnails
 from server.files.importers import Importers
 from server.files.importing import remove_strays
+from server.files.intake import Intake
 from server.library.caretaker import Caretaker
 from server.library.disk import free_bytes
 from server.library.ports import Library
@@ -59,8 +60,7 @@ class Services:
 
     Attributes:
         leave: whether the server is taking it. access: who may do what, how much of it, and the audit.
-        importers: read files.
-        import_slots: one is held by each import that runs.
+        intake: has files read, and takes over what comes of it.
     """
 
     settings: Settings
@@ -80,11 +80,8 @@ class Services:
     caretaker: Caretaker
     thumbnails: Thumbnails
     live: SessionServices
-    importers: Importers
-    import_slots: asyncio.Semaphore
+    intake: Intake
 
-
-MAX_IMPORTS = 2
 
 OpenLibrary = Callable[[int, int], Library]
 OpenBakes = Callable[[Settings], BakeService]
@@ -173,8 +170,7 @@ async def open_services(
             caretaker=caretaker,
             thumbnails=thumbnails,
             live=_live(settings, metrics, traces, library, threads, service, access, leave, rooms, keeper),
-            importers=importers,
-            import_slots=asyncio.Semaphore(MAX_IMPORTS),
+            intake=Intake(settings, service.ledger, access.quotas, importers),
         )
 
 

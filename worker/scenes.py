@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,8 +61,14 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
         The scene's id.
     """
     save_scene(scene, scene_path(data_dir, scene.id))
-    push(scene_path(data_dir, scene.id))
-    summary = {
+    enter_scene(data_dir, ledger, scene.id, summary_of(scene))
+    return scene.id
+
+
+def summary_of(scene: Scene) -> dict[str, Any]:
+    """What lists show of a scene, its name too."""
+    return {
+        "name": scene.name,
         "views": [camera.name for camera in scene.cameras],
         "materials": [
             {
@@ -79,15 +85,24 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
     }
-    row = SceneRow(id=scene.id, name=scene.name, created=time.time(), summary=json.dumps(summary))
+
+
+def enter_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[str, Any]) -> None:
+    """List a scene whose files are in their place.
+
+    Args:
+        data_dir: where scenes are kept. ledger: where they are listed.
+        scene_id: of the scene. summary: of it, see `summary_of`.
+    """
+    push(scene_path(data_dir, scene_id))
+    row = SceneRow(id=scene_id, name=summary["name"], created=time.time(), summary=json.dumps(summary))
     try:
         with ledger.sessions.begin() as session:
             session.add(row)
     except IntegrityError:
         with ledger.sessions.begin() as session:
-            if (known := session.get(SceneRow, scene.id)) is not None:
-                known.name, known.summary = scene.name, json.dumps(summary)
-    return scene.id
+            if (known := session.get(SceneRow, scene_id)) is not None:
+                known.name, known.summary = summary["name"], json.dumps(summary)
 
 
 def list_scenes(ledger: Ledger) -> list[SceneRecord]:

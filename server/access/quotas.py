@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from server.settings import Settings
 
 log = logging.getLogger(__name__)
-Kind = Literal["scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
+Kind = Literal["upload", "scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
 _ACTIVE = ("queued", "running")
 
 
@@ -32,11 +33,12 @@ class Quotas:
     Things are shared: who brings what is here already owns nothing of it.
 
     Attributes:
-        deciding: held while a bake is looked at and queued, lest two at once both be the last that may.
+        settings: of the server.
+        deciding: held while something is looked at and counted, lest two at once both be the last that may.
     """
 
     def __init__(self, sessions: sessionmaker[Session], settings: Settings) -> None:
-        self._sessions, self._settings = sessions, settings
+        self._sessions, self.settings = sessions, settings
         self._lock, self._open = threading.Lock(), Counter[str]()
         self._is_full = False
         self.deciding = threading.Lock()
@@ -49,7 +51,7 @@ class Quotas:
     @contextmanager
     def session(self, who: str) -> Iterator[None]:
         """One live session of somebody. Raises BusyError, QuotaError: enough are open."""
-        most, each = self._settings.max_sessions, self._settings.max_sessions_each
+        most, each = self.settings.max_sessions, self.settings.max_sessions_each
         with self._lock:
             if self._open.total() >= most:
                 raise BusyError(f"as many sessions are open as may be, {most}; close one and try again")
@@ -67,12 +69,12 @@ class Quotas:
     @property
     def counts_bytes(self) -> bool:
         """Whether there is a limit on them."""
-        return self._settings.max_bytes_each is not None
+        return self.settings.max_bytes_each is not None
 
     def check_room(self) -> None:
         """Raises NearlyFullError where the disk lacks the room that the ledger needs, to delete, too."""
-        free = free_bytes(self._settings.data)
-        is_full = free < self._settings.least_free_bytes
+        free = free_bytes(self.settings.data)
+        is_full = free < self.settings.least_free_bytes
         with self._lock:
             was_full, self._is_full = self._is_full, is_full
         if is_full and not was_full:
@@ -85,19 +87,48 @@ class Quotas:
     def check_bytes(self, who: str, more: int) -> None:
         """Raises QuotaError where somebody would have too much with so many bytes more; and as `check_room` does."""
         self.check_room()
-        most = self._settings.max_bytes_each
+        most = self.settings.max_bytes_each
         if most is None:
             return
         used = self.used_bytes(who)
         if used + more > most:
-            raise QuotaError(
-                f"you have {bytes_text(used)} of at most {bytes_text(most)}, and this takes {bytes_text(more)}; "
-                "delete a scene, a bake, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
+            raise _too_much(used, most, more)
+
+    def left_bytes(self, who: str) -> int | None:
+        """What somebody may still have, below zero where it is too much already; None where there is no limit."""
+        most = self.settings.max_bytes_each
+        return None if most is None else most - self.used_bytes(who)
+
+    def put_reserved(self, who: str, row: str, num_bytes: int) -> None:
+        """What an upload takes while it is taken in, see `Reservation`; what a killed server left ends."""
+        now = f"{int(time.time()):012d}"
+        with self._sessions.begin() as session:
+            session.execute(delete(OwnedRow).where(OwnedRow.kind == "upload", OwnedRow.object < now))
+            session.merge(OwnedRow(kind="upload", object=row, owner=who, bytes=num_bytes))
+
+    def drop_reserved(self, row: str) -> None:
+        """It takes nothing any more."""
+        self.disown("upload", row)
+
+    def check_reserved(self, who: str, num_bytes: int) -> None:
+        """Whether there is room for all that is reserved, of which somebody's newest is so many bytes. An upload is on
+        the disk twice, as it came and under its own name. Raises QuotaError, NearlyFullError."""
+        self.check_room()
+        with self._sessions() as session:
+            all_bytes = session.scalar(select(func.sum(OwnedRow.bytes)).where(OwnedRow.kind == "upload")) or 0
+        free = free_bytes(self.settings.data)
+        if free - 2 * all_bytes < self.settings.least_free_bytes:
+            raise NearlyFullError(
+                f"the disk of the data directory has {bytes_text(free)} left, too little for {bytes_text(num_bytes)} "
+                f"more beside what else is sent now ({bytes_text(all_bytes - num_bytes)}); free some space"
             )
+        most = self.settings.max_bytes_each
+        if most is not None and (used := self.used_bytes(who)) > most:
+            raise _too_much(used - num_bytes, most, num_bytes)
 
     def check_bakes(self, who: str) -> None:
         """Raises QuotaError where enough bakes of somebody wait or run."""
-        most = self._settings.max_bakes_each
+        most = self.settings.max_bakes_each
         if most is None:
             return
         query = (
@@ -168,3 +199,10 @@ class Quotas:
         """They are deleted."""
         with self._sessions.begin() as session:
             session.execute(delete(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object.in_(things)))
+
+
+def _too_much(used: int, most: int, more: int) -> QuotaError:
+    return QuotaError(
+        f"you have {bytes_text(used)} of at most {bytes_text(most)}, and this takes {bytes_text(more)}; "
+        "delete a scene, a bake, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
+    )

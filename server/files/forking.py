@@ -21,11 +21,15 @@ import time
 import traceback
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import BinaryIO, NoReturn
 
+from server.files.confining import confine
 from server.files.importing import ImportRequest, answer_of
 
 MAX_ANSWER_BYTES, MAX_SAID_BYTES = 64 * 1024, 2_000
+LEAST_FILE_BYTES = 1 << 16  # what it says of its end is a file, too
+MAX_OPEN = 1_024  # files at once; a scene has at most 900 companions
 
 
 @dataclass(frozen=True)
@@ -68,11 +72,13 @@ def _load() -> None:
     """Load what imports need, readers of scenes as well, while nobody waits for it."""
     import relume.environments.reading
     import relume.images.shelf
+    import relume.measured.asset_store
     import relume.scene.companions
     import relume.scene.importer  # noqa: F401
-    import worker.database
-    import worker.ledger
     import worker.scenes  # noqa: F401
+    from server.files.confining import missing
+
+    missing()
 
 
 def _keep(asker: socket.socket) -> NoReturn:
@@ -124,6 +130,10 @@ def _import(request: ImportRequest, writing: int, said: BinaryIO) -> NoReturn:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_CPU, (request.seconds, request.seconds))
         resource.setrlimit(resource.RLIMIT_AS, (request.max_bytes, request.max_bytes))
+        most_bytes = max(request.max_file_bytes, LEAST_FILE_BYTES)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (MAX_OPEN, MAX_OPEN))
+        confine(request.own, Path(request.into))
         told = json.dumps(answer_of(request)).encode()
         while told:
             told = told[os.write(writing, told) :]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import signal
 import socket
 import subprocess
@@ -13,23 +12,26 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
-from relume.errors import DatabaseDamagedError, DiskFullError, RelumeError, SceneError, StorageError
+from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
+from server.files.confining import environment, missing
 from server.files.forking import End
 from server.files.importing import ImportRequest
-from worker.database.faults import away_elsewhere
 
 log = logging.getLogger(__name__)
 START_S = 120.0  # that a busy machine may take to load what imports need
 _DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
 _FAULTS: Mapping[str, Callable[[str], Exception]] = {
     "problem": SceneError,
+    "material": MaterialError,
     "full": lambda _: DiskFullError("what was imported"),
-    "storage": StorageError,
-    "away": away_elsewhere,
-    "damaged": DatabaseDamagedError,
+    "large": lambda _: OutgrownError("what was imported is larger than there is room for"),
     "failure": RelumeError,
 }
 _COMMAND = [sys.executable, "-m", "server.files.forking"]
+
+
+class OutgrownError(RelumeError):
+    """A file unpacks to more than it may take."""
 
 
 class Importers:
@@ -45,11 +47,11 @@ class Importers:
             self._running()
 
     def run(self, request: ImportRequest) -> str:
-        """Import and register; returns the id. Blocks.
+        """Import into the request's folder; returns the id. Blocks.
 
         Raises:
             SceneError: the file cannot be used, or reading it took too much. DiskFullError: there is no room for it.
-            StorageError, OperationalError, DatabaseDamagedError: of the service. RelumeError: a defect; it is logged.
+            OutgrownError: it takes more than it may. RelumeError: a defect; it is logged.
         """
         asker, theirs = socket.socketpair()
         with asker:
@@ -78,7 +80,13 @@ class Importers:
 
 def _begin() -> tuple[subprocess.Popen[bytes], socket.socket]:
     # No thread pools: what is forked would lack them, and each reserves address space, which counts against the limit.
-    environ = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environ = environment() | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    if missing():
+        log.warning(
+            "this machine has no %s: what reads uploads has limits, and is not kept from other files or the network "
+            "(docs/operations.md)",
+            " and no ".join(missing()),
+        )
     asking, theirs = socket.socketpair()
     with theirs:
         process = subprocess.Popen(_COMMAND, stdin=theirs.fileno(), stdout=subprocess.DEVNULL, env=environ)  # noqa: S603
@@ -108,7 +116,7 @@ def _result(request: ImportRequest, end: End) -> str:
         return str(answer["id"])
     for key, fault in _FAULTS.items():
         if key in answer:
-            if key != "problem" and end.said:  # it has no log of its own
+            if key not in ("problem", "material") and end.said:  # it has no log of its own
                 _log(end)
             raise fault(answer[key])
     if end.is_late or end.code < 0:

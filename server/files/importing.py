@@ -1,22 +1,24 @@
-"""Imports an uploaded file, and says what it is or why it failed.
+"""Reads an uploaded file, writes what it is into a folder, and says its id or why it failed.
 
-That is done in a process of its own, with limits: a hostile file can end that process, not the server.
-`server.files.forking` makes it, `server.files.importers` asks for it.
+That is done in a process of its own, with limits, which has neither the database nor other files: a hostile file can
+end that process, not the server. `server.files.forking` makes it, `server.files.importers` asks for it, and
+`server.files.adopting` takes over what it has made.
 """
 
 from __future__ import annotations
 
 import errno
+import json
 import os
 import shutil
 import time
 from collections.abc import Mapping
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from relume.errors import DatabaseDamagedError, DiskFullError, LedgerVersionError, RelumeError, StorageError, is_no_room
+from relume.errors import DiskFullError, MaterialError, RelumeError, is_no_room
 from relume.replacing import UNFINISHED
 
 if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
@@ -25,7 +27,9 @@ if TYPE_CHECKING:  # the import process itself has no use for them, or not at on
 
 _NO_MEMORY = (os.strerror(errno.ENOMEM), "can't start new thread")
 UPLOAD_PREFIX = "upload-"
-Kind = Literal["scene", "environment", "built_in", "grounded", "image", "tile"]
+SUMMARY = "summary.json"
+"""What lists show of a scene, beside its folder."""
+Kind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "tile"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class ImportRequest:
     """What to import.
 
     Attributes:
+        into: an empty folder, which what is made is written to, and nothing else.
         kind, file: what it is, and its path; empty for a built-in scene; of a scene to be "grounded" the folder that it
             is kept in. A "tile", which a BTF is made of, is looked at alone, and has no id.
         environment: path of a scene's environment map, or None.
@@ -40,17 +45,17 @@ class ImportRequest:
         scene: the name that a scene's file had, folders included. companions: paths of the files that came with it, by
             theirs.
         ground: whether a scene is put on one. period: side of what repeats, metres, where it is known.
-        seconds: of processor and wall. max_bytes: of address space.
+        seconds: of processor and wall. max_bytes: of address space. max_file_bytes: of each file that is written.
     """
 
-    data: str
-    database: str
+    into: str
     kind: Kind
     file: str
     environment: str | None
     name: str
     seconds: int
     max_bytes: int
+    max_file_bytes: int
     ground: bool = False
     period: float | None = None
     scene: str = ""
@@ -67,19 +72,25 @@ class ImportRequest:
         scene: str = "",
         companions: Mapping[str, Path] | None = None,
     ) -> ImportRequest:
-        """A request within a server's limits."""
+        """A request within a server's limits; where to, and how large, is known when it has its turn."""
         return cls(
-            data=str(settings.data.resolve()),
-            database=settings.database_url,
+            into="",
             kind=kind,
             file="" if file is None else str(file),
             environment=None if environment is None else str(environment),
             name=name,
             seconds=settings.import_seconds,
             max_bytes=settings.import_bytes,
+            max_file_bytes=0,
             scene=scene,
             companions={named: str(path) for named, path in (companions or {}).items()},
         )
+
+    @property
+    def own(self) -> list[Path]:
+        """The files that it is about."""
+        paths = [self.file, self.environment or "", *self.companions.values()]
+        return [Path(path) for path in paths if path]
 
 
 def remove_strays(data: Path, older_than_s: float) -> None:
@@ -91,34 +102,36 @@ def remove_strays(data: Path, older_than_s: float) -> None:
 
 
 def answer_of(request: ImportRequest) -> dict[str, str]:
-    """What the process says: {"id": id}, {"problem": sentence} of the file, or what of the service failed.
+    """What the process says: {"id": id}, or what failed.
 
-    That is {"full": sentence} of the disk, {"storage": sentence}, {"away": sentence} and {"damaged": sentence} of the
-    database, and {"failure": sentence} of all else that is known. What nobody foresaw passes.
+    That is {"problem": sentence} of the file, {"material": sentence} of that of a material, {"full": sentence} of the
+    disk, {"large": sentence} where a file that it writes became larger than it may be, and {"failure": sentence} of all
+    else that is known. What nobody foresaw passes.
     """
-    from sqlalchemy.exc import OperationalError
-
-    from worker.database.faults import told
-
     try:
         return {"id": _import(request)}
     except DiskFullError as error:
         return {"full": str(error)}
-    except StorageError as error:
-        return {"storage": str(error)}
-    except DatabaseDamagedError as error:
-        return {"damaged": error.detail}
-    except OperationalError as error:
-        return {"away": told(error)}
+    except MaterialError as error:
+        return {"material": str(error)}
     except RelumeError as error:
-        is_of_file = type(error) is not RelumeError and not isinstance(error, LedgerVersionError)
-        return {"problem" if is_of_file else "failure": str(error)}
+        if _is_too_large(error.__cause__):
+            return {"large": str(error)}
+        return {"problem" if type(error) is not RelumeError else "failure": str(error)}
     except Exception as error:
         if isinstance(error, OSError) and is_no_room(error):
             return {"full": str(error)}
+        if _is_too_large(error):
+            return {"large": str(error)}
         if not _is_out_of_memory(error):
             raise
         return {"problem": f"the import needs more than {request.max_bytes / 1e9:.1f} GB; simplify the file"}
+
+
+def _is_too_large(error: BaseException | None) -> bool:
+    """Whether the limit of the files that it writes was met; NumPy says of a short write only how much was missing."""
+    is_short = isinstance(error, OSError) and error.errno is None and "requested and" in str(error)
+    return is_short or (isinstance(error, OSError) and error.errno == errno.EFBIG)
 
 
 def _is_out_of_memory(error: Exception) -> bool:
@@ -131,6 +144,8 @@ def _import(request: ImportRequest) -> str:
         return _put_on_ground(request)
     if request.kind == "image":
         return _import_image(request)
+    if request.kind == "material":
+        return _import_material(request)
     if request.kind == "tile":
         return _look_at_tile(request)
     return _import_environment(request) if request.kind == "environment" else _import_scene(request)
@@ -138,16 +153,20 @@ def _import(request: ImportRequest) -> str:
 
 def _import_environment(request: ImportRequest) -> str:
     from relume.environments.asset_store import keep
-    from worker.paths import environments_path
 
-    return keep(environments_path(Path(request.data)), Path(request.file), request.name).id
+    return keep(Path(request.into), Path(request.file), request.name).id
 
 
 def _import_image(request: ImportRequest) -> str:
     from relume.images.shelf import keep
-    from worker.paths import images_path
 
-    return keep(images_path(Path(request.data)), Path(request.file), request.name).id
+    return keep(Path(request.into), Path(request.file), request.name).id
+
+
+def _import_material(request: ImportRequest) -> str:
+    from relume.measured.asset_store import keep
+
+    return keep(Path(request.into), Path(request.file), request.name).id
 
 
 def _look_at_tile(request: ImportRequest) -> str:
@@ -163,7 +182,7 @@ def _import_scene(request: ImportRequest) -> str:
         from relume.scene.ground import with_ground
 
         scene = with_ground(scene)
-    return _registered(request, scene)
+    return _written(request, scene)
 
 
 def _built_in(name: str) -> Scene:
@@ -176,16 +195,16 @@ def _put_on_ground(request: ImportRequest) -> str:
     from relume.scene.archive import load_scene
     from relume.scene.ground import with_ground
 
-    return _registered(request, with_ground(load_scene(request.file), request.name))
+    return _written(request, with_ground(load_scene(request.file), request.name))
 
 
-def _registered(request: ImportRequest, scene: Scene) -> str:
-    from worker.database import open_database
-    from worker.ledger import Ledger
-    from worker.scenes import register_scene
+def _written(request: ImportRequest, scene: Scene) -> str:
+    from relume.scene.archive import save_scene
+    from worker.scenes import summary_of
 
-    with closing(Ledger(open_database(request.database))) as ledger:
-        return register_scene(Path(request.data), ledger, scene)
+    save_scene(scene, Path(request.into) / scene.id)
+    (Path(request.into) / SUMMARY).write_text(json.dumps(summary_of(scene)))
+    return scene.id
 
 
 def _read_scene(request: ImportRequest) -> Scene:

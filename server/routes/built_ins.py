@@ -12,7 +12,7 @@ from relume.scene.built_in import BUILT_IN
 from server.access.roles import Who
 from server.files.importing import ImportRequest
 from server.routes.paging import Paged
-from server.routes.scenes import get_one, own_scene
+from server.routes.scenes import get_one
 from server.services import Shared
 from server.wire.bodies import BuiltInBody, SceneBody
 
@@ -34,10 +34,8 @@ async def take_one(name: BuiltInName, services: Shared, caller: Who, response: R
     """Make it and register it like an imported one; a second time it is the same scene."""
     if name not in BUILT_IN:
         raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")
-    await run_in_threadpool(services.access.quotas.check_bytes, caller.name, 0)
     order = ImportRequest.of(services.settings, "built_in", None, name)
-    async with services.import_slots:
-        identity = await run_in_threadpool(services.importers.run, order)
-    await run_in_threadpool(own_scene, caller, identity, services)
+    async with services.intake.reserving(caller.name, 0) as held:
+        identity = await services.intake.take(held, lambda folder: order)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)

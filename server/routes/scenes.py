@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,14 +13,15 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError, ParameterError
 from relume.folders import folder_bytes
-from server.access.roles import Caller, Who
+from server.access.roles import Who
 from server.apart.bakes import MAX_WIDTH
+from server.files.door import Held
 from server.files.downloads import Download
-from server.files.importing import UPLOAD_PREFIX, ImportRequest
-from server.files.uploads import keep_upload, plain_stem, upload_bytes
+from server.files.importing import ImportRequest
+from server.files.uploads import keep_upload, plain_stem
 from server.openapi import files
 from server.routes.paging import Paged, newest
-from server.services import Services, Shared
+from server.services import Shared
 from server.wire.bodies import SceneBody, SceneMaterial, SceneRemark, SceneVariant, SceneView, moment
 from server.wire.body import Id
 from worker.cameras import kept_cameras, placed_names
@@ -50,7 +50,7 @@ MAX_COMPANIONS, MAX_PATH = 900, 1_024
 async def import_scene(
     scene: SceneFile,
     services: Shared,
-    caller: Who,
+    held: Held,
     response: Response,
     environment: EnvironmentFile = None,
     name: SceneName = "",
@@ -58,59 +58,36 @@ async def import_scene(
     ground: Ground = False,
 ) -> SceneBody:
     """Import a scene, in a process of its own; the body lists what was understood and a warning for what was not."""
-    sent_bytes = upload_bytes(scene, environment, *companions)
-    await run_in_threadpool(services.access.quotas.check_bytes, caller.name, sent_bytes)
-    async with services.import_slots:
-        identity = await run_in_threadpool(_import, scene, environment, name, companions, ground, services)
-    await run_in_threadpool(own_scene, caller, identity, services)
-    response.headers["Location"] = f"/api/scenes/{identity}"
-    return await run_in_threadpool(get_one, identity, services)
-
-
-def _import(
-    scene: UploadFile,
-    environment: UploadFile | None,
-    name: str,
-    companions: Sequence[UploadFile],
-    ground: bool,
-    services: Services,
-) -> str:
-    settings = services.settings
     if not name.isprintable():
         raise ParameterError("name", name, "printable characters")
     if len(companions) > MAX_COMPANIONS or any(len(each.filename or "") > MAX_PATH for each in companions):
         allowed = f"at most {MAX_COMPANIONS} files, their names of at most {MAX_PATH:,} characters"
         raise ParameterError("companions", f"{len(companions)} files", allowed)
-    with tempfile.TemporaryDirectory(dir=settings.data, prefix=UPLOAD_PREFIX) as folder:
-        file = keep_upload(scene, Path(folder) / "scene")
-        lit_by = None if environment is None else keep_upload(environment, Path(folder) / "environment")
+    called = name.strip() or plain_stem(scene.filename) or "Scene"
+
+    def order(folder: Path) -> ImportRequest:
+        file = keep_upload(scene, folder / "scene")
+        lit_by = None if environment is None else keep_upload(environment, folder / "environment")
         beside = {
-            each.filename or "": keep_upload(each, Path(folder) / f"companion-{number}")
+            each.filename or "": keep_upload(each, folder / f"companion-{number}")
             for number, each in enumerate(companions)
         }
-        name = name.strip() or plain_stem(scene.filename) or "Scene"
-        order = ImportRequest.of(settings, "scene", file, name, lit_by, scene.filename or "", beside)
-        return services.importers.run(replace(order, ground=ground))
+        request = ImportRequest.of(services.settings, "scene", file, called, lit_by, scene.filename or "", beside)
+        return replace(request, ground=ground)
 
-
-def own_scene(caller: Caller, scene: str, services: Services) -> None:
-    """What was imported takes room of whoever did."""
-    num_bytes = folder_bytes(scene_path(services.settings.data, scene))
-    services.access.quotas.own(caller.name, "scene", scene, num_bytes)
+    identity = await services.intake.take(held, order)
+    response.headers["Location"] = f"/api/scenes/{identity}"
+    return await run_in_threadpool(get_one, identity, services)
 
 
 @router.post("/{scene}/ground", status_code=201)
 async def add_ground(scene: Id, services: Shared, caller: Who, response: Response) -> SceneBody:
     """The same on a ground that catches shadows, as a new scene; this one stays as it is."""
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
-    settings = services.settings
-    folder = await run_in_threadpool(fetched, scene_path(settings.data, scene))
-    more_bytes = await run_in_threadpool(folder_bytes, folder)
-    await run_in_threadpool(services.access.quotas.check_bytes, caller.name, more_bytes)
-    order = ImportRequest.of(settings, "grounded", folder, f"{record.name[:185]} on a ground")
-    async with services.import_slots:
-        identity = await run_in_threadpool(services.importers.run, order)
-    await run_in_threadpool(own_scene, caller, identity, services)
+    folder = await run_in_threadpool(fetched, scene_path(services.settings.data, scene))
+    request = ImportRequest.of(services.settings, "grounded", folder, f"{record.name[:185]} on a ground")
+    async with services.intake.reserving(caller.name, await run_in_threadpool(folder_bytes, folder)) as held:
+        identity = await services.intake.take(held, lambda _: request)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_one, identity, services)
 

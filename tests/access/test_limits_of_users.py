@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from btf_zips import zipped
 from fastapi.testclient import TestClient
-from server_fakes import SIZE, FakeMethod, tiny_scene
+from server_fakes import SIZE, FakeMethod, made
 from session_client import Baked
 from sqlalchemy import update
 
@@ -21,7 +21,6 @@ from server.access.buckets import Buckets
 from server.errors import BusyError
 from server.settings import Settings
 from worker.database.models import BakeRow
-from worker.scenes import register_scene
 from worker.service import BakeService
 
 Bearer = Callable[..., dict[str, str]]
@@ -34,9 +33,7 @@ SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
 @pytest.fixture
 def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     """Importing makes the tiny scene, without a process of its own."""
-    bakes: BakeService = client.app.state.services.bakes
-    importers = client.app.state.services.importers
-    monkeypatch.setattr(importers, "run", lambda _: register_scene(bakes.data_dir, bakes.ledger, tiny_scene()))
+    monkeypatch.setattr(client.app.state.services.intake.importers, "run", made)
 
 
 def test_buckets_fill_again() -> None:

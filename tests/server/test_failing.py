@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import pytest
 from fastapi.testclient import TestClient
+from server_fakes import made
 
-from relume.errors import DatabaseDamagedError, DiskFullError, LedgerVersionError, SceneError, StorageError
+from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
 from server.apart.process import _answer
 from server.errors import problem_of
 from server.files import importing
@@ -89,11 +90,10 @@ def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
 @pytest.mark.parametrize(
     ("failure", "key"),
     [
-        (StorageError("away"), "storage"),
-        (away_elsewhere("refused"), "away"),
-        (DatabaseDamagedError("malformed"), "damaged"),
-        (LedgerVersionError("of a later relume"), "failure"),
+        (RelumeError("of the program"), "failure"),
         (SceneError("empty"), "problem"),
+        (MaterialError("of another size"), "material"),
+        (OSError(errno.EFBIG, os.strerror(errno.EFBIG)), "large"),
         (OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)), "problem"),
     ],
 )
@@ -107,8 +107,15 @@ def test_the_process_of_an_import_tells_faults_of_the_service_from_those_of_the_
     assert answer_of(ImportRequest.of(settings, "built_in", None, "cornell_box")).keys() == {key}
 
 
-def test_an_import_without_its_database_is_no_fault_of_the_file(settings: Settings) -> None:
-    settings.database = "postgresql://relume@127.0.0.1:9/relume"
-    answer = answer_of(ImportRequest.of(settings, "built_in", None, "cornell_box"))
-    assert answer.keys() == {"away"}
-    assert problem_of(away_elsewhere(answer["away"])).status == 503
+def test_an_import_whose_scene_cannot_be_listed_says_why_and_leaves_nothing_half_there(
+    client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise away_elsewhere("refused")
+
+    monkeypatch.setattr("server.files.intake.enter_scene", fail)
+    monkeypatch.setattr(client.app.state.services.intake.importers, "run", made)  # type: ignore[attr-defined]
+    refused = client.post("/api/scenes", files={"scene": ("triangle.glb", b"which nobody reads")})
+    assert refused.status_code == 503
+    assert client.get("/api/scenes").json() == []
+    assert list((settings.data / "scenes").iterdir()) == []

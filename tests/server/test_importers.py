@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import sys
+import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -13,18 +14,45 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
-from sqlalchemy.exc import OperationalError
 
-from relume.errors import DatabaseDamagedError, DiskFullError, RelumeError, SceneError, StorageError
+from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
 from relume.resident import resident_bytes
 from server.errors import problem_of
 from server.files import importers
-from server.files.importers import Importers
+from server.files.confining import missing
+from server.files.importers import Importers, OutgrownError
 from server.files.importing import ImportRequest
 
 STAND_IN = """
-import os, signal, time
-from server.files import forking
+import importlib, os, signal, time
+from server.files import confining, forking, importing
+
+def reached(request):
+    import socket, subprocess
+    from pathlib import Path
+    own, into = Path(request.file), Path(request.into)
+    tries = {
+        "read its file": own.read_bytes,
+        "write its folder": lambda: (into / "it").write_text("x"),
+        "read another file": (own.parent / "other").read_bytes,
+        "list a folder": lambda: os.listdir(own.parent),
+        "write another file": lambda: (own.parent / "new").write_text("x"),
+        "make a link": lambda: (into / "link").symlink_to(own.parent / "other"),
+        "read another process": lambda: Path(f"/proc/{os.getppid()}/environ").read_bytes(),
+        "signal another process": lambda: os.kill(os.getppid(), 0),
+        "speak to the network": lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM),
+        "speak to the machine": lambda: socket.socket(socket.AF_UNIX),
+        "run a program": lambda: subprocess.run(["/bin/true"]),
+    }
+    done = [name for name, attempt in tries.items() if not refused(attempt)]
+    return {"id": ", ".join(done)}
+
+def refused(attempt):
+    try:
+        attempt()
+    except PermissionError:
+        return True
+    return False
 
 def answer_of(request):
     name = request.name
@@ -37,17 +65,26 @@ def answer_of(request):
             pass
     if name == "swell":
         bytearray(request.max_bytes)
+    if name == "write":
+        import numpy
+        numpy.save(os.path.join(request.into, "texels.npy"), numpy.zeros(1 << 20))
+    if name == "reach":
+        return reached(request)
+    if name == "environment":
+        return {"id": " ".join(os.environ)}
     if name == "defect":
         raise ValueError("of nobody's file")
     return {"id": f"{os.getpid()} {os.getppid()}"} if name == "it" else {name: "no."}
 
-forking._load, forking.answer_of = lambda: None, answer_of
+importing._import = lambda request: answer_of(request)["id"]
+forking._load = lambda: (importlib.import_module("numba.core.caching"), confining.missing())
+forking.answer_of = lambda request: importing.answer_of(request) if request.name == "write" else answer_of(request)
 forking.main()
 """
 
 
 def asked(name: str, seconds: int = 60) -> ImportRequest:
-    return ImportRequest("", "", "scene", "", None, name, seconds, 1 << 32)
+    return ImportRequest(tempfile.gettempdir(), "scene", "", None, name, seconds, 1 << 32, 1 << 32)
 
 
 @pytest.fixture
@@ -117,7 +154,7 @@ def test_who_imports_ends_with_who_asked(waiting: Importers) -> None:
 def test_what_is_forked_from_has_one_thread(tmp_path: Path) -> None:
     with closing(Importers()) as importers:
         with pytest.raises(SceneError, match="cannot be read"):
-            importers.run(replace(asked("it"), data=str(tmp_path), file=str(tmp_path / "none")))
+            importers.run(replace(asked("it"), file=str(tmp_path / "none")))
         assert len(list(Path(f"/proc/{parent_of(importers)}/task").iterdir())) == 1
 
 
@@ -126,9 +163,8 @@ def test_what_is_forked_from_has_one_thread(tmp_path: Path) -> None:
     [
         ("problem", 60, SceneError, "^no"),
         ("full", 60, DiskFullError, "free some space"),
-        ("storage", 60, StorageError, "^no"),
-        ("away", 60, OperationalError, "no"),
-        ("damaged", 60, DatabaseDamagedError, "put a backup"),
+        ("material", 60, MaterialError, "^no"),
+        ("large", 60, OutgrownError, "larger than"),
         ("failure", 60, RelumeError, "^no"),
         ("damage", 60, SceneError, "damaged"),
         ("hang", 1, SceneError, "more than 1 s or"),
@@ -153,3 +189,38 @@ def test_a_defect_is_no_fault_of_the_file_and_leaves_one_line(
     (line,) = [record.getMessage() for record in caplog.records if record.levelno == logging.ERROR]
     assert "ValueError: of nobody's file" in line
     assert "\n" not in line
+
+
+@pytest.mark.skipif(bool(missing()), reason=f"this machine has no {' and no '.join(missing())}")
+def test_who_imports_reaches_its_own_files_and_nothing_else(waiting: Importers, tmp_path: Path) -> None:
+    for name in ("file", "other"):
+        (tmp_path / name).write_text(name)
+    into = tmp_path / "made"
+    into.mkdir()
+    done = waiting.run(replace(asked("reach"), file=str(tmp_path / "file"), into=str(into)))
+    assert done == "read its file, write its folder"
+
+
+def test_who_imports_is_given_no_password(waiting: Importers, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("RELUME_DATABASE", "AWS_SECRET_ACCESS_KEY", "OTEL_EXPORTER_OTLP_HEADERS", "ANYTHING"):
+        monkeypatch.setenv(name, "secret")
+    names = waiting.run(asked("environment")).split()
+    assert "PATH" in names
+    assert not {"RELUME_DATABASE", "AWS_SECRET_ACCESS_KEY", "OTEL_EXPORTER_OTLP_HEADERS", "ANYTHING"} & {*names}
+
+
+def test_a_file_that_unpacks_to_more_than_it_may_is_stopped_while_it_does(waiting: Importers, tmp_path: Path) -> None:
+    with pytest.raises(OutgrownError):
+        waiting.run(replace(asked("write"), into=str(tmp_path), max_file_bytes=1 << 18))
+    assert (tmp_path / "texels.npy").stat().st_size <= 1 << 18
+
+
+def test_a_machine_that_cannot_confine_says_so_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(importers, "_COMMAND", [sys.executable, "-c", STAND_IN])
+    monkeypatch.setattr(importers, "missing", lambda: ("Landlock",))
+    with closing(Importers()) as found:
+        found.start()
+        found.start()
+    assert len([line for line in caplog.messages if "this machine has no Landlock" in line]) == 1

@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,8 +15,10 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.asset_store import check_name
 from relume.synthetic.make import MESH
-from server.access.roles import Caller, Who
+from server.access.reservations import Reservation
+from server.access.roles import Who
 from server.apart.btfs import SENT
+from server.files.door import Held
 from server.files.importing import UPLOAD_PREFIX, ImportRequest
 from server.files.uploads import keep_upload, plain_stem, upload_bytes
 from server.queues.btfs import BtfWork
@@ -43,39 +46,34 @@ BoundField = Annotated[Bound, Form()]
 async def import_btf(
     images: ImagesFile,
     services: Shared,
-    caller: Who,
+    held: Held,
     response: Response,
     name: BtfName = "",
     error: BoundField = BOUND,
 ) -> BtfWorkBody:
     """Queue the import of a zip of images or of a .btf container; what is wrong with it the work says."""
-    quotas, sent_bytes = services.access.quotas, upload_bytes(images)
-    await run_in_threadpool(quotas.check_bytes, caller.name, sent_bytes)
-    async with services.import_slots:
-        identity = await run_in_threadpool(_submit_images, images, sent_bytes, name, error, caller, services)
-    return _answer(identity, services, response)
+    identity = await run_in_threadpool(_submit_images, images, name, error, held, services)
+    return await run_in_threadpool(_answer, identity, services, response)
 
 
-def _submit_images(
-    images: UploadFile, sent_bytes: int, name: str, error: float, caller: Caller, services: Services
-) -> str:
+def _submit_images(images: UploadFile, name: str, error: float, held: Reservation, services: Services) -> str:
     request = BtfRequest(name=check_name(name or plain_stem(images.filename) or "BTF"), error=error)
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
         path = keep_upload(images, Path(folder) / SENT)
-        return _submit(request, sent_bytes, caller, services, lambda into: shutil.move(path, into / SENT))
+        return _submit(request, upload_bytes(images), held, services, lambda into: shutil.move(path, into / SENT))
 
 
 def _submit(
     request: BtfRequest,
     num_bytes: int,
-    caller: Caller,
+    held: Reservation,
     services: Services,
     prepare: Callable[[Path], object] | None = None,
 ) -> str:
     """Queue a work that is its caller's from the beginning: it may be done before the next line is reached."""
     identity = new_id()
-    with services.access.quotas.owning(caller.name, "btf-work", identity, num_bytes):
-        return services.btfs.submit(request, caller.name, prepare, identity)
+    with held.owning("btf-work", identity, num_bytes):
+        return services.btfs.submit(request, held.who, prepare, identity)
 
 
 @router.post("/synthetic", status_code=202)
@@ -85,17 +83,16 @@ async def make_synthetic_btf(
     """Queue the rendering of a small geometry from all sides in light from all sides."""
     name = check_name(request.name or f"{request.geometry.capitalize()} (synthetic)")
     wanted = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
-    quotas = services.access.quotas
-    await run_in_threadpool(quotas.check_bytes, caller.name, 1)  # how many it will take is known when it is made
-    identity = await run_in_threadpool(_submit, wanted, 0, caller, services)
-    return _answer(identity, services, response)
+    async with services.intake.reserving(caller.name, 1) as held:  # how many it will take is known when it is made
+        identity = await run_in_threadpool(_submit, wanted, 0, held, services)
+    return await run_in_threadpool(_answer, identity, services, response)
 
 
 @router.post("/geometry", status_code=202)
 async def make_btf_of_mesh(
     geometry: MeshFile,
     services: Shared,
-    caller: Who,
+    held: Held,
     response: Response,
     period: Annotated[Period | None, Form()] = None,
     size: Annotated[Texels, Form()] = TEXELS,
@@ -105,19 +102,16 @@ async def make_btf_of_mesh(
     """Queue the rendering of a small geometry that is sent; what is wrong with the mesh is said at once."""
     stem = name or f"{plain_stem(geometry.filename) or 'Mesh'} (synthetic)"
     wanted = BtfRequest(name=check_name(stem), error=error, geometry=MESH, size=size, period=period)
-    quotas, sent_bytes = services.access.quotas, upload_bytes(geometry)
-    await run_in_threadpool(quotas.check_bytes, caller.name, sent_bytes)
-    async with services.import_slots:
-        identity = await run_in_threadpool(_submit_mesh, geometry, sent_bytes, wanted, caller, services)
-    return _answer(identity, services, response)
+    identity = await services.intake.work(held.who, partial(_submit_mesh, geometry, wanted, held, services))
+    return await run_in_threadpool(_answer, identity, services, response)
 
 
-def _submit_mesh(mesh: UploadFile, sent_bytes: int, wanted: BtfRequest, caller: Caller, services: Services) -> str:
+def _submit_mesh(mesh: UploadFile, wanted: BtfRequest, held: Reservation, services: Services) -> str:
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
         path = keep_upload(mesh, Path(folder) / SENT)
         looked_at = ImportRequest.of(services.settings, "tile", path, wanted.name)
-        services.importers.run(replace(looked_at, period=wanted.period))
-        return _submit(wanted, sent_bytes, caller, services, lambda into: shutil.move(path, into / SENT))
+        services.intake.read(held, replace(looked_at, period=wanted.period), Path(folder))
+        return _submit(wanted, upload_bytes(mesh), held, services, lambda into: shutil.move(path, into / SENT))
 
 
 def _answer(identity: str, services: Services, response: Response) -> BtfWorkBody:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Response, UploadFile
@@ -12,10 +12,10 @@ from fastapi.concurrency import run_in_threadpool
 from relume.environments.asset_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
 from relume.environments.built_in import BUILT_IN, built_in
 from relume.environments.thumbnail import thumbnail
-from server.access.roles import Who
+from server.files.door import Held
 from server.files.png import A_DAY, PngResponse
 from server.routes.paging import NameFilter, Paged
-from server.routes.shelves.sending import import_apart, take_in
+from server.routes.shelves.sending import take_in
 from server.services import Shared
 from server.wire.bodies import EnvironmentBody, moment
 from server.wire.body import Id
@@ -29,12 +29,10 @@ AnyId = Annotated[str, PathPart(max_length=40, description="id of an imported en
 
 @router.post("", status_code=201)
 async def import_environment(
-    environment: MapFile, services: Shared, caller: Who, response: Response, name: MapName = ""
+    environment: MapFile, services: Shared, held: Held, response: Response, name: MapName = ""
 ) -> EnvironmentBody:
     """Import an environment, in a process of its own; the body says how look documents name it."""
-    shelf = environments_path(services.settings.data)
-    read = partial(import_apart, environment, name, "environment", services)
-    identity = await take_in(environment, caller, services, "environment", shelf, read)
+    identity = await take_in(environment, name, "environment", held, services)
     response.headers["Location"] = f"/api/environments/{identity}"
     return await run_in_threadpool(get_environment, identity, services)
 

@@ -17,10 +17,11 @@ from relume.images.shelf import ImageRecord, get_record, records, thumbnail_path
 from relume.scene.archive import load_material
 from relume.scene.model import Material
 from server.access.roles import Caller, Who
+from server.files.door import Held
 from server.files.png import FOREVER, PngResponse
 from server.routes.paging import NameFilter, Paged, records_page
 from server.routes.shelves.in_use import remove_unused
-from server.routes.shelves.sending import import_apart, take_in
+from server.routes.shelves.sending import take_in
 from server.services import Services, Shared
 from server.wire.bodies import moment
 from server.wire.body import Id
@@ -35,11 +36,10 @@ ImageName = Annotated[str, Form(max_length=200)]
 
 @router.post("", status_code=201)
 async def send_image(
-    image: ImageFile, services: Shared, caller: Who, response: Response, name: ImageName = ""
+    image: ImageFile, services: Shared, held: Held, response: Response, name: ImageName = ""
 ) -> ImageBody:
     """Keep an image, read in a process of its own; the body says how terms of looks name it."""
-    shelf, read = images_path(services.settings.data), partial(import_apart, image, name, "image", services)
-    identity = await take_in(image, caller, services, "image", shelf, read)
+    identity = await take_in(image, name, "image", held, services)
     response.headers["Location"] = f"/api/images/{identity}"
     return await run_in_threadpool(get_image, identity, services)
 
@@ -67,8 +67,8 @@ async def put_metalness(image: Id, request: MetalnessRequest, services: Shared, 
     def read(scene: str, material: str) -> Material:
         return load_material(fetched(scene_path(data, scene)), material)
 
-    async with services.import_slots:
-        made = await run_in_threadpool(with_metalness, folder, terms, image, request.scene, request.material, read)
+    make = partial(with_metalness, folder, terms, image, request.scene, request.material, read)
+    made = await services.intake.work(caller.name, make)
     for name in sorted({texture for term in made if is_image(texture := term["texture"])}):
         await run_in_threadpool(_own, services, caller, folder, name.removeprefix(IMAGES.prefix))
     return MetalnessBody(terms=made)

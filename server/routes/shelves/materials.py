@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import tempfile
-from functools import lru_cache, partial
-from pathlib import Path
+from functools import lru_cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.asset_store import check_name
 from relume.brdf.document import complete_term
 from relume.btf.shelf import BtfRecord
-from relume.measured.asset_store import STORE, MaterialRecord, get_record, keep, records
-from server.access.roles import Who
-from server.files.importing import UPLOAD_PREFIX
+from relume.measured.asset_store import STORE, MaterialRecord, get_record, records
+from server.files.door import Held
 from server.files.png import A_DAY, PngResponse
-from server.files.uploads import keep_upload, plain_stem
 from server.routes.paging import NameFilter, Paged, records_page
 from server.routes.shelves.in_use import remove_unused
 from server.routes.shelves.sending import take_in
-from server.services import Services, Shared
+from server.services import Shared
 from server.wire.bodies import MeasuredBody, moment
 from server.wire.body import Id
 from worker.paths import materials_path
@@ -33,20 +28,12 @@ MaterialName = Annotated[str, Form(max_length=200)]
 
 @router.post("", status_code=201)
 async def import_measured(
-    material: MaterialFile, services: Shared, caller: Who, response: Response, name: MaterialName = ""
+    material: MaterialFile, services: Shared, held: Held, response: Response, name: MaterialName = ""
 ) -> MeasuredBody:
-    """Import a MERL file; the body says how look documents name it."""
-    shelf, read = materials_path(services.settings.data), partial(_import, material, name, services)
-    identity = await take_in(material, caller, services, "material", shelf, read)
+    """Import a MERL file, in a process of its own; the body says how look documents name it."""
+    identity = await take_in(material, name, "material", held, services)
     response.headers["Location"] = f"/api/materials/measured/{identity}"
     return await run_in_threadpool(get_measured, identity, services)
-
-
-def _import(material: UploadFile, name: str, services: Services) -> str:
-    name = check_name(name or plain_stem(material.filename) or "Material")
-    with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
-        path = keep_upload(material, Path(folder) / "material.binary")
-        return keep(materials_path(services.settings.data), path, name).id
 
 
 @router.get("")

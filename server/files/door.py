@@ -1,0 +1,116 @@
+"""Where uploads come in: room for one is there before any of its body is read, and so many of one user at once.
+
+Pure ASGI, behind the gate, which knows who calls: FastAPI reads the whole body before a route is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated
+
+from anyio import CancelScope
+from anyio.to_thread import run_sync
+from fastapi import Depends, Request
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.access.access import Access
+from server.access.reservations import Reservation
+from server.access.roles import KEY
+from server.errors import NearlyFullError, QuotaError, problem_of, problem_response
+from server.files.slots import Slots
+
+UPLOADS = frozenset(
+    {
+        "/api/scenes",
+        "/api/environments",
+        "/api/images",
+        "/api/materials/measured",
+        "/api/materials/btf-works",
+        "/api/materials/btf-works/geometry",
+    }
+)
+UPLOADS_AT_ONCE, UPLOADS_EACH = 64, 8
+STEP_BYTES = 16 << 20
+"""Held at a time of a body that does not say how large it is."""
+_HELD = "relume.reservation"
+_Refusal = QuotaError | NearlyFullError
+
+
+class Door:
+    """The middleware behind the gate.
+
+    Args:
+        access: asked for with each upload, because it is opened after the app is made.
+        each: uploads of one user at once; more of them wait. shares: turns of some users.
+    """
+
+    def __init__(self, app: ASGIApp, *, access: Callable[[], Access], each: int, shares: Mapping[str, float]) -> None:
+        self._app, self._access = app, access
+        self._places = Slots(UPLOADS_AT_ONCE, each, shares)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Hand on; an upload with what it may take, which is let go when it is answered."""
+        if scope["type"] != "http" or scope["method"] != "POST" or scope["path"] not in UPLOADS:
+            await self._app(scope, receive, send)
+            return
+        who = scope[KEY].name
+        async with self._places.held(who):
+            reservation = scope[_HELD] = Reservation(self._access().quotas, who)
+            try:
+                await _Upload(reservation, scope).take(self._app, receive, send)
+            finally:
+                with CancelScope(shield=True):  # whoever has gone takes nothing any more
+                    await run_sync(reservation.release)
+
+
+class _Upload:
+    """One of them, as its body comes in."""
+
+    def __init__(self, reservation: Reservation, scope: Scope) -> None:
+        self._reservation, self._scope = reservation, scope
+        length = Headers(scope=scope).get("content-length", "")
+        self._length = int(length) if length.isdecimal() else None
+        self._num_bytes, self._is_started = 0, False
+        self._refusal: _Refusal | None = None
+
+    async def take(self, app: ASGIApp, receive: Receive, send: Send) -> None:
+        """Hand it on, unless there is no room for it; said on the way whatever the app makes of that."""
+
+        async def counted() -> Message:
+            message = await receive()
+            self._num_bytes += len(message.get("body", b""))
+            if self._num_bytes > self._reservation.bytes:
+                await self._hold(self._num_bytes + STEP_BYTES)
+            return message
+
+        async def unless_refused(message: Message) -> None:
+            if self._refusal is None or self._is_started:
+                self._is_started = True
+                await send(message)
+
+        try:
+            await self._hold(STEP_BYTES if self._length is None else self._length)
+            await app(self._scope, counted, unless_refused)
+        except (QuotaError, NearlyFullError):
+            if self._refusal is None or self._is_started:
+                raise
+        if self._refusal is not None and not self._is_started:
+            close = {"Connection": "close"}  # what is left of the body is not read
+            await problem_response(problem_of(self._refusal), close)(self._scope, receive, send)
+
+    async def _hold(self, num_bytes: int) -> None:
+        try:
+            await run_sync(self._reservation.hold, num_bytes)
+        except (QuotaError, NearlyFullError) as error:
+            self._refusal = error
+            raise
+
+
+def _held(request: Request) -> Reservation:
+    reservation: Reservation = request.scope[_HELD]
+    return reservation
+
+
+Held = Annotated[Reservation, Depends(_held)]
+"""What an upload's route may let it take."""

@@ -1,0 +1,136 @@
+"""Takes in what imports make: read in a process of its own, measured, counted as somebody's, put in its place."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from fastapi.concurrency import run_in_threadpool
+
+from relume.asset_store import AssetStore
+from relume.brdf.channels import IMAGES
+from relume.environments.asset_store import STORE as ENVIRONMENTS
+from relume.errors import RelumeError
+from relume.measured.asset_store import STORE as MATERIALS
+from server.access.quotas import Kind, Quotas
+from server.access.reservations import IMPORTS_AT_ONCE, Reservation
+from server.files.importers import Importers, OutgrownError
+from server.files.importing import SUMMARY, UPLOAD_PREFIX, ImportRequest
+from server.files.slots import Slots
+from worker.ledger import Ledger
+from worker.paths import environments_path, images_path, materials_path, scene_path
+from worker.scenes import enter_scene
+
+if TYPE_CHECKING:
+    from server.settings import Settings
+
+T = TypeVar("T")
+_MADE = "made"
+MAX_SUMMARY_BYTES = 64 << 20
+_STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], Kind]] = {
+    "environment": (ENVIRONMENTS, environments_path, "environment"),
+    "image": (IMAGES, images_path, "image"),
+    "material": (MATERIALS, materials_path, "material"),
+}
+
+
+class Intake:
+    """What routes give files to.
+
+    Attributes:
+        importers: read files.
+    """
+
+    def __init__(self, settings: Settings, ledger: Ledger, quotas: Quotas, importers: Importers) -> None:
+        self._settings, self._ledger, self._quotas, self.importers = settings, ledger, quotas, importers
+        self._slots = Slots(IMPORTS_AT_ONCE, 1 if settings.login else IMPORTS_AT_ONCE, settings.turns)
+
+    @asynccontextmanager
+    async def reserving(self, who: str, num_bytes: int) -> AsyncIterator[Reservation]:
+        """Room for something that is made and not sent. Raises QuotaError, NearlyFullError."""
+        reservation = Reservation(self._quotas, who)
+        try:
+            await run_in_threadpool(reservation.hold, num_bytes)
+            yield reservation
+        finally:
+            await run_in_threadpool(reservation.release)
+
+    async def work(self, who: str, work: Callable[[], T]) -> T:
+        """Do something in a thread when it is somebody's turn to import."""
+        async with self._slots.held(who):
+            return await run_in_threadpool(work)
+
+    async def take(self, reservation: Reservation, order: Callable[[Path], ImportRequest]) -> str:
+        """Import a file, and return the id under which it is kept; whose it is, is counted.
+
+        Args:
+            reservation: what it may take. order: lays files into an empty folder, in a thread, and says what they are.
+        Raises:
+            QuotaError, NearlyFullError: what it unpacks to is too much; nothing of it is kept.
+            And what `Importers.run` raises.
+        """
+        return await self.work(reservation.who, lambda: self._take(reservation, order))
+
+    def _take(self, reservation: Reservation, order: Callable[[Path], ImportRequest]) -> str:
+        with tempfile.TemporaryDirectory(dir=self._settings.data, prefix=UPLOAD_PREFIX) as folder:
+            request = order(Path(folder))
+            identity = self.read(reservation, request, Path(folder))
+            self._adopt(reservation, request, Path(folder) / _MADE, identity)
+        return identity
+
+    def read(self, reservation: Reservation, request: ImportRequest, folder: Path) -> str:
+        """Have a file of a folder read, within what it may take; what is made of it is there, too."""
+        most, into = reservation.most_bytes(), folder / _MADE
+        into.mkdir()
+        try:
+            return self.importers.run(replace(request, into=str(into), max_file_bytes=most))
+        except OutgrownError:
+            raise reservation.outgrown(most) from None
+
+    def _adopt(self, reservation: Reservation, request: ImportRequest, into: Path, identity: str) -> None:
+        store = _STORES.get(request.kind)
+        target = scene_path(self._settings.data, identity)
+        if store is not None:
+            target = store[1](self._settings.data) / store[0].path(into, identity).name
+        num_bytes = _measured(into / identity)
+        if not target.exists():  # else it takes nothing more
+            reservation.hold(num_bytes)
+        if store is None:
+            self._enter(into, identity, target)
+        else:
+            store[0].adopt(target.parent, into / identity)
+        reservation.become(store[2] if store else "scene", identity, num_bytes)
+
+    def _enter(self, into: Path, identity: str, target: Path) -> None:
+        """Put a scene in its place; one that is here and damaged is whole again."""
+        with (into / SUMMARY).open("rb") as file:
+            summary = json.loads(file.read(MAX_SUMMARY_BYTES))
+        is_new = not target.exists()
+        target.mkdir(parents=True, exist_ok=True)
+        for name in ("arrays.npz", "scene.json"):
+            os.replace(into / identity / name, target / name)
+        try:
+            enter_scene(self._settings.data, self._ledger, identity, summary)
+        except Exception:
+            if is_new:  # nobody would find it
+                shutil.rmtree(target, ignore_errors=True)
+            raise
+
+
+def _measured(folder: Path) -> int:
+    """What the files in a folder take that another process has written. Raises RelumeError where one is no file."""
+    total = 0
+    for path in folder.rglob("*"):
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
+            raise RelumeError("the import wrote what is no file; report the file that was sent")
+        total += status.st_size
+    return total

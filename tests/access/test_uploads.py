@@ -1,0 +1,268 @@
+"""Uploads: room for them is there before their bodies are read, and while they unpack; one user takes no other's."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from server_fakes import tiny_scene
+from starlette.types import Message, Receive, Scope, Send
+
+from relume.environments.model import Environment
+from relume.folders import folder_bytes
+from relume.scene.archive import make_scene
+from server.access import quotas as quotas_module
+from server.access.access import Access
+from server.access.reservations import Reservation
+from server.access.roles import KEY, Caller, Role
+from server.errors import NearlyFullError, QuotaError
+from server.files import door
+from server.files.door import Door
+from server.files.importers import OutgrownError
+from server.files.importing import ImportRequest, _written
+from server.files.slots import Slots
+from server.settings import Settings
+
+Bearer = Callable[..., dict[str, str]]
+SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
+CALLER = Caller("Ann", Role.EDIT, "", "token")
+
+
+def some_scene(request: ImportRequest) -> str:
+    """Each name is another scene."""
+    scene = tiny_scene(request.name)
+    light = Environment("gray", np.full((4, 8, 3), float(request.name.removeprefix("n")), np.float32))
+    return _written(request, make_scene(request.name, scene.meshes, scene.materials, scene.cameras, light))
+
+
+@pytest.fixture
+def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client.app.state.services.intake.importers, "run", some_scene)
+
+
+class Body:
+    """A request's body, piece by piece, and what came back."""
+
+    def __init__(self, app: Callable[..., Any], pieces: list[bytes], length: int | None = None) -> None:
+        headers = [] if length is None else [(b"content-length", str(length).encode())]
+        self.scope = {
+            "type": "http", "method": "POST", "path": "/api/scenes", "query_string": b"", "headers": headers,
+            KEY: CALLER,
+        }  # fmt: skip
+        self.pieces, self.num_read, self.sent = pieces, 0, list[Message]()
+        self._app = app
+
+    async def __call__(self) -> int:
+        await self._app(self.scope, self._receive, self._send)
+        return int(self.sent[0]["status"])
+
+    async def _receive(self) -> Message:
+        self.num_read += 1
+        left = self.num_read < len(self.pieces)
+        return {"type": "http.request", "body": self.pieces[self.num_read - 1], "more_body": left}
+
+    async def _send(self, message: Message) -> None:
+        self.sent.append(message)
+
+
+async def taken(scope: Scope, receive: Receive, send: Send) -> None:
+    """A route that reads the whole body, and turns whatever happens into an answer of its own, as FastAPI does."""
+    try:
+        while (await receive())["more_body"]:
+            pass
+        status = 201
+    except Exception:
+        status = 400
+    await send({"type": "http.response.start", "status": status, "headers": []})
+    await send({"type": "http.response.body", "body": b""})
+
+
+def a_door(access: Access, app: Callable[..., Any] = taken, each: int = 8) -> Door:
+    return Door(app, access=lambda: access, each=each, shares={})
+
+
+class TestBodies:
+    @pytest.fixture
+    def settings(self, settings: Settings) -> Settings:
+        settings.max_bytes_each = 100_000
+        return settings
+
+    def test_one_that_says_that_it_is_too_large_is_not_read(self, access: Access) -> None:
+        body = Body(a_door(access), [b"x"], length=100_001)
+        assert asyncio.run(body()) == 429
+        assert body.num_read == 0
+        assert access.quotas.used_bytes("Ann") == 0
+
+    def test_one_that_does_not_say_it_is_read_as_far_as_there_is_room(
+        self, access: Access, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(door, "STEP_BYTES", 10_000)
+        body = Body(a_door(access), [b"x" * 10_000] * 50)
+        assert asyncio.run(body()) == 429
+        assert body.num_read <= 10
+        assert access.quotas.used_bytes("Ann") == 0
+
+    def test_those_that_come_together_count_each_other(self, access: Access) -> None:
+        reading = asyncio.Event()
+        waiting: list[bool] = []
+
+        async def slow(scope: Scope, receive: Receive, send: Send) -> None:
+            waiting.append(True)
+            await reading.wait()
+            await taken(scope, receive, send)
+
+        async def all_at_once() -> list[int]:
+            whole = a_door(access, slow)
+            tasks = [asyncio.create_task(Body(whole, [b"x"], length=30_000)()) for _ in range(5)]
+            while sum(task.done() for task in tasks) < 2 or len(waiting) < 3:
+                await asyncio.sleep(0)
+            assert access.quotas.used_bytes("Ann") == 90_000
+            reading.set()
+            return sorted(await asyncio.gather(*tasks))
+
+        assert asyncio.run(all_at_once()) == [201, 201, 201, 429, 429]
+        assert access.quotas.used_bytes("Ann") == 0
+
+    def test_of_one_user_so_many_are_read_at_once(self, access: Access) -> None:
+        now, most = [0], [0]
+
+        async def slow(scope: Scope, receive: Receive, send: Send) -> None:
+            now[0] += 1
+            most[0] = max(most[0], now[0])
+            await asyncio.sleep(0.01)
+            now[0] -= 1
+            await taken(scope, receive, send)
+
+        async def all_at_once() -> list[int]:
+            whole = a_door(access, slow, each=2)
+            return list(await asyncio.gather(*(Body(whole, [b"x"], length=1)() for _ in range(6))))
+
+        assert asyncio.run(all_at_once()) == [201] * 6
+        assert most == [2]
+
+    def test_who_goes_away_takes_nothing_any_more(self, access: Access) -> None:
+        async def gone(scope: Scope, receive: Receive, send: Send) -> None:
+            assert access.quotas.used_bytes("Ann") == 5
+            raise asyncio.CancelledError
+
+        with pytest.raises(asyncio.CancelledError):
+            asyncio.run(Body(a_door(access, gone), [b"x"], length=5)())
+        assert access.quotas.used_bytes("Ann") == 0
+
+
+@pytest.mark.usefixtures("_imports")
+class TestUnpacking:
+    def test_ten_at_once_keep_no_more_than_a_quota(
+        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings
+    ) -> None:
+        ann = bearer("edit", "Ann")
+
+        def send(number: int) -> int:
+            return client.post("/api/scenes", files=SCENE, data={"name": f"n{number}"}, headers=ann).status_code
+
+        assert send(0) == 201
+        one = access.quotas.used_bytes("Ann")
+        settings.max_bytes_each = int(3.5 * one) + 1_000
+        with ThreadPoolExecutor(10) as threads:
+            answers = [*threads.map(send, range(1, 11))]
+        assert sorted({*answers}) == [201, 429]
+        kept = folder_bytes(settings.data / "scenes")
+        assert one < kept <= settings.max_bytes_each
+        assert access.quotas.used_bytes("Ann") == kept
+        assert not list(settings.data.glob("upload-*"))
+
+    def test_what_unpacks_to_more_than_there_is_left_is_stopped_there(
+        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[int] = []
+
+        def unpack(request: ImportRequest) -> str:
+            asked.append(request.max_file_bytes)
+            raise OutgrownError("too large")
+
+        settings.max_bytes_each = 5_000
+        access.quotas.own("Ann", "scene", "another", 3_000)
+        monkeypatch.setattr(client.app.state.services.intake.importers, "run", unpack)
+        refused = client.post("/api/scenes", files=SCENE, headers=bearer("edit", "Ann"))
+        assert (refused.status_code, asked) == (429, [2_000])
+        assert "unpacks to more than the 2.0 kB" in refused.json()["detail"]
+        assert access.quotas.used_bytes("Ann") == 3_000
+
+
+class TestDisk:
+    @pytest.fixture(autouse=True)
+    def _disk(self, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+        settings.least_free_bytes = 1_000
+        for name in ("quotas", "reservations"):
+            monkeypatch.setattr(f"server.access.{name}.free_bytes", lambda _: 10_000)
+
+    def test_what_all_send_leaves_the_ledger_its_room(self, access: Access) -> None:
+        quotas = access.quotas
+        ann, bob = Reservation(quotas, "Ann"), Reservation(quotas, "Bob")
+        ann.hold(3_000)
+        with pytest.raises(NearlyFullError, match="beside what else is sent now"):
+            bob.hold(3_000)
+        bob.hold(1_000)
+        ann.release()
+        bob.hold(4_000)
+
+    def test_what_one_makes_leaves_the_ledger_its_room(self, access: Access) -> None:
+        reservation = Reservation(access.quotas, "Ann")
+        assert reservation.most_bytes() == (10_000 - 1_000) // 2  # another may unpack at the same time
+        assert isinstance(reservation.outgrown(4_500), NearlyFullError)
+
+    def test_what_a_killed_server_has_reserved_ends(self, access: Access, monkeypatch: pytest.MonkeyPatch) -> None:
+        Reservation(access.quotas, "Ann").hold(4_000)
+        assert access.quotas.used_bytes("Ann") == 4_000
+        monkeypatch.setattr(quotas_module.time, "time", lambda: 1e10)
+        Reservation(access.quotas, "Bob").hold(4_000)
+        assert access.quotas.used_bytes("Ann") == 0
+
+    def test_what_was_held_is_held_where_more_is_refused(self, access: Access, settings: Settings) -> None:
+        settings.max_bytes_each = 2_000
+        reservation = Reservation(access.quotas, "Ann")
+        reservation.hold(1_500)
+        with pytest.raises(QuotaError, match=r"you have 0 bytes of at most 2.0 kB, and this takes 2.5 kB"):
+            reservation.hold(2_500)
+        assert (reservation.bytes, access.quotas.used_bytes("Ann")) == (1_500, 1_500)
+
+
+class TestSlots:
+    def order_of(self, slots: Slots, who: str) -> str:
+        """In which order those get a slot who ask while the first one has it."""
+        got: list[str] = []
+
+        async def take(client: str) -> None:
+            async with slots.held(client):
+                got.append(client)
+                await asyncio.sleep(0)
+
+        async def all_of_them() -> None:
+            await asyncio.gather(*map(take, who))
+
+        asyncio.run(all_of_them())
+        return "".join(got)
+
+    def test_users_take_turns(self) -> None:
+        assert self.order_of(Slots(1, 1, {}), "aaaabb") == "aababa"
+
+    def test_one_user_leaves_a_slot_to_others(self) -> None:
+        assert self.order_of(Slots(2, 1, {}), "aab") == "aba"
+
+    def test_one_who_does_not_wait_any_more_leaves_the_slot(self) -> None:
+        async def cancelled() -> None:
+            slots = Slots(1, 1, {})
+            async with slots.held("a"):
+                waiting = asyncio.create_task(slots.held("b").__aenter__())
+                await asyncio.sleep(0)
+                waiting.cancel()
+                await asyncio.gather(waiting, return_exceptions=True)
+            async with slots.held("c"):
+                pass
+
+        asyncio.run(cancelled())
