@@ -28,6 +28,7 @@ from server.wire import (
     cameras,
     color,
     comments,
+    connection,
     images,
     message,
     models,
@@ -54,6 +55,7 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.EyeMessage,
     protocol.EvaluateMessage,
     rooms.PresenceMessage,
+    connection.PingMessage,
 )
 SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.HelloMessage,
@@ -62,10 +64,11 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.ProbeAnswer,
     protocol.CurveMessage,
     protocol.BakeMessage,
-    protocol.LeavingMessage,
+    connection.LeavingMessage,
     rooms.RoomMessage,
     rooms.SharedMessage,
     rooms.CommentsMessage,
+    connection.PongMessage,
 )
 INPUTS: tuple[type[BaseModel], ...] = (
     message.PatchOperation,

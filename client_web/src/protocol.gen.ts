@@ -136,6 +136,11 @@ export interface PatchOperation {
   value?: unknown;
 }
 
+/** client → server: is anybody there? Answered by a `PongMessage` at once, whatever is being computed. */
+export interface PingMessage {
+  type: "ping";
+}
+
 /** client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and the material in hand. */
 export interface PresenceMessage {
   type: "presence";
@@ -661,6 +666,11 @@ export interface PlanBody {
   seconds: number | null;
 }
 
+/** server → client: the answer to a `PingMessage`. */
+export interface PongMessage {
+  type: "pong";
+}
+
 /** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. `position` and `normal` are of the surface that covers most of it, world space; null for background. */
 export interface ProbeAnswer {
   type: "probe";
@@ -938,7 +948,8 @@ export type ClientMessage =
   | TouchMessage
   | EyeMessage
   | EvaluateMessage
-  | PresenceMessage;
+  | PresenceMessage
+  | PingMessage;
 
 export type ServerMessage =
   | HelloMessage
@@ -950,4 +961,5 @@ export type ServerMessage =
   | LeavingMessage
   | RoomMessage
   | SharedMessage
-  | CommentsMessage;
+  | CommentsMessage
+  | PongMessage;

@@ -109,6 +109,7 @@ MESSAGES: Mapping[str, Role] = {
     "probe": VIEW,
     "brush": VIEW,
     "presence": VIEW,
+    "ping": VIEW,
 }
 """What the messages of a live session need."""
 

@@ -20,6 +20,7 @@ from server.live.session_state import SessionState
 from server.live.state.pointers import check_held, find_curve
 from server.live.state.target import Eye
 from server.wire import protocol
+from server.wire.connection import PingMessage, PongMessage
 from server.wire.rooms import PresenceMessage
 
 MAX_BAD_MESSAGES = 50
@@ -53,6 +54,9 @@ class Reception:
                 message = protocol.CLIENT_MESSAGE.validate_json(text)
             except ValidationError as error:
                 await self._bad(message_problem(error, text))
+                continue
+            if isinstance(message, PingMessage):  # from here, so that no frame is waited for
+                await self._socket.send(PongMessage())
                 continue
             try:
                 self._take(message, received_s)

@@ -39,7 +39,8 @@ from server.logs.context import BAKE, SESSION
 from server.metrics import Metrics
 from server.running.leave import Leave
 from server.traces import Traces
-from server.wire.protocol import CameraInfo, HelloMessage, LeavingMessage, MovingError, ViewInfo
+from server.wire.connection import LeavingMessage
+from server.wire.protocol import CameraInfo, HelloMessage, MovingError, ViewInfo
 from worker.database.faults import AWAY, told
 
 if TYPE_CHECKING:

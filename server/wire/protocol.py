@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 from relume.look.patch import MAX_OPERATIONS
 from relume.picture.fidelity import Word
 from relume.scene.checks import MAX_LIGHTS
+from server.wire.connection import LeavingMessage, PingMessage, PongMessage
 from server.wire.message import Message, Name, PatchOperation, Pointer, Revision, RoleWord
 from server.wire.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, SharedMessage
 from worker.status import Phase
@@ -184,7 +185,8 @@ ClientMessage = Annotated[
     | TouchMessage
     | EyeMessage
     | EvaluateMessage
-    | PresenceMessage,
+    | PresenceMessage
+    | PingMessage,
     Field(discriminator="type"),
 ]
 CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
@@ -317,14 +319,6 @@ class BakeMessage(Message):
     seconds_left: float | None
 
 
-class LeavingMessage(Message):
-    """server → client: the server is being stopped. Open the session again, there or on another server, within so many
-    seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token."""
-
-    type: Literal["leaving"] = "leaving"
-    seconds: float
-
-
 ServerMessage = (
     HelloMessage
     | StatusMessage
@@ -336,6 +330,7 @@ ServerMessage = (
     | RoomMessage
     | SharedMessage
     | CommentsMessage
+    | PongMessage
 )
 
 

@@ -106,6 +106,20 @@ def test_a_frame_that_waits_for_others_shows_what_is_newest_when_its_turn_comes(
         assert control.num_looks == num_looks + 1
 
 
+def test_a_ping_is_answered_while_frames_wait(client: TestClient, baked: Baked) -> None:
+    turns = client.app.state.services.threads.turns  # type: ignore[attr-defined]
+    assert client.portal is not None
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        while not turns.locked():
+            client.portal.call(turns.acquire)
+        session.edit(1, SIGMA, 0.3)
+        session.send(type="ping")
+        assert session.receive() == {"type": "pong"}
+        client.portal.call(turns.release)
+        assert session.exact(1).header["revision"] == 1
+
+
 def test_the_next_frame_is_painted_while_one_goes_out(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:

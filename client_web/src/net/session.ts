@@ -85,6 +85,7 @@ export class Session {
       comments: () => handlers.comments(),
       shared: (message) => this.follow(message),
       leaving: () => this.socket.moveOn(),
+      pong: () => undefined, // that it came is all it says
     };
   }
 
