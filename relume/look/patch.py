@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import jsonpatch
@@ -14,6 +15,7 @@ from relume.look.document import complete_changes
 MAX_OPERATIONS = 256
 MAX_PATH = 1024
 _OPERATIONS = ("add", "remove", "replace", "test")
+_DOES_NOT_FIT = (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError)
 
 
 def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, Any]) -> dict[str, Any]:
@@ -38,10 +40,24 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
             changed = _apply(changed, _checked(operation, k))
         except RecursionError as error:  # jsonpatch copies values recursively
             raise EditError(f"operation {k} has a value nested too deep; no look is nested like that") from error
-        except (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError) as error:
+        except _DOES_NOT_FIT as error:
             where = f"{operation['op']} at {operation['path']!r}"
             raise EditError(f"operation {k} cannot be applied, {where}: {_why(error)}") from error
     return complete_changes(changed, default, document)
+
+
+def rebased(document: Any, patch: Iterable[dict[str, Any]]) -> Any:
+    """A look after a patch that was made for another state of it; operations that do not fit are left out.
+
+    The editor does the same (`client_web/src/document/change.ts`). Nothing is completed or checked.
+
+    Args:
+        document: a look; it is not changed, unchanged parts are shared. patch: operations that are well formed.
+    """
+    for operation in patch:
+        with suppress(*_DOES_NOT_FIT):
+            document = _apply(document, operation)
+    return document
 
 
 def _why(error: Exception) -> str:

@@ -125,7 +125,9 @@ class Reception:
             if self._traces is not None:
                 self._traces.refused(received_s, str(error), {"revision": message.revision})
             raise
-        self._pending.target = target if self._guest is None else self._guest.edited(target)
+        if self._guest is not None:
+            target = self._guest.edited(target, [operation.model_dump(exclude_unset=True) for operation in message.patch])
+        self._pending.target = target
         if self._notes is not None:
             self._notes.note(operation.path for operation in message.patch)
         self._metrics.edits.labels("applied").inc()
@@ -173,7 +175,9 @@ class Reception:
 def _kind(message: protocol.ClientMessage) -> str:
     """What a message is to the table of roles."""
     match message:
-        case protocol.EditMessage(patch=patch) if all(is_own_way(operation.path) for operation in patch):
+        case protocol.EditMessage(patch=patch, hand=hand) if all(
+            is_own_way(path) for path in (*(operation.path for operation in patch), *((hand,) if hand else ()))
+        ):
             return "seen"
         case protocol.TouchMessage(curve=None):
             return "hold"

@@ -97,6 +97,8 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
         assert told["problem"]["detail"].startswith("Vera may look at this picture but not edit it; ask an admin")
         session.send(type="touch", parameter=SIGMA)
         assert session.text("problem")["problem"]["status"] == 403
+        session.send(type="edit", revision=1, patch=[SEEN], hand=SIGMA)  # which would prepare it
+        assert session.text("problem")["problem"]["status"] == 403
         session.send(type="touch", curve=THETA_H)
         shape = session.text("curve")
         assert (shape["curve"], len(shape["bands"])) == (THETA_H, len(shape["generated"]))

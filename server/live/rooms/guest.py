@@ -1,17 +1,20 @@
 """One session in a room: its edits go to all others, theirs come to it.
 
-What a client is told is the difference between what it was told last and what there is now, its own edits in it. It is
-found when it can be sent: however much others edit and however slowly a client reads, nothing piles up.
+A client knows of its own edits by itself. It is told the difference between that look and the one that there is, which
+is found when it can be sent: however much others edit and however slowly a client reads, nothing piles up.
 """
 
 from __future__ import annotations
 
 import asyncio
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from relume.errors import ParameterError
-from relume.look.difference import difference
+from relume.look.difference import Operation, difference
+from relume.look.patch import rebased
 from server.live.rooms.door import Door, check_person
 from server.live.rooms.room import OWN, Room, seen_by
 from server.live.rooms.seat import Seat
@@ -22,6 +25,7 @@ from server.live.state.target import Target
 from server.wire.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, SharedMessage, SharedOperation
 
 PACE_S = 1 / 60
+_UNKNOWN = math.nan  # as a value of a look it equals none, itself included
 
 
 @dataclass(frozen=True)
@@ -52,10 +56,12 @@ class Guest:
         self._place, self._room, self._seat, self._may_edit = place, place.room, place.seat, may_edit
         self._look, self._pending = look, pending
         self.news, self.has_comments = asyncio.Event(), False
-        self._told, self._told_revision = place.room.document, look.revision
+        self._client, self._client_revision = look.document, look.revision  # what the client takes the look for
+        self._last_patch: Sequence[Operation] = ()
+        # the room's look without what this session edited since its pictures showed its edits, or will if they can
+        self._painted = self._painting = place.room.document
         self._told_people = place.room.people()
         self._authors: set[int] = set()
-        self._has_others = False
         self._room.guests.append(self)
 
     async def lost(self) -> None:
@@ -74,38 +80,65 @@ class Guest:
             default=self._look.default,
         )
 
-    def edited(self, target: Target) -> Target:
-        """The session's own edit was accepted: everybody else follows, where it is more than another way of looking.
+    def edited(self, target: Target, patch: Sequence[Operation]) -> Target:
+        """The session's own edit was accepted: all others follow, if it is more than another way of looking.
 
+        Args:
+            patch: that made the look of `target`, as the client sent it.
         Returns:
             What is to be shown here, which says how often the room's look has changed.
         """
-        is_seen = bool(difference(self._room.document, target.document, OWN))
-        if self._may_edit:  # else it is only a way of looking, which whoever comes next does not begin with
+        self._client, self._last_patch = rebased(self._client, patch), patch
+        return self._change(target)
+
+    def _change(self, target: Target) -> Target:
+        """Make this the room's look, if this session may edit; else only the session shows it."""
+        changes: Sequence[Operation] = ()
+        if self._may_edit:
+            changes = difference(self._room.document, target.document, OWN)
             self._room.document = target.document
-        self._room.num_changes += is_seen
+            self._room.num_changes += bool(changes)
         target = replace(target, shared=self._room.num_changes)
-        self._note(self._seat.number, is_own=True)
+        self._note(self._seat.number)
         for other in self._room.guests:
-            if is_seen and other is not self:
-                other.follow(target, self._seat.number)
+            if changes and other is not self:
+                other.follow(target, self._seat.number, changes)
         return target
 
-    def taken_back(self, target: Target) -> Target:
-        """An edit of this session turned out not to be possible: all, and its own client, go back to this look."""
-        self._has_others = True
-        return self.edited(target)
+    def painting(self) -> None:
+        """The session's pictures are about to be given the newest look."""
+        self._painting = self._room.document
 
-    def follow(self, target: Target, author: int) -> None:
-        """Show what somebody else has made of the look."""
+    def painted(self) -> None:
+        """They can show it: none of the edits in it will be taken back."""
+        self._painted = self._painting
+
+    def without_own(self, shown: Target) -> Target | None:
+        """The room's look without what this session edited since its pictures showed `shown`; None if that is nothing.
+
+        Raises RelumeError where that is no look.
+        """
+        document = seen_by(self._painted if self._may_edit else self._room.document, shown.document)
+        is_own = bool(difference(document, self._look.document)) or self._look.solo != shown.solo
+        return self._look.reverted(document, shown) if is_own else None
+
+    def taken_back(self, target: Target) -> Target:
+        """The newest edit of this session was not possible: all, and its own client, go on with this look instead."""
+        self._look.revert(target)
+        unknown = [{"op": "add", "path": each["path"], "value": _UNKNOWN} for each in self._last_patch if each["path"]]
+        self._client = rebased(self._client, unknown) if len(unknown) == len(self._last_patch) else {}
+        return self._change(target)
+
+    def follow(self, target: Target, author: int, changes: Sequence[Operation]) -> None:
+        """Show what somebody else has made of the look by these changes."""
+        self._painted, self._painting = rebased(self._painted, changes), rebased(self._painting, changes)
         document = seen_by(target.document, self._look.document)
         self._pending.target = self._look.follow(document, target)
         self._pending.news.set()
-        self._note(author, is_own=False)
+        self._note(author)
 
-    def _note(self, author: int, *, is_own: bool) -> None:
+    def _note(self, author: int) -> None:
         self._authors.add(author)
-        self._has_others = self._has_others or not is_own
         self.news.set()
 
     def present(self, message: PresenceMessage, caller_name: str) -> None:
@@ -135,13 +168,13 @@ class Guest:
             await asyncio.sleep(PACE_S)
 
     def _shared(self) -> SharedMessage | None:
-        """What the look has become; of what the client did by itself only how far that was accepted."""
-        document, revision = self._room.document, self._look.revision
-        patch = difference(self._told, document, OWN) if self._has_others else []
-        authors, self._authors, self._has_others = sorted(self._authors), set(), False
-        if not patch and revision == self._told_revision:
+        """What the look has become besides what the client did by itself; of that only how far it was accepted."""
+        document, revision = self._look.document, self._look.revision
+        patch = difference(self._client, document)
+        authors, self._authors = sorted(self._authors), set()
+        if not patch and revision == self._client_revision:
             return None
-        self._told, self._told_revision = document, revision
+        self._client, self._client_revision = document, revision
         operations = [SharedOperation(**each) for each in patch]
         return SharedMessage(revision=revision, shared=self._room.num_changes, patch=operations, by=authors)
 

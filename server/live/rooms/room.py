@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
+from relume.look.difference import Operation
 from server.access.roles import Caller
 from server.errors import BusyError
 from server.live.rooms.door import Door
@@ -34,7 +35,7 @@ class Listener(Protocol):
     news: asyncio.Event
     has_comments: bool
 
-    def follow(self, target: Target, author: int) -> None: ...
+    def follow(self, target: Target, author: int, changes: Sequence[Operation]) -> None: ...
 
 
 class Room:

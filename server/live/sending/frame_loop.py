@@ -26,6 +26,7 @@ from server.live.state.target import Target
 
 if TYPE_CHECKING:
     from relume.picture.jobs import Job
+    from server.live.rooms.guest import Guest
 
 REST_S = 0.040  # a hand that moves edits at least this often; refining in between would only delay the next frame
 SETTLE_S = 0.250  # what only refines a picture takes both cores from the next edit
@@ -151,6 +152,18 @@ class FrameLoop:
                 await self._socket.refuse(error)
         self._viewports[name] = Viewport(self._transfer.views[name], picture, moves=self._transfer.eyes is Eyes.FREE)
 
+    def _newest(self) -> Target:
+        """The look that the pictures are given next."""
+        if self._guest is not None:
+            self._guest.painting()
+        return self._pending.target
+
+    def _accept(self, target: Target) -> None:
+        """The pictures can show this look, as `_newest` gave it."""
+        self._accepted = target
+        if self._guest is not None:
+            self._guest.painted()
+
     def _pictures(self) -> list[Picture]:
         return [viewport.picture for viewport in self._viewports.values()]
 
@@ -164,11 +177,11 @@ class FrameLoop:
 
     async def _prepare(self, pointer: str) -> bool:
         """Freeze along what the user has in hand, in the newest look there is; False where that was refused."""
-        target = self._pending.target
+        target = self._newest()
         if target is not self._accepted:
             try:
                 await self._work.quick(painter.accept, self._pictures(), target)
-                self._accepted = target
+                self._accept(target)
             except RelumeError as error:
                 await self._take_back(target, error)
         try:
@@ -246,7 +259,7 @@ class FrameLoop:
         """Paint the newest look, or go on with it; a look that the bake cannot follow is taken back."""
         painted: Painted | RelumeError
         async with self._work.turn():
-            target = self._pending.target
+            target = self._newest()
             accepting = self._pictures() if target is not self._accepted else []
             request = viewport.request(target, self._pending, self._window, accepting)
             try:
@@ -256,7 +269,8 @@ class FrameLoop:
         if isinstance(painted, RelumeError):
             await self._take_back(target, painted)
             return
-        self._accepted, viewport.served_s = target, time.perf_counter()
+        self._accept(target)
+        viewport.served_s = time.perf_counter()
         is_moved = viewport.is_behind(target) and target.received_s is not None
         if is_moved or request.eye is not None:
             self._rest_until_s = time.perf_counter() + REST_S
@@ -304,20 +318,35 @@ class FrameLoop:
             self._pending.news.set()
 
     async def _take_back(self, target: Target, error: RelumeError) -> None:
-        """Go back to the look before; where there is none, or that one itself fails, the session cannot go on.
-
-        In a room whoever made the edit takes it back for all, with what others edited in the same moment; another,
-        whose bake cannot follow it, keeps the picture that there was and tries again with the next edit.
-        """
+        """Go back to the look before; where there is none, or that one itself fails, the session cannot go on."""
         before = self._accepted
         if before is None or before is target:
             raise error
-        is_own = self._guest is None or target.revision > before.revision
-        await self._socket.refuse(error, target.revision if is_own else None)
-        if self._pending.target is target:  # a newer one stands on this and is refused itself
-            self._pending.target = before
-            if is_own:
+        if self._guest is not None:
+            await self._take_back_own(self._guest, target, before, error)
+        else:
+            await self._socket.refuse(error, target.revision)
+            if self._pending.target is target:  # a newer one stands on this and is refused itself
+                self._pending.target = before
                 self._look.revert(before)
-            if is_own and self._guest is not None:
-                self._pending.target = self._guest.taken_back(before)
         await self._work.quick(painter.accept, self._pictures(), before)
+
+    async def _take_back_own(self, guest: Guest, target: Target, before: Target, error: RelumeError) -> None:
+        """In a room a session takes back its own newest edits alone, if the pictures can show the look without them.
+
+        If they cannot, it is somebody else's edit that this bake cannot follow: it keeps the picture that there was,
+        and tries again with the next edit.
+        """
+        if self._pending.target is not target:  # the newer one says whether it can be shown
+            return
+        without = guest.without_own(before)
+        if without is not None:
+            try:
+                await self._work.quick(painter.accept, self._pictures(), without)
+            except RelumeError:
+                without = None
+            if self._pending.target is not target:
+                return
+        if without is not None:
+            self._pending.target = guest.taken_back(without)
+        await self._socket.refuse(error, None if without is None else target.revision)

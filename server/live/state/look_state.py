@@ -51,6 +51,10 @@ class LookState:
         look = self._read(document)
         return Target(look, document, self.revision, of.received_s, of.hand, self.solo, of.shared, of.taken_s)
 
+    def reverted(self, document: dict[str, Any], shown: Target) -> Target:
+        """What would be shown if the look became this document, and what is alone as it was when `shown` was."""
+        return Target(self._read(document), document, self.revision, None, solo=shown.solo, shared=shown.shared)
+
     def revert(self, shown: Target) -> None:
         """Go back to the look that is shown; the revision stays, so that the client counts on."""
         self.document, self.solo = shown.document, shown.solo
