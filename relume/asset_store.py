@@ -138,7 +138,8 @@ class AssetStore:
         """Give a thing that is here its newest name, if it came from the same file."""
         document = self.read(target)
         if document.get("sha256", digest) != digest:  # two files were made for that: it takes billions of tries
-            raise self.problem(f"another file is the {self.what} {target.name}; delete that one first, if it is not yours")
+            clash = f"another file is the {self.what} {target.name}"
+            raise self.problem(f"{clash}; delete that one first, if it is not yours")
         if document["name"] != name:
             with replacing(target / self.record) as unfinished:
                 unfinished.write_text(json.dumps({**document, "name": name}))
