@@ -24,7 +24,7 @@ from relume.eye.layers import most_shown
 from relume.eye.merged import PATTERNS, POSITIONS_A_PIXEL, Chosen
 from relume.eye.seen import Edges, Eye
 from relume.eye.sorted_rows import Column, SortedRows
-from relume.eye.tinted import NUM_CHANNELS, POINTS_A_BLOCK, ColumnOfParted, TintedLight, has_tinted_glass, parted
+from relume.eye.tinted import POINTS_A_BLOCK, Split, SplitColumn, TintedLight, num_tints
 from relume.eye.ways import Chain
 from relume.eye.windows import AT_ONCE, Window, morton, windows_of
 from relume.parallel import each_in_order
@@ -44,7 +44,7 @@ _LEVELS = 256
 _POINTS = ("position", "normal", "tangent")
 _SURFACE = ("diffuse", "specular", "uv", "roughness", "normal_length", "emission", "surface_normal")
 _CHAIN = ("mirror", "mirror_cosine", "mirror_tint")
-_OWN = ("pixel", "weight", "material", "level", "through", "eye", "is_mirrored")
+_OWN = ("pixel", "weight", "material", "level", "through", "eye", "is_mirrored", "chance")
 _COLUMNS = (*_OWN, *_POINTS, *_SURFACE, *_CHAIN)
 _NEEDED = ("material", "level", "position", "normal")  # to tell which samples light comes to through tinted glass
 
@@ -63,11 +63,12 @@ class ViewSamples:
         num_rays: how many were traced to find them.
         level: of roughness, see `relume.scene.roughness`; 0 where the material has but one. (n,) uint8
         through: what glass before a sample lets through. Samples on glass and those behind it, on mirrors and those
-            seen in them, have the same shares of a pixel. Of samples of one channel it is three times that of
-            this one, and nothing of others. (n, 3) float32
+            seen in them, have the same shares of a pixel. Where light comes to a sample through tinted glass, several
+            stand in its place, which share its `weight`, and this says how (`relume.eye.tinted`). (n, 3) float32
         eye: where each is seen from: the camera, or the last surface that turned the way to it. (n, 3) float32
         chain: the mirrors that it is seen in, `NO_MIRROR` where it is seen in fewer.
         is_mirrored: whether its surface is a mirror, and other samples have what is seen in it. (n,)
+        chance: of its rays at surfaces that blend, see `relume.points.Points`. (n,) float32
     """
 
     pixel: NDArray[np.uint32]
@@ -80,6 +81,7 @@ class ViewSamples:
     eye: F32
     chain: Chain
     is_mirrored: NDArray[np.bool_]
+    chance: F32
 
     @classmethod
     def of(cls, columns: Mapping[str, Any], num_rays: int) -> ViewSamples:
@@ -120,6 +122,7 @@ def sample_view(
     *,
     follows_mirrors: bool = True,
     smooths_edges: bool = True,
+    by_channel: bool = False,
 ) -> ViewSamples:
     """Find the view samples of one camera, in memory.
 
@@ -128,9 +131,10 @@ def sample_view(
         view: name of the camera. size: width and height in pixels.
         follows_mirrors: whether what is seen in mirrors has samples.
         smooths_edges: whether pixels across edges have several; else each shows what is seen through its middle.
+        by_channel: whether samples that see light through tinted glass are split by channel, not by tint.
     """
     eye = eye_of(scene, geometry, view, size, follows_mirrors=follows_mirrors)
-    return ViewSamples.of(*sampled(eye, io.BytesIO, smooths_edges=smooths_edges))
+    return ViewSamples.of(*sampled(eye, io.BytesIO, smooths_edges=smooths_edges, by_channel=by_channel))
 
 
 def eye_of(scene: Scene, geometry: Geometry, view: str, size: tuple[int, int], *, follows_mirrors: bool = True) -> Eye:
@@ -140,13 +144,18 @@ def eye_of(scene: Scene, geometry: Geometry, view: str, size: tuple[int, int], *
 
 
 def sampled(
-    eye: Eye, scratch: Callable[[], IO[bytes]], names: Sequence[str] = _COLUMNS, *, smooths_edges: bool = True
+    eye: Eye,
+    scratch: Callable[[], IO[bytes]],
+    names: Sequence[str] = _COLUMNS,
+    *,
+    smooths_edges: bool = True,
+    by_channel: bool = False,
 ) -> tuple[dict[str, Column], int]:
     """Find the view samples of an eye, of which no more than a window's are in memory.
 
     Args:
         eye: that sees them. scratch: opens a file that is gone when it is closed.
-        names: of the columns that are wanted. smooths_edges: see `sample_view`.
+        names: of the columns that are wanted. smooths_edges, by_channel: see `sample_view`.
     Returns:
         The columns of `ViewSamples`, of its surface, points and chain, by name; how many rays were traced.
     """
@@ -159,9 +168,9 @@ def sampled(
             break
     assert rows is not None  # for two samples of each pixel there is room
     columns = rows.columns()
-    if has_tinted_glass(materials):
-        by_channel, num_traced = _by_channel(eye, columns, most)
-        columns, num_rays = {**columns, **by_channel}, num_rays + num_traced
+    if num_tints(materials):
+        split, num_traced = _split(eye, columns, most, by_channel=by_channel)
+        columns, num_rays = {**columns, **split}, num_rays + num_traced
     return {name: columns[name] for name in names}, num_rays
 
 
@@ -242,29 +251,33 @@ def _sorted_samples(eye: Eye, chosen: Chosen) -> dict[str, NDArray[Any]]:
     return {
         "pixel": chosen.pixel[order].astype(np.uint32), "weight": chosen.weight[order], "material": material[order],
         "level": level, "through": seen.through, "eye": seen.eyes, "is_mirrored": seen.is_mirrored,
+        "chance": np.zeros(len(order), np.float32),
         **{name: getattr(full.points, name) for name in _POINTS},
         **{name: getattr(full, name) for name in _SURFACE},
         **dict(zip(_CHAIN, seen.chain, strict=True)),
     }  # fmt: skip
 
 
-def _by_channel(eye: Eye, columns: Mapping[str, Column], most: int) -> tuple[dict[str, Any], int]:
-    """Make samples of one channel of those that light reaches through tinted glass; none where that were too many.
+def _split(
+    eye: Eye, columns: Mapping[str, Column], most: int, *, by_channel: bool
+) -> tuple[dict[str, SplitColumn], int]:
+    """Split samples that light reaches through tinted glass; none where they were too many.
 
     Args:
         eye: that sees the samples. columns: of them. most: samples that a plan has room for.
+        by_channel: see `sample_view`.
     Returns:
         Columns in place of those; how many rays were traced.
     """
     key = _key(np.asarray(columns["material"]), np.asarray(columns["level"]))
     num, num_surface = len(key), int(np.searchsorted(key, BACKGROUND * _LEVELS))
     light = TintedLight(eye.geometry, eye.scene.environment.radiance)
-    is_lit, num_rays = np.zeros(num, np.bool_), 0
+    tints, num_rays = np.full((num, light.num_groups, 3), np.nan, np.float32), 0
     for start in range(0, num_surface, POINTS_A_BLOCK):
         block = slice(start, min(start + POINTS_A_BLOCK, num_surface))
-        is_lit[block], num_traced = light.reaches(columns["position"][block], columns["normal"][block])
+        tints[block], num_traced = light.tints(columns["position"][block], columns["normal"][block])
         num_rays += num_traced
-    if num + (NUM_CHANNELS - 1) * np.count_nonzero(is_lit) > most:
+    split = Split(tints, np.append(np.flatnonzero(np.diff(key, prepend=-1)), num), by_channel=by_channel)
+    if len(split.row) > most:
         return {}, num_rays
-    of = parted(is_lit, np.append(np.flatnonzero(np.diff(key, prepend=-1)), num))
-    return {name: ColumnOfParted(name, column, of) for name, column in columns.items()}, num_rays
+    return {name: SplitColumn(name, column, split) for name, column in columns.items()}, num_rays

@@ -15,7 +15,7 @@ from relume.bake import Recipe
 from relume.errors import PlanError
 from relume.eye.layers import most_layers, most_shown
 from relume.eye.merged import PATTERNS, POSITIONS_A_PIXEL
-from relume.eye.tinted import RAYS_TO_TINTED, has_tinted_glass
+from relume.eye.tinted import num_tints, rays_to_tinted
 from relume.eye.view_samples import most_samples
 from relume.eye.windows import SIDE
 from relume.light.gather_rays import MAX_RAYS
@@ -29,7 +29,7 @@ _TREE_BYTES_A_TRIANGLE = 160  # Embree's, while it is built
 LIGHT_BYTES_A_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
 BYTES_A_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
 _PIXEL_BYTES = 16  # of what is known of every pixel before samples are made, and while they are looked through
-_PARTED_BYTES = 40  # of a sample, while it is found which are of one channel
+_SPLIT_BYTES, _TINT_BYTES = 36, 12  # of a sample, while tinted light is looked for; of each of its tints
 _WRITING_BYTES = 64 << 20  # a shard of a column, as it is, compressed, and while it is read
 _HALVINGS = 1 / 3  # of a texture's texels, in half precision
 _HALVING = 2  # of the largest texture's bytes, while its first halving is made
@@ -52,7 +52,7 @@ def camera_rays(scene: Scene, recipe: Recipe) -> int:
 
 def tinted_rays(scene: Scene, num_samples: int) -> int:
     """Rays that find which of some samples see light through tinted glass."""
-    return num_samples * RAYS_TO_TINTED if has_tinted_glass(scene.materials) else 0
+    return num_samples * rays_to_tinted(scene.materials)
 
 
 def lights_bytes(scene: Scene, recipe: Recipe) -> int:
@@ -129,8 +129,9 @@ def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
     """What a task of the first stage takes besides: the lights, or the samples of a view."""
     num_pixels = recipe.size[0] * recipe.size[1]
     num_rays = (1 + POSITIONS_A_PIXEL) * min(num_pixels, SIDE**2) * most_layers(scene.materials)
-    parted = _PARTED_BYTES * samples_of_view(scene, recipe) if has_tinted_glass(scene.materials) else 0
-    sampling = num_rays * BYTES_A_RAY + num_pixels * _PIXEL_BYTES + parted + _WRITING_BYTES
+    tints = num_tints(scene.materials)
+    split = (_SPLIT_BYTES + tints * _TINT_BYTES) * samples_of_view(scene, recipe) if tints else 0
+    sampling = num_rays * BYTES_A_RAY + num_pixels * _PIXEL_BYTES + split + _WRITING_BYTES
     return max(weighing_bytes(scene), sampling)
 
 

@@ -15,6 +15,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
     views/<k>/normal_length, surface_normal                  of scenes with bumps: relume.trace.surface.Surface
     views/<k>/through, eye, is_mirrored, mirror, mirror_cosine, mirror_tint
                                                              of scenes with glass or mirrors: relume.eye.view_samples
+    views/<k>/chance                                         of scenes with tinted glass: relume.points.Points
     views/<k>/visibility                                     samples on surfaces only
     views/<k>/rays/<shard>                                   relume.trace.coherent.RayCounts of a shard's rows
 """
@@ -32,6 +33,7 @@ from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, W
 from relume.errors import PlanError
 from relume.eye.layers import has_layers
 from relume.eye.mirrors import MOST_MIRRORS
+from relume.eye.tinted import num_tints
 from relume.eye.view_samples import BACKGROUND, eye_of, sampled
 from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.light.triangles import Unturned, weigh
@@ -50,7 +52,7 @@ CHUNK_ROWS = 1024
 MAX_PIXELS = 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
 _EMISSION_BYTES, _BUMP_BYTES = 12, 4 + 12
-_LAYER_BYTES = 12 + 12 + 1 + MOST_MIRRORS * (2 + 4 + 12)
+_LAYER_BYTES = 12 + 12 + 1 + 4 + MOST_MIRRORS * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
 _RAY_NS, _TRIANGLE_US = 5.0, 2.0  # of one core, on scenes of 200 to a million triangles
@@ -134,6 +136,7 @@ class SampledViews:
             "double_sided": [material.double_sided for material in scene.materials],
             "has_holes": any(material.lets_pass for material in scene.materials),
             "has_layers": has_layers(scene.materials),
+            "has_tints": num_tints(scene.materials) > 0,
             "has_emission_images": has_images(scene),
             "roughness_levels": [list(levels_of(material)) for material in scene.materials],
             "shortest_normals": [shortest_normal(material.normal_map) for material in scene.materials],
@@ -203,6 +206,8 @@ def _columns(scene: Scene) -> list[str]:
     names = ["pixel", "weight", "material", "level", "position", "normal", "tangent", "diffuse", "specular", "uv"]
     if has_layers(scene.materials):
         names += ["through", "eye", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
+    if num_tints(scene.materials):
+        names.append("chance")
     if has_images(scene):
         names.append("emission")
     return names + ["normal_length", "surface_normal"] * _has_bumps(scene)

@@ -18,11 +18,11 @@ from relume.environments.equirect import lookup, turned
 from relume.environments.model import Environment
 from relume.errors import CancelledError
 from relume.eye.mirrors import are_mirrors
-from relume.eye.tinted import chance_of
 from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.light.tiles import MIN_LIGHTS
 from relume.look import Look, Paths
 from relume.methods.direct import DirectMethod
+from relume.points import ALIKE
 from relume.reference.images import roughness_at, textures_of, wearing
 from relume.reference.indirect import reference_indirect
 from relume.reference.kinds import kinds_of
@@ -183,7 +183,8 @@ class _Draw:
 def _shoot(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _Shot:
     """Trace a view's samples and find the look's light."""
     geometry = merge(scene)
-    samples = sample_view(scene, geometry, view, size, follows_mirrors=False)  # here mirrors are lobes like others
+    # here mirrors are lobes like others, and light through tinted glass is traced, not told by a mean
+    samples = sample_view(scene, geometry, view, size, follows_mirrors=False, by_channel=True)
     light = scene.environment if look.environment.map is None else environments.find(look.environment.map)
     texels = texels_of(light, look.environment.rotation).times(look.environment.gain)
     of_look = scene, look, samples.surface, samples.material
@@ -248,7 +249,7 @@ def points_of(samples: ViewSamples, textures: Mapping[str, F32], roughness: F32)
     points = samples.surface.points
     towards = samples.eye.astype(np.float64) - points.position
     wo = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
-    chance = chance_of(samples.through)
+    chance = samples.chance if samples.chance.any() else ALIKE
     return Points(points.position, points.normal, points.tangent, wo, textures, roughness, samples.surface.uv, chance)
 
 

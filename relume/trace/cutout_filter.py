@@ -20,7 +20,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.color import LUMINANCE
-from relume.trace.cutouts import PASSES, TINTED, Cutouts
+from relume.trace.cutouts import MOST_TINTS, PASSES, Cutouts, tint_groups
 from relume.trace.texture import two_texels
 from relume.uncounted import UNCOUNTED
 
@@ -34,21 +34,23 @@ _MOST = np.float32(254.5 / 255)  # a chance that texels of 255 reach, however th
 # chances of rays that are stopped by whatever is there a little, of those that only what is wholly there stops, and of
 # those that see no glass, and else what their direction makes them see
 ANYWHERE, EVERYWHERE, PAST_GLASS = np.float32(-1), np.float32(2), np.float32(-2)
-# of rays that only light of one channel takes; and of those that glass stops where it is tinted, and no other
-OF_CHANNEL, TO_TINTED = np.array([-3, -4, -5], np.float32), np.float32(-6)
+# of rays that only light of one channel takes
+OF_CHANNEL = np.array([-3, -4, -5], np.float32)
 _LAST_CHANNEL = OF_CHANNEL[2]
-_TINTED = np.float32(TINTED)
+# of rays that tinted glass stops, and from then on of those that glass of one more group of tints lets pass altogether
+UP_TO_GROUP = np.array([-6 - group for group in range(MOST_TINTS + 1)], np.float32)
+_NO_GROUP = UP_TO_GROUP[0]
 
 
 class Holes(NamedTuple):
     """What the filter reads, kept for as long as the scene that it belongs to.
 
     Attributes:
-        addresses: of the arrays below and of those of the cut-outs. (7,) int64
+        addresses: of the arrays below and of those of the cut-outs. (8,) int64
         image: row of `Cutouts.images` of each triangle, −1 where it has no holes. (faces,) int32
         sheet: those of one number are passed by one chance: all of an image, but each piece of glass. (faces,) int32
         faces: corners. (faces, 3) uint32. uvs: places of corners in textures. (corners, 2) float32
-        cutouts: the images.
+        cutouts: the images. groups: of the tints of each, see `tint_groups`. (images,) int32
     """
 
     addresses: NDArray[np.int64]
@@ -57,6 +59,7 @@ class Holes(NamedTuple):
     faces: U32
     uvs: F32
     cutouts: Cutouts
+    groups: NDArray[np.int32]
 
     @property
     def blends(self) -> bool:
@@ -76,9 +79,9 @@ class Holes(NamedTuple):
         """
         image = np.ascontiguousarray(cutouts.of_material[face_material], np.int32)
         faces, uvs = np.ascontiguousarray(faces, np.uint32), np.ascontiguousarray(uvs, np.float32)
-        sheet = _sheets(positions, faces, image, cutouts)
-        read = (image, faces, uvs, cutouts.texels, cutouts.images, cutouts.rules, sheet)
-        return cls(np.array([array.ctypes.data for array in read], np.int64), image, sheet, faces, uvs, cutouts)
+        sheet, groups = _sheets(positions, faces, image, cutouts), tint_groups(cutouts)
+        read = (image, faces, uvs, cutouts.texels, cutouts.images, cutouts.rules, sheet, groups)
+        return cls(np.array([array.ctypes.data for array in read], np.int64), image, sheet, faces, uvs, cutouts, groups)
 
 
 def _sheets(positions: F32, faces: U32, image: NDArray[np.int32], cutouts: Cutouts) -> NDArray[np.int32]:
@@ -160,14 +163,21 @@ def _schlick(cosine, f0):  # type: ignore[no-untyped-def]
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _passed(rule, given):  # type: ignore[no-untyped-def]
     """What a side of glass lets pass but for what it reflects: of a channel, or of luminance. rule: of `Cutouts`"""
-    if given == 0:
-        return _RED * rule[1] + _GREEN * rule[2] + _BLUE * rule[3]
-    return rule[np.int64(-given) - 2]
+    if _LAST_CHANNEL <= given < 0:
+        return rule[np.int64(-given) - 2]
+    return _RED * rule[1] + _GREEN * rule[2] + _BLUE * rule[3]
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _is_tinted(rule):  # type: ignore[no-untyped-def]
-    return max(rule[1], rule[2], rule[3]) - min(rule[1], rule[2], rule[3]) > _TINTED
+def _is_open(group, given):  # type: ignore[no-untyped-def]
+    """Whether glass lets all rays of a chance pass. group: of its tint, see `tint_groups`."""
+    return given == PAST_GLASS or (group > 0 and given <= _NO_GROUP and np.float32(group) <= _NO_GROUP - given)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _lets_a_share_pass(group, given):  # type: ignore[no-untyped-def]
+    """Whether glass lets a share of the rays of a chance pass, and else none. group: of its tint."""
+    return given == 0 or _LAST_CHANNEL <= given < PAST_GLASS or (given <= _NO_GROUP and group == 0)
 
 
 @nb.cfunc("void(CPointer(int64))", cache=True, error_model="numpy")
@@ -179,7 +189,7 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
     rays = _array(_at(words[3]), (9, width), np.float32)
     hits = _array(_at(words[4]), (6, width), np.float32)
     primitives = _array(_at(words[4]), (6, width), np.uint32)
-    read = _array(_at(words[1]), (7,), np.int64)
+    read = _array(_at(words[1]), (8,), np.int64)
     of_face = _array(_at(read[0]), (1 << 40,), np.int32)
     faces = _array(_at(read[1]), (1 << 40, 3), np.uint32)
     uvs = _array(_at(read[2]), (1 << 40, 2), np.float32)
@@ -187,6 +197,7 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
     texels = _array(_at(read[3]), (1 << 40,), np.uint8)
     images = _array(_at(read[4]), (1 << 30, 5), np.int64)
     rules = _array(_at(read[5]), (1 << 30, 6), np.float32)
+    groups = _array(_at(read[7]), (1 << 30,), np.int32)
     for lane in range(width):
         if valid[lane] == 0:
             continue
@@ -203,9 +214,9 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
             along = hits[0, lane] * x + hits[1, lane] * y + hits[2, lane] * z
             given = rays[_TIME, lane]
             least = _chance(given, face, sheets[face], x, y, z, along > 0)
-            if rules[row, 0] == PASSES and (given == PAST_GLASS or (given == TO_TINTED and not _is_tinted(rules[row]))):
+            if rules[row, 0] == PASSES and _is_open(groups[row], given):
                 there = np.float32(0)
-            elif rules[row, 0] == PASSES and (given == 0 or _LAST_CHANNEL <= given < PAST_GLASS):
+            elif rules[row, 0] == PASSES and _lets_a_share_pass(groups[row], given):
                 square = hits[0, lane] ** 2 + hits[1, lane] ** 2 + hits[2, lane] ** 2
                 cosine = abs(along) / np.sqrt(square * (x * x + y * y + z * z))
                 there *= np.float32(1) - _passed(rules[row], given) * (np.float32(1) - _schlick(cosine, rules[row, 4]))

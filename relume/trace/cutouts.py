@@ -19,6 +19,7 @@ from relume.scene.model import WRAPS, Glass, Material, Opacity
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
 BLENDS, PASSES = -1.0, -2.0  # instead of a bound: shares of opacity; glass
+MOST_TINTS = 3  # groups of tints that are told from each other
 TINTED = 0.05  # by how much the shares of channels differ at least that pass a side of glass which has a colour
 
 
@@ -63,6 +64,25 @@ def is_tinted(glass: Glass) -> bool:
     """Tell whether glass has a colour that its shadows show."""
     passed = _of_glass(glass)[1:4]
     return max(passed) - min(passed) > TINTED
+
+
+def tint_groups(cutouts: Cutouts) -> NDArray[np.int32]:
+    """Number the tints of glass from 1 on: those that are nearly alike share a number, and all beyond the last do.
+
+    Returns:
+        Of each image; 0 of what has no tint. (images,) int32
+    """
+    passed = cutouts.rules[:, 1:4]
+    is_glass = cutouts.rules[:, 0] == PASSES
+    group, first = np.zeros(len(passed), np.int32), list[NDArray[np.float32]]()
+    for row in np.flatnonzero(is_glass & (np.ptp(passed, axis=1) > TINTED)):
+        off = [float(np.abs(passed[row] - tint).max()) for tint in first]
+        if (not off or min(off) > TINTED) and len(first) < MOST_TINTS:
+            first.append(passed[row])
+            group[row] = len(first)
+        else:
+            group[row] = 1 + int(np.argmin(off))
+    return group
 
 
 def _of_glass(glass: Glass) -> tuple[float, ...]:

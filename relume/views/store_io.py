@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.errors import ChunkDamagedError, SceneError, StoreError
-from relume.eye.tinted import chance_of
 from relume.light.gather_rays import Pattern, make_pattern
 from relume.points import ALIKE, Points
 from relume.project.receivers import GatherRays
@@ -99,9 +98,10 @@ def read_chance(store: StoreReader, k: int, start: int, stop: int) -> F32:
     Args:
         store: an open store. k: number of the view. start, stop: rows of its arrays.
     """
-    if not store.attributes.get("has_layers"):
+    if not store.attributes.get("has_tints"):
         return ALIKE
-    return chance_of(store.read(f"views/{k}/through", start, stop))
+    chance = store.read(f"views/{k}/chance", start, stop)
+    return chance if chance.any() else ALIKE
 
 
 def read_eyes(store: StoreReader, k: int, start: int, stop: int) -> F32:

@@ -1,0 +1,135 @@
+"""Light through tinted glass: its color in narrow lobes and in wide ones, against brute force and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sessions import look_of, relative_rmse
+from tiny_scenes import looking, quad, scene_of
+
+from relume.bake import Recipe
+from relume.brdf.fresnel import schlick
+from relume.environments.equirect import texel_directions
+from relume.eye.tinted import Split
+from relume.eye.view_samples import sample_view
+from relume.memory import Memory
+from relume.methods.registry import METHODS, open_bake
+from relume.reference.image import reference_image
+from relume.render.image import render_image
+from relume.scene.model import Glass, Material
+from relume.store import bake_here
+from relume.trace.cutout_filter import UP_TO_GROUP
+from relume.trace.geometry import merge
+
+SIZE = (24, 16)
+CLEAR = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.3, "f0": [0.04] * 3}}
+WHITE = Material("White", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))
+POLISHED = Material("Gold", ({"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.12, "f0": [0.9] * 3}},))
+GREEN, RED, BLUE = (0.6, 0.95, 0.7), (0.9, 0.2, 0.1), (0.1, 0.2, 0.9)
+
+
+def pane(name, material, x=(-60, 60), y=4.0):
+    """A level rectangle over the floor."""
+    (a, b) = x
+    return quad(name, [[a, y, 60], [b, y, 60], [b, y, -60], [a, y, -60]], material)
+
+
+def floor_under(*panes, of, tints, sky=None):
+    """A floor below panes, looked at from under them. of: its material"""
+    floor = quad("floor", [[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]], 0)
+    glasses = [Material(f"Glass {k}", (CLEAR,), glass=Glass(tint=tint)) for k, tint in enumerate(tints)]
+    sky = np.ones((32, 64, 3), np.float32) if sky is None else sky
+    camera = looking("front", (0, 3, 4), (0, 0, 0), 0.5)
+    return scene_of(floor, *panes, camera=camera, environment=sky, materials=[of, *glasses])
+
+
+def rendered(scene, folder, change=lambda document: None, method="direct"):
+    recipe = Recipe(method, ("front",), SIZE, 600, relightable=True)
+    store = bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr")
+    found = open_bake(store, Memory(1 << 28))
+    look = look_of(found, change)
+    return render_image(found, "front", look), look
+
+
+def test_a_polished_metal_below_tinted_glass_shows_the_tint_in_every_pixel(tmp_path):
+    scene = floor_under(pane("pane", 1), of=POLISHED, tints=[GREEN])
+    picture, _ = rendered(scene, tmp_path)
+    of_pixels = (picture / picture.max(axis=2, keepdims=True)).reshape(-1, 3)
+    np.testing.assert_allclose(of_pixels, np.tile(np.divide(GREEN, 0.95), (len(of_pixels), 1)), atol=0.02)
+
+
+def test_so_it_does_where_the_glass_also_sends_what_it_reflects(tmp_path):
+    scene = floor_under(pane("pane", 1), of=POLISHED, tints=[GREEN])
+    picture, look = rendered(scene, tmp_path, method="gather")
+    wanted = reference_image(scene, "front", look, SIZE, 256, reflects=True).mean(axis=(0, 1))
+    of_pixels = (picture / picture.max(axis=2, keepdims=True)).reshape(-1, 3)
+    np.testing.assert_allclose(of_pixels.mean(axis=0), wanted / wanted.max(), atol=0.04)
+    assert np.ptp(of_pixels, axis=0).max() < 0.1
+
+
+def test_panes_of_two_tints_side_by_side_each_show_their_own_in_a_polished_metal(tmp_path):
+    scene = floor_under(pane("red", 1, (-60, 0)), pane("blue", 2, (0, 60)), of=POLISHED, tints=[RED, BLUE])
+    picture, _ = rendered(scene, tmp_path)
+    for part, tint in ((picture[:, :9], RED), (picture[:, -9:], BLUE)):
+        of_each = part.reshape(-1, 3) / part.max(axis=2).reshape(-1, 1)
+        np.testing.assert_allclose(of_each, np.tile(np.divide(tint, 0.9), (len(of_each), 1)), atol=0.05)
+
+
+def below_two_panes(position, sky, degrees):
+    """What a matt floor sends at positions (n, 3), summed over the texels of a sky that is turned about +Y. (n, 3)"""
+    height, width, _ = sky.shape
+    directions = texel_directions(height, width).reshape(-1, 3)
+    area = np.repeat(np.sin((np.arange(height) + 0.5) * np.pi / height), width) * 2 * np.pi**2 / (height * width)
+    a = np.radians(degrees)
+    directions = directions @ np.array([[np.cos(a), 0, -np.sin(a)], [0, 1, 0], [np.sin(a), 0, np.cos(a)]])
+    above = directions[:, 1] > 0
+    (x, y, _), power = directions[above].T, sky.reshape(-1, 3)[above] * area[above, None]
+    passes = (y * (1 - schlick(y, 0.04)))[:, None] * power
+    is_blue = position[:, :1] + (4 - position[:, 1:2]) * x / y > 0
+    return 0.8 / np.pi * (~is_blue @ (passes * RED) + is_blue @ (passes * BLUE))
+
+
+@pytest.mark.parametrize("degrees", [0.0, 180.0])
+def test_a_matt_floor_below_two_tints_is_as_the_sky_says_however_it_is_turned(degrees, tmp_path):
+    """A sky with one bright side: what comes through which pane changes with its turn."""
+    sky = np.ones((32, 64, 3), np.float32)
+    sky[:, 8:20] *= 12
+    scene = floor_under(pane("red", 1, (-60, 0)), pane("blue", 2, (0, 60)), of=WHITE, tints=[RED, BLUE], sky=sky)
+    picture, _ = rendered(scene, tmp_path, lambda d: d["environment"].update(rotation=degrees))
+    samples = sample_view(scene, merge(scene), "front", SIZE)
+    axes = samples.surface.points.position.T
+    middle = np.stack([np.bincount(samples.pixel, samples.weight * axis) for axis in axes], axis=1)
+    wanted = below_two_panes(middle, sky, degrees)
+    assert relative_rmse(picture.reshape(-1, 3), wanted) < 0.04
+    np.testing.assert_allclose(picture.mean(axis=(0, 1)), wanted.mean(axis=0), rtol=0.03)
+
+
+def test_light_that_comes_past_the_glass_has_no_tint(tmp_path):
+    """Half of the sky is seen through a pane, half past it; a narrow lobe sees one or the other."""
+    scene = floor_under(pane("pane", 1, (-60, 0)), of=POLISHED, tints=[GREEN])
+    picture, _ = rendered(scene, tmp_path)
+    past = picture[:, -9:].reshape(-1, 3)
+    np.testing.assert_allclose(past / past.max(axis=1, keepdims=True), 1, atol=0.01)
+
+
+def test_shares_of_split_samples_are_those_of_one_and_no_other_sample_changes():
+    scene = floor_under(pane("red", 1, (-60, 0)), pane("blue", 2, (0, 60)), of=WHITE, tints=[RED, BLUE])
+    samples = sample_view(scene, merge(scene), "front", SIZE)
+    whole = np.bincount(samples.pixel, samples.weight, SIZE[0] * SIZE[1])
+    np.testing.assert_allclose(whole, 1, atol=1e-6)
+    of_pixel = [np.bincount(samples.pixel, samples.gains[:, c], SIZE[0] * SIZE[1]) for c in range(3)]
+    np.testing.assert_allclose(of_pixel, 1, atol=1e-5)  # light that no glass is before is whole
+    assert set(np.unique(samples.chance)) == set(UP_TO_GROUP[:3])
+
+
+def test_a_sample_is_split_by_the_tints_that_reach_it():
+    none = [np.nan] * 3
+    tints = np.array([[none, none], [GREEN, none], [none, BLUE], [RED, BLUE]], np.float32)
+    split = Split(tints, np.array([0, 4]), by_channel=False)
+    form = split.form(slice(0, len(split.row)))
+    np.testing.assert_array_equal(split.row, [0, 1, 2, 3, 1, 3, 2, 3])
+    np.testing.assert_array_equal(form.chance, [0, *UP_TO_GROUP[[0, 0, 0, 1, 1, 2, 2]]])
+    np.testing.assert_array_equal(form.count, [1, 2, 2, 3, 2, 3, 2, 3])
+    red, green, blue = (np.array(tint, np.float32) for tint in (RED, GREEN, BLUE))
+    wanted = [np.ones(3), 1 - green, 1 - blue, 1 - red, green, red - blue, blue, blue]
+    np.testing.assert_allclose(form.shown / form.count[:, None], wanted, atol=1e-6)
