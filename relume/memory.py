@@ -20,6 +20,8 @@ from relume.resident import held_bytes
 
 PASSING_SHARE = 8  # what is made in passing pushes out what lasts up to the budget over this
 
+ASSETS = "assets"  # owner of what is made of files that looks of any bake name: see `relume.asset_memory`
+
 Key = tuple[Hashable, ...]
 
 
@@ -234,17 +236,18 @@ class Memory:
     def shrink(self, floor_bytes: int, bakes: Collection[str]) -> None:
         """Drop entries of all but some bakes, least recently used first, until those left hold at most a floor.
 
-        Under it are operators and images, which open a bake at once; lights and the like go with the bake.
+        Under it are operators and images, which open a bake at once; lights and the like go with the bake. Assets stay
+        as long as any bake does.
 
         Args:
             bakes: paths of stores whose entries stay.
         """
-        room = self._room
+        room, used = self._room, {*bakes, ASSETS} if bakes else set()
         with room.lock:
             parts = room.passing, room.lasting
-            unused = [(part, key) for part in parts for key in part if _owner(key) not in bakes]
+            unused = [(part, key) for part in parts for key in part if _owner(key) not in used]
             for part, key in unused:
-                if isinstance(part[key], _Kept):
+                if isinstance(part[key], _Kept) and _owner(key) != ASSETS:
                     part.drop(key)
             others = [(part, key) for part, key in unused if key in part]
             held = sum(part[key].num_bytes for part, key in others)

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.asset_memory import stored
 from relume.asset_store import AssetStore
 from relume.btf.compress import MOST_CLUSTERS, MOST_COMPONENTS, MOST_TEXELS
 from relume.btf.eigen import I8, MOST_HEIGHT, U8, EigenBtf
@@ -128,7 +128,7 @@ def btf(data: str) -> EigenBtf:
     return _load(STORE.found(data))
 
 
-@lru_cache(maxsize=4)
+@stored("BTF file")
 def _load(path: Path) -> EigenBtf:
     document = STORE.read(path)
     try:

@@ -10,12 +10,12 @@ Look documents name one as "env:<id>".
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from relume.asset_memory import stored
 from relume.asset_store import AssetStore
 from relume.environments.model import Environment
 from relume.environments.reading import read_environment
@@ -97,7 +97,7 @@ def imported(name: str) -> Environment:
     return _load(STORE.found(name))
 
 
-@lru_cache(maxsize=32)
+@stored("environment file")
 def _load(path: Path) -> Environment:
     radiance = STORE.array(path, _RADIANCE)
     height = len(radiance) if radiance.ndim else 0

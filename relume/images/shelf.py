@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from relume.asset_memory import stored
 from relume.brdf.channels import IMAGES, NormalMap, is_image
 from relume.color import srgb_encode
 from relume.imageio.files import png_bytes, to_bytes
@@ -196,13 +197,13 @@ def mean_roughness(name: str) -> float:
     return _load_mean(IMAGES.found(name))
 
 
-@lru_cache(maxsize=4)
+@stored("image of normals")
 def _load_normals(path: Path, scale: float) -> Texture:
     texture = _load(path)
     return Texture(_bytes_of(texture), texture.wrap, Coding("normal", (scale, scale, 1.0)))
 
 
-@lru_cache(maxsize=4)
+@stored("image of roughness")
 def _load_roughness(path: Path) -> Texture:
     most = 1 / max(_load_mean(path), _LEAST_ROUGHNESS)
     return Texture(_shares(_load(path)), coding=Coding("share", (most, most, most)))
@@ -228,7 +229,7 @@ def _mean(shares: NDArray[np.uint8]) -> float:
     return float(shares.mean() / 255)
 
 
-@lru_cache(maxsize=16)
+@stored("image file")
 def _load(path: Path) -> Texture:
     texels = IMAGES.array(path, _TEXELS)
     is_image = texels.ndim == 3 and texels.shape[2] == 3 and min(texels.shape[:2]) >= 1

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from relume.asset_memory import stored
 from relume.asset_store import AssetStore
 from relume.errors import MaterialError
 from relume.measured.factors import factorise
@@ -114,7 +114,7 @@ def material(data: str) -> Measured:
     return _load(STORE.found(data))
 
 
-@lru_cache(maxsize=32)
+@stored("measured material")
 def _load(path: Path) -> Measured:
     document, table = STORE.read(path), STORE.array(path, _TABLE)
     try:

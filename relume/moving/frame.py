@@ -32,7 +32,7 @@ from relume.moving.points.images import Wears
 from relume.moving.points.surface import Surface
 from relume.moving.relief.light import ReliefLight
 from relume.moving.relief.show import Arrived, Sight, show_texels
-from relume.moving.relief.tables import Cover, covers_of
+from relume.moving.relief.tables import Covers, covers_of
 from relume.moving.sky import turn_of
 from relume.moving.transfer import MovingTransfer
 from relume.moving.vectors.arriving import Arriving
@@ -71,7 +71,7 @@ class Materials(NamedTuple):
     tables: Tables
     lobes: Lobes
     sends: NDArray[np.bool_]
-    covers: Sequence[Cover]
+    covers: Covers
     each: Sequence[Projected]
     wears: tuple[Wears, ...]
 
@@ -81,23 +81,30 @@ class Materials(NamedTuple):
         terms: Sequence[Sequence[Mapping[str, Any]]],
         before: Self | None = None,
         normals: Sequence[NormalMap | None] | None = None,
+        *,
+        waits: bool = True,
     ) -> Self:
         """Project the terms of each, of a complete look.
 
         Args:
             terms: of each. before: those of another, which hold what has not changed.
             normals: in the place of the normal maps of each; None: all have their own.
+            waits: see `covers_of`.
         """
         of_normals = [None] * len(terms) if normals is None else normals
         wears = tuple(Wears(images_of(these), one) for these, one in zip(terms, of_normals, strict=True))
         known = before.each if before is not None else [None] * len(terms)
         each = [_projected(these, one) for these, one in zip(terms, known, strict=True)]
+        covers = covers_of(terms, before.covers.shown if before is not None else (), waits=waits)
         if before is not None and all(map(operator.is_, each, before.each)):
-            return before if before.wears == wears else before._replace(wears=wears)
+            is_covered = len(covers.missing) == len(before.covers.missing)
+            if before.wears == wears and is_covered:
+                return before
+            return before._replace(wears=wears, covers=before.covers if is_covered else covers)
         tables, lobes = Tables.joined([one.tables for one in each]), Lobes.joined([one.lobes for one in each])
         sends, with_lobe = np.asarray((tables.of >= 0).any(axis=2)), lobes.of >= 0
         sends[with_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.of[with_lobe]]
-        return cls(tables, lobes, sends, covers_of(terms), each, wears)
+        return cls(tables, lobes, sends, covers, each, wears)
 
 
 class Wanted(NamedTuple):
@@ -219,9 +226,26 @@ def only_materials_differ(before: Wanted, after: Wanted) -> bool:
         and np.array_equal(before.gain, after.gain)
         and one.background == other.background
         and not any(catchers)
-        and not before.materials.covers
-        and not after.materials.covers
+        and _are_covered_alike(before.materials, after.materials)
     )
+
+
+def _are_covered_alike(before: Materials, after: Materials) -> bool:
+    """Whether the same BTFs lie on the same materials, none of which was edited."""
+    one, other = before.covers.shown, after.covers.shown
+    return len(one) == len(other) and all(
+        a.material == b.material and a.tables is b.tables and before.each[a.material] is after.each[b.material]
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def shows_texels(transfer: MovingTransfer, materials: Materials, seen: Seen, part: Part) -> bool:
+    """Whether any ray of a part of a picture sees a material that a BTF covers."""
+    if not materials.covers.shown:
+        return False
+    face = seen.hits.face if part.rays is None else seen.hits.face[part.rays]
+    covered = [cover.material for cover in materials.covers.shown]
+    return bool(np.isin(transfer.surface.face_material[face[face >= 0]], covered).any())
 
 
 def change(
@@ -234,7 +258,7 @@ def change(
     words: NDArray[np.uint32],
     shares: Sequence[F32] = (),
 ) -> None:
-    """Bring a frame to what materials send now, where `only_materials_differ`.
+    """Bring a frame to what materials send now, where `only_materials_differ` and the part `shows_texels` of no BTF.
 
     Args:
         transfer, seen, camera, shares: as in `frame_of`. wanted: what is shown from now on.
@@ -276,9 +300,9 @@ def _summed(
     pixel_angle, from_vertices = camera.yfov / height, FromVertices(broad, materials.sends, towards)
     mirrored = Mirrored(lobes, sky, along, turn, wanted.is_fine)
     out = combine(surface, seen, pixel_angle, from_vertices, emission, mirrored, rays, out)
-    sight = Sight(eye, pixel_angle, seen)
-    arrived = Arrived(arriving.total, wanted.relief)
-    show_texels(materials.covers, transfer.surface, transfer.positions, sight, arrived, out)
+    if rays is None:  # else none of them sees a texel
+        sight, arrived = Sight(eye, pixel_angle, seen), Arrived(arriving.total, wanted.relief)
+        show_texels(materials.covers.shown, transfer.surface, transfer.positions, sight, arrived, out)
     return Sums(glances, sent, turns, (broad, along, turn), towards, out)
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.registry import TERMS
 from relume.errors import NotMadeError, ParameterError
 from relume.look import Look
 from relume.moving.again import Shown, shown_of
@@ -19,10 +18,11 @@ from relume.moving.behind import alpha_of
 from relume.moving.correction import corrected
 from relume.moving.drawn import Drawn
 from relume.moving.fine_job import FineJob, fine_frame
-from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ
+from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ, shows_texels
 from relume.moving.look_up import Seen, look
 from relume.moving.parted import mend
 from relume.moving.points.surface import Surface
+from relume.moving.relief.job import TablesJob
 from relume.moving.relief.light import ReliefLight
 from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
 from relume.moving.transfer import MovingTransfer
@@ -32,7 +32,7 @@ from relume.moving.vectors.live import Asked, LiveVectors
 from relume.picture.fidelity import Word
 from relume.picture.light import Light, Solo, gain_of, light_of
 from relume.picture.picture import Advance
-from relume.picture.pointer import CurvePointer, ParameterPointer, parse_pointer
+from relume.picture.pointer import CurvePointer, ParameterPointer, check_there, parse_pointer
 from relume.picture.view_images import documents_of
 from relume.scene.model import Camera
 from relume.views.resolve import encode_coverage, encode_pixels
@@ -134,23 +134,19 @@ class MovingPicture:
         """
         found = parse_pointer(pointer)
         if isinstance(found, CurvePointer | ParameterPointer) and self._look is not None:
-            self._check_there(found, self._look)
+            check_there(found, self._look)
 
-    @staticmethod
-    def _check_there(pointer: CurvePointer | ParameterPointer, shown: Look) -> None:
-        material = shown.materials.get(pointer.material)
-        if material is None or not 0 <= pointer.term < len(material.terms):
-            raise ParameterError("pointer", str(pointer), "a term of this look")
-        declared = TERMS[material.terms[pointer.term]["model"]]
-        names = declared.curves if isinstance(pointer, CurvePointer) else declared.parameters
-        if pointer.name not in [one.name for one in names]:
-            raise ParameterError("pointer", str(pointer), "a curve or a parameter of its term")
-
-    def next_job(self) -> FollowJob | LightJob | FineJob | None:
-        """What makes a rough picture as good as it gets: the light vectors that it lacks; then its highlights."""
+    def next_job(self) -> FollowJob | LightJob | TablesJob | FineJob | None:
+        """What makes a rough picture as good as it gets: the light vectors that it lacks; BTFs; then its highlights."""
         if self._is_rough and self._has_to_be_rough():
             return self._vectors.next_job(self._asked(), self._needed)
+        if self._look is not None and (missing := self._materials_of(self._look).covers.missing):
+            return TablesJob(missing[0].data, missing[0].components, self._show_texels)
         return self._fine_job() if self._is_watched and self.draws else None
+
+    def _show_texels(self) -> None:
+        """Show texels whose tables are there by now."""
+        self._materials, self._shown = (None, self._materials[1]), None
 
     def _fine_job(self) -> FineJob | None:
         """Find highlights finely in what is shown, if they were not."""
@@ -202,7 +198,7 @@ class MovingPicture:
     def _asked(self) -> Asked:
         """What is to arrive; pixels find no shadows of beams where a shader draws, nor on BTFs."""
         assert self._look is not None
-        return Asked(self._now(), self.draws and not self._materials_of(self._look).covers)
+        return Asked(self._now(), self.draws and not any(self._materials_of(self._look).covers))
 
     @property
     def _needed(self) -> NDArray[np.uint8]:
@@ -230,7 +226,10 @@ class MovingPicture:
     def _may_change(self, drawn: Drawn, wanted: Wanted, seen: Seen) -> bool:
         """Whether what was drawn may be changed; where nobody waits for it, all rims are found anew."""
         is_same = drawn.seen is seen and not len(seen.panes.ray) and only_materials_differ(drawn.wanted, wanted)
-        return is_same and self._is_watched
+        if not (is_same and self._is_watched):
+            return False
+        shown = self._shown_of(drawn.wanted.materials, wanted.materials, seen)
+        return not shows_texels(self._transfer, wanted.materials, seen, shown.part)
 
     def _shown_of(self, before: Materials, after: Materials, seen: Seen) -> Shown:
         """What shows materials that were edited; found once while a hand is on them."""
@@ -312,7 +311,8 @@ class MovingPicture:
         if before is None or before_of is not shown:
             names = self._transfer.material_names
             normals = [shown.materials[name].normals for name in names]
-            found = Materials.of([documents_of(shown, name) for name in names], before, normals)
+            terms = [documents_of(shown, name) for name in names]
+            found = Materials.of(terms, before, normals, waits=not self._is_watched)
             self._num_materials += found is not before
             self._materials = shown, found
             return found

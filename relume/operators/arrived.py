@@ -64,7 +64,7 @@ class Arrived:
 def is_quick(texels: Texels, num_samples: int) -> bool:
     """Whether a frame can wait for texels to be summed anew: each sample sums the tables of clusters about it."""
     clusters = min(texels.btf.mean.shape[1], _CLUSTERS_ABOUT)
-    return bool(num_samples * clusters * texels.tables.shape[2] <= _QUICK)
+    return bool(num_samples * clusters * (1 + texels.btf.num_components) <= _QUICK)
 
 
 def arrived_bytes(texels: Texels, num_samples: int) -> int:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from relume.brdf.registry import TERMS
 from relume.errors import ParameterError
-from relume.look.model import EnvironmentLook, TransportLook
+from relume.look.model import EnvironmentLook, Look, TransportLook
 
 
 @dataclass(frozen=True)
@@ -131,3 +132,14 @@ def parse_curve(pointer: str) -> CurvePointer:
     if not isinstance(found, CurvePointer):
         raise ParameterError("curve", pointer, "a pointer like /materials/NAME/terms/0/curves/theta_h")
     return found
+
+
+def check_there(pointer: CurvePointer | ParameterPointer, look: Look) -> None:
+    """Raises ParameterError where a pointer is to a term, a curve or a parameter that a look has not."""
+    material = look.materials.get(pointer.material)
+    if material is None or not 0 <= pointer.term < len(material.terms):
+        raise ParameterError("pointer", str(pointer), "a term of this look")
+    declared = TERMS[material.terms[pointer.term]["model"]]
+    names = declared.curves if isinstance(pointer, CurvePointer) else declared.parameters
+    if pointer.name not in [one.name for one in names]:
+        raise ParameterError("pointer", str(pointer), "a curve or a parameter of its term")

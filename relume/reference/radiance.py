@@ -6,12 +6,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.asset_memory import stored
 from relume.basis.bands import MAX_ANGLE
 from relume.brdf.channels import channel_of
 from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
@@ -110,7 +110,7 @@ def _tabulate(document: Document) -> _Tables:
     return _tables_of(json.dumps(document, sort_keys=True))
 
 
-@lru_cache(maxsize=128)
+@stored("tables of brute force")
 def _tables_of(term_text: str) -> _Tables:
     """Paths ask for the terms of a scene at every bounce, of rough and smooth texels; some megabytes each."""
     document = json.loads(term_text)

@@ -16,7 +16,7 @@ from relume.moving.relief import tables
 from relume.moving.relief.light import ReliefLight, light_about_numpy
 from relume.moving.relief.numbers import AXIS_OF, FUNCTIONS, LANE_OF
 from relume.moving.relief.show import Arrived, Sight, show_texels
-from relume.moving.relief.tables import covers_of, hat_factors, in_lanes
+from relume.moving.relief.tables import Covers, covers_of, hat_factors, in_lanes
 from relume.render.image import render_image
 
 SCALE, ROTATION, MEAN = 2.0, 40.0, np.float32(0.02)
@@ -77,7 +77,7 @@ def oracle(cover, d, place):
 
 def test_the_kernel_is_the_oracle(moving, small_btf):
     look_of = covered(moving, small_btf.record, (0.5, 1.0, 2.0), scale=SCALE, rotation=ROTATION)
-    covers, seen_by, surface = covers_of(terms_of(look_of)), sight(moving), moving.surface
+    covers, seen_by, surface = covers_of(terms_of(look_of)).shown, sight(moving), moving.surface
     seen, out = seen_by.seen, np.full((len(seen_by.seen.directions), 3), MEAN, np.float32)
     show_texels(covers, surface, moving.positions, seen_by, arrived(surface), out)
     rays = np.flatnonzero(seen.hits.face >= 0)
@@ -127,7 +127,7 @@ def test_another_light_is_another(moving):
 
 def test_few_numbers_tell_out_factors(moving, small_btf):
     """Of each texel, from all sides, as its own values have them, but for rounding and colours of what is narrow."""
-    cover = covers_of(terms_of(covered(moving, small_btf.record)))[0]
+    cover = covers_of(terms_of(covered(moving, small_btf.record))).shown[0]
     whole, found, squares = cover.texels.btf, cover.tables, np.zeros(2)
     integrals = hat_factors(whole.rings)
     mean = np.einsum("vlc,lk->vck", whole.average, integrals)
@@ -141,11 +141,11 @@ def test_few_numbers_tell_out_factors(moving, small_btf):
 def test_the_finest_texels_of_large_tables_are_left_out(small_btf, monkeypatch):
     whole = btf(small_btf.record.data)
     monkeypatch.setattr(tables, "_MOST_BYTES", 81 * 24 * 100)
-    found = tables._tables_of.__wrapped__(whole)
+    found = tables.tables_of(whole)
     assert found.levels[0].tolist() == [0, 8, 8]
     assert found.weight.shape[1] == 64 + 16 + 4 + 1
     monkeypatch.undo()
-    complete = tables._tables_of.__wrapped__(whole)
+    complete = tables.tables_of(whole)
     one, other = (t.step[:, None] * t.weight for t in (found, complete))
     np.testing.assert_allclose(one, other[:, 256:], atol=float((found.step + complete.step).max()))
 
@@ -162,7 +162,7 @@ def test_a_moving_view_shows_what_a_fixed_one_does(moving, small_btf, tmp_path, 
     look_of = covered(moving, small_btf.record, scale=SCALE)
     expected = render_image(opened(floor(), tmp_path), "front", look_of)
     found = render_image(moving, "front", look_of)
-    monkeypatch.setattr(frame, "covers_of", lambda terms: [])
+    monkeypatch.setattr(frame, "covers_of", lambda *_, **__: Covers([], []))
     mean = render_image(moving, "front", look_of)
     size = np.linalg.norm(expected)
     assert np.linalg.norm(found - expected) < 0.03 * size < 0.1 * size < np.linalg.norm(mean - expected)
@@ -183,6 +183,6 @@ def test_two_textures_on_one_material_are_summed(moving, small_btf):
     found = []
     for times in (1, 2):
         out = np.full((len(seen_by.seen.directions), 3), 10.0, np.float32)
-        show_texels(covers_of([terms[0] * times]), surface, moving.positions, seen_by, arrived(surface), out)
+        show_texels(covers_of([terms[0] * times]).shown, surface, moving.positions, seen_by, arrived(surface), out)
         found.append(out - 10)
     np.testing.assert_allclose(found[1], 2 * found[0], atol=1e-5)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
 
+from relume.asset_memory import stored
 from relume.brdf.term import Parameter, Term
 from relume.btf.average import mean_brdf
 from relume.btf.compress import MOST_COMPONENTS
@@ -26,32 +27,42 @@ class Texels:
     """How a surface is covered with a BTF.
 
     Attributes:
-        btf: with the components that are used. tables: of it, see `EigenBtf.tables`.
+        data: the name of the BTF. components: that are used. btf: with these alone.
         scale: how often it repeats along a unit of texture coordinates. rotation: counter-clockwise, radians.
     """
 
+    data: str
+    components: int
     btf: EigenBtf
-    tables: F32
     scale: float
     rotation: float
+
+    @property
+    def tables(self) -> F32:
+        """Of the BTF, see `EigenBtf.tables`; made where they are asked for first, which takes a while."""
+        return _tables(self.data, self.components)
 
 
 def _without_data(*directions: object) -> NoReturn:
     raise ParameterError("data", None, "the data of a BTF that was imported or made")
 
 
-@lru_cache(maxsize=3)
-def _tables(data: str, components: int) -> tuple[EigenBtf, F32]:
-    found = btf(data).with_components(components)
-    return found, found.tables()
+@stored("BTF")
+def _with_components(data: str, components: int) -> EigenBtf:
+    return btf(data).with_components(components)
+
+
+@stored("BTF tables")
+def _tables(data: str, components: int) -> F32:
+    return _with_components(data, components).tables()
 
 
 def _settle(fixed: Mapping[str, Any]) -> dict[str, Any]:
-    found, tables = _tables(fixed["data"], int(fixed["components"]))
-    rotation = float(np.radians(fixed["rotation"]))
+    data, components = fixed["data"], int(fixed["components"])
+    found, rotation = _with_components(data, components), float(np.radians(fixed["rotation"]))
     return {
         "quotient": partial(mean_brdf, found.rings, found.average, rotation),
-        "texels": Texels(found, tables, float(fixed["scale"]), rotation),
+        "texels": Texels(data, components, found, float(fixed["scale"]), rotation),
     }
 
 

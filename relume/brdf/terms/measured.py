@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
 
+from relume.asset_memory import stored
 from relume.basis.bands import MAX_ANGLE
 from relume.brdf.term import F64, Angle, Curve, Params, Term
 from relume.errors import ParameterError
@@ -60,7 +61,7 @@ _CURVES = {
 }
 
 
-@lru_cache(maxsize=64)
+@stored("measured quotient")
 def _settle(part: Part, data: str) -> dict[str, Any]:
     """Quotient and curves of one material."""
     found = material(data)

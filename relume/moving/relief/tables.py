@@ -10,18 +10,19 @@ the numbers of `relume.moving.relief.numbers`, a byte each: by what its out-fact
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.asset_memory import is_stored, stored
 from relume.basis.zernike import in_basis
 from relume.brdf.registry import TERMS
 from relume.brdf.terms.btf import Texels
 from relume.btf.eigen import LARGEST, EigenBtf
 from relume.btf.rings import Rings, taps_numpy
+from relume.btf.shelf import btf
 from relume.moving.relief.numbers import AXIS_OF, FUNCTIONS, LANE_OF, NUM_FUNCTIONS, NUMBERS, WIDTH
 from relume.parallel import for_ranges
 from relume.uncounted import UNCOUNTED
@@ -33,6 +34,7 @@ _AROUND, _DOWN = 180, 90  # directions of the quadrature
 _MOST_BYTES = 1 << 30  # of a table; of larger ones the finest texels are left out
 _LOOKED_AT = 9, 256  # views and texels of each that axes of colours are found by
 _LEAST = np.float32(1e-30)
+_KIND = "BTF tables of the free camera"  # among what is stored
 
 
 class ReliefTables(NamedTuple):
@@ -64,20 +66,42 @@ class Cover(NamedTuple):
     color: F32
 
 
-def covers_of(materials: Sequence[Sequence[Mapping[str, Any]]]) -> list[Cover]:
+class Covers(NamedTuple):
+    """What covers the materials of a look.
+
+    Attributes:
+        shown: those whose tables are there. missing: texels whose tables are still to be made.
+    """
+
+    shown: Sequence[Cover]
+    missing: Sequence[Texels]
+
+
+def covers_of(
+    materials: Sequence[Sequence[Mapping[str, Any]]], before: Sequence[Cover] = (), *, waits: bool = True
+) -> Covers:
     """Find what covers materials.
 
     Args:
-        materials: the terms of each, of a complete look.
+        materials: the terms of each, of a complete look. before: what covered those of another look.
+        waits: whether tables are made that nobody has made, which takes as long as many frames; else they are missing.
     """
-    found = []
+    found, missing = list[Cover](), list[Texels]()
+    known = {(cover.texels.data, cover.texels.components): cover.tables for cover in before}
     for index, terms in enumerate(materials):
         for term in terms:
             texels = TERMS[term["model"]].settled(term).texels
-            if texels is not None:
-                color = np.asarray(term["color"], np.float32)
-                found.append(Cover(index, texels, _tables_of(texels.btf), color))
-    return found
+            if texels is None:
+                continue
+            key = texels.data, texels.components
+            tables = known.get(key)
+            if tables is None and (waits or is_stored(_KIND, *key)):
+                tables = known[key] = relief_tables(*key)
+            if tables is None:
+                missing.append(texels)
+            else:
+                found.append(Cover(index, texels, tables, np.asarray(term["color"], np.float32)))
+    return Covers(found, missing)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
@@ -108,8 +132,18 @@ def _weigh(factors, cluster, weight, view, step, out):  # type: ignore[no-untype
             out[texel, i] = np.int8(np.rint(numbers[i] / step[i]))
 
 
-@lru_cache(maxsize=2)
-def _tables_of(whole: EigenBtf) -> ReliefTables:
+@stored(_KIND)
+def relief_tables(data: str, components: int) -> ReliefTables:
+    """The tables of a BTF of which some components are used, by the name of its data; made once, which takes seconds.
+
+    Raises:
+        NotFoundError: it is not here. MaterialError: its files are damaged.
+    """
+    return tables_of(btf(data).with_components(components))
+
+
+def tables_of(whole: EigenBtf) -> ReliefTables:
+    """Find the out-factors of all texels from all sides."""
     integrals, num_views = hat_factors(whole.rings).astype(np.float32), whole.rings.num_directions
     mean = np.einsum("vlc,lk->vck", whole.average, integrals)
     axes, levels = _axes_of(whole, mean, integrals), _levels_of(whole)
