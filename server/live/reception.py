@@ -58,6 +58,9 @@ class Reception:
             if isinstance(message, PingMessage):  # from here, so that no frame is waited for
                 await self._socket.send(PongMessage())
                 continue
+            if isinstance(message, PingMessage):  # from here, so that no frame is waited for
+                await self._socket.send(PongMessage())
+                continue
             try:
                 self._take(message, received_s)
             except RelumeError as error:
