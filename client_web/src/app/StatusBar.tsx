@@ -51,13 +51,14 @@ export function StatusBar() {
       .filter(Boolean)
       .join(". "),
   );
+  const canTryNow = connection.value === "silent" || (connection.value === "reconnecting" && retryInMs.value > 0);
   const running = coming.value !== null && (coming.value.state === "running" || coming.value.state === "queued");
   return (
     <footer class="status">
       <span class={`state ${connection.value}`}>
         <i class="lamp" aria-hidden="true" />
         {connectionWords()}
-        {connection.value === "reconnecting" && retryInMs.value > 0 && <button onClick={reconnectNow}>Now</button>}
+        {canTryNow && <button onClick={reconnectNow}>Now</button>}
       </span>
       <span class="latency" title="From the hand to the drawn frame">
         edit → picture {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}

@@ -9,6 +9,7 @@ import { openScene } from "../scene/open";
 import { followPlace } from "../scene/persistence";
 import { placeFromUrl } from "../scene/url";
 import { StartPage } from "../start/StartPage";
+import { followNetwork } from "../live/connections";
 import { followToneMap } from "../live/displayViews";
 import { followPanels } from "../state/panels";
 import { followTimeline } from "../looks/keyframes";
@@ -57,6 +58,7 @@ async function start(): Promise<void> {
 
 function open(): void {
   const place = placeFromUrl(location.search);
+  followNetwork();
   followName();
   if (place.share !== null) void openShare(place.share, place);
   else if (place.scene !== null) void openScene(place.scene, place);

@@ -2,6 +2,7 @@
 import { Session, type SessionHandlers } from "../net/session";
 import { Arrivals } from "../picture/arrival";
 import type { ClientMessage, HelloMessage } from "../protocol";
+import { offline } from "../state/connection";
 import { watched } from "../state/me";
 import { scene } from "../state/scene";
 import { door, ownName, seatIn } from "../state/together";
@@ -62,6 +63,21 @@ export function send(message: ClientMessage): boolean {
 
 export function reconnectNow(): void {
   connections.shown?.session.reconnectNow();
+  connections.incoming?.session.reconnectNow();
+}
+
+/** Heed what the browser says of its network: asks the server when it is gone, and connects at once when it is back. */
+export function followNetwork(): void {
+  offline.value = !navigator.onLine;
+  window.addEventListener("offline", () => {
+    offline.value = true;
+    connections.shown?.session.check();
+    connections.incoming?.session.check();
+  });
+  window.addEventListener("online", () => {
+    offline.value = false;
+    reconnectNow();
+  });
 }
 
 export function disconnect(): void {

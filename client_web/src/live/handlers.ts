@@ -10,7 +10,7 @@ import { coming } from "../state/bakes";
 import { connection, freezing, refusedBecause, retryInMs } from "../state/connection";
 import { showShape } from "../state/curveShape";
 import { exact } from "../state/fidelity";
-import { editSent } from "../state/latency";
+import { editSent, forgetWaiting } from "../state/latency";
 import { defaultLook, look } from "../state/look";
 import { loginWords, mayEdit, readOnlyWords } from "../state/me";
 import { probe } from "../state/probe";
@@ -83,6 +83,7 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
   return {
     connection(state, retryIn, reason) {
       if (!isShown()) return;
+      if (state === "open" && connection.peek() === "silent") forgetWaiting();
       connection.value = state;
       retryInMs.value = retryIn;
       if (state === "open" || retryIn > 0) refusedBecause.value = reason ?? null;

@@ -84,7 +84,7 @@ export class Session {
       room: (message) => handlers.room(message),
       comments: () => handlers.comments(),
       shared: (message) => this.follow(message),
-      leaving: () => this.socket.moveOn(),
+      leaving: () => this.socket.leave(),
       pong: () => undefined, // that it came is all it says
     };
   }
@@ -106,6 +106,11 @@ export class Session {
   /** Try at once instead of waiting for the backoff. */
   reconnectNow(): void {
     this.socket.reconnectNow();
+  }
+
+  /** Ask the server whether it is still there. */
+  check(): void {
+    this.socket.check();
   }
 
   close(): void {

@@ -1,6 +1,7 @@
 /** The transport of a live session: a WebSocket that connects again by itself, with the token that finds its look. */
 import { SUBPROTOCOL, type ClientMessage } from "../protocol";
 import { backoffMs } from "./backoff";
+import { Heartbeat } from "./heartbeat";
 
 /** Nobody has logged in, or may no longer be here. */
 export const LOGIN_CODE = 4401;
@@ -11,7 +12,8 @@ const BUSY_CODE = 1013;
 /** A token that was refused so often is not tried for ever. */
 const MAX_RESUMES = 3;
 
-export type Connection = "connecting" | "open" | "reconnecting" | "closed";
+/** `silent`: the connection is there, and nothing comes over it. */
+export type Connection = "connecting" | "open" | "silent" | "reconnecting" | "closed";
 
 /** With what a session is to begin, and in which room. */
 export type Asked = () => Readonly<Record<string, string>>;
@@ -34,6 +36,12 @@ export class LiveSocket {
   private closed = false;
   /** Names this session to the server, so that a lost connection finds its look again. */
   private resume: string | null = null;
+  private readonly heartbeat = new Heartbeat({
+    ask: () => void this.send({ type: "ping" }),
+    silent: () => this.handlers.connection("silent", 0),
+    answered: () => this.handlers.connection("open", 0),
+    lost: () => this.leave(),
+  });
 
   constructor(
     readonly bake: string,
@@ -48,9 +56,14 @@ export class LiveSocket {
     url.protocol = url.protocol.replace("http", "ws");
     for (const [name, value] of Object.entries(this.asked())) url.searchParams.set(name, value);
     if (this.resume !== null) url.searchParams.set("resume", this.resume);
+    this.socket?.close(1000); // one that hangs while it connects
     const socket = new WebSocket(url, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
-    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.handlers.received(event.data);
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
+      if (socket !== this.socket) return; // it was left for another one
+      this.heartbeat.heard();
+      this.handlers.received(event.data);
+    };
     socket.onclose = (event) => this.lost(socket, event);
     this.socket = socket;
     this.number += 1;
@@ -60,12 +73,14 @@ export class LiveSocket {
   greet(resume: string): void {
     this.attempt = 0;
     this.greeted = true;
+    this.heartbeat.start();
     this.resume = resume;
   }
 
   private lost(socket: WebSocket, event: Pick<CloseEvent, "code" | "reason">): void {
     if (this.closed || socket !== this.socket) return;
     this.greeted = false;
+    this.heartbeat.stop();
     this.socket = null;
     if (FINAL_CODES.has(event.code)) {
       this.close();
@@ -78,8 +93,8 @@ export class LiveSocket {
     this.retry = window.setTimeout(() => this.connect(), wait);
   }
 
-  /** The server is being stopped: leave it, and try until it, or another in its place, is there. */
-  moveOn(): void {
+  /** Leave the connection, and try until the server, or another in its place, is there. */
+  leave(): void {
     const leaving = this.socket;
     if (leaving === null || this.closed) return;
     leaving.close(1000);
@@ -88,9 +103,16 @@ export class LiveSocket {
 
   /** Try at once instead of waiting for the backoff. */
   reconnectNow(): void {
-    if (this.greeted || this.closed) return;
+    if (this.closed) return;
+    if (this.heartbeat.isSilent) this.leave();
+    if (this.greeted) return;
     clearTimeout(this.retry);
     this.connect();
+  }
+
+  /** Ask the server whether it is still there. */
+  check(): void {
+    this.heartbeat.check();
   }
 
   get isOpen(): boolean {
@@ -112,6 +134,7 @@ export class LiveSocket {
   close(): void {
     this.closed = true;
     this.greeted = false;
+    this.heartbeat.stop();
     clearTimeout(this.retry);
     this.socket?.close(1000);
     this.handlers.connection("closed", 0);

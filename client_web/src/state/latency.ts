@@ -14,6 +14,7 @@ export interface Latency {
 const MAX_KEPT = 1000;
 /** The number on the status bar changes at most this often: painting it must not cost frames. */
 const SHOW_EVERY_MS = 250;
+let connectedTime = -Infinity;
 const waiting: { revision: number; inputTime: number }[] = [];
 const latencies: Latency[] = [];
 
@@ -31,13 +32,15 @@ export function noteDrawnHere(): void {
 }
 
 export function editSent(revision: number, inputTime: number): void {
-  waiting.push({ revision, inputTime });
+  waiting.push({ revision, inputTime: Math.max(inputTime, connectedTime) });
   if (waiting.length > MAX_KEPT) waiting.shift();
 }
 
-/** Another session counts its revisions anew. */
+/** What was sent is no measure: another session counts its revisions anew, or nothing came for a while. What is sent from
+ * now on counts from now, however long it waited for a connection. */
 export function forgetWaiting(): void {
   waiting.length = 0;
+  connectedTime = performance.now();
 }
 
 /** These revisions are drawn, nobody saw when. */

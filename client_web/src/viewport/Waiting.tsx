@@ -29,6 +29,7 @@ function words(view: string, elapsed: number): Words {
   }
   const text = {
     reconnecting: refusedBecause.value === null ? "Waiting for the server" : `Waiting: ${refusedBecause.value}`,
+    silent: "Waiting for the server",
     closed: "There is no picture to show",
     connecting: "Opening the scene",
     open: "Waiting for the first picture",

@@ -1,0 +1,25 @@
+"""A browser that loses its network: said soon, and nothing that was edited is lost."""
+
+from __future__ import annotations
+
+import numpy as np
+from editor_page import Editor, changed
+from playwright.sync_api import expect
+
+
+def test_offline_is_said_and_edits_are_kept(editor: Editor) -> None:
+    """Twice: the network goes, an edit is made, the network is back, and the server has the edit."""
+    page, state = editor.page, editor.page.locator(".status .state")
+    editor.choose("Ball", 1)
+    roughness = editor.slider("Roughness σ")
+    for key in ("Home", "End"):
+        before = editor.pixels()
+        page.context.set_offline(True)
+        expect(state).to_contain_text("Offline. Edits are kept")
+        roughness.press(key)
+        value = roughness.get_attribute("aria-valuenow")
+        np.testing.assert_array_equal(editor.pixels_now(), before)  # the last picture stays
+        page.context.set_offline(False)
+        expect(state).to_have_text("Connected")
+        assert changed(before, editor.pixels()) > 0.01
+        expect(roughness).to_have_attribute("aria-valuenow", str(value))
