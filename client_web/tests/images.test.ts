@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
-import { baseTexture, mapNamed, withBaseImage, withoutBaseImage, withTexture } from "../src/images/colour";
+import { baseTexture, withBaseImage, withoutBaseImage, withTexture } from "../src/images/colour";
+import { mapNamed } from "../src/images/mapNames";
 import type { ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 

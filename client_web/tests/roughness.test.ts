@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { mapNamed } from "../src/images/colour";
+import { mapNamed } from "../src/images/mapNames";
 import { roughPlaces, roughnessImage, withMap, withoutRoughnessImage, withRoughnessImage } from "../src/images/roughness";
 import type { ImageBody, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";

@@ -62,18 +62,19 @@ class Measured:
     homomorphic: F64
 
 
-def keep(folder: Path, source: Path, name: str) -> MaterialRecord:
+def keep(folder: Path, source: Path, name: str, file_name: str | None = None) -> MaterialRecord:
     """Import a MERL file; the same content twice is the same material, its newest name wins.
 
     Args:
         folder: of the asset store.
         source: the file to import.
         name: what people call it.
+        file_name: what errors call the file; None: its name in the path.
     Raises:
         MaterialError: the file cannot be used, or the store is full.
     Cost: some seconds, 0.5 GB of memory.
     """
-    planes = read_merl(source)
+    planes = read_merl(source, file_name)
 
     def fill(made: Path) -> dict[str, Any]:
         table = table_of(planes)

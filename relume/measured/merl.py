@@ -28,29 +28,32 @@ _HEADER = struct.Struct("<3i")
 FILE_BYTES = _HEADER.size + 3 * math.prod(SHAPE) * 8
 
 
-def read_merl(path: Path) -> F64:
+def read_merl(path: Path, file_name: str | None = None) -> F64:
     """The planes of a file, as they are stored.
 
+    Args:
+        file_name: what errors call the file; None: its name in the path.
     Returns:
         (3, 90, 90, 180) float64; finite, negative where nothing was measured.
     Raises:
         MaterialError: the file has another size or header, holds a value that is not finite or above 10⁶ per
             steradian, or holds nothing that was measured.
     """
+    what = file_name or path.name
     with path.open("rb") as file:
         header = file.read(_HEADER.size)
         size = path.stat().st_size
         if len(header) < _HEADER.size or _HEADER.unpack(header) != SHAPE:
-            raise MaterialError(f"{path.name} is not a MERL file: it does not begin with 90, 90, 180; give a .binary")
+            raise MaterialError(f"{what} is not a MERL file: it does not begin with 90, 90, 180; give a .binary")
         if size != FILE_BYTES:
-            raise MaterialError(f"{path.name} has {size:,} bytes, a MERL file {FILE_BYTES:,}; fetch it again")
+            raise MaterialError(f"{what} has {size:,} bytes, a MERL file {FILE_BYTES:,}; fetch it again")
         planes = np.fromfile(file, "<f8").reshape(3, *SHAPE).astype(np.float64, copy=False)
     if not np.isfinite(planes).all():
-        raise MaterialError(f"{path.name} holds values that are not finite; fetch it again")
+        raise MaterialError(f"{what} holds values that are not finite; fetch it again")
     if float((planes.max(axis=(1, 2, 3)) * CHANNEL_SCALE).max()) > MAX_VALUE:
-        raise MaterialError(f"{path.name} holds values above {MAX_VALUE:g} per steradian; no material reflects that")
+        raise MaterialError(f"{what} holds values above {MAX_VALUE:g} per steradian; no material reflects that")
     if not is_measured(planes).any():
-        raise MaterialError(f"{path.name} holds no measured value; give another one")
+        raise MaterialError(f"{what} holds no measured value; give another one")
     return planes
 
 

@@ -42,7 +42,7 @@ class ImportRequest:
             is kept in. A "tile", which a BTF is made of, is looked at alone, and has no id.
         environment: path of a scene's environment map, or None.
         name: what people will call it; of a built-in scene, which one it is.
-        scene: the name that a scene's file had, folders included. companions: paths of the files that came with it, by
+        scene: the name that a scene's or a material's file had, folders included. companions: paths of the files that came with it, by
             theirs.
         ground: whether a scene is put on one. period: side of what repeats, metres, where it is known.
         seconds: of processor and wall. max_bytes: of address space. max_file_bytes: of each file that is written.
@@ -166,7 +166,7 @@ def _import_image(request: ImportRequest) -> str:
 def _import_material(request: ImportRequest) -> str:
     from relume.measured.asset_store import keep
 
-    return keep(Path(request.into), Path(request.file), request.name).id
+    return keep(Path(request.into), Path(request.file), request.name, request.scene or None).id
 
 
 def _look_at_tile(request: ImportRequest) -> str:

@@ -22,7 +22,19 @@ def upload_bytes(*uploads: UploadFile | None) -> int:
     return sum(upload.size or 0 for upload in uploads if upload is not None)
 
 
+def plain_name(filename: str | None) -> str:
+    """The uploaded file's name without folders; empty where nothing printable is left."""
+    return _printable(_base_name(filename))
+
+
 def plain_stem(filename: str | None) -> str:
-    """A name from the uploaded file's; empty where nothing printable is left."""
-    stem = (filename or "").replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
-    return "".join(c for c in stem if c.isprintable()).strip()[:80]
+    """A name from the uploaded file's, without its suffix; empty where nothing printable is left."""
+    return _printable(_base_name(filename).rsplit(".", 1)[0])
+
+
+def _base_name(filename: str | None) -> str:
+    return (filename or "").replace("\\", "/").rsplit("/", 1)[-1]
+
+
+def _printable(name: str) -> str:
+    return "".join(c for c in name if c.isprintable()).strip()[:80]

@@ -19,6 +19,8 @@ SETTLE = """() => new Promise((done) => {
   const tick = () => (left-- > 0 ? requestAnimationFrame(tick) : done());
   tick();
 })"""
+# Messages lie over the picture's foot for some seconds.
+WITHOUT_MESSAGES = ".toasts { visibility: hidden !important }"
 # Controls that a screen reader has no word for.
 NAMELESS = """() => {
   const controls = "button, input, select, canvas:not([aria-hidden]), a, [role=slider], [role=option], [tabindex='0']";
@@ -51,7 +53,7 @@ class Editor:
         """The canvas as it is on the screen, exact or not. (height, width, 3)"""
         self.page.mouse.move(2, 2)  # a pointer over the picture outlines what it is over
         self.page.evaluate(SETTLE)
-        with Image.open(io.BytesIO(self.canvas.screenshot())) as image:
+        with Image.open(io.BytesIO(self.canvas.screenshot(style=WITHOUT_MESSAGES))) as image:
             return np.asarray(image.convert("RGB")).astype(np.int16)
 
     def choose(self, material: str, term: int) -> None:

@@ -1,12 +1,10 @@
 /** The editor's layout: what stands where. Everything but the picture collapses. */
 import { ReadOnly } from "../account/Account";
 import { CommentsPanel } from "../comments/CommentsPanel";
-import { isImageFile, takeImages } from "../images/images";
 import { Inspector } from "../inspector/Inspector";
 import { LibraryPanel } from "../library/LibraryPanel";
 import { Filmstrip } from "../looks/Filmstrip";
 import { Outline } from "../outline/Outline";
-import { environmentOf, take } from "../outline/environments";
 import { useFileDrop } from "../start/useFileDrop";
 import { filmstripOpen, helpOpen, timelineOpen } from "../state/panels";
 import { mayEdit } from "../state/me";
@@ -18,12 +16,9 @@ import { PictureView } from "../viewport/PictureView";
 import { Help } from "./Help";
 import { StatusBar } from "./StatusBar";
 import { TopBar } from "./TopBar";
+import { DropHint } from "./DropHint";
+import { takeDropped } from "./dropped";
 import { useKeyboard } from "./keyboard";
-
-/** An environment lights the scene; an image is for a material. */
-function takeDropped(files: readonly File[]): void {
-  void (environmentOf(files) === null && files.some(isImageFile) ? takeImages(files) : take(files));
-}
 
 export function Editor() {
   useKeyboard();
@@ -31,13 +26,14 @@ export function Editor() {
   const widths = { outline, library, truth, comments, inspector: inspectorShownWidth.value };
   const style = Object.fromEntries(Object.entries(widths).map(([name, width]) => [`--${name}`, `${width}px`]));
   const shown = (name: SidePanel) => shownPanels.value.includes(name);
-  const over = useFileDrop((files) => takeDropped(files.map(({ file }) => file)));
+  const over = useFileDrop(takeDropped);
   return (
     <div class={`editor ${over ? "over" : ""}`} style={style}>
       <TopBar />
       <div class="middle">
         {shown("outline") && <Outline />}
         <PictureView />
+        {over && <DropHint />}
         {shown("library") && mayEdit.value && <LibraryPanel />}
         {shown("truth") && <TruthPanel />}
         {shown("comments") && <CommentsPanel />}

@@ -18,6 +18,7 @@ import { me } from "../state/me";
 import { page } from "../state/scene";
 import { followName } from "../state/together";
 import { recallTruth } from "../truth/truth";
+import { keepFocus } from "../ui/keepFocus";
 import { Toasts } from "../ui/toasts";
 import { Editor } from "./Editor";
 import "../ui/base.css";
@@ -41,10 +42,12 @@ import "./bars.css";
 import "../ui/adapting.css"; // after all that it adapts
 
 function App() {
+  const isIn = me.value.role !== "anyone";
+  const inEditor = isIn && page.value === "editor"; // which has its own place for messages
   return (
     <>
-      {me.value.role !== "anyone" && (page.value === "editor" ? <Editor /> : <StartPage />)}
-      <Toasts />
+      {inEditor ? <Editor /> : isIn && <StartPage />}
+      {!inEditor && <Toasts />}
       <Login />
     </>
   );
@@ -58,6 +61,7 @@ async function start(): Promise<void> {
 
 function open(): void {
   const place = placeFromUrl(location.search);
+  keepFocus();
   followNetwork();
   followName();
   if (place.share !== null) void openShare(place.share, place);

@@ -9,6 +9,9 @@ const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif"
 /** What may belong to a scene. */
 export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
 
+/** Measured materials, which the library takes; a .zip may be one, too. */
+export const MEASURED_SUFFIXES = [".binary", ".btf"];
+
 export interface ScenePart extends Dropped {
   /** The files that it names. */
   companions: Dropped[];
@@ -21,7 +24,7 @@ export interface Chosen {
   environment: File | null;
 }
 
-function endsWith(name: string, suffixes: readonly string[]): boolean {
+export function endsWith(name: string, suffixes: readonly string[]): boolean {
   return suffixes.some((suffix) => name.toLowerCase().endsWith(suffix));
 }
 
@@ -29,7 +32,11 @@ export function isEnvironment(file: File): boolean {
   return endsWith(file.name, ENVIRONMENT_SUFFIXES);
 }
 
-const isScene = ({ path }: Dropped) => endsWith(path, SCENE_SUFFIXES);
+export const isMeasured = ({ name }: File): boolean => endsWith(name, MEASURED_SUFFIXES);
+/** Whether a file is an image, if not always of a kind that a material can show. */
+export const isTextureLike = ({ name }: File): boolean => endsWith(name, IMAGE_SUFFIXES);
+
+export const isScene = ({ path }: Dropped) => endsWith(path, SCENE_SUFFIXES);
 
 /** A file's name without its folders and what it ends with. */
 export function stem(name: string): string {

@@ -1,6 +1,6 @@
 /** The image in the place of one of a material's maps: choose one, send one, drop one here, take it off. */
 import { ImageChoice, type Choice } from "./ImageChoice";
-import { letGoOver } from "./images";
+import { letGoOver } from "./taking";
 
 export function MapImage(props: Choice) {
   const { label, title, material, put } = props;

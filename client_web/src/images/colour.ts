@@ -16,6 +16,11 @@ function basePlaces(terms: readonly Term[]): number[] {
   return diffuse.length > 0 ? diffuse : placesOf("specular");
 }
 
+/** Whether anything of a material shows a base color. */
+export function hasBaseColor(terms: readonly Term[]): boolean {
+  return basePlaces(terms).length > 0;
+}
+
 /** The texture of the base colour as it is. */
 export function baseTexture(terms: readonly Term[]): string | null {
   const first = basePlaces(terms)[0];
@@ -46,29 +51,4 @@ export function withoutBaseImage(terms: readonly Term[], own: readonly Term[]): 
     const before = own[k]?.model === term.model ? own[k] : undefined;
     return { ...term, texture: before?.texture ?? null, color: before?.color ?? term.color };
   });
-}
-
-/** Last words of file names, as libraries of textures write them, and what such images are maps of. */
-const MAPS: readonly (readonly [RegExp, string])[] = [
-  [/^rough(ness)?$/, "roughness"],
-  [/^gloss(iness)?$/, "gloss"],
-  [/^(metal(lic|ness)?)$/, "metal"],
-  [/^(arm|orm|rma|metallicroughness)$/, "roughness and metal"],
-  [/^(nor|nrm|normals?)dx$/, "normals for DirectX"],
-  [/^(nor|nrm|normals?)(gl)?$/, "normals"],
-  [/^(bump|height|disp(lacement)?)$/, "heights"],
-  [/^(emission|emissive|emit|glow)$/, "what shines"],
-  [/^(ao|ambientocclusion|occlusion)$/, "occlusion"],
-];
-
-/** What an image is a map of, by its name, where that is no colour; sizes such as 2k are no words of it. */
-export function mapNamed(file: string): string | null {
-  const plain = file.replace(/\.\w+$/, "").replace(/([a-z])([A-Z])/g, "$1 $2");
-  const words = plain
-    .toLowerCase()
-    .split(/[^a-z]+/)
-    .filter((word) => word.length > 1);
-  if (words.length < 2) return null;
-  const ends = [words.slice(-1), words.slice(-2)].map((last) => last.join(""));
-  return MAPS.find(([name]) => ends.some((end) => name.test(end)))?.[1] ?? null;
 }

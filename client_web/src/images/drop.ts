@@ -1,22 +1,25 @@
-/** Images held over the picture: the object below is outlined, and takes what is dropped on it. */
+/** Files held over the picture: the object below is outlined, and takes the images among those that are dropped on it. */
 import { eyeOf } from "../cameras/eye";
 import { askProbe } from "../live/probing";
 import { hitAt } from "../picture/hit";
 import type { Screen } from "../picture/screen";
 import { hoveredMaterial } from "../state/selection";
-import { IMAGE_TYPES, letGoOver } from "./images";
+import { IMAGE_TYPES, letGoOver } from "./taking";
 
-function holdsImage({ dataTransfer }: DragEvent): boolean {
-  return [...(dataTransfer?.items ?? [])].some(({ kind, type }) => kind === "file" && IMAGE_TYPES.includes(type));
+const holdsFiles = ({ dataTransfer }: DragEvent): boolean => dataTransfer?.types.includes("Files") ?? false;
+
+/** Whether there may be images among them: a folder has no type, and shows its files only when it is dropped. */
+function mayHoldImages({ dataTransfer }: DragEvent): boolean {
+  return [...(dataTransfer?.items ?? [])].some(({ kind, type }) => kind === "file" && (type === "" || IMAGE_TYPES.includes(type)));
 }
 
 export function acceptImages(screen: Screen): () => void {
   const { canvas } = screen;
   const over = (event: DragEvent) => {
-    if (holdsImage(event)) hoveredMaterial.value = hitAt(screen, event).material;
+    if (mayHoldImages(event)) hoveredMaterial.value = hitAt(screen, event).material;
   };
   const drop = (event: DragEvent) => {
-    if (!holdsImage(event)) return;
+    if (!holdsFiles(event)) return;
     const { px, py, material } = hitAt(screen, event);
     const { view } = screen.picture;
     hoveredMaterial.value = null;

@@ -9,14 +9,14 @@ import { uploadImage } from "../net/upload";
 import type { ImageBody, MaterialLook, Term } from "../protocol";
 import { defaultLook, look } from "../state/look";
 import { scene } from "../state/scene";
-import { select, selectedMaterial } from "../state/selection";
+import { select } from "../state/selection";
 import { attempt, note } from "../ui/toasts";
-import { baseTexture, mapNamed, withBaseImage, withoutBaseImage } from "./colour";
+import { baseTexture, hasBaseColor, withBaseImage, withoutBaseImage } from "./colour";
 import { mayBeMetal, metalnessOf, withoutMetalness } from "./metalness";
 import { withNormals, withoutNormals } from "./normals";
+import { withColorAndRoughness, withSet, type Slot } from "./textureSet";
 import { roughPlaces, withoutRoughnessImage, withRoughnessImage } from "./roughness";
 
-export const IMAGE_TYPES = ["image/png", "image/jpeg", "image/webp"];
 export const images = signal<readonly ImageBody[]>([]);
 /** What is on its way, in words. */
 export const sending = signal<string | null>(null);
@@ -24,6 +24,7 @@ export const sending = signal<string | null>(null);
 /** Those that people sent: others were made of them. */
 export const sentImages = computed(() => images.value.filter(({ metalness }) => metalness === null));
 
+const NO_COLOR = "Nothing of this material shows a base color: it needs a term that scatters light, or a highlight.";
 const NO_METAL = "This material cannot become metal: it needs a term that scatters light, and a highlight with f0, such as GGX.";
 
 /** Puts an image onto a material, in some place. */
@@ -32,21 +33,12 @@ export type Put = (material: string, image: ImageBody) => void | Promise<void>;
 /** What becomes of a material's terms; `own`: those of the scene. */
 type Make = (terms: readonly Term[], own: readonly Term[]) => Term[];
 
-/** The material that files were let go over, and the place in it where that is known, until they are taken. */
-let target: { material: Promise<string | null>; put: Put | undefined } | null = null;
-
 export const imageOf = (texture: string): ImageBody | undefined => images.value.find((image) => image.texture === texture);
-export const isImageFile = (file: File): boolean => IMAGE_TYPES.includes(file.type);
 
 export async function loadImages(): Promise<void> {
   await attempt(async () => {
     images.value = await listImages();
   });
-}
-
-/** Files were let go over a material, which is known now or soon; over what `put` is for, or anywhere on it. */
-export function letGoOver(material: Promise<string | null>, put?: Put): void {
-  target = { material, put };
 }
 
 const termsOf = (material: string) => look.value?.materials[material]?.terms;
@@ -93,6 +85,7 @@ export function baseOf(terms: readonly Term[]): string | null {
 
 /** Show an image as the base colour of a material. */
 export async function putImage(material: string, { texture, name }: ImageBody): Promise<void> {
+  if (!hasBaseColor(termsOf(material) ?? [])) return note(NO_COLOR);
   select(material);
   await replaceBase(`Image · ${name}`, material, (terms) => withBaseImage(terms, texture));
 }
@@ -136,30 +129,13 @@ export function takeNormalsOff(material: string): void {
 }
 
 /** Show an image as both, as files of glTF pack them: green is roughness, blue is metalness. */
-function putBoth(material: string, image: ImageBody): void | Promise<void> {
+export function putBoth(material: string, image: ImageBody): void | Promise<void> {
   if (!mayBeMetal(termsOf(material) ?? [])) {
     note(NO_METAL);
     return putRoughness(material, image);
   }
   return putMetalness(material, image, (terms) => withRoughnessImage(terms, roughPlaces(terms), image));
 }
-
-/** What is put where, by what an image is a map of, and in words. */
-const PLACES: Record<string, { put: Put; as: string }> = {
-  roughness: { put: putRoughness, as: "as roughness" },
-  metal: { put: putMetalness, as: "as metalness" },
-  normals: { put: putNormals, as: "as normals" },
-  "roughness and metal": { put: putBoth, as: "as roughness by its green and as metalness by its blue" },
-};
-
-/** Why what an image is a map of has no place. */
-const NO_PLACE: Record<string, string> = {
-  gloss: "Turn it round into one of roughness, and drop that.",
-  heights: "Drop the normal map that was made of it.",
-  "normals for DirectX": "Its green points down: drop the one for OpenGL, as glTF has it.",
-  occlusion: "What hides light is traced here.",
-  "what shines": "Light is part of a bake: import the scene with it, and bake again.",
-};
 
 /** The material is as rough as the scene's own again. */
 export function takeRoughnessOff(material: string): void {
@@ -174,38 +150,38 @@ export async function takeOff(material: string): Promise<void> {
   await replaceBase("Image off", material, withoutBaseImage);
 }
 
+/** Put the images of a set onto a material, in one step; gives those that have no place, with the reason. */
+export async function putSet(label: string, material: string, set: Map<Slot, ImageBody>): Promise<Map<Slot, string>> {
+  const refused = new Map<Slot, string>();
+  const of = look.value?.materials[material];
+  const sceneId = scene.value?.id;
+  if (of === undefined || sceneId === undefined) return refused;
+  const refuse = (slot: Slot, reason: string) => set.delete(slot) && refused.set(slot, reason);
+  if (!hasBaseColor(of.terms)) refuse("base color", "nothing of the material shows one");
+  if (roughPlaces(of.terms).length === 0) refuse("roughness", "nothing of the material has one");
+  if (!mayBeMetal(of.terms)) refuse("metalness", "the material needs a term that scatters light, and a highlight with f0");
+  const metal = set.get("metalness") ?? (set.has("base color") ? metalOn(material) : undefined);
+  const bare = set.has("base color") ? withoutMetalness(of.terms, ownTerms(material), imageOf) : of.terms;
+  let terms = withColorAndRoughness(bare, set);
+  if (metal !== undefined) terms = await withMetalness(metal.id, sceneId, material, terms);
+  await loadImages(); // those that were made are known before the look names them
+  if (look.value?.materials[material] !== of) throw new Error("The material was changed meanwhile; drop the images on it again.");
+  if (set.size > 0) replaceMaterial(label, material, () => withSet(of, terms, set));
+  return refused;
+}
+
 /** Send an image, and show it as the base colour of a material, or where `put` puts it. */
 export async function sendOnto(material: string, file: File, put: Put = putImage): Promise<void> {
   if (sending.value !== null) return note("One image is on its way already; give the next one when it is there.");
   const tell = (share: number) =>
     (sending.value = share < 1 ? `Sending ${file.name}, ${Math.round(100 * share)} %` : `Reading ${file.name}…`);
   tell(0);
-  const image = await attempt(() => uploadImage(file, tell));
+  const image = await attempt(() => uploadImage(file, tell), "files");
   sending.value = null;
   if (image === undefined) return;
   await loadImages();
   await put(material, image);
   for (const warning of image.warnings) note(warning);
-}
-
-/** Take images that were dropped on the page: by what they were let go over, else by what is selected. */
-export async function takeImages(files: readonly File[]): Promise<void> {
-  const over = target;
-  target = null;
-  const material = (await attempt(async () => over?.material)) ?? selectedMaterial.value;
-  const file = files.find(isImageFile);
-  if (file === undefined) return;
-  if (material === null) return note("Drop the image on an object, or choose a material first; it takes what comes next.");
-  if (over?.put !== undefined) return sendOnto(material, file, over.put);
-  const map = mapNamed(file.name);
-  if (map === null) return sendOnto(material, file);
-  const asColour = { label: "Use as colour", run: () => void sendOnto(material, file) };
-  const place = PLACES[map];
-  if (place !== undefined) {
-    note(`“${file.name}” is shown ${place.as}.`, asColour);
-    return sendOnto(material, file, place.put);
-  }
-  note(`“${file.name}” looks like a map of ${map}. ${NO_PLACE[map] ?? ""}`, asColour);
 }
 
 /** Delete an image once that was confirmed; the material shows its own again. What saved looks show stays. */

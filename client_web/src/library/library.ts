@@ -113,7 +113,7 @@ async function begin(work: () => Promise<void>): Promise<void> {
     model.value = BTFS;
     await work();
     await followMakings(refreshBtfs);
-  });
+  }, "files");
 }
 
 export const make = (geometry: Geometry) => begin(() => makeSynthetic(geometry));
@@ -128,6 +128,12 @@ export async function importMaterial(file: File): Promise<void> {
   else await importMeasured(file);
 }
 
+/** Import several, one after another, in the open library. */
+export async function importMaterials(files: readonly File[]): Promise<void> {
+  if (!libraryOpen.value) await openLibrary();
+  for (const file of files) await importMaterial(file);
+}
+
 /** Import a MERL file and show it among the measurements. */
 async function importMeasured(file: File): Promise<void> {
   await attempt(async () => {
@@ -140,7 +146,7 @@ async function importMeasured(file: File): Promise<void> {
     } finally {
       sending.value = null;
     }
-  });
+  }, "files");
 }
 
 /** Give an object the terms of another material. A material is what it looks like: the object's images do not come

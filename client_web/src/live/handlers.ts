@@ -17,7 +17,7 @@ import { probe } from "../state/probe";
 import { curvePath } from "../state/selection";
 import { door, people, you } from "../state/together";
 import { focusedView } from "../state/views";
-import { showError } from "../ui/toasts";
+import { mended, showError } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
 import { take } from "./drawing";
 import { answered } from "./probing";
@@ -85,6 +85,7 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
       if (!isShown()) return;
       if (state === "open" && connection.peek() === "silent") forgetWaiting();
       connection.value = state;
+      if (state === "open") mended("server");
       retryInMs.value = retryIn;
       if (state === "open" || retryIn > 0) refusedBecause.value = reason ?? null;
     },
@@ -94,7 +95,8 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
       if (isShown()) freezing.value = state === "ready" ? null : { state, view, what, progress };
     },
     problem({ problem, revision }, lastGood) {
-      showError(revision === null ? problemText(problem) : `${problemText(problem)} The look is as it was before.`);
+      if (revision === null) showError(problemText(problem));
+      else showError(`${problemText(problem)} The look is as it was before.`, "edit");
       if (isShown() && revision !== null) takeBack(self, lastGood);
     },
     probe(message) {

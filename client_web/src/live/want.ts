@@ -12,6 +12,7 @@ import { held } from "../state/display";
 import { forgetDrawn } from "../state/latency";
 import { look } from "../state/look";
 import { focusedView } from "../state/views";
+import { mended } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
 import { whenExact } from "./exactness";
 
@@ -29,7 +30,10 @@ function wantEverywhere(wanted: Look, inputTime: number, change: Change | null =
   if (connections.incoming?.hello?.room == null) want(connections.incoming, wanted, inputTime, change);
 }
 
-onChange((change, inputTime) => wantEverywhere(change.after, inputTime, change));
+onChange((change, inputTime) => {
+  mended("edit"); // what was refused before is answered by this one
+  wantEverywhere(change.after, inputTime, change);
+});
 
 effect(() => {
   soloLight.value;

@@ -51,7 +51,7 @@ export function environmentOf(files: readonly File[]): File | null {
 export async function take(files: readonly File[]): Promise<void> {
   const file = environmentOf(files);
   if (file === null) {
-    showError(`${files.map((each) => each.name).join(", ")}: give an environment as .hdr or .exr, or an image as .png, .jpg or .webp.`);
+    showError(`${files.map((each) => each.name).join(", ")}: an environment is one of .hdr .exr.`, "files");
     return;
   }
   if (importing.value !== null) {
@@ -61,7 +61,7 @@ export async function take(files: readonly File[]): Promise<void> {
   const tell = (share: number) =>
     (importing.value = share < 1 ? `Sending ${file.name}, ${Math.round(100 * share)} %` : `Reading ${file.name}…`);
   tell(0);
-  const body = await attempt(() => uploadEnvironment(file, tell));
+  const body = await attempt(() => uploadEnvironment(file, tell), "files");
   importing.value = null;
   if (body === undefined) return;
   await loadEnvironments();

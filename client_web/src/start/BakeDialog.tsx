@@ -3,6 +3,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { SceneBody } from "../protocol";
 import { viewsToBake, type BakeChoice } from "../scene/bakeChoice";
 import { IconButton } from "../ui/Button";
+import { useReturnFocus } from "../ui/keepFocus";
 import { PresetList } from "./PresetList";
 import { Remarks } from "./Remarks";
 
@@ -14,6 +15,7 @@ interface Props {
 
 export function BakeDialog({ scene, onClose, onOpen }: Props) {
   const panel = useRef<HTMLElement>(null);
+  useReturnFocus(panel);
   useEffect(() => {
     panel.current?.focus();
     panel.current?.scrollIntoView({ block: "nearest" });

@@ -12,25 +12,14 @@ import {
   together,
   type Chosen,
 } from "../files/files";
+import { refusalOnStart } from "../files/refusals";
 import type { SceneBody } from "../protocol";
-import { showError } from "../ui/toasts";
+import { mended, showError } from "../ui/toasts";
 import { ChosenScenes } from "./ChosenScenes";
 import { useFileDrop } from "./useFileDrop";
 import { useImport, type Sending } from "./useImport";
 
 const NOTHING: Chosen = { scenes: [], environment: null };
-const MAX_NAMED = 5;
-const FORMATS = `A scene is one of ${SCENE_SUFFIXES.join(" ")}, an environment one of ${ENVIRONMENT_SUFFIXES.join(" ")}.`;
-
-/** Why nothing of a drop, or not all of it, can be imported; null where all can. A folder may hold anything. */
-function refusal(files: readonly Dropped[]): string | null {
-  const refused = files.filter((each) => !isOfUse(each) && !each.path.includes("/")).map(({ path }) => path);
-  if (refused.length > 0) {
-    const more = refused.length > MAX_NAMED ? ` and ${refused.length - MAX_NAMED} more` : "";
-    return `${refused.slice(0, MAX_NAMED).join(", ")}${more}: ${FORMATS}`;
-  }
-  return files.some(isOfUse) ? null : `There is nothing to import in it. ${FORMATS}`;
-}
 
 function useSorted(files: readonly Dropped[]): Chosen {
   const [chosen, setChosen] = useState(NOTHING);
@@ -62,11 +51,12 @@ function FileInput({ label, folder, take }: { label: string; folder?: boolean; t
   );
 }
 
-function SendingWords({ name, share }: Sending) {
+function SendingWords({ name, share, number, count }: Sending) {
+  const which = count > 1 ? ` (${number} of ${count})` : "";
   return (
     <>
       <progress max={1} value={share} aria-label="Upload" />
-      <span>{share < 1 ? `Sending “${name}”, ${Math.round(100 * share)} %` : `The server reads “${name}”…`}</span>
+      <span>{share < 1 ? `Sending “${name}”${which}, ${Math.round(100 * share)} %` : `The server reads “${name}”${which}…`}</span>
     </>
   );
 }
@@ -78,9 +68,10 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
   const chosen = useSorted(files);
   const { scenes, environment } = chosen;
   const take = (news: Dropped[]) => {
-    if (news.length === 0) return;
-    const words = refusal(news);
-    if (words !== null) showError(words);
+    if (news.length === 0) return showError("The folder is empty. Nothing was chosen.", "files");
+    mended("files"); // what was wrong with those before
+    const words = refusalOnStart(news);
+    if (words !== null) showError(words, "files");
     forgetProblems();
     setFiles((before) => together(before, news.filter(isOfUse)));
   };

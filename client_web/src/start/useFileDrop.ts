@@ -11,7 +11,8 @@ export function useFileDrop(take: (files: Dropped[]) => void): boolean {
     const drag = (event: DragEvent) => {
       if (!event.dataTransfer?.types.includes("Files")) return;
       event.preventDefault(); // else the browser would open the file in place of the page
-      setOver(event.type === "dragover");
+      // from one element to the next is no way out of the page
+      if (event.type === "dragover" || event.relatedTarget === null) setOver(event.type === "dragover");
     };
     const drop = (event: DragEvent) => {
       const transfer = event.dataTransfer;

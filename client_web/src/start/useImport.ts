@@ -3,12 +3,15 @@ import { useState } from "preact/hooks";
 import { stem, type Chosen } from "../files/files";
 import { uploadScene } from "../net/upload";
 import type { SceneBody } from "../protocol";
-import { showError } from "../ui/toasts";
+import { mended, showError } from "../ui/toasts";
 
 export interface Sending {
   name: string;
   /** Of the bytes that are sent. */
   share: number;
+  /** Which one it is, from 1, of how many. */
+  number: number;
+  count: number;
 }
 
 interface Outcome {
@@ -30,8 +33,9 @@ function sayRefused(problems: ReadonlyMap<string, string>, numSent: number): voi
   if (problems.size === 0) return;
   showError(
     numSent === 1
-      ? [...problems.values()].join()
+      ? [...problems].map(([path, problem]) => `${path}: ${problem}`).join()
       : `${problems.size} of ${numSent} scenes could not be imported; the list says why.`,
+    "files",
   );
 }
 
@@ -42,11 +46,14 @@ export function useImport(): Import {
     const imported: SceneBody[] = [];
     const done = new Set<string>();
     const refused = new Map<string, string>();
-    for (const scene of scenes) {
+    mended("files");
+    for (const [k, scene] of scenes.entries()) {
       const name = stem(scene.path);
       try {
         const order = { scene, companions: scene.companions, environment, name, ground };
-        imported.push(await uploadScene(order, (share) => setSending({ name, share })));
+        const which = { name, number: k + 1, count: scenes.length };
+        setSending({ ...which, share: 0 });
+        imported.push(await uploadScene(order, (share) => setSending({ ...which, share })));
         done.add(scene.path);
       } catch (error) {
         refused.set(scene.path, (error as Error).message);

@@ -3,6 +3,7 @@ import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { EyeBar } from "../cameras/EyeBar";
 import { PlacingBar } from "../lights/PlacingBar";
 import { shownViews, view } from "../state/views";
+import { Toasts } from "../ui/toasts";
 import { Cell } from "./Cell";
 import { FalseColourLegend } from "./FalseColourLegend";
 import { HistogramView } from "./HistogramView";
@@ -42,6 +43,7 @@ export function PictureView() {
         <PlacingBar />
         <Limits />
         <HistogramView />
+        <Toasts />
       </div>
       <FalseColourLegend />
       <PictureBar />

@@ -10,7 +10,7 @@ from fastapi import UploadFile
 from relume.asset_store import check_name
 from server.access.reservations import Reservation
 from server.files.importing import ImportRequest
-from server.files.uploads import keep_upload, plain_stem
+from server.files.uploads import keep_upload, plain_name, plain_stem
 from server.services import Services
 
 
@@ -30,6 +30,7 @@ async def take_in(
     called = check_name(name or plain_stem(file.filename) or kind.capitalize())
 
     def order(folder: Path) -> ImportRequest:
-        return ImportRequest.of(services.settings, kind, keep_upload(file, folder / kind), called)
+        path = keep_upload(file, folder / kind)
+        return ImportRequest.of(services.settings, kind, path, called, scene=plain_name(file.filename))
 
     return await services.intake.take(reservation, order)

@@ -44,7 +44,7 @@ def test_an_image_is_put_on_by_a_button_and_by_a_drop(editor: Editor, stripes: P
     page.get_by_role("button", name="Undo", exact=True).click()
     expect(chosen.locator("option:checked")).to_have_text("stripes")
     page.get_by_role("button", name="Undo", exact=True).click()
-    material = drop_on_the_middle(editor, stripes, "dropped.png")
+    material = drop_on_the_middle(editor, {"dropped.png": stripes})
     expect(page.locator(".inspector > header h2")).to_have_text(material)
     expect(chosen.locator("option:checked")).to_have_text("dropped")
     editor.wait_until_exact()
@@ -54,7 +54,7 @@ def test_an_image_named_like_a_map_of_roughness_and_metal_becomes_both(editor: E
     page = editor.page
     editor.choose("Ball", 1)
     page.get_by_label("Model").last.select_option("ggx")
-    assert drop_on_the_middle(editor, stripes, "tiles_orm.png") == "Ball"
+    assert drop_on_the_middle(editor, {"tiles_orm.png": stripes}) == "Ball"
     chosen, metal = (page.get_by_label(label, exact=True) for label in ("Roughness map", "Metalness map"))
     for each in (chosen, metal):
         expect(each.locator("option:checked")).to_have_text("tiles_orm")
@@ -102,28 +102,68 @@ def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> N
     editor.choose("Ball", 0)
     expect(chosen.locator("option:checked")).to_have_text("bumps")
     for name in ("tiles_nor_gl_1k.png", "tiles_Normal.png"):  # the same file, by its newest name
-        assert drop_on_the_middle(editor, bumps, name) == "Ball"
+        assert drop_on_the_middle(editor, {name: bumps}) == "Ball"
         expect(chosen.locator("option:checked")).to_have_text(name.removesuffix(".png"))
-    drop_on_the_middle(editor, bumps, "tiles_nor_dx_1k.png")
+    drop_on_the_middle(editor, {"tiles_nor_dx_1k.png": bumps})
     expect(page.get_by_text("drop the one for OpenGL")).to_be_visible()
 
 
-def drop_on_the_middle(editor: Editor, file: Path, name: str) -> str:
-    """Let a file go over the middle of the picture; returns the material that is seen there."""
+def test_images_that_are_dropped_together_are_one_step(editor: Editor, stripes: Path, bumps: Path) -> None:
+    """Each in its place, and one message says what is not used; undone at once, and dropped again."""
+    page = editor.page
+    editor.choose("Ball", 1)
+    page.get_by_label("Model").last.select_option("ggx")
+    names = ["tiles_Color", "tiles_Normal", "tiles_Roughness", "tiles_Displacement"]
+    labels = ["Image of the base colour", "Normal map", "Roughness map"]
+    steps = page.locator(".tile.step")
+    for _ in range(2):
+        count = steps.count()
+        files = {f"{name}.png": bumps if name == "tiles_Normal" else stripes for name in names}
+        assert drop_on_the_middle(editor, files) == "Ball"
+        message = page.locator(".toast", has_text="On “Ball”: base color, roughness and normals.")
+        expect(message).to_contain_text("Not used: tiles_Displacement.png")
+        for label, name in zip(labels, names, strict=False):
+            expect(page.get_by_label(label, exact=True).locator("option:checked")).to_have_text(name)
+        expect(steps).to_have_count(count + 1)
+        page.get_by_role("button", name="Undo", exact=True).click()
+        for label, name in zip(labels, names, strict=False):
+            expect(page.get_by_label(label, exact=True).locator("option:checked")).not_to_have_text(name)
+        message.get_by_role("button", name="Close this message").click()
+
+
+def test_what_cannot_be_taken_is_named_until_the_next_drop(editor: Editor, stripes: Path) -> None:
+    page = editor.page
+    for name, words in (("cayman.brdf", "Measured materials go into the Library"), ("car.glb", "on the start page")):
+        drop_on_the_middle(editor, {name: stripes}, "")
+        expect(page.locator(".toast.error")).to_have_count(1)  # that before is gone
+        expect(page.locator(".toast.error")).to_contain_text(name)
+        expect(page.locator(".toast.error")).to_contain_text(words)
+    toast, strip = page.locator(".toast.error").bounding_box(), page.locator(".filmstrip").bounding_box()
+    assert toast is not None
+    assert strip is not None
+    assert toast["y"] + toast["height"] <= strip["y"]
+    drop_on_the_middle(editor, {"tiles.png": stripes})
+    expect(page.locator(".toast.error")).to_have_count(0)
+
+
+def drop_on_the_middle(editor: Editor, files: dict[str, Path], mime: str = "image/png") -> str:
+    """Let files go over the middle of the picture, each under a name; returns the material that is seen there."""
     page, box = editor.page, editor.canvas.bounding_box()
     assert box is not None
     place = {"clientX": box["x"] + 0.5 * box["width"], "clientY": box["y"] + 0.5 * box["height"]}
     page.mouse.move(place["clientX"], place["clientY"])
     material = page.locator(".picture-bar .material").inner_text()
-    told = [base64.b64encode(file.read_bytes()).decode(), name]
+    told = [[name, base64.b64encode(file.read_bytes()).decode()] for name, file in files.items()]
     carried = page.evaluate_handle(
-        """([told, name]) => {
+        """([told, type]) => {
           const held = new DataTransfer();
-          const bytes = Uint8Array.from(atob(told), (c) => c.charCodeAt(0));
-          held.items.add(new File([bytes], name, { type: "image/png" }));
+          for (const [name, text] of told) {
+            const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+            held.items.add(new File([bytes], name, { type }));
+          }
           return held;
         }""",
-        told,
+        [told, mime],
     )
     editor.canvas.dispatch_event("dragover", {"dataTransfer": carried, **place})
     editor.canvas.dispatch_event("drop", {"dataTransfer": carried, **place})

@@ -1,0 +1,96 @@
+/** Several images that are dropped together, as libraries of textures name them. */
+import { expect, test } from "vitest";
+import { refusalInEditor, refusalOnStart } from "../src/files/refusals";
+import { isTexture } from "../src/images/taking";
+import { planned, setName, setWords, withColorAndRoughness, withSet, type Slot } from "../src/images/textureSet";
+import type { ImageBody, MaterialLook, ModelBody, Term } from "../src/protocol";
+import { models } from "../src/state/scene";
+
+const TYPES: Record<string, string> = { jpg: "image/jpeg", png: "image/png", tga: "image/x-tga" };
+const file = (name: string) => new File([], name, { type: TYPES[name.split(".").at(-1) ?? ""] ?? "" });
+
+function slotsOf(...names: string[]): Record<string, string> {
+  return Object.fromEntries([...planned(names.map(file), isTexture).slots].map(([slot, { name }]) => [slot, name]));
+}
+
+test("each map of a set has its place, in whatever order the files come", () => {
+  const names = ["Color", "Displacement", "Metalness", "Normal", "Roughness", "AmbientOcclusion"].map((map) => `Metal007_1K_${map}.jpg`);
+  const places = {
+    "base color": "Metal007_1K_Color.jpg",
+    metalness: "Metal007_1K_Metalness.jpg",
+    normals: "Metal007_1K_Normal.jpg",
+    roughness: "Metal007_1K_Roughness.jpg",
+  };
+  expect(slotsOf(...names)).toEqual(places);
+  expect(slotsOf(...names.toReversed())).toEqual(places);
+  expect(planned(names.map(file), isTexture).refused.map(({ name }) => name)).toEqual([
+    "Metal007_1K_Displacement.jpg",
+    "Metal007_1K_AmbientOcclusion.jpg",
+  ]);
+});
+
+test("normals for OpenGL are taken beside those for DirectX, and EXR files by what they are named", () => {
+  expect(slotsOf("oak_nor_dx_1k.jpg", "oak_nor_gl_1k.exr", "oak_rough_1k.exr", "oak_diff_1k.jpg")).toEqual({
+    "base color": "oak_diff_1k.jpg",
+    normals: "oak_nor_gl_1k.exr",
+    roughness: "oak_rough_1k.exr",
+  });
+  expect(isTexture(file("studio_small.exr"))).toBe(false);
+});
+
+test("one image may be roughness and metalness, unless one of them has its own", () => {
+  expect(slotsOf("rust_OcclusionRoughnessMetallic.png", "rust_BaseColor.png")).toEqual({
+    "base color": "rust_BaseColor.png",
+    roughness: "rust_OcclusionRoughnessMetallic.png",
+    metalness: "rust_OcclusionRoughnessMetallic.png",
+  });
+  expect(slotsOf("rust_arm_2k.jpg", "rust_rough_2k.jpg")).toEqual({ roughness: "rust_rough_2k.jpg", metalness: "rust_arm_2k.jpg" });
+});
+
+test("a preview beside the color is not used, and what cannot be read says how to save it", () => {
+  const { slots, refused } = planned(["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"].map(file), isTexture);
+  expect([...slots.values()].map(({ name }) => name)).toEqual(["Marble006_1K_Color.jpg"]);
+  expect(refused).toEqual([
+    { name: "Marble006_Roughness.tga", reason: "save it as .png, .jpg, .webp or .exr" },
+    { name: "Marble006.png", reason: "another image is the base color" },
+  ]);
+});
+
+test("one message says what is used and what is not, and a step has the name that the files share", () => {
+  const refused = [{ name: "oak_ao.png", reason: "ambient occlusion; relume traces it" }];
+  expect(setWords("Seat", ["base color", "roughness", "normals"], refused)).toBe(
+    "On “Seat”: base color, roughness and normals. Not used: oak_ao.png (ambient occlusion; relume traces it).",
+  );
+  expect(setWords("Seat", ["normals"], [])).toBe("On “Seat”: normals.");
+  expect(setName(["Metal007_1K_Color.jpg", "Metal007_1K_Normal.jpg"])).toBe("Metal007_1K");
+  expect(setName(["oak rough.png", "oak.png"])).toBe("oak");
+  expect(setName(["a.png", "b.png"])).toBe("2 images");
+});
+
+test("a material with a set has all of it at once", () => {
+  models.value = [
+    { model: "lambert", texture: "diffuse", parameters: [] },
+    { model: "ggx", texture: "specular", width: "roughness", width_power: 1, parameters: [{ name: "roughness", minimum: 0, maximum: 1 }] },
+  ] as unknown as ModelBody[];
+  const image = (name: string) => ({ texture: `image:${name}`, roughness: 0.7 }) as ImageBody;
+  const set = new Map<Slot, ImageBody>([["base color", image("c")], ["roughness", image("r")], ["normals", image("n")]]);
+  const terms = [
+    { model: "lambert", color: [0.5, 0.2, 0.1], texture: null },
+    { model: "ggx", color: [1, 1, 1], texture: null, params: { roughness: 0.2 } },
+  ] as Term[];
+  const made = withSet({ terms } as MaterialLook, withColorAndRoughness(terms, set), set);
+  expect(made.terms.map(({ texture }) => texture)).toEqual(["image:c", null]);
+  expect(made.terms[1]).toMatchObject({ params: { roughness: 0.7 }, roughness_map: "image:r" });
+  expect(made.normal_map).toEqual({ image: "image:n", scale: 1 });
+});
+
+test("what was dropped on the wrong place is named, with where it belongs", () => {
+  const dropped = (path: string) => [{ path, file: file(path) }];
+  for (const refusal of [refusalInEditor, refusalOnStart]) {
+    expect(refusal(dropped("cayman.brdf"))).toMatch(/^cayman\.brdf: Measured materials go into the Library/);
+    expect(refusal(dropped("car.fbx"))).toMatch(/^car\.fbx: .*Export it as \.glb/);
+  }
+  expect(refusalInEditor(dropped("car.glb"))).toMatch(/^car\.glb: Scenes are imported on the start page/);
+  expect(refusalOnStart(dropped("gold.binary"))).toMatch(/^gold\.binary: Measured materials/);
+  expect(refusalOnStart(dropped("car.glb"))).toBeNull();
+});
