@@ -98,6 +98,14 @@ describe("a new light", () => {
     expect(on("directional")).toMatchObject({ direction: [0, -1, 0] });
   });
 
+  test("a panel beside a low object stands no lower than what was clicked, and one under a ceiling hangs", () => {
+    const panel = (normal: Triple) => lightFor("rectangle", { position: [0, 0.03, 0], normal, distance: 5, radiance: 0.5 });
+    const lowest = (light: Light) => Math.min(...outlineOf(light).map(([, y]) => y));
+    expect(lowest(panel([0, 0, 1]))).toBeGreaterThan(0.02);
+    expect(lowest(panel([0.6, 0, 0.8]))).toBeGreaterThan(0.02);
+    expect(panel([0, -1, 0])).toMatchObject({ position: [0, -0.97, 0] });
+  });
+
   test("gives the same irradiance whatever its kind", () => {
     const panel = on("rectangle") as Extract<Light, { kind: "rectangle" }>;
     expect(panel.emission[0] * panel.size[0] * panel.size[1]).toBeCloseTo(3, 1);

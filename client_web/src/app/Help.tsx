@@ -2,12 +2,15 @@
 import { useEffect, useRef } from "preact/hooks";
 import { helpOpen } from "../state/panels";
 import { IconButton } from "../ui/Button";
+import { keyName } from "../ui/chord";
+import { useReturnFocus } from "../ui/keepFocus";
 import { ACTIONS, FOCUS_KEYS } from "./actions";
 
 const GROUPS = ["Picture", "Look", "Compare", "Curve", "Panels"] as const;
 
 export function Help() {
   const panel = useRef<HTMLDivElement>(null);
+  useReturnFocus(panel);
   useEffect(() => panel.current?.focus(), []);
   return (
     <div class="help" ref={panel} tabIndex={-1} role="dialog" aria-label="Keyboard map">
@@ -24,7 +27,7 @@ export function Help() {
                 <dt>{action.label}</dt>
                 <dd>
                   {action.keys.map((key) => (
-                    <kbd key={key}>{key}</kbd>
+                    <kbd key={key}>{keyName(key)}</kbd>
                   ))}
                 </dd>
               </div>
@@ -37,7 +40,9 @@ export function Help() {
             <div key={label}>
               <dt>{label}</dt>
               <dd>
-                <kbd>{keys}</kbd>
+                {keys.map((key) => (
+                  <kbd key={key}>{key}</kbd>
+                ))}
               </dd>
             </div>
           ))}

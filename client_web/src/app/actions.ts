@@ -78,19 +78,32 @@ export const ACTIONS: readonly Action[] = [
 ];
 
 /** Keys of controls that have the focus; listed, handled where they belong. */
-export const FOCUS_KEYS: readonly [label: string, keys: string][] = [
-  ["Slider: step, large step, ends", "← →  Page  Home End"],
-  ["Slider: fine steps, type, reset", "Shift  Enter or a digit  Delete"],
-  ["Curve point: move, fine", "← → ↑ ↓  Shift"],
-  ["Curve point: pick up and put down", "Enter, click"],
-  ["Curve point: delete, reset", "Delete  R"],
-  ["Stretch: scale, shift", "↑ ↓  ← →"],
-  ["Handle of a light: move", "← → ↑ ↓"],
-  ["Handle of a light: away, near", "Shift ↑ ↓"],
-  ["Pin of a new comment: move, by ten", "← → ↑ ↓  Shift"],
-  ["Picture: pan, or turn its eye", "← → ↑ ↓"],
-  ["Eye: slide, nearer and farther, back", "Shift ← → ↑ ↓  + −  Home"],
-  ["One of several views: show it alone", "Enter, double-click"],
+export const FOCUS_KEYS: readonly (readonly [label: string, keys: readonly string[]])[] = [
+  ["Slider: step", ["←", "→"]],
+  ["Slider: large step", ["Page Up", "Page Down"]],
+  ["Slider: ends", ["Home", "End"]],
+  ["Slider: fine steps", ["Shift+←", "Shift+→"]],
+  ["Slider: type a number", ["Enter", "0–9"]],
+  ["Slider: reset", ["Delete"]],
+  ["Curve point: angle", ["←", "→"]],
+  ["Curve point: value by 2 %", ["↑", "↓"]],
+  ["Curve point: value by 25 %", ["Page Up", "Page Down"]],
+  ["Curve point: fine steps", ["Shift+arrow"]],
+  ["Curve point: pick up, put down", ["Enter"]],
+  ["Curve point: delete", ["Delete"]],
+  ["Curve point: reset", ["R"]],
+  ["Stretch: scale", ["↑", "↓"]],
+  ["Stretch: shift", ["←", "→"]],
+  ["Handle of a light: select", ["Enter", "Space"]],
+  ["Handle of a light: move", ["←", "→", "↑", "↓"]],
+  ["Handle of a light: away, near", ["Shift+↑", "Shift+↓"]],
+  ["Pin of a new comment: move", ["←", "→", "↑", "↓"]],
+  ["Pin of a new comment: by ten", ["Shift+arrow"]],
+  ["Picture: pan, or turn its eye", ["←", "→", "↑", "↓"]],
+  ["Eye: slide", ["Shift+arrow"]],
+  ["Eye: nearer, farther", ["+", "−"]],
+  ["Eye: back", ["Home"]],
+  ["One of several views: show it alone", ["Enter"]],
 ];
 
 export function onWipeKey(key: string): void {

@@ -5,6 +5,7 @@ import { comments, listedComments, numberOf, openComments, pinning, resolvedShow
 import { mayComment, mayEdit, noCommentWords } from "../state/me";
 import { togglePanel } from "../state/room";
 import { IconButton } from "../ui/Button";
+import { useReturnFocus } from "../ui/keepFocus";
 import { beginComment, cancelComment, keepComment, pointOut, remove, settle } from "./comments";
 
 const WHEN = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
@@ -99,9 +100,11 @@ function Entry({ comment }: { comment: CommentBody }) {
 }
 
 export function CommentsPanel() {
+  const panel = useRef<HTMLElement>(null);
+  useReturnFocus(panel);
   const numResolved = comments.value.length - openComments.value.length;
   return (
-    <aside class="comments beside-picture" aria-label="Comments">
+    <aside ref={panel} class="comments beside-picture" aria-label="Comments">
       <header class="panel-head">
         <h2 class="spacer">Comments</h2>
         <IconButton icon="close" label="Close" onClick={() => togglePanel("comments")} />

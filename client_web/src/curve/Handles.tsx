@@ -1,7 +1,6 @@
 /** The curve's points: each a slider for keyboard and screen reader. */
 import type { Point } from "../protocol";
 import { formatNumber } from "../ui/scale";
-import { valueAt, yFraction } from "./model/axes";
 import { valueOn } from "./model/edited";
 import { putPoints } from "./model/model";
 import { movePoint, removePoint } from "./model/points";
@@ -15,6 +14,20 @@ interface Props {
 }
 
 const FINE = 0.1;
+/** What keys multiply a point's value by. */
+const STEP = 1.02;
+const LARGE_STEP = 1.25;
+/** Of the top of the plot: what a point at zero begins with, and what is as good as zero. */
+const FIRST_VALUE = 1e-3;
+const LEAST_VALUE = 1e-9;
+const DIGITS = 6;
+
+/** A value after key steps, as a share of itself: a point in the tail of a highlight moves as far as one at its peak. */
+export function steppedValue(value: number, factor: number, top: number): number {
+  if (value <= 0) return factor > 1 ? FIRST_VALUE * top : 0;
+  const next = Number((value * factor).toPrecision(DIGITS));
+  return next < LEAST_VALUE * top ? 0 : next;
+}
 
 /** The generator's value at a point's angle. */
 function generatorAt(hand: Hand, degrees: number): number | null {
@@ -45,22 +58,21 @@ export function moveTo(
   putPoints(hand.model, label, points, moved, hand.channels);
 }
 
-function nudge(hand: Hand, points: Point[], index: number, dx: number, dy: number): void {
+function nudge(hand: Hand, points: Point[], index: number, dx: number, factor: number): void {
   const [x, y] = points[index] as Point;
-  const height = Math.max(0, yFraction(hand.axes, y) + dy);
-  moveTo(hand, points, index, x + dx, dy === 0 ? y : valueAt(hand.axes, height));
+  moveTo(hand, points, index, x + dx, factor === 1 ? y : steppedValue(y, factor, hand.axes.top));
 }
 
 function onKey(event: KeyboardEvent, hand: Hand, points: Point[], index: number): void {
   const step = event.shiftKey ? FINE : 1;
   const degrees = Math.max(0.5, 90 / hand.model.info.bands) * step;
   const moves: Record<string, [number, number]> = {
-    ArrowLeft: [-degrees, 0],
-    ArrowRight: [degrees, 0],
-    ArrowUp: [0, 0.02 * step],
-    ArrowDown: [0, -0.02 * step],
-    PageUp: [0, 0.1],
-    PageDown: [0, -0.1],
+    ArrowLeft: [-degrees, 1],
+    ArrowRight: [degrees, 1],
+    ArrowUp: [0, STEP ** step],
+    ArrowDown: [0, STEP ** -step],
+    PageUp: [0, LARGE_STEP],
+    PageDown: [0, 1 / LARGE_STEP],
   };
   const move = moves[event.key];
   if (move !== undefined) nudge(hand, points, index, ...move);

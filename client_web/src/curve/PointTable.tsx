@@ -62,7 +62,7 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
                   value={value}
                   minimum={0}
                   maximum={MAX_CURVE_VALUE}
-                  step={Math.max(0.01, value / 50)}
+                  step={value > 0 ? value / 50 : hand.axes.top / 1000}
                   onChange={(y) => moveTo(hand, points, index, degrees, y)}
                 />
               </td>

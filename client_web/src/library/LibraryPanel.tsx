@@ -1,8 +1,10 @@
 /** Materials to put onto objects: by dragging a ball into the picture, or by choosing one for the selection. */
+import { useRef } from "preact/hooks";
 import { libraryOpen } from "../state/panels";
 import { models } from "../state/scene";
 import { selectedMaterial } from "../state/selection";
 import { IconButton } from "../ui/Button";
+import { useReturnFocus } from "../ui/keepFocus";
 import { Makings } from "./Makings";
 import { NavigationMap } from "./NavigationMap";
 import {
@@ -61,8 +63,11 @@ function takeFiles(event: DragEvent): void {
 }
 
 export function LibraryPanel() {
+  const panel = useRef<HTMLElement>(null);
+  useReturnFocus(panel);
   return (
     <aside
+      ref={panel}
       class="panel library"
       aria-label="Library of materials"
       onDragOver={(event) => event.preventDefault()}

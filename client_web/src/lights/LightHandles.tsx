@@ -5,7 +5,7 @@ import { hold } from "../live/touch";
 import type { Screen } from "../picture/screen";
 import { shownWidth, toScreen } from "../picture/transform";
 import { transformOf } from "../picture/viewTransforms";
-import type { Light, Rgb, Triple } from "../protocol";
+import type { Light, LightKind, Rgb, Triple } from "../protocol";
 import { drawn, handlesOpen } from "../state/display";
 import { aimLocked } from "../state/panels";
 import { selectedLight, selectLight } from "../state/selection";
@@ -14,6 +14,7 @@ import { useDrag } from "../ui/drag";
 import { formatNumber } from "../ui/scale";
 import { cameraOf, project, pushed, slid, type Camera } from "./camera";
 import { aimed, anchorsOf, moved, outlineOf, type Change } from "./handleGeometry";
+import { labelOf } from "./kinds";
 import { changeLight, lightPath, lights, removeLight } from "./lights";
 
 /** How a point of the world lies on a canvas, and how the canvas pulls at it. */
@@ -57,6 +58,16 @@ const STEPS: Record<string, [dx: number, dy: number]> = {
   ArrowDown: [0, STEP_PX],
 };
 
+/** What a handle looks like: a bulb is round, a spot a cone, a panel a square, a sun has rays; an aim is a diamond. */
+const SHAPES: Record<LightKind | "aim", string> = {
+  point: "M-5 0a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z",
+  spot: "M-2 -6h4l4 11h-12z",
+  rectangle: "M-5 -5h10v10h-10z",
+  directional: "M-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0 -7 0zM0 -5.5v-2.5M0 5.5v2.5M-5.5 0h-2.5M5.5 0h2.5M-4 -4l-1.7 -1.7M4 4l1.7 1.7M-4 4l-1.7 1.7M4 -4l1.7 -1.7",
+  mesh: "",
+  aim: "M0 -6l6 6l-6 6l-6 -6z",
+};
+
 interface HandleProps {
   ground: Ground;
   name: string;
@@ -94,8 +105,11 @@ function Handle({ ground, name, light, at, deed, change }: HandleProps) {
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (step !== undefined) go(ground.pulled(at, ...step, event.shiftKey));
-    else if (event.key === "Delete" || event.key === "Backspace") removeLight(name);
+    if (step !== undefined) {
+      take();
+      go(ground.pulled(at, ...step, event.shiftKey));
+    }
+    else if ((event.key === "Delete" || event.key === "Backspace") && !event.repeat) removeLight(name);
     else return;
     event.preventDefault();
     event.stopPropagation();
@@ -108,14 +122,16 @@ function Handle({ ground, name, light, at, deed, change }: HandleProps) {
     <button
       class={`light-handle ${deed.toLowerCase()} ${selectedLight.value === name ? "selected" : ""}`}
       style={{ transform: `translate(${place[0].toFixed(1)}px, ${place[1].toFixed(1)}px)` }}
-      title={deed === "Move" ? name : `What ${name} aims at`}
+      title={deed === "Move" ? `${name}: ${labelOf(light.kind)}` : `What ${name} aims at`}
       aria-roledescription="handle"
       aria-label={`${name}, ${deed === "Move" ? "at" : "aims at"} ${where}. Arrow keys move it, with Shift away and near.`}
       {...hand}
-      onFocus={take}
+      onClick={take}
       onKeyDown={key}
     >
-      <i style={light.on ? { background: toHex(lit, 0) } : undefined} />
+      <svg viewBox="-9 -9 18 18" aria-hidden="true">
+        <path d={SHAPES[deed === "Move" ? light.kind : "aim"]} style={light.on ? { fill: toHex(lit, 0) } : undefined} />
+      </svg>
     </button>
   );
 }

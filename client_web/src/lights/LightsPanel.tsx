@@ -1,4 +1,5 @@
 /** The lights of the scene as a mixer: each switched on and off, alone, stronger or weaker, and tinted. */
+import { useEffect, useRef } from "preact/hooks";
 import { fromHex, toHex } from "../color/color";
 import { hold } from "../live/touch";
 import type { Light } from "../protocol";
@@ -19,8 +20,15 @@ const TITLE = "Lights";
 
 function Row({ name, light }: { name: string; light: Light }) {
   const selected = name === selectedLight.value;
+  const row = useRef<HTMLLIElement>(null);
+  useEffect(() => {
+    if (selected) row.current?.scrollIntoView({ block: "nearest" }); // a new one may be below the fold
+  }, [selected]);
   return (
-    <li class={`light ${selected ? "selected" : ""} ${light.on ? "" : "off"}`}>
+    <li
+      ref={row}
+      class={`light ${selected ? "selected" : ""} ${light.on ? "" : "off"}`}
+    >
       <IconButton
         icon="lamp"
         label={`${name}: ${light.on ? "switch off" : "switch on"}`}

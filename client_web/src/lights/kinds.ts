@@ -50,6 +50,14 @@ const SIDE = 0.4;
 /** Irradiance of a new light, of the picture's mean radiance: as bright as what is there on a surface of middle grey. */
 const SHARE = 6;
 
+/** Where a panel is put, so that its lower edge is not below what was clicked, which may stand on a floor. A panel that hangs
+ * below what was clicked stays there. */
+function raisedBy(clicked: Triple, place: Triple, direction: Triple, halfSide: number): Triple {
+  const hangs = direction[1] > Math.SQRT1_2 * length(direction);
+  const below = clicked[1] - (place[1] - halfSide * Math.sqrt(1 - (direction[1] / length(direction)) ** 2));
+  return hangs || below <= 0 ? place : tidy(add(place, [0, below, 0]));
+}
+
 /** A light for what was clicked: off the surface by a part of the camera's distance, aimed at it, and as bright as the
  * rest of the picture. */
 export function lightFor(kind: AddedKind, { position, normal, distance, radiance }: Clicked): Light {
@@ -69,7 +77,9 @@ export function lightFor(kind: AddedKind, { position, normal, distance, radiance
     case "rectangle": {
       const side = Number((SIDE * offset).toPrecision(2));
       const emission = grey((irradiance * offset ** 2) / side ** 2);
-      return { ...DEFAULT_LIGHTS.rectangle, emission, position: place, direction, size: [side, side] };
+      const raised = raisedBy(position, place, direction, side / 2);
+      const aim = tidy(subtract(position, raised));
+      return { ...DEFAULT_LIGHTS.rectangle, emission, position: raised, direction: aim, size: [side, side] };
     }
   }
 }

@@ -6,7 +6,7 @@ import { MAX_LIGHTS } from "../look.gen";
 import type { Light, Look, Triple } from "../protocol";
 import { soloLight } from "../seen/solo";
 import { defaultLook, look } from "../state/look";
-import { selectedLight } from "../state/selection";
+import { selectedLight, selectLight } from "../state/selection";
 import { note } from "../ui/toasts";
 import type { Change } from "./handleGeometry";
 import { beside, freeLightName } from "./kinds";
@@ -34,7 +34,7 @@ export function editLight(deed: string, name: string, field: string, value: unkn
 export function addLight(name: string, light: Light): void {
   batch(() => {
     edit("Add", lightPath(name), light);
-    selectedLight.value = name;
+    selectLight(name);
   });
 }
 

@@ -1,8 +1,9 @@
 /** The error map beside the picture, and what it means. */
-import { useState } from "preact/hooks";
+import { useRef, useState } from "preact/hooks";
 import { truthPicture } from "../net/api";
 import type { TruthBody } from "../protocol";
 import { IconButton } from "../ui/Button";
+import { useReturnFocus } from "../ui/keepFocus";
 import { type Choice, RadioRow } from "../ui/RadioRow";
 import { askTruth, goOnWithTruth, haltTruth, isGoingOn, judged, toggleTruth, truth, truthPlan } from "./truth";
 import { findings, omissions, type Paths, planWords, progressWords, verdicts } from "./words";
@@ -76,10 +77,12 @@ function Found({ body }: { body: TruthBody }) {
 }
 
 export function TruthPanel() {
+  const panel = useRef<HTMLElement>(null);
+  useReturnFocus(panel);
   const body = truth.value?.body;
   const isOld = truth.value !== null && truth.value.look !== judged();
   return (
-    <aside class="truth beside-picture" aria-label="How true is this picture?">
+    <aside ref={panel} class="truth beside-picture" aria-label="How true is this picture?">
       <header class="panel-head">
         <h2>How true is this?</h2>
         <IconButton icon="close" label="Close" onClick={toggleTruth} />

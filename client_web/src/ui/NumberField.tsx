@@ -2,6 +2,7 @@
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { history } from "../edit/history";
 import { formatNumber, parseNumber } from "./scale";
+import { note } from "./toasts";
 
 interface Props {
   value: number;
@@ -37,6 +38,9 @@ export function NumberField({ value, label, minimum, maximum, step, whole = fals
     const typed = draft !== null && draft !== shown && !refused.current;
     const next = typed ? parseNumber(draft) : null;
     if (next !== null) {
+      const taken = Math.min(maximum, Math.max(minimum, next));
+      if (taken !== next)
+        note(`${label} goes from ${formatNumber(minimum)} to ${formatNumber(maximum)}: ${formatNumber(next)} became ${formatNumber(taken)}.`);
       // a number that was typed is a step by itself
       history.seal();
       put(next);

@@ -4,3 +4,8 @@ export function chord(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" |
   if (!event.ctrlKey && !event.metaKey) return key;
   return `Ctrl+${event.shiftKey ? "Shift+" : ""}${key}`;
 }
+
+/** A key or chord as tooltips and the keyboard map write it: letters in upper case. */
+export function keyName(keys: string): string {
+  return keys.replace(/[a-z]$/, (letter) => (/(^|\+)[a-z]$/.test(keys) ? letter.toUpperCase() : letter));
+}
