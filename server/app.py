@@ -44,7 +44,7 @@ from server.routes import (
     surface,
 )
 from server.routes.paging import check_query
-from server.routes.shelves import btf_works, btfs, environments, images, library, materials
+from server.routes.shelves import balls, btf_works, btfs, environments, images, library, materials
 from server.running.connection import Connection
 from server.running.leave import Leave
 from server.running.process import Process
@@ -65,6 +65,7 @@ ROUTE_GROUPS = (
     btfs,
     btf_works,
     library,
+    balls,
     environments,
     images,
     bakes,

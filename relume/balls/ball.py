@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from relume.operators.shade import shade
 from relume.picture.wanted import Wanted
 from relume.points import Points
 from relume.project.receivers import Receivers
+from relume.scene.coding import decode
+from relume.scene.model import Texture
 
 F32 = NDArray[np.float32]
 
@@ -24,6 +27,9 @@ THUMBNAIL_SIZE = 64
 _EXPOSURE = 1.0
 _NUM_LIGHTS = 200
 _FINER = 2  # samples a pixel, along each side
+_MOST_TEXELS = 512  # a side that are read of an image
+_FEWEST_TEXELS = 32  # a side that it is blurred to
+NO_IMAGES: Mapping[str, Texture] = MappingProxyType({})
 _BEHIND = 0.05  # radiance around the ball
 _PIXEL = 2 / (_FINER * THUMBNAIL_SIZE)  # side of one on the texture, a half turn being one
 _TO_CAMERA = np.array([0.0, 0.0, 1.0], np.float32)
@@ -34,12 +40,13 @@ def _lights() -> TriangleLights:
     return subdivide(studio().radiance, _NUM_LIGHTS)
 
 
-def ball_image(documents: Sequence[Mapping[str, Any]], size: int) -> F32:
+def ball_image(documents: Sequence[Mapping[str, Any]], size: int, images: Mapping[str, Texture] = NO_IMAGES) -> F32:
     """Render a ball seen from far away; nothing but itself is there to cast a shadow.
 
     Args:
-        documents: complete terms, without textures.
+        documents: complete terms; roughness is the same everywhere.
         size: width and height in pixels.
+        images: that terms name as their texture; others show none.
     Returns:
         Linear radiance. (size, size, 3) float32
     """
@@ -48,18 +55,20 @@ def ball_image(documents: Sequence[Mapping[str, Any]], size: int) -> F32:
     x, y = np.meshgrid(across, -across)
     inside = x**2 + y**2 < 1.0
     picture = np.full((finer, finer, 3), _BEHIND)
-    picture[inside] = _shaded(documents, _receivers(x[inside], y[inside]))
+    picture[inside] = _shaded(documents, _receivers(x[inside], y[inside]), images)
     return np.asarray(picture.reshape(size, _FINER, size, _FINER, 3).mean(axis=(1, 3)), np.float32)
 
 
-def ball_pixels(documents: Sequence[Mapping[str, Any]]) -> NDArray[np.uint8]:
+def ball_pixels(
+    documents: Sequence[Mapping[str, Any]], images: Mapping[str, Texture] = NO_IMAGES
+) -> NDArray[np.uint8]:
     """A ball as displayed. (THUMBNAIL_SIZE, THUMBNAIL_SIZE, 3)"""
-    return to_bytes(tone_map(ball_image(documents, THUMBNAIL_SIZE), _EXPOSURE, "agx"))
+    return to_bytes(tone_map(ball_image(documents, THUMBNAIL_SIZE, images), _EXPOSURE, "agx"))
 
 
-def ball_png(documents: Sequence[Mapping[str, Any]]) -> bytes:
+def ball_png(documents: Sequence[Mapping[str, Any]], images: Mapping[str, Texture] = NO_IMAGES) -> bytes:
     """The same as a PNG."""
-    return png_bytes(ball_pixels(documents))
+    return png_bytes(ball_pixels(documents, images))
 
 
 def _receivers(x: NDArray[np.float64], y: NDArray[np.float64]) -> Receivers:
@@ -75,13 +84,32 @@ def _receivers(x: NDArray[np.float64], y: NDArray[np.float64]) -> Receivers:
     return Receivers(points, np.tile(_TO_CAMERA, (len(x), 1)), visible, uv=uv.astype(np.float32))
 
 
-def _shaded(documents: Sequence[Mapping[str, Any]], receivers: Receivers) -> NDArray[np.float64]:
+def _shaded(
+    documents: Sequence[Mapping[str, Any]], receivers: Receivers, images: Mapping[str, Texture]
+) -> NDArray[np.float64]:
     """Sum of the terms. (n, 3)"""
     num = len(receivers.normal)
     radiance = np.zeros((num, 3))
-    for document in documents:
+    for named in documents:
+        document = {**named, "texture": None, "roughness_map": False}
         wanted = Wanted.of(document, lambda: np.arccos(receivers.normal[:, 2].astype(np.float64)))
         shaded = shade(wanted.term, wanted.bands, _lights(), receivers, lambda share: None, lambda: False)
         rows = shaded.rows(num) * np.asarray(document["color"])
+        image = images.get(named["texture"]) if named["texture"] is not None else None
+        if image is not None:
+            rows = rows * _looked_up(image, receivers)
         radiance += rows if wanted.outgoing is None else rows * wanted.outgoing.T
     return radiance
+
+
+def _looked_up(image: Texture, receivers: Receivers) -> F32:
+    """The values of an image on a ball, which it goes round as BTFs do; blurred, as a ball is small. (n, 3)"""
+    step = -(-max(image.pixels.shape[:2]) // _MOST_TEXELS)
+    values = decode(image.pixels[::step, ::step], image.coding)
+    blocks = -(-max(values.shape[:2]) // _FEWEST_TEXELS)
+    height, width = (max(1, side // blocks) for side in values.shape[:2])
+    whole = values[: height * blocks, : width * blocks]
+    blurred = whole.reshape(height, len(whole) // height, width, whole.shape[1] // width, 3)
+    u, v = (np.asarray(receivers.uv[:, k], np.float64) % 1.0 for k in range(2))
+    column, row = (u * width).astype(int) % width, (v * height).astype(int) % height
+    return np.asarray(blurred.mean(axis=(1, 3))[row, column], np.float32)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from relume.errors import ParameterError, ShapeMismatchError
 from relume.imageio.exr import channels_of, write_scanlines
@@ -66,7 +67,10 @@ def _displayed(image: F32, exposure: float, tone_map_name: str | OcioView) -> ND
 
 
 def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
-    path.write_bytes(png_bytes(_displayed(image, exposure, tone_map_name)))
+    tags = PngInfo()
+    if isinstance(tone_map_name, str) or "sRGB" in tone_map_name.display:
+        tags.add(b"sRGB", b"\x00")  # to be shown perceptually
+    Image.fromarray(_displayed(image, exposure, tone_map_name)).save(path, "PNG", pnginfo=tags)
 
 
 def _write_webp(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:

@@ -38,6 +38,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/scenes/{scene}/comments/{comment}/picture.webp": {"GET": VIEW},
     "/api/scenes/{scene}/finder": {"GET": VIEW, "POST": VIEW},
     "/api/scenes/{scene}/finder/place": {"POST": VIEW},
+    "/api/scenes/{scene}/ball": {"POST": VIEW},
     "/api/built-ins": {"GET": VIEW},
     "/api/built-ins/{name}": {"POST": EDIT},
     "/api/color": {"GET": VIEW},

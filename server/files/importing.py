@@ -42,8 +42,8 @@ class ImportRequest:
             is kept in. A "tile", which a BTF is made of, is looked at alone, and has no id.
         environment: path of a scene's environment map, or None.
         name: what people will call it; of a built-in scene, which one it is.
-        scene: the name that a scene's or a material's file had, folders included. companions: paths of the files that came with it, by
-            theirs.
+        scene: the name that a scene's or a material's file had, folders included.
+        companions: paths of the files that came with a scene, by theirs.
         ground: whether a scene is put on one. period: side of what repeats, metres, where it is known.
         seconds: of processor and wall. max_bytes: of address space. max_file_bytes: of each file that is written.
     """

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from relume.look.document import MAX_TERMS
-from server.wire.body import Body
+from server.wire.body import Body, Name
 
 
 class ParameterBody(Body):
@@ -63,6 +63,12 @@ class TermsRequest(Body):
     """Terms as they stand in a look."""
 
     terms: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_TERMS)]
+
+
+class BallRequest(TermsRequest):
+    """Terms of a `material` of a scene, whose own images they may name."""
+
+    material: Name
 
 
 class InOutBody(Body):

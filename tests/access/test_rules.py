@@ -61,5 +61,6 @@ def test_an_answer_of_200_says_that_nothing_was_changed() -> None:
 def test_changes_are_what_others_see() -> None:
     assert is_change("PUT", "/api/looks/Red")
     assert not is_change("POST", "/api/models/albedo")
+    assert not is_change("POST", "/api/scenes/x/ball")
     assert not is_change("GET", "/api/audit")
     assert not is_change("POST", "/api/login")

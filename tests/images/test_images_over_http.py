@@ -165,6 +165,27 @@ def wait(is_done):
 
 
 @pytest.mark.slow
+def test_a_ball_of_a_material_shows_its_images(client, sent):
+    """The scene's own and one that was sent; what is not here is refused by its name."""
+    scene = client.post("/api/built-ins/still_life").json()["id"]
+    url = f"/api/scenes/{scene}/ball"
+
+    def ball(**given):
+        response = client.post(url, json={"material": "Tray", "terms": [{"model": "lambert", **given}]})
+        assert response.status_code == 200, response.text
+        with Image.open(io.BytesIO(response.content)) as picture:
+            assert picture.size == (64, 64)
+            return np.asarray(picture.convert("RGB"), int)[8:56, 24:40]
+
+    plain, wood, striped = ball(texture=None), ball(texture="diffuse"), ball(texture=sent["texture"])
+    assert np.ptp(plain, axis=2).max() < 30
+    assert (wood[..., 0] - wood[..., 2]).mean() > 40  # brown
+    assert np.abs(striped - wood).max() > 40
+    for place, material, texture in ((scene, "Lid", "diffuse"), (scene, "Tray", "image:0"), ("0" * 16, "Tray", None)):
+        asked = {"material": material, "terms": [{"model": "lambert", "texture": texture}]}
+        assert client.post(f"/api/scenes/{place}/ball", json=asked).status_code in (404, 422)
+
+
 def test_a_session_shows_what_a_batch_renders_and_goes_back(client, sent):
     services = client.app.state.services
     scene = register_scene(services.bakes.data_dir, services.bakes.ledger, still_life())

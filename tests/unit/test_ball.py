@@ -6,6 +6,7 @@ import pytest
 from relume.balls.ball import _lights, ball_image
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
+from relume.scene.model import Coding, Texture
 
 
 def term(model: str, **given: object) -> dict[str, object]:
@@ -35,3 +36,18 @@ def test_every_term_makes_a_ball(model: str) -> None:
     assert np.isfinite(image).all()
     assert image.min() >= 0
     assert image[3:5, 3:5].max() > 0
+
+
+def test_a_ball_shows_its_images_in_color_and_place() -> None:
+    """Red above, blue below; a channel that the material has no image of leaves the color."""
+    pixels = np.zeros((70, 30, 3), np.uint8)
+    pixels[:35, :, 0] = pixels[35:, :, 2] = 255
+    images = {"diffuse": Texture(pixels, coding=Coding("srgb", (1.0, 1.0, 1.0)))}
+    plain = ball_image([term("lambert", texture=None)], 32)
+    dressed = ball_image([term("lambert", texture="diffuse")], 32, images)
+    ratio = dressed[2:30, 14:18] / plain[2:30, 14:18]
+    reds, blues = (ratio[..., channel].mean(axis=1) > 0.5 for channel in (0, 2))
+    assert reds.any()
+    assert blues.any()
+    assert not (reds & blues)[ratio.max(axis=(1, 2)) > 0.99].any()
+    np.testing.assert_array_equal(ball_image([term("lambert", texture="specular")], 32, images), plain)

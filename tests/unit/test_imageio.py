@@ -9,6 +9,7 @@ from PIL import Image
 
 from relume.errors import DiskFullError, ParameterError, RelumeError, ShapeMismatchError
 from relume.imageio.files import to_bytes, write_image
+from relume.imageio.ocio.view import OcioView
 from relume.imageio.tonemap import tone_map
 
 
@@ -39,6 +40,17 @@ def test_webp_is_close_to_what_the_screen_shows(tmp_path, image):
         shown = np.asarray(opened.convert("RGB"), np.float64)
     assert shown.shape == image.shape
     assert np.abs(shown - tone_map(image, 0.0, "agx") * 255).mean() < 4
+
+
+def test_png_says_what_its_colors_are(tmp_path, image, monkeypatch):
+    monkeypatch.setattr("relume.imageio.files.tone_map", lambda shown, exposure, view: shown)
+    views = ["agx", OcioView("sRGB - Display", "Un-tone-mapped"), OcioView("Display P3 - Display", "Un-tone-mapped")]
+    tagged = []
+    for view in views:
+        write_image(tmp_path / "a.png", image, 0.0, view)
+        with Image.open(tmp_path / "a.png") as png:
+            tagged.append("srgb" in png.info)
+    assert tagged == [True, True, False]
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.webp", "a.exr"])

@@ -14,7 +14,7 @@ import { commentsOpen } from "../state/panels";
 import { probe } from "../state/probe";
 import { togglePanel } from "../state/room";
 import { scene } from "../state/scene";
-import { ownName } from "../state/together";
+import { ownName, people, you } from "../state/together";
 import { shownViews, showAlone, viewName, views, workIn } from "../state/views";
 import { attempt, note } from "../ui/toasts";
 
@@ -68,7 +68,8 @@ export async function keepComment(text: string): Promise<boolean> {
   if (pin === null || of === undefined || shown === null || current === null) return false;
   const picture = thumbnail(stage.of(pin.view).pixels, current.display, PICTURE_WIDTH);
   const kept = await attempt(async () => {
-    const author = ownName.peek() || null;
+    const inRoom = people.peek().find(({ number }) => number === you.peek())?.name; // as others see this one
+    const author = ownName.peek() || inRoom || null;
     const made = await api.addComment(of, { ...pin, bake: shown, camera: cameraOf(pin.view), text, author, picture });
     pinning.value = null;
     selectedComment.value = made.id;

@@ -17,7 +17,10 @@ import { withNormals, withoutNormals } from "./normals";
 import { withColorAndRoughness, withSet, type Slot } from "./textureSet";
 import { roughPlaces, withoutRoughnessImage, withRoughnessImage } from "./roughness";
 
-export const images = signal<readonly ImageBody[]>([]);
+/** Null until the server has listed them. */
+const listed = signal<readonly ImageBody[] | null>(null);
+export const images = computed(() => listed.value ?? []);
+export const areListed = computed(() => listed.value !== null);
 /** What is on its way, in words. */
 export const sending = signal<string | null>(null);
 
@@ -37,7 +40,7 @@ export const imageOf = (texture: string): ImageBody | undefined => images.value.
 
 export async function loadImages(): Promise<void> {
   await attempt(async () => {
-    images.value = await listImages();
+    listed.value = await listImages();
   });
 }
 

@@ -54,12 +54,22 @@ export function thumbnail(pixels: Pixels, display: Display, width = THUMBNAIL_WI
   return canvasOf(image).toDataURL("image/jpeg", 0.85);
 }
 
-export function pngBlob(pixels: Pixels, alpha: Uint8Array | null, display: Display): Promise<Blob> {
+/** The first chunk of a PNG, which is always its header, ends here. */
+const HEADER_END = 33;
+/** A chunk "sRGB" with its checksum: the colors are sRGB, to be shown perceptually. */
+const SRGB_CHUNK = new Uint8Array([0, 0, 0, 1, 0x73, 0x52, 0x47, 0x42, 0, 0xae, 0xce, 0x1c, 0xe9]);
+
+/** Whether what is displayed is meant for sRGB screens: all but views of other displays. */
+const isSrgb = ({ tone_map }: Display): boolean => typeof tone_map === "string" || tone_map.display.includes("sRGB");
+
+/** A PNG that says that its colors are sRGB. */
+export function withSrgb(png: Blob): Blob {
+  return new Blob([png.slice(0, HEADER_END), SRGB_CHUNK, png.slice(HEADER_END)], { type: png.type });
+}
+
+export async function pngBlob(pixels: Pixels, alpha: Uint8Array | null, display: Display): Promise<Blob> {
   const canvas = canvasOf(displayed(pixels, alpha, display));
-  return new Promise((resolve, reject) => {
-    canvas.toBlob(
-      (blob) => (blob === null ? reject(new Error("The picture could not be written as PNG.")) : resolve(blob)),
-      "image/png",
-    );
-  });
+  const png = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, "image/png"));
+  if (png === null) throw new Error("The picture could not be written as PNG.");
+  return isSrgb(display) ? withSrgb(png) : png;
 }

@@ -155,6 +155,11 @@ export async function withMetalness(image: string, scene: string, material: stri
   const path = `/api/images/${encodeURIComponent(image)}/metalness`;
   return ((await (await request(path, json("POST", { scene, material, terms }))).json()) as MetalnessBody).terms;
 }
+/** A ball of a material with these terms, in their images. */
+export async function ballOf(scene: string, material: string, terms: readonly Term[]): Promise<Blob> {
+  const path = `/api/scenes/${encodeURIComponent(scene)}/ball`;
+  return (await request(path, json("POST", { material, terms }))).blob();
+}
 /** The light that a bake's scene came with. */
 export const ownEnvironmentThumbnail = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;
 export const getBake = (id: string) => getJson<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);

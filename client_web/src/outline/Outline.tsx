@@ -1,4 +1,5 @@
 /** What is in the scene: materials to select, the lights and the light around them. */
+import { useEffect } from "preact/hooks";
 import { toHex } from "../color/color";
 import { isSame } from "../document/difference";
 import { LightsPanel } from "../lights/LightsPanel";
@@ -11,13 +12,17 @@ import { mayEdit } from "../state/me";
 import { hoveredMaterial, select, selectedMaterial } from "../state/selection";
 import { IconButton } from "../ui/Button";
 import { Section } from "../ui/Section";
+import { followBalls, shownBalls } from "./balls";
 import { BackgroundPanel } from "./BackgroundPanel";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 import { TransportPanel } from "./TransportPanel";
 
-/** A ball in the material's colours: body from its diffuse term, highlight from the rest. Of what was measured its picture. */
-function Swatch({ material }: { material: MaterialLook | undefined }) {
+/** A ball of the material; until it is rendered one in its colors: body from its diffuse term, highlight from the rest. Of
+ * what was measured its picture. */
+function Swatch({ name, material }: { name: string; material: MaterialLook | undefined }) {
   const terms = material?.terms ?? [];
+  const ball = shownBalls.value.get(name);
+  if (ball !== undefined) return <span class="swatch" style={{ background: `url(${ball}) center / 130%` }} />;
   const measured = terms.find((term) => term.data != null)?.data;
   if (measured != null) return <span class="swatch" style={{ background: `url(${measuredThumbnail(measured)}) center / 130%` }} />;
   const diffuse = terms.find((term) => modelOf(term)?.texture === "diffuse");
@@ -69,7 +74,7 @@ function Materials() {
             onBlur={() => (hoveredMaterial.value = null)}
             onClick={() => select(name)}
           >
-            <Swatch material={material} />
+            <Swatch name={name} material={material} />
             <span class="name" title={name}>
               {name}
             </span>
@@ -96,6 +101,7 @@ function SoloButton() {
 }
 
 export function Outline() {
+  useEffect(followBalls, []);
   return (
     <nav class="panel outline" aria-label="Scene">
       <Section title="Materials" count={materialNames.value.length} actions={<SoloButton />}>
