@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,6 +10,7 @@ from relume.bake import Recipe
 from relume.errors import PlanError
 from worker.status import MOVING
 
+_STEP = 16  # pixels: widths are multiples of it
 PresetName = Literal["preview", "good", "final"]
 
 
@@ -18,6 +20,11 @@ class Preset:
 
     size: tuple[int, int]
     num_lights: int
+
+    def shaped(self, aspect: float) -> tuple[int, int]:
+        """Width and height of about as many pixels. aspect: width ÷ height."""
+        width = max(_STEP, _STEP * round(math.sqrt(math.prod(self.size) * aspect) / _STEP))
+        return width, max(_STEP, round(width / aspect))
 
 
 PRESETS: dict[PresetName, Preset] = {

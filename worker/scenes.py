@@ -33,7 +33,7 @@ class SceneRecord:
 
     Attributes:
         created: seconds since 1970.
-        views: camera names, in order.
+        views: camera names, in order. aspects: of each the width ÷ height that its file says, or None.
         materials: {"name", "terms", "catcher", "is_projected", "is_glass"} each, in the order of material ids; old ones
             lack the last three.
         variants: partial looks that the file brought, by name.
@@ -49,6 +49,7 @@ class SceneRecord:
     num_triangles: int
     variants: dict[str, dict[str, Any]]
     lights: tuple[str, ...] = ()
+    aspects: tuple[float | None, ...] = ()
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
@@ -70,6 +71,7 @@ def summary_of(scene: Scene) -> dict[str, Any]:
     return {
         "name": scene.name,
         "views": [camera.name for camera in scene.cameras],
+        "aspects": [camera.aspect for camera in scene.cameras],
         "materials": [
             {
                 "name": material.name,
@@ -196,4 +198,5 @@ def _record(row: SceneRow) -> SceneRecord:
         num_triangles=summary["num_triangles"],
         variants=summary.get("variants", {}),  # rows of before there were any
         lights=tuple(summary.get("lights", ())),
+        aspects=tuple(summary.get("aspects", ())),
     )

@@ -27,12 +27,13 @@ export interface AckMessage {
   frame: number;
 }
 
-/** What to bake. A preset gives size and lights; what is named beside it wins. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none, and a number of them is refused. `gather_samples`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point, that look for them; as many as fit the picture where they are not named (methods `gather` and `surface`). `relightable`: divide the light so that turning or exchanging the environment errs little. */
+/** What to bake. A preset gives size and lights; what is named beside it wins. `aspect`: width ÷ height of the preset's picture, of as many pixels; beside a `size` it says nothing. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none, and a number of them is refused. `gather_samples`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point, that look for them; as many as fit the picture where they are not named (methods `gather` and `surface`). `relightable`: divide the light so that turning or exchanging the environment errs little. */
 export interface BakeRequest {
   scene: string;
   method?: string;
   views?: (string | CameraBody)[] | null;
   preset?: "preview" | "good" | "final" | null;
+  aspect?: number | null;
   size?: [number, number] | null;
   lights?: number | null;
   points?: number | null;

@@ -1,6 +1,6 @@
 /** Errors go when what they say is mended. */
 import { beforeEach, expect, test } from "vitest";
-import { ApiError } from "../src/net/api";
+import { ApiError, UnansweredError } from "../src/net/api";
 import { attempt, mended, shownWords, showError } from "../src/ui/toasts";
 
 beforeEach(() => {
@@ -17,9 +17,9 @@ test("an error goes with the next success in its topic, and others stay", () => 
 });
 
 test("a request that nobody answered is mended by one that somebody does", async () => {
-  await attempt(() => Promise.reject(new ApiError("The server cannot be reached.", 0)));
+  await attempt(() => Promise.reject(new UnansweredError()));
   await attempt(() => Promise.reject(new ApiError("There is no such scene.", 404)), "files");
-  expect(shownWords()).toEqual(["The server cannot be reached.", "There is no such scene."]);
+  expect(shownWords()).toEqual([new UnansweredError().message, "There is no such scene."]);
   await attempt(() => Promise.resolve());
   expect(shownWords()).toEqual(["There is no such scene."]);
   await attempt(() => Promise.resolve(), "files");

@@ -67,9 +67,9 @@ def scene_id(document: dict[str, Any], arrays: Arrays) -> str:
 
 
 def scene_digest(document: dict[str, Any], arrays: Arrays) -> str:
-    """SHA-256 over all arrays and all that stands in the document but warnings, in hexadecimal digits."""
+    """SHA-256 over all arrays and all that stands in the document but warnings and aspects, in hexadecimal digits."""
     digest = hashlib.sha256()
-    content = {key: value for key, value in document.items() if key not in ("id", "warnings")}
+    content = {key: value for key, value in document.items() if key not in ("id", "warnings", "aspects")}
     digest.update(json.dumps(content, sort_keys=True, allow_nan=False).encode())
     for key in sorted(arrays):
         array = np.ascontiguousarray(arrays[key])
@@ -191,6 +191,8 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "environment": {"name": scene.environment.name},
         "warnings": [remark.document() for remark in scene.warnings],
     }
+    if any(camera.aspect is not None for camera in scene.cameras):
+        document["aspects"] = [camera.aspect for camera in scene.cameras]
     if scene.variants:
         document["variants"] = scene.variants
     if scene.lights:
@@ -268,7 +270,11 @@ def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:
 
 def _cameras(document: dict[str, Any]) -> list[Camera]:
     found = document["cameras"]
-    return [Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"])) for c in found]
+    aspects = document.get("aspects") or [None] * len(found)
+    return [
+        Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"]), None if a is None else float(a))
+        for c, a in zip(found, aspects, strict=True)
+    ]
 
 
 def _read_document(path: Path) -> dict[str, Any]:

@@ -144,11 +144,13 @@ class Camera:
 
     Attributes:
         to_world: camera to world. (4, 4) float64, rigid
+        aspect: width ÷ height, as its file says; None where it does not. Pictures may have any other.
     """
 
     name: str
     to_world: NDArray[np.float64]
     yfov: float
+    aspect: float | None = None
 
 
 @dataclass(frozen=True)

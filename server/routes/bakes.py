@@ -169,7 +169,8 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
     preset = PRESETS[request.preset or "good"]
     lights = request.lights or preset.num_lights
     points = points_of(request.method, request.points)
-    size, gathering = request.size or preset.size, (request.gather_samples, request.gather_rays)
+    size = request.size or (preset.size if request.aspect is None else preset.shaped(request.aspect))
+    gathering = (request.gather_samples, request.gather_rays)
     return Recipe(request.method, views, size, lights, request.relightable, cameras, points, *gathering)
 
 

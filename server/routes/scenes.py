@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated
 
@@ -32,7 +33,7 @@ from worker.storage import fetched
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
 _OF_OLD_ROWS = {"catcher": False, "is_projected": False, "is_glass": False}  # which do not say it
-DEFAULT_ASPECT = 4 / 3  # cameras say only their height; a bake's size says the width
+DEFAULT_ASPECT = 4 / 3  # of cameras that say only their height
 SceneFile = Annotated[
     UploadFile, File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files it names")
 ]
@@ -153,9 +154,9 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus], placed: Sequence[str
         name=record.name,
         created=moment(record.created),
         views=[
-            SceneView(name=name, aspect=DEFAULT_ASPECT, is_placed=is_placed)
-            for names, is_placed in ((record.views, False), (placed, True))
-            for name in names
+            SceneView(name=name, aspect=aspect or DEFAULT_ASPECT, is_placed=is_placed)
+            for names, aspects, is_placed in ((record.views, record.aspects, False), (placed, (), True))
+            for name, aspect in zip_longest(names, aspects)
         ],
         materials=[SceneMaterial(**{**_OF_OLD_ROWS, **material}) for material in record.materials],
         lights=list(record.lights),

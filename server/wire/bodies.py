@@ -171,7 +171,8 @@ class EnvironmentBody(Body):
 
 
 class BakeRequest(Body):
-    """What to bake. A preset gives size and lights; what is named beside it wins.
+    """What to bake. A preset gives size and lights; what is named beside it wins. `aspect`: width ÷ height of the
+    preset's picture, of as many pixels; beside a `size` it says nothing.
 
     `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
     where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none,
@@ -185,6 +186,7 @@ class BakeRequest(Body):
     method: Name = "direct"
     views: Annotated[list[Name | CameraBody], Field(min_length=1, max_length=64)] | None = None
     preset: Preset | None = None
+    aspect: Annotated[float, Field(ge=0.125, le=8)] | None = None
     size: tuple[Side, Side] | None = None
     lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
     points: Annotated[int, Field(ge=1, le=10_000_000)] | None = None

@@ -13,7 +13,7 @@ import pytest
 from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.remarks import simplified
-from relume.scene.archive import load_scene, make_scene, save_scene
+from relume.scene.archive import load_cameras, load_scene, make_scene, save_scene
 from relume.scene.model import Camera, Coding, Glass, Light, Material, Mesh, Opacity, Scene, Texture
 
 
@@ -105,6 +105,16 @@ def test_id_changes_with_content_but_not_with_warnings() -> None:
     ]
     assert len({scene.id, *(other.id for other in others)}) == 7
     assert small_scene(warnings=[]).id == scene.id
+
+
+def test_shapes_of_cameras_are_stored_and_say_nothing_of_the_content(tmp_path: Path) -> None:
+    """Scenes of before cameras had one keep their ids."""
+    camera = Camera("front", np.eye(4), 0.5, 16 / 9)
+    wide, plain = small_scene(cameras=[camera]), small_scene(cameras=[dataclasses.replace(camera, aspect=None)])
+    assert wide.id == plain.id
+    for scene, aspect in ((wide, 16 / 9), (plain, None)):
+        save_scene(scene, tmp_path)
+        assert load_scene(tmp_path).cameras[0].aspect == load_cameras(tmp_path)[0].aspect == aspect
 
 
 def test_saving_again_replaces_the_files_and_leaves_nothing_else(tmp_path: Path) -> None:

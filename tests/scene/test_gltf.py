@@ -288,7 +288,7 @@ def test_the_second_set_of_coordinates_is_used_where_asked_for() -> None:
 def test_cameras_are_rigid_and_named_for_urls() -> None:
     glb = Glb().quad()
     glb.document["cameras"] = [
-        {"type": "perspective", "perspective": {"yfov": 0.6}, "name": "Über Küche / 1"},
+        {"type": "perspective", "perspective": {"yfov": 0.6, "aspectRatio": 1.5}, "name": "Über Küche / 1"},
         {"type": "orthographic"},
     ]
     glb.document["nodes"] += [{"camera": 0, "scale": [2, 2, 2], "translation": [0, 1, 4]}, {"camera": 0}, {"camera": 1}]
@@ -298,7 +298,7 @@ def test_cameras_are_rigid_and_named_for_urls() -> None:
     expected = np.eye(4)
     expected[:3, 3] = [0, 1, 4]
     np.testing.assert_allclose(scene.cameras[0].to_world, expected, atol=1e-12)
-    assert scene.cameras[0].yfov == 0.6
+    assert (scene.cameras[0].yfov, scene.cameras[0].aspect) == (0.6, 1.5)
     assert any("not a perspective" in warning for warning in scene.warnings)
 
 

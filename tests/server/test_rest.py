@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 from fastapi.testclient import TestClient
+from glb_builder import Glb
 from PIL import Image
 from server_fakes import SIZE, BatchesHere, Control
 from session_client import Baked
@@ -107,6 +108,23 @@ def test_the_thumbnail_is_of_the_coarsest_bake_that_has_its_pixels(client: TestC
         assert wait_until_done(client, queued.headers["location"])["state"] == "ready"
         shown = client.get(f"/api/scenes/{baked.scene}").json()
         assert shown["thumbnail"].endswith(f"bake={queued.json()['id']}") == is_shown
+
+
+def test_a_view_has_the_shape_of_its_camera_and_a_preset_takes_any(client: TestClient) -> None:
+    glb = Glb().quad()
+    glb.document["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.6, "aspectRatio": 16 / 9}}]
+    glb.document["nodes"] += [{"camera": 0, "translation": [0, 1, 4]}]
+    glb.document["scenes"] = [{"nodes": [0, 1]}]
+    scene = client.post("/api/scenes", files={"scene": ("wide.glb", glb.bytes())}).json()
+    (view,) = scene["views"]
+    assert view["aspect"] == pytest.approx(16 / 9)
+    asked = {"scene": scene["id"], "method": "direct", "preset": "good", "dry_run": True}
+    for aspect, size in ((None, [640, 480]), (4 / 3, [640, 480]), (view["aspect"], [736, 414]), (0.8, [496, 620])):
+        planned = client.post("/api/bakes", json={**asked, "aspect": aspect})
+        assert planned.json()["recipe"]["size"] == size, planned.text
+    assert client.post("/api/bakes", json={**asked, "aspect": 2, "size": [64, 64]}).json()["recipe"]["size"] == [64, 64]
+    assert client.post("/api/bakes", json={**asked, "aspect": 20}).status_code == 422
+    client.delete(f"/api/scenes/{scene['id']}")
 
 
 def test_same_recipe_twice_is_the_same_bake(client: TestClient, baked: Baked) -> None:

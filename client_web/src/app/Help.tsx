@@ -10,7 +10,7 @@ const GROUPS = ["Picture", "Look", "Compare", "Curve", "Panels"] as const;
 
 export function Help() {
   const panel = useRef<HTMLDivElement>(null);
-  useReturnFocus(panel);
+  useReturnFocus(panel, true);
   useEffect(() => panel.current?.focus(), []);
   return (
     <div class="help" ref={panel} tabIndex={-1} role="dialog" aria-label="Keyboard map">

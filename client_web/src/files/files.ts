@@ -66,6 +66,6 @@ export async function sortFiles(files: readonly Dropped[]): Promise<Chosen> {
   const scenes = await Promise.all(
     files.filter(isScene).map(async (scene) => ({ ...scene, ...(await namedBy(scene, find, images)) })),
   );
-  scenes.sort((a, b) => a.path.localeCompare(b.path));
+  scenes.sort((a, b) => a.path.localeCompare(b.path, undefined, { numeric: true }));
   return { scenes, environment: environments.at(-1)?.file ?? null };
 }

@@ -44,6 +44,13 @@ export class ApiError extends Error {
   }
 }
 
+/** Nobody answered. */
+export class UnansweredError extends ApiError {
+  constructor() {
+    super("The server cannot be reached. Nothing was lost; try again when it is back.", 0);
+  }
+}
+
 /** What a problem document says, in one sentence. */
 export function problemText(
   problem: Problem | string | null | undefined,
@@ -73,7 +80,7 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
   try {
     response = await fetch(path, init);
   } catch {
-    throw new ApiError("The server cannot be reached. Nothing was lost; try again when it is back.", 0);
+    throw new UnansweredError();
   }
   if (response.ok) return response;
   const error = await failure(response);

@@ -10,6 +10,8 @@ export interface BakeChoice {
   views: string[];
   /** Gives the size and the number of lights that are not named beside it. */
   preset?: Preset;
+  /** Width ÷ height of the preset's picture. */
+  aspect?: number;
   size?: Size;
   lights?: number;
   gather_samples?: number;

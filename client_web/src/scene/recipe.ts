@@ -22,6 +22,37 @@ export function previewSize([width, height]: Size): Size {
   return [Math.max(1, Math.round(width * factor)), Math.max(1, Math.round(height * factor))];
 }
 
+/** A picture's shape: width ÷ height, and how it is called. */
+export interface Shape {
+  label: string;
+  aspect: number;
+}
+
+const SHAPES: readonly Shape[] = [
+  { label: "4:3", aspect: 4 / 3 },
+  { label: "16:9", aspect: 16 / 9 },
+  { label: "1:1", aspect: 1 },
+  { label: "4:5", aspect: 4 / 5 },
+];
+const ALIKE = 0.01;
+/** The server takes no others. */
+const ASPECT = { minimum: 0.125, maximum: 8 };
+
+/** The shapes to choose from, a camera's own first where it is none of the usual ones; and which one that camera has. */
+export function shapesFor(own: number): { shapes: readonly Shape[]; chosen: Shape } {
+  const usual = SHAPES.find(({ aspect }) => Math.abs(aspect / own - 1) < ALIKE);
+  if (usual !== undefined) return { shapes: SHAPES, chosen: usual };
+  const aspect = Math.min(ASPECT.maximum, Math.max(ASPECT.minimum, own));
+  const chosen = { label: `${Number(aspect.toFixed(2))}:1`, aspect };
+  return { shapes: [chosen, ...SHAPES], chosen };
+}
+
+/** About as many pixels in another shape. */
+export function reshaped([width, height]: Size, aspect: number): Size {
+  const wide = Math.max(1, Math.round(Math.sqrt(width * height * aspect)));
+  return [wide, Math.max(1, Math.round(wide / aspect))];
+}
+
 const isWhole = (value: number, { minimum, maximum }: { minimum: number; maximum: number }) =>
   Number.isInteger(value) && value >= minimum && value <= maximum;
 

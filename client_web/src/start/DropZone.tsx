@@ -75,6 +75,11 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
     forgetProblems();
     setFiles((before) => together(before, news.filter(isOfUse)));
   };
+  const clear = () => {
+    mended("files");
+    forgetProblems();
+    setFiles([]);
+  };
   const over = useFileDrop(take);
   /** What was refused stays chosen, so that what it lacks can be added. */
   const sendAll = async () => {
@@ -111,7 +116,7 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
             <button class="primary" disabled={scenes.length === 0} onClick={() => void sendAll()}>
               {scenes.length > 1 ? `Import ${scenes.length} scenes` : "Import"}
             </button>
-            {files.length > 0 && <button onClick={() => setFiles([])}>Clear</button>}
+            {files.length > 0 && <button onClick={clear}>Clear</button>}
           </>
         )}
       </div>

@@ -5,7 +5,8 @@ import { planBake } from "../net/api";
 import type { SceneBody } from "../protocol";
 import type { BakeChoice, Preset } from "../scene/bakeChoice";
 import { METHODS, type Method } from "../scene/methods";
-import type { Size } from "../scene/recipe";
+import { reshaped, shapesFor, type Size } from "../scene/recipe";
+import { RadioRow } from "../ui/RadioRow";
 import { OwnRecipe } from "./OwnRecipe";
 import { PlanWords, type Planned } from "./PlanWords";
 import { ViewChoice } from "./ViewChoice";
@@ -16,18 +17,23 @@ const PRESETS: { name: Preset; label: string; help: string }[] = [
   { name: "final", label: "Final", help: "for sharp highlights and print" },
 ];
 
+/** The shape of a view of the scene, as its file says. */
+function aspectOf({ views }: SceneBody, name: string | undefined): number {
+  return views.find((view) => view.name === name)?.aspect ?? OWN_SIZE[0] / OWN_SIZE[1];
+}
+
 type Plans = Partial<Record<Preset, Planned>>;
 
 const OWN_SIZE: Size = [640, 480];
 const OWN_LIGHTS = 2000;
 
-function usePlans(scene: string, method: Method, views: readonly string[], relightable: boolean): Plans {
+function usePlans(scene: string, method: Method, views: readonly string[], relightable: boolean, aspect: number): Plans {
   const [plans, setPlans] = useState<Plans>({});
   useEffect(() => {
     let stale = false;
     setPlans({});
     for (const { name } of PRESETS) {
-      planBake({ scene, method, preset: name, views: [...views], relightable }).then(
+      planBake({ scene, method, preset: name, aspect, views: [...views], relightable }).then(
         (plan) => !stale && setPlans((before) => ({ ...before, [name]: plan })),
         (error: Error) => !stale && setPlans((before) => ({ ...before, [name]: error })),
       );
@@ -35,7 +41,7 @@ function usePlans(scene: string, method: Method, views: readonly string[], relig
     return () => {
       stale = true;
     };
-  }, [scene, method, views, relightable]);
+  }, [scene, method, views, relightable, aspect]);
   return plans;
 }
 
@@ -82,21 +88,33 @@ interface Props {
   views: readonly string[];
   action: string;
   /** Where a size of one's own begins. */
-  size?: Size;
+  size?: Size | null;
   /** Where a new camera begins; else where the scene's first one is. */
   from?: Frame | null;
   onChoose(choice: BakeChoice): void;
 }
 
-export function PresetList({ scene, method: initial, views, action, size = OWN_SIZE, from = null, onChoose }: Props) {
+export function PresetList({ scene, method: initial, views, action, size = null, from = null, onChoose }: Props) {
   const [method, setMethod] = useState(initial);
   const [chosen, setChosen] = useState([...views]);
   const [relightable, setRelightable] = useState(false);
-  const plans = usePlans(scene.id, method, chosen, relightable);
+  const { shapes, chosen: initialShape } = shapesFor(size === null ? aspectOf(scene, chosen[0]) : size[0] / size[1]);
+  const [shape, setShape] = useState(initialShape);
+  const { aspect } = shape;
+  const plans = usePlans(scene.id, method, chosen, relightable, aspect);
   return (
     <>
       <Methods chosen={method} onChoose={setMethod} />
       <ViewChoice scene={scene} from={from} chosen={chosen} onChoose={setChosen} />
+      <div class="bake-shape">
+        Shape of the picture
+        <RadioRow
+          label="Shape of the picture"
+          choices={shapes.map(({ label }) => ({ value: label, label, title: `Width to height, ${label}` }))}
+          chosen={shape.label}
+          onChoose={(label) => setShape(shapes.find((each) => each.label === label) ?? shape)}
+        />
+      </div>
       <Relightable chosen={relightable} onChoose={setRelightable} />
       <ul class="presets">
         {PRESETS.map(({ name, label, help }) => (
@@ -108,15 +126,16 @@ export function PresetList({ scene, method: initial, views, action, size = OWN_S
             <button
               class={name === "good" ? "primary" : ""}
               disabled={plans[name] instanceof Error}
-              onClick={() => onChoose({ method, preset: name, views: chosen, relightable })}
+              onClick={() => onChoose({ method, preset: name, aspect, views: chosen, relightable })}
             >
               {action}
             </button>
           </li>
         ))}
         <OwnRecipe
+          key={aspect}
           request={{ scene: scene.id, method, views: chosen, relightable }}
-          initial={{ size, lights: OWN_LIGHTS }}
+          initial={{ size: shape.label === initialShape.label && size !== null ? size : reshaped(size ?? OWN_SIZE, aspect), lights: OWN_LIGHTS }}
           action={action}
           onChoose={(recipe) => onChoose({ method, views: chosen, relightable, ...recipe })}
         />

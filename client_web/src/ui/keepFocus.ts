@@ -56,15 +56,16 @@ export function keepFocus(): void {
   new MutationObserver(mend).observe(document.body, { childList: true, subtree: true });
 }
 
-/** A panel gives the focus back to what had it when it opened. */
-export function useReturnFocus(panel: { current: HTMLElement | null }): void {
+/** A panel gives the focus back to what had it when it opened. `toPage`: where nothing had it, the keys are the page's
+ * again; else what is nearest gets it. */
+export function useReturnFocus(panel: { current: HTMLElement | null }, toPage = false): void {
   useLayoutEffect(() => {
     const [opened, before] = [panel.current, document.activeElement];
     return () => {
       const isInside = opened?.contains(document.activeElement) ?? false;
       if (!isInside || !(before instanceof HTMLElement) || !before.isConnected) return;
       before.focus();
-      if (before === document.body) path = []; // where the keys are the page's
+      if (before === document.body && toPage) path = [];
     };
   }, []);
 }

@@ -1,6 +1,7 @@
 /** Short messages in words, announced to screen readers; errors stay until they are closed, or what they say is mended. */
 import { signal } from "@preact/signals";
 import { useRef } from "preact/hooks";
+import { UnansweredError } from "../net/api";
 import { useReturnFocus } from "./keepFocus";
 
 /** What an error is about: the next success there takes it away. */
@@ -39,11 +40,8 @@ export function note(text: string, action?: Toast["action"]): void {
   show({ kind: "note", text, ...(action ? { action } : {}) });
 }
 
-/** A request that nobody answered, as `ApiError` has it. */
-const isUnanswered = (error: unknown): boolean => error instanceof Error && "status" in error && error.status === 0;
-
 export function showError(error: unknown, topic?: Topic): void {
-  const about = isUnanswered(error) ? "server" : topic;
+  const about = error instanceof UnansweredError ? "server" : topic;
   const text = error instanceof Error ? error.message : String(error);
   show({ kind: "error", text, ...(about ? { topic: about } : {}) });
 }

@@ -126,6 +126,7 @@ class Mesh(Part):
 
 class Perspective(Part):
     yfov: Annotated[float, Field(gt=0, lt=3.1, allow_inf_nan=False)]
+    aspectRatio: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None  # noqa: N815
 
 
 class Camera(Part):

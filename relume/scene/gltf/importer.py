@@ -246,7 +246,8 @@ class _Reading:
         elif frame is None:
             self.warnings.append(wrong(f"camera {name[:80]!r} is scaled to nothing; it is left out"))
         else:
-            self.cameras.append(Camera(slug(name, self._camera_names), frame, camera.perspective.yfov))
+            yfov, aspect = camera.perspective.yfov, camera.perspective.aspectRatio
+            self.cameras.append(Camera(slug(name, self._camera_names), frame, yfov, aspect))
 
     def _warn_of_the_rest(self) -> None:
         document = self._document
