@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 from typing import TYPE_CHECKING, Annotated
+from urllib.parse import urlencode
 
 import typer
 
@@ -13,9 +14,13 @@ from cli.options import Data
 from cli.serve import Port, address, check_port
 
 if TYPE_CHECKING:
+    from relume.bake import Recipe
+    from relume.scene.model import Scene
     from server.settings import Settings
 
 WAIT_FOR_SERVER_S = 60.0
+# What the editor opens with: a highlight that fills a part of the picture.
+SELECTED = {"material": "Bowl", "term": "1", "curve": "theta_h"}
 
 
 def demo(
@@ -53,19 +58,16 @@ def _queue_and_follow(settings: Settings, browser: bool) -> tuple[str, str]:
     """Returns the bake, and the address of the editor on its scene."""
     from cli.data_folder import open_bakes
     from cli.follow import follow
-    from relume.bake import Recipe
     from relume.errors import PlanError
     from relume.scene.demo import demo_scene
-    from worker.presets import PRESETS
     from worker.scenes import register_scene
 
     service = open_bakes(settings)
     try:
-        scene, preset = demo_scene(), PRESETS["good"]
+        scene = demo_scene()
         register_scene(service.data_dir, service.ledger, scene)
-        recipe = Recipe("direct", tuple(camera.name for camera in scene.cameras), preset.size, preset.num_lights)
-        identity = service.submit(scene.id, recipe)
-        editor = f"{address(settings.host, settings.port)}?scene={scene.id}"
+        _, identity = [service.submit(scene.id, recipe) for recipe in demo_recipes(scene)]
+        editor = f"{address(settings.host, settings.port)}?{urlencode({'scene': scene.id, **SELECTED})}"
         _wait_for_server(settings)
         if browser:
             _open_browser(editor)
@@ -76,6 +78,18 @@ def _queue_and_follow(settings: Settings, browser: bool) -> tuple[str, str]:
         return identity, editor
     finally:
         service.close()
+
+
+def demo_recipes(scene: Scene) -> list[Recipe]:
+    """Of what is baked: a preview, with which people begin, and the bake that takes its place.
+
+    Both are as the editor asks for them, so that it finds these.
+    """
+    from relume.bake import Recipe
+    from worker.presets import PRESETS
+
+    views = tuple(camera.name for camera in scene.cameras)
+    return [Recipe("gather", views, PRESETS[name].size, PRESETS[name].num_lights) for name in ("preview", "good")]
 
 
 def _wait_for_server(settings: Settings) -> None:

@@ -1,6 +1,7 @@
 /** What is said of a moving picture: how far it is off, where it rested last or as its bake was measured. */
 import { beforeEach, expect, test, vi } from "vitest";
-import { bakedError, fidelity, movingError } from "../src/state/fidelity";
+import { method } from "../src/state/bakes";
+import { bakedError, fidelity, movingError, settled } from "../src/state/fidelity";
 import { shownViews, viewName, views } from "../src/state/views";
 import { playing } from "../src/timeline/play";
 import { marks } from "../src/viewport/fidelityMarks";
@@ -37,4 +38,14 @@ test("while a time line plays it is said to play, whichever way its frames come"
   }
   playing.value = false;
   expect(words()).toEqual(["Followed closely"]);
+});
+
+test("a bake of direct light says that objects are not reflected, also where its picture is exact", () => {
+  fidelity.value = "exact";
+  settled.value = true;
+  method.value = "direct";
+  expect(words()).toEqual(["Direct light only"]);
+  expect(marks()[0]?.title).toContain("Objects are not reflected");
+  method.value = "gather";
+  expect(words()).toEqual([]);
 });

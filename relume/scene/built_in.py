@@ -33,7 +33,6 @@ BUILT_IN: dict[str, BuiltIn] = {
         "Still life",
         "Teapot, bowl, cloth and pearls in a studio: highlights and textures.",
         demo_scene,
-        method="direct",
     ),
     "cornell_box": BuiltIn(
         "Cornell box",

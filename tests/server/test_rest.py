@@ -59,7 +59,7 @@ def test_scenes_of_other_formats_are_told_apart_by_content_and_files_come_with_t
 def test_built_in_scenes_are_listed_and_taken_by_name(client: TestClient) -> None:
     listed = client.get("/api/built-ins").json()
     assert [each["name"] for each in listed][:2] == ["still_life", "cornell_box"]
-    assert all(each["description"] and each["method"] in ("direct", "gather") for each in listed)
+    assert all(each["description"] and each["method"] == "gather" for each in listed)
     created = client.post("/api/built-ins/cornell_box")
     assert created.status_code == 201, created.text
     scene = created.json()

@@ -1,6 +1,9 @@
 /** What a bake may follow of light, in words. */
 export type Method = "direct" | "gather" | "surface";
 
+/** What is baked where nobody chooses: without indirect light metal and glass mirror no objects. */
+export const DEFAULT_METHOD: Method = "gather";
+
 interface MethodWords {
   name: Method;
   label: string;

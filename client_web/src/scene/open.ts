@@ -19,6 +19,7 @@ import { door, people, you, type Door } from "../state/together";
 import { availableOf, pointedView, shownViews, viewName } from "../state/views";
 import { attempt } from "../ui/toasts";
 import { bakesOf, viewsToBake, type BakeChoice } from "./bakeChoice";
+import { DEFAULT_METHOD } from "./methods";
 import { recall, recallHistory, remember } from "./persistence";
 import { bakePreview, follow, openBake, startFullBake, stopFollowing } from "./takeover";
 import { placeFromUrl, type Place } from "./url";
@@ -115,7 +116,7 @@ async function openBakes(of: SceneBody, id: string | null, choice: BakeChoice | 
   const ready = bakes.peek().filter((each) => each.state === "ready");
   const shown = ready.find((each) => each.id === id) ?? ready[0];
   const running = bakes.peek().find((each) => each.state === "running" || each.state === "queued");
-  const wanted = choice ?? { method: "direct", preset: "good", views: viewsToBake(of) };
+  const wanted = choice ?? { method: DEFAULT_METHOD, preset: "good", views: viewsToBake(of) };
   openBake(shown?.id ?? (await bakePreview(of, wanted)));
   if (choice === undefined && running !== undefined) follow(running);
   else if (choice !== undefined || shown === undefined) await startFullBake(of, wanted);

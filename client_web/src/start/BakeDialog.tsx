@@ -2,6 +2,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import type { SceneBody } from "../protocol";
 import { viewsToBake, type BakeChoice } from "../scene/bakeChoice";
+import { DEFAULT_METHOD } from "../scene/methods";
 import { IconButton } from "../ui/Button";
 import { useReturnFocus } from "../ui/keepFocus";
 import { PresetList } from "./PresetList";
@@ -39,7 +40,7 @@ export function BakeDialog({ scene, onClose, onOpen }: Props) {
       <PresetList
         key={scene.id}
         scene={scene}
-        method="direct"
+        method={DEFAULT_METHOD}
         views={viewsToBake(scene)}
         action="Open and bake"
         onChoose={onOpen}

@@ -2,6 +2,8 @@
  * that nothing flickers while a hand drags. */
 import { computed, effect, signal } from "@preact/signals";
 import type { Fidelity } from "../protocol";
+import { DEFAULT_METHOD, wordsOf } from "../scene/methods";
+import { method } from "../state/bakes";
 import { bakedError, fidelity, movingError, settled } from "../state/fidelity";
 import { bakedLight } from "../state/look";
 import { moves } from "../state/views";
@@ -21,6 +23,11 @@ const MARKS: Record<Exclude<Fidelity, "exact">, Mark> = {
 const OTHER_LIGHT: Mark = {
   words: "Baked for other light",
   title: "Shadows were baked before this light was known: those of small lamps are approximate. A new bake mends it.",
+};
+
+const DIRECT_ONLY: Mark = {
+  words: "Direct light only",
+  title: `Objects are not reflected, in metal and glass neither, and do not light each other. A bake “${wordsOf(DEFAULT_METHOD).label}” shows both.`,
 };
 
 const PLAYING: Mark = {
@@ -73,5 +80,6 @@ function markOf(now: Exclude<Fidelity, "exact">): Mark {
 /** What is said now: of the picture, and of what its bake cannot know. */
 export function marks(): Mark[] {
   const ofPicture = rough.value === null ? [] : [playing.value ? PLAYING : markOf(rough.value)];
-  return bakedLight.value ? ofPicture : [...ofPicture, OTHER_LIGHT];
+  const ofBake = [...(bakedLight.value ? [] : [OTHER_LIGHT]), ...(method.value === "direct" ? [DIRECT_ONLY] : [])];
+  return [...ofPicture, ...ofBake];
 }

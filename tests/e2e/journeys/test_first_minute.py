@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -88,11 +89,16 @@ def test_a_dropped_folder_becomes_a_scene_baked_in_any_shape_whose_remarks_stay_
     own.get_by_label("Height").fill("200")
     own.get_by_label("Light triangles").fill("40")
     expect(dialog.get_by_text("60×200, 40 light triangles")).to_be_visible()
+    expect(dialog.get_by_role("radio", name=re.compile("^With reflected light"))).to_be_checked()
+    dialog.get_by_role("radio", name=re.compile("^Direct light")).check()
     dialog.get_by_label("Ready for other light").check()
     dialog.locator(".own-recipe").get_by_role("button", name="Open and bake").click()
     editor = Editor(start)
     expect(start.get_by_role("button", name="60×200, direct")).to_be_visible()
     wall = editor.pixels()
+    mark = start.get_by_text("Direct light only")
+    expect(mark).to_be_visible()
+    expect(mark).to_have_attribute("title", re.compile("Objects are not reflected"))
     assert (wall[..., 0] - wall[..., 2]).max() > 40  # the image came along: it is red
     (scene,) = (each for each in server.call("/api/scenes") if each["name"] == "room")
     recipes = [bake["recipe"] for bake in server.call(f"/api/bakes?scene={scene['id']}")]

@@ -1,0 +1,30 @@
+"""What `relume demo` bakes, and what the editor opens with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fastapi.testclient import TestClient
+
+from cli.demo import SELECTED, demo_recipes
+from relume.brdf.registry import TERMS
+from relume.scene.demo import demo_scene
+from server.app import create_app
+from server.settings import Settings
+from worker.status import bake_id
+
+
+def test_the_demo_bakes_what_the_editor_asks_for_first(tmp_path: Path) -> None:
+    app = create_app(Settings(data=tmp_path, importer_at_start=False, ahead=False))
+    with TestClient(app, "http://127.0.0.1") as client:
+        scene = client.post("/api/built-ins/still_life").json()
+        request = {"scene": scene["id"], "method": "gather", "views": [view["name"] for view in scene["views"]]}
+        for recipe, preset in zip(demo_recipes(demo_scene()), ("preview", "good"), strict=True):
+            asked = client.post("/api/bakes", json=request | {"preset": preset, "dry_run": True})
+            assert asked.json()["id"] == bake_id(scene["id"], recipe)
+
+
+def test_the_demo_opens_with_a_curve_that_its_scene_has() -> None:
+    (material,) = (each for each in demo_scene().materials if each.name == SELECTED["material"])
+    term = material.terms[int(SELECTED["term"])]
+    assert SELECTED["curve"] in [curve.name for curve in TERMS[term["model"]].curves]
