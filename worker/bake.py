@@ -64,6 +64,7 @@ class BakeRunner:
         changed: called after every change of the ledger.
         stopped: the service is closing; the bake stays `running` for the next start.
         expected: what finished bakes tell of this one.
+        working_since: when its first task began, by `time.monotonic`; None before.
     """
 
     ledger: Ledger
@@ -74,9 +75,9 @@ class BakeRunner:
     changed: Callable[[], None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
     expected: Expected = field(default_factory=Expected)
+    working_since: float | None = None
     _flying: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
     _entered: tuple[Phase | None, float] = (None, 0.0)
-    _is_working: bool = False
     _parts: Parts | None = None
     _lost_s: float = -inf
 
@@ -200,10 +201,10 @@ class BakeRunner:
         note = read_note(self._staging)
         if note == "compiling":
             return note
-        if not self._is_working and note != "working":
+        if self.working_since is None and note != "working":
             return note or "loading"
-        if not self._is_working:
-            self._is_working = True
+        if self.working_since is None:
+            self.working_since = time.monotonic()
             progress.begin_work()
         return "sampling" if stage == 0 else "tracing"
 
@@ -226,7 +227,7 @@ class BakeRunner:
             waiting.append((task, attempt + 1))
             return
         self._record(task, cost, attempt)
-        self._is_working = True
+        self.working_since = self.working_since or time.monotonic() - cost.seconds
         progress.add(task, cost, here=True)
 
     def _say_lost(self) -> None:

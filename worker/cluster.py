@@ -13,7 +13,7 @@ import dask
 from distributed import Nanny
 
 from relume.errors import ParameterError, PlanError
-from worker.executor import DASK_CONFIG, ONE_THREAD, check_certificates, num_cores
+from worker.executor import DASK_CONFIG, ONE_THREAD, YIELDING, check_certificates, num_cores
 
 log = logging.getLogger(__name__)
 
@@ -66,4 +66,5 @@ def _nanny(scheduler: str) -> Nanny:
         local_directory=tempfile.gettempdir(),
         death_timeout=JOIN_S,
         env=ONE_THREAD,
+        preload=YIELDING,
     )

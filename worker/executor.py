@@ -1,8 +1,8 @@
 """Where tasks run: this process for tiny bakes, a Dask cluster for all others.
 
-A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes about one. So a bake of at
-most `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES` runs in this process, one task at a time on the kernels' own threads, and
-the cluster starts with the first larger one.
+A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes fewer. So a bake of at most
+`TINY_BAKE_S`, or of `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES`, runs in this process, one task at a time on the kernels'
+own threads, and the cluster starts with the first larger one. Its processes yield to what people look at.
 """
 
 from __future__ import annotations
@@ -25,10 +25,15 @@ from worker.dask_executor import DaskExecutor
 
 log = logging.getLogger(__name__)
 
-# As planned: about four seconds of tracing on two cores, what starting a cluster costs; a preview bake is below it.
+# As planned, of one core: half of that on two, what starting a cluster costs on a busy machine. A preview with indirect
+# light of as many views as are shown at once is below it.
+TINY_BAKE_S = 20.0
 TINY_BAKE_RAYS = 400_000_000
 TINY_BAKE_BYTES = 512 << 20  # on disk: points on millions of triangles take longer to place than rays to trace
 CONNECT_S = 10
+# Shading that somebody waits for is at 5 (`relume.parallel`): at 0, two processes left it a quarter of two cores.
+BAKE_NICE = 10
+YIELDING = ["worker.executor"]  # Dask's name for modules whose `dask_setup` runs in each process
 
 # One Python thread per process, so one thread for every library below it.
 ONE_THREAD = dict.fromkeys(
@@ -50,8 +55,15 @@ NO_PAGES: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distribute
 
 
 def is_tiny(plan: Plan) -> bool:
-    """Whether a bake is done before a cluster would have started."""
+    """Whether a bake is done before a cluster would have started, or nearly so."""
+    if 0 < plan.work_s <= TINY_BAKE_S:
+        return True
     return plan.num_rays <= TINY_BAKE_RAYS and plan.store_bytes <= TINY_BAKE_BYTES
+
+
+def dask_setup(_: object) -> None:
+    """Make a worker process yield; its threads start later and inherit that."""
+    os.nice(BAKE_NICE)
 
 
 def num_cores() -> int:
@@ -92,6 +104,11 @@ class Executors:
             if self._client is None:
                 self._client = self._connect()
             return DaskExecutor(self._client)
+
+    @property
+    def has_cluster(self) -> bool:
+        """Whether the cluster is there, so that the next bake need not start it."""
+        return self._client is not None
 
     def cluster_threads(self) -> int:
         """How many tasks the cluster runs at once; at least 1."""
@@ -164,6 +181,7 @@ class Executors:
                 local_directory=tempfile.gettempdir(),
                 silence_logs=logging.ERROR,
                 env=ONE_THREAD,
+                preload=YIELDING,
             )
         return self._cluster
 

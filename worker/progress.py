@@ -14,6 +14,8 @@ from worker.status import TaskCost
 FORESIGHT = 0.9
 # Once so much of a bake is done, its time left follows from its own rate alone; before, also from what others took.
 EVIDENCE = 0.08
+# Before so much of a bake is done, nobody can say how long the rest takes: others' bakes were of other scenes.
+SAID_FROM = 0.1
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,8 @@ class Progress:
             self._last = self._clock()
 
     def fields(self) -> dict[str, float | None]:
-        """As the ledger keeps them: progress from 0 to 1 that never falls, rays per second, seconds left."""
+        """As the ledger keeps them: progress from 0 to 1 that never falls, rays per second, and seconds left, once a
+        tenth of the bake is done."""
         since_s, worked_s = self._clock() - self._last, self._last - self._began
         per_second = self._rate()
         if per_second:
@@ -121,8 +124,12 @@ class Progress:
         return {
             "progress": min(1.0, self._shown),
             "rays_per_second": self._rays_here / max(1e-3, worked_s) if self._rays_here else None,
-            "seconds_left": self._seconds_left(per_second, since_s) if per_second else None,
+            "seconds_left": self._seconds_left(per_second, since_s) if per_second and self._is_said else None,
         }
+
+    @property
+    def _is_said(self) -> bool:
+        return self._done >= SAID_FROM
 
     def _seconds_left(self, per_second: float, since_s: float) -> float:
         """At a rate; but at least as many as where all tasks in hand ended just now."""

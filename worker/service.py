@@ -43,6 +43,7 @@ log = logging.getLogger(__name__)
 POLL_S = 1.0
 CLOSE_S = 10.0
 KEPT_S = 7 * 86_400.0  # what a failed or cancelled bake has finished, for whoever asks for it again
+START_S = 8.0  # until worker processes are at work, where none has been started yet: measured on two cores
 NUM_JUDGED_BY = 8  # finished bakes that an estimate looks at
 
 
@@ -84,6 +85,7 @@ class BakeService:
         self._owner = new_owner()
         self._closing = threading.Event()
         self._is_crowding = threading.Event()
+        self._start_s = START_S
         self._turns = {is_tiny_lane: Turns(shares or {}) for is_tiny_lane in (True, False)}
         self._wakes = {True: threading.Event(), False: threading.Event()}
         self._threads: list[threading.Thread] = []
@@ -179,7 +181,16 @@ class BakeService:
         return bake_path(self.data_dir, bake_id)
 
     def seconds_for(self, plan: Plan) -> float | None:
-        """Seconds that a bake will take, by those that took place here; None where there were none."""
+        """Seconds that a bake will take, by those that took place here; None where there were none.
+
+        Processes that have to be started for it, and to load the kernels, are part of it.
+        """
+        work_s = self._work_s(plan)
+        is_cold = not is_tiny(plan) and not self._executors.has_cluster
+        return work_s if work_s is None or not is_cold else work_s + self._start_s
+
+    def _work_s(self, plan: Plan) -> float | None:
+        """Seconds from the first task's begin on."""
         load = load_of_machine()
         if is_tiny(plan) or not self._is_crowding.is_set():  # else a bake that ends before this one is counted already
             load += self._executors.num_workers
@@ -191,7 +202,7 @@ class BakeService:
         seconds = self.ledger.stage_seconds(status.scene, method.name, self._executors.num_workers, NUM_JUDGED_BY)
         total, stages = sum(seconds.values()), range(len(method.stages))
         shares = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
-        return Expected(self.seconds_for(status.plan), shares, parallel)
+        return Expected(self._work_s(status.plan), shares, parallel)
 
     def workers_resident_bytes(self) -> int:
         """Memory of the worker processes that this service has started."""
@@ -266,6 +277,7 @@ class BakeService:
 
     def _run(self, status: BakeStatus, tiny: bool) -> None:
         self._board.changed()
+        began, is_cold = time.monotonic(), not self._executors.has_cluster
         try:
             method = self._method(status.recipe.method)
             expected = self._expected(status, 1 if tiny else self._executors.num_workers)
@@ -297,6 +309,8 @@ class BakeService:
             runner.run()
         finally:
             self._is_crowding.clear()
+        if is_cold and runner.working_since is not None:
+            self._start_s = runner.working_since - began
 
     def _store_all(self) -> None:
         """Store what is here and not in the storage: from before there was one, or from while it was away."""

@@ -8,11 +8,13 @@ from relume.bake import Plan, Recipe
 from relume.methods.registry import METHODS
 from relume.scene.archive import make_scene
 from relume.scene.cornell import sunny_sky
+from relume.scene.demo import demo_scene
 from relume.scene.demo.still_life import look_at
 from relume.scene.demo.surfaces import sphere
 from relume.scene.model import Material
 from worker.estimate import Finished, crowding, seconds_for
 from worker.executor import TINY_BAKE_BYTES, TINY_BAKE_RAYS, is_tiny
+from worker.presets import PRESETS
 
 LARGE = Plan(1000, 20 * TINY_BAKE_RAYS, 1, 1)
 SMALL = Plan(1000, TINY_BAKE_RAYS // 2, 1, 1)
@@ -22,6 +24,14 @@ def test_few_rays_of_millions_of_triangles_are_no_tiny_bake():
     assert is_tiny(SMALL)
     assert not is_tiny(LARGE)
     assert not is_tiny(Plan(1000, 1000, TINY_BAKE_BYTES + 1, 1))
+
+
+def test_a_preview_with_indirect_light_waits_behind_no_larger_bake():
+    scene, preset = demo_scene(), PRESETS["preview"]
+    views = tuple(camera.name for camera in scene.cameras)
+    plan = METHODS["gather"].plan(scene, Recipe("gather", views, preset.size, preset.num_lights))
+    assert is_tiny(plan)
+    assert not is_tiny(replace(plan, work_s=20 * plan.work_s))
 
 
 def test_nothing_is_said_before_anything_was_measured():
@@ -79,11 +89,11 @@ def test_bakes_of_other_methods_judge_by_what_a_ray_takes_in_each():
 
 
 def test_what_small_bakes_took_for_themselves_is_no_rate_of_large_ones():
-    small, large = replace(LARGE, work_s=0.1), replace(LARGE, work_s=40.0)
-    assert seconds_for(large, [Finished(small, 10.0)], 1) == pytest.approx(10.0 + 39.9)
-    assert seconds_for(large, [Finished(small, 10.0)], 2) == pytest.approx(5.0 + 39.9 / 2)
-    assert seconds_for(large, [Finished(small, 0.05)], 1) == pytest.approx(20.0)
-    assert seconds_for(replace(LARGE, work_s=0.8), [Finished(small, 10.0)], 1) == pytest.approx(80.0)
+    small, large = replace(LARGE, work_s=25.0), replace(LARGE, work_s=10_000.0)
+    assert seconds_for(large, [Finished(small, 2500.0)], 1) == pytest.approx(2500.0 + 9975.0)
+    assert seconds_for(large, [Finished(small, 2500.0)], 2) == pytest.approx(1250.0 + 9975.0 / 2)
+    assert seconds_for(large, [Finished(small, 12.5)], 1) == pytest.approx(5000.0)
+    assert seconds_for(replace(LARGE, work_s=200.0), [Finished(small, 2500.0)], 1) == pytest.approx(20_000.0)
 
 
 def test_plans_that_tell_rays_alone_judge_where_there_are_no_others():

@@ -4,6 +4,7 @@ import asyncio
 import concurrent.futures
 import errno
 import logging
+import os
 import subprocess
 import sys
 import urllib.error
@@ -16,7 +17,7 @@ import pytest
 
 from relume.errors import PlanError
 from worker.dask_executor import DaskExecutor
-from worker.executor import Executors
+from worker.executor import BAKE_NICE, Executors
 
 
 def run(work: Coroutine[Any, Any, None]) -> None:
@@ -160,3 +161,14 @@ def test_the_cluster_of_this_machine_runs_nothing_for_who_has_no_key_of_it() -> 
 def test_a_cluster_of_somebody_else_says_what_it_lacks_where_tls_is_not_set_up() -> None:
     with pytest.raises(PlanError, match="DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
         Executors("tls://127.0.0.1:1").cluster()
+
+
+def test_worker_processes_yield_to_what_somebody_waits_for() -> None:
+    executors = Executors(num_workers=1)
+    assert not executors.has_cluster
+    try:
+        niceness = executors.cluster().submit(os.getpriority, os.PRIO_PROCESS, 0).result(60)
+        assert executors.has_cluster
+    finally:
+        executors.close()
+    assert niceness == min(19, os.getpriority(os.PRIO_PROCESS, 0) + BAKE_NICE)

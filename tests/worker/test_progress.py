@@ -121,13 +121,30 @@ def test_nothing_is_said_without_evidence() -> None:
         clock.now += 1
 
 
-def test_what_others_took_is_said_until_it_cannot_be_true() -> None:
+def test_what_others_took_is_said_of_a_bake_that_goes_on_until_it_cannot_be_true() -> None:
     progress, clock = expected_alone(20.0)
-    assert progress.fields()["seconds_left"] == pytest.approx(20.0)
+    assert progress.fields()["seconds_left"] is None  # in the first tenth others' bakes tell nothing
+    progress.add(TASKS[0], TaskCost(1000, 1, 1), here=False)
+    assert progress.fields()["seconds_left"] == pytest.approx(18.0)
     clock.now += 1
-    assert progress.fields()["seconds_left"] == pytest.approx(19.0)
-    clock.now += 9  # the first of ten tasks should have ended eight seconds ago
-    assert progress.fields()["seconds_left"] >= 90.0
+    assert progress.fields()["seconds_left"] == pytest.approx(17.0)
+    clock.now += 9  # the next of ten tasks should have ended eight seconds ago
+    assert progress.fields()["seconds_left"] >= 80.0
+
+
+def test_no_time_is_said_in_the_first_tenth_whatever_others_took() -> None:
+    clock = Clock()
+    progress = Progress(PLAN, expected=Expected(3.0, (1.0,)), clock=clock)
+    tasks = [Task(0, i, "front", i, i + 1) for i in range(40)]
+    progress.begin_stage(tasks, last=True)
+    progress.begin_work()
+    said = []
+    for task in tasks:
+        clock.now += 1
+        progress.add(task, TaskCost(1000, 1, 1), here=True)
+        said.append(progress.fields()["seconds_left"])
+    assert said[:3] == [None] * 3
+    assert said[3:] == [pytest.approx(left) for left in range(36, -1, -1)]
 
 
 def test_stages_count_by_the_time_they_took_before() -> None:

@@ -17,10 +17,11 @@ from relume.bake import Task
 from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
 from relume.store import bake_here, open_store
 from worker import lease, scenes
+from worker.executor import Executors
 from worker.ledger import Ledger
 from worker.paths import staging_path
 from worker.scenes import delete_bakes, delete_scene, register_scene
-from worker.service import BakeService
+from worker.service import START_S, BakeService
 from worker.status import BakeStatus, TaskCost, bake_id
 from worker.tasks import Job
 
@@ -264,6 +265,21 @@ def test_what_one_process_takes_at_a_time_counts_once(tmp_path: Path, monkeypatc
         assert service.plan(SCENE.id, RECIPE).peak_bytes == alone
     with open_service(tmp_path, peak_bytes=alone) as service, pytest.raises(MemoryBudgetError, match="fewer triangles"):
         service.plan(SCENE.id, RECIPE)
+
+
+def test_processes_that_a_bake_has_to_start_are_part_of_its_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_service(tmp_path) as service:
+        follow(service, service.submit(SCENE.id, RECIPE))
+        plan = service.plan(SCENE.id, RECIPE)
+        warm_s = service.seconds_for(plan)
+        monkeypatch.setattr("worker.service.is_tiny", lambda plan: False)
+        cold_s = service.seconds_for(plan)
+        monkeypatch.setattr(Executors, "has_cluster", True)
+        assert service.seconds_for(plan) == warm_s
+    assert warm_s is not None
+    assert cold_s == pytest.approx(warm_s + START_S)
 
 
 def test_unknown_names_are_refused(tmp_path: Path) -> None:
