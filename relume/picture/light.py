@@ -152,6 +152,11 @@ def gain_of(look: Look, solo: Solo = None) -> Rgb:
     return (1.0, 1.0, 1.0) if tuple(_local(look, alone)) else _environment_gain(look, alone)
 
 
+def is_solo(look: Look, solo: Solo) -> bool:
+    """Whether some of the look's sources alone are shown; `solo` as in `light_of`."""
+    return _alone(look, solo) is not None
+
+
 def _alone(look: Look, solo: Solo) -> frozenset[str] | None:
     """Which of the look's sources alone are shown; None: all that are on."""
     return None if solo is None else solo & {ENVIRONMENT, *look.lights} or None

@@ -45,6 +45,8 @@ class LiveTerm:
 
     def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, levels: Levels, light: Light) -> None:
         self.light = light
+        self._is_solo = False
+        self._before_solo: Shown | None = None  # what can be gone on from when all sources come back
         self._cos_theta_o, self._levels = cos_theta_o, levels
         tiles, samples = tiles_of(len(cos_theta_o))
         self.ready = self.displayed = Shown(np.zeros((tiles, 3, samples), np.float32))
@@ -74,7 +76,7 @@ class LiveTerm:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
         wanted = Wanted.of(document, lambda: self._theta_o, self._levels)
         if wanted.model != self.model:
-            self.ready = Shown(np.zeros_like(self.ready.image))
+            self.ready, self._before_solo = Shown(np.zeros_like(self.ready.image)), None
             self.displayed = replace(self.displayed, bands={}, is_outdated=True)  # none of its curves is wanted
         elif self.ready.basis is not None and not self.ready.basis.holds_for(document):
             self.ready = self._go_on_as(self.ready.without_basis())
@@ -93,11 +95,23 @@ class LiveTerm:
         if not fades or set(self.displayed.differing(self.target)) <= set(steps):
             self.mirror, self.is_composed = self.document, False
 
-    def set_light(self, light: Light) -> None:
-        """It is wanted in another light; the picture goes on showing what it shows (`show_ready`)."""
+    def set_light(self, light: Light, *, is_solo: bool) -> None:
+        """It is wanted in another light; the picture goes on showing what it shows (`show_ready`).
+
+        Args:
+            is_solo: it is of some sources alone. Mixed from their images, those of the others would all be lacking when
+                they come back, so the image of all sources is stored for then.
+        """
         self.light = light
-        self.ready = self.ready.in_other_light()
-        anchor = self.ready.anchor
+        current = self.ready.in_other_light()
+        if is_solo and not self._is_solo:
+            self._before_solo = current.anchor
+        elif self._is_solo and not is_solo:
+            before, self._before_solo = self._before_solo, None
+            if before is not None and not before.differing(self.target):
+                current = replace(current, anchor=before)
+        self.ready, self._is_solo = current, is_solo
+        anchor = current.anchor
         if anchor is not None and anchor.light == light:  # as before, after all
             self.ready = replace(anchor.without_basis(), image=anchor.image.copy())
 

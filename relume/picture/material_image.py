@@ -89,11 +89,11 @@ class MaterialImage:
         self.documents = list(documents)
         self._is_current = False
 
-    def set_light(self, light: Light) -> None:
-        """It is lit by this from now on."""
+    def set_light(self, light: Light, *, is_solo: bool) -> None:
+        """It is lit by this from now on. is_solo: by some sources alone."""
         self._light = light
         for term in self.terms:
-            term.set_light(light)
+            term.set_light(light, is_solo=is_solo)
 
     def set_emission(self, emission: tuple[float, float, float], shines: Callable[[int], F32]) -> None:
         """The surfaces send this out themselves, as `shines` says of the material's samples, (n, 1 or 3)."""

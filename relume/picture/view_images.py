@@ -20,7 +20,7 @@ from relume.operators.edit_basis import CurveBasis, EditBasis
 from relume.operators.nodes import linearise
 from relume.operators.operator import Operator
 from relume.operators.shade import Shaded, shaded_bytes
-from relume.picture.light import Light, Solo, emission_of, gain_of, light_of
+from relume.picture.light import Light, Solo, emission_of, gain_of, is_solo, light_of
 from relume.picture.live_term import LiveTerm
 from relume.picture.material_image import MaterialImage
 from relume.picture.mirrors import Mirrors
@@ -124,7 +124,7 @@ class ViewImages:
                 self.transfer.radiance_of(light.environment.map)
             self.light = light
             for material in self.by_name.values():
-                material.set_light(light)
+                material.set_light(light, is_solo=is_solo(look, solo))
         for name, material in self.by_name.items():
             material.set_documents(documents_of(look, name))
         self.gain = gain_of(look, solo)

@@ -103,6 +103,32 @@ def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer,
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look_with(transfer, ALL)), rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize("environment", [{}, {"rotation": 40.0}])
+def test_after_a_solo_the_others_come_back_without_being_shaded(transfer, lit, environment):
+    def look_at(sun_scale):
+        lights = changed("Panel", scale=3.0) | {"Sun": SUN | {"scale": sun_scale}}
+        return look_with(transfer, lights, environment)
+
+    lit.set_look(look_at(1.0))
+    settle(lit).set_look(look_at(1.0), solo=frozenset({"Sun"}))
+    settle(lit).set_look(look_at(2.0), solo=frozenset({"Sun"}))
+    settle(lit).set_look(look_at(2.0))
+    assert lit.advance(None).exact
+    np.testing.assert_allclose(lit.image(), exact_image(transfer, look_at(2.0)), rtol=1e-4, atol=1e-5)
+
+
+def test_curves_that_were_changed_under_one_light_are_shaded_under_all(transfer, lit):
+    def dull(document):
+        document["lights"].update(ALL)
+        document["materials"]["Wall"]["terms"][1]["params"].update(exponent=20.0)
+
+    lit.set_look(look_with(transfer, ALL), solo=frozenset({"Sun"}))
+    settle(lit).set_look(look_of(transfer, dull), solo=frozenset({"Sun"}))
+    settle(lit).set_look(look_of(transfer, dull))
+    expected = exact_image(transfer, look_of(transfer, dull))
+    np.testing.assert_allclose(settle(lit).image(), expected, rtol=1e-4, atol=1e-5)
+
+
 @pytest.mark.slow
 def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
     """A curve's operator belongs to one light; after another gain it is made anew, never used on."""
