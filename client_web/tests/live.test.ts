@@ -7,6 +7,7 @@ import { stage } from "../src/picture/stage";
 import type { HelloMessage, Look } from "../src/protocol";
 import { bake } from "../src/state/bakes";
 import { placeEye } from "../src/state/eyes";
+import { isOutdated } from "../src/state/fidelity";
 import { look } from "../src/state/look";
 import { shownViews, viewName } from "../src/state/views";
 import { onePixel } from "./frames";
@@ -19,6 +20,7 @@ const opened = vi.hoisted((): FakeSession[] => {
 });
 
 interface FakeSession {
+  revision: number;
   bake: string;
   handlers: SessionHandlers;
   sent: { type: string }[];
@@ -118,4 +120,19 @@ test("a visitor without a look of their own is shown what a link brought with th
   const session = greet("first");
   stop();
   expect(session.wanted).toEqual(brought);
+});
+
+test("what is shown is outdated from the edit on until every shown view has a picture of after it", async () => {
+  const session = greet("old");
+  for (const view of shownViews.value) await session.handlers.frame(frame(view));
+  expect(isOutdated.value).toBe(false);
+  session.revision = 1;
+  session.handlers.sent(1, 0);
+  expect(isOutdated.value).toBe(true);
+  for (const view of ["front", "left"]) {
+    expect(isOutdated.value).toBe(true);
+    const answer = frame(view);
+    await session.handlers.frame({ ...answer, header: { ...answer.header, revision: 1 } });
+  }
+  expect(isOutdated.value).toBe(false);
 });

@@ -1,7 +1,7 @@
 /** What is said of a moving picture: how far it is off, where it rested last or as its bake was measured. */
 import { beforeEach, expect, test, vi } from "vitest";
 import { method } from "../src/state/bakes";
-import { bakedError, fidelity, movingError, settled } from "../src/state/fidelity";
+import { bakedError, fidelity, isOutdated, movingError, settled } from "../src/state/fidelity";
 import { shownViews, viewName, views } from "../src/state/views";
 import { playing } from "../src/timeline/play";
 import { marks } from "../src/viewport/fidelityMarks";
@@ -47,5 +47,18 @@ test("a bake of direct light says that objects are not reflected, also where its
   expect(words()).toEqual(["Direct light only"]);
   expect(marks()[0]?.title).toContain("Objects are not reflected");
   method.value = "gather";
+  expect(words()).toEqual([]);
+});
+
+test("a picture of before the newest edit says so until one of after it is there", () => {
+  fidelity.value = "exact";
+  [settled.value, settled.value] = [false, true];
+  views.value = [{ name: "front", eye: "baked" } as never];
+  isOutdated.value = true;
+  vi.advanceTimersByTime(200);
+  expect(words()).toEqual([]); // nothing flickers under a hand
+  vi.advanceTimersByTime(200);
+  expect(words()).toEqual(["Updating…"]);
+  isOutdated.value = false;
   expect(words()).toEqual([]);
 });

@@ -1,7 +1,7 @@
 /** Whether what is on the screens is the look's picture, and how near it is. */
 import { stage } from "../picture/stage";
 import type { FrameHeader } from "../protocol";
-import { exact, fidelity, movingError, worst } from "../state/fidelity";
+import { exact, fidelity, isOutdated, movingError, worst } from "../state/fidelity";
 import { connections, type BakeConnection } from "./connections";
 
 const waiters: (() => void)[] = [];
@@ -35,7 +35,13 @@ export function noteShown(of: BakeConnection, header: FrameHeader): void {
 export function sayExact(of: BakeConnection): void {
   const { revision, shared } = of.session;
   exact.value = stage.shown.every((each) => each.exactRevision >= revision && each.exactShared >= shared);
+  if (isAnswered(of)) isOutdated.value = false;
   if (exact.value) for (const done of waiters.splice(0)) done();
+}
+
+/** Whether every shown picture is of the newest look that was sent, or on its way there. */
+function isAnswered({ session }: BakeConnection): boolean {
+  return stage.shown.every((each) => each.revision >= session.revision);
 }
 
 /** Resolves when the picture is exact for everything that was sent. */

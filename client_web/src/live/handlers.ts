@@ -9,7 +9,7 @@ import { wholeOf } from "../seen/paths";
 import { coming } from "../state/bakes";
 import { connection, freezing, refusedBecause, retryInMs } from "../state/connection";
 import { showShape } from "../state/curveShape";
-import { exact } from "../state/fidelity";
+import { exact, isOutdated } from "../state/fidelity";
 import { editSent, forgetWaiting } from "../state/latency";
 import { defaultLook, look } from "../state/look";
 import { loginWords, mayEdit, readOnlyWords } from "../state/me";
@@ -121,6 +121,7 @@ export function handlersOf(self: BakeConnection): SessionHandlers {
     sent(revision, inputTime) {
       if (!isShown()) return;
       exact.value = false;
+      isOutdated.value = true;
       editSent(revision, inputTime);
     },
     readOnly: () => showError(readOnlyWords.value),

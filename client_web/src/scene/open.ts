@@ -11,7 +11,7 @@ import { seenPaths } from "../seen/paths";
 import { solo, soloLight } from "../seen/solo";
 import { axes, bake, bakes, coming, method } from "../state/bakes";
 import { connection, freezing } from "../state/connection";
-import { fidelity } from "../state/fidelity";
+import { fidelity, isOutdated } from "../state/fidelity";
 import { defaultLook, look } from "../state/look";
 import { models, page, scene } from "../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm } from "../state/selection";
@@ -43,6 +43,7 @@ function reset(to: SceneBody): void {
   connection.value = "connecting";
   freezing.value = null;
   fidelity.value = "exact";
+  isOutdated.value = false;
   people.value = [];
   you.value = null;
   page.value = "editor";

@@ -4,6 +4,8 @@ import type { Fidelity, HelloMessage } from "../protocol";
 
 /** Whether every shown picture equals the look. */
 export const exact = signal(false);
+/** Whether an edit was sent that no shown picture has answered yet: what stands there is of before it. */
+export const isOutdated = signal(false);
 /** Exact, and for a moment: what the status bar says, so that it stands still while a hand drags. */
 export const settled = signal(false);
 /** Of the shown pictures the worst; of no picture nothing bad is said. */

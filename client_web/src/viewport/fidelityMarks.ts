@@ -4,7 +4,7 @@ import { computed, effect, signal } from "@preact/signals";
 import type { Fidelity } from "../protocol";
 import { DEFAULT_METHOD, wordsOf } from "../scene/methods";
 import { method } from "../state/bakes";
-import { bakedError, fidelity, movingError, settled } from "../state/fidelity";
+import { bakedError, fidelity, isOutdated, movingError, settled } from "../state/fidelity";
 import { bakedLight } from "../state/look";
 import { moves } from "../state/views";
 import { playing } from "../timeline/play";
@@ -16,7 +16,7 @@ export interface Mark {
 
 const MARKS: Record<Exclude<Fidelity, "exact">, Mark> = {
   preview: { words: "Preview", title: "A few points are shaded, the others guessed from them. All are shaded next." },
-  approximate: { words: "Catching up", title: "The picture is of a moment ago; what the new one needs is being made." },
+  approximate: { words: "Updating…", title: "The picture is of a moment ago; what the new one needs is being made." },
   followed: { words: "Followed closely", title: "What the hand changes is followed roughly. Exact at rest." },
   near: { words: "Nearly exact", title: "What the hand changes is followed closely. Exact at rest." },
 };
@@ -59,6 +59,14 @@ function say(): void {
   if (now !== "exact") rough.value = now;
 }
 
+/** The picture is of before the newest edit, for longer than a blink. */
+const isLate = signal(false);
+effect(() => {
+  const timer = isOutdated.value ? setTimeout(() => (isLate.value = true), SHOWN_AFTER_MS) : undefined;
+  if (!isOutdated.value) isLate.value = false;
+  return () => clearTimeout(timer);
+});
+
 const isRough = computed(() => fidelity.value !== "exact");
 effect(() => {
   if (settled.value) rough.value = null;
@@ -79,7 +87,8 @@ function markOf(now: Exclude<Fidelity, "exact">): Mark {
 
 /** What is said now: of the picture, and of what its bake cannot know. */
 export function marks(): Mark[] {
-  const ofPicture = rough.value === null ? [] : [playing.value ? PLAYING : markOf(rough.value)];
+  const word = isLate.value ? "approximate" : rough.value;
+  const ofPicture = word === null ? [] : [playing.value ? PLAYING : markOf(word)];
   const ofBake = [...(bakedLight.value ? [] : [OTHER_LIGHT]), ...(method.value === "direct" ? [DIRECT_ONLY] : [])];
   return [...ofPicture, ...ofBake];
 }
