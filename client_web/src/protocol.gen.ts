@@ -914,10 +914,11 @@ export interface TruthFigures {
   significant: number;
 }
 
-/** The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn. */
+/** The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn. `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment. */
 export interface TruthPlanBody {
   passes: number;
   seconds: number;
+  is_measured: boolean;
 }
 
 /** A view of a display, as looks name it in `display.tone_map`. */

@@ -39,17 +39,20 @@ describe("how true a picture is, in words", () => {
   });
 
   it("counts the pass that is being made, and never beyond the last", () => {
-    const at = (passes: number) => progressWords({ state: "running", passes, total: 16, problem: null, seconds_left: null });
-    expect(at(0)).toContain("pass 1 of 16");
-    expect(at(16)).toContain("pass 16 of 16");
-    const failed = { state: "failed" as const, passes: 0, total: 16, problem: "The disk is full.", seconds_left: null };
-    expect(progressWords(failed)).toBe("The disk is full.");
+    const at = (passes: number, progress: number) =>
+      progressWords({ state: "running", passes, total: 16, progress, problem: null, seconds_left: null }, 7.8);
+    expect(at(0, 0)).toBe("Preparing the picture, 7 s so far");
+    expect(at(0, 0.02)).toBe("Brute force: pass 1 of 16, 32 % of it, 7 s so far");
+    expect(at(16, 1)).toContain("pass 16 of 16, 0 % of it");
+    const failed = { state: "failed" as const, passes: 0, total: 16, progress: 0, problem: "The disk is full.", seconds_left: null };
+    expect(progressWords(failed, 1)).toBe("The disk is full.");
   });
 
   it("says how long it takes, before and on the way, and where it was stopped", () => {
-    expect(planWords({ passes: 16, seconds: 90 })).toMatch(/16 passes .* about \S/);
-    const on = { state: "running" as const, passes: 4, total: 16, problem: null, seconds_left: 61 };
-    expect(progressWords(on)).toContain("left");
-    expect(progressWords({ ...on, state: "stopped", seconds_left: null })).toBe("Stopped after 4 of 16 passes");
+    expect(planWords({ passes: 16, seconds: 90, is_measured: true })).toMatch(/16 passes .* about [^,]*\.$/);
+    expect(planWords({ passes: 16, seconds: 90, is_measured: false })).toMatch(/about .*, judged by other pictures/);
+    const on = { state: "running" as const, passes: 4, total: 16, progress: 0.3, problem: null, seconds_left: 61 };
+    expect(progressWords(on, 3)).toContain("left");
+    expect(progressWords({ ...on, state: "stopped", seconds_left: null }, 3)).toBe("Stopped after 4 of 16 passes");
   });
 });

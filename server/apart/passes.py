@@ -3,7 +3,8 @@
 A comparison keeps in its folder the frame and the sums of its passes, so that whoever comes later goes on with the next
 pass, under other code with the first. Passes are added up twice, by all light paths and by those that the bake's method
 follows, where both are asked for. After each pass from the second on there are the figures and pictures of all passes
-so far: `error` and `reference` of the paths that were asked for, `method-error` and `method-reference` of the method's.
+so far: `error` and `reference` of the paths that were asked for, `method-error` and `method-reference` of the method's;
+before, `reference` pictures alone, for nothing tells their noise: at first small ones, which are soon there.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 SPP = 64
 FIGURES = "figures.json"
+_FIRST_SPP = 16
 _SAMPLE = 4  # times as wide as its sample is a picture whose pace is not known
 _Estimates = dict[str, Estimate]  # by whose paths: "all", "method"
 
@@ -44,7 +46,7 @@ _Estimates = dict[str, Estimate]  # by whose paths: "all", "method"
 def make_frame(
     shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: Mapping[str, Any], folder: str
 ) -> Mapping[str, Any]:
-    """The frame that is compared, where it is not there.
+    """The frame that is compared, and a first brute force to look at, where they are not there.
 
     Args:
         request: the comparison's body. folder: its files.
@@ -58,8 +60,20 @@ def make_frame(
         eye = compared_from(asked, transfer) if transfer.eyes is Eyes.FREE else None
         frame = shop.library.render(transfer, asked.view, _look(asked, transfer), cancelled=cancelled, eye=eye)
         kept = frame, {paths: Estimate.nothing(*frame.shape[:2]) for paths in dict.fromkeys((asked.paths, "method"))}
+        _write_first(shop, where, transfer, asked, kept[0].shape[1::-1], cancelled)
         _keep(where, *kept)
     return {"passes": kept[1]["method"].passes}
+
+
+def _write_first(
+    shop: Workshop, folder: Path, transfer: Opened, asked: TruthRequest, size: tuple[int, ...], cancelled: Cancelled
+) -> None:
+    """Write small pictures of brute force, of few samples: a pass may take minutes."""
+    look, small = _look(asked, transfer), tuple(max(1, side // _SAMPLE) for side in size)
+    truth = _pass(shop, transfer, asked, look, small, 0, lambda share: None, cancelled, spp=_FIRST_SPP)
+    for paths in dict.fromkeys((asked.paths, "method")):
+        estimate = Estimate.nothing(*truth.pictures[paths].shape[:2]).add(truth.pictures[paths])
+        _write_reference(folder, estimate, paths != asked.paths, look.display)
 
 
 def make_pass(
@@ -110,10 +124,10 @@ def _look(request: TruthRequest, transfer: Opened) -> Any:
 
 def _pass(
     shop: Workshop, transfer: Opened, asked: TruthRequest, look: Any, size: tuple[int, int], index: int, tell: Any,
-    cancelled: Any,
+    cancelled: Any, spp: int = SPP,
 ) -> Truth:  # fmt: skip
     return shop.library.reference(
-        scene_path(shop.data, transfer.scene_id), compared_from(asked, transfer)[0], look, size, SPP, tell, cancelled,
+        scene_path(shop.data, transfer.scene_id), compared_from(asked, transfer)[0], look, size, spp, tell, cancelled,
         index, reflects=Axis.BOUNCES in transfer.axes, is_whole=asked.paths == "all",
     )  # fmt: skip
 
@@ -144,15 +158,26 @@ def _judge(folder: Path, frame: F32, estimates: _Estimates, asked: str, truth: T
     if estimates["method"].passes >= 2:
         found = {paths: _shown(folder, frame, of, paths != asked, display) for paths, of in estimates.items()}
         figures |= {"found": asdict(found[asked]), "found_of_method": asdict(found["method"])}
+    else:
+        for paths, estimate in estimates.items():
+            _write_reference(folder, estimate, paths != asked, display)
     with replacing(folder / FIGURES) as unfinished:
         unfinished.write_text(json.dumps(figures))
 
 
 def _shown(folder: Path, frame: F32, estimate: Estimate, is_beside: bool, display: Any) -> Comparison:
     """Write the pictures of a comparison. is_beside: it is not what was asked for."""
-    prefix = "method-" if is_beside else ""
     found, differs = compare(frame, estimate)
-    write_image(folder / f"{prefix}reference.png", estimate.mean, display.exposure, display.tone_map)
-    with replacing(folder / f"{prefix}error.png") as unfinished:
+    _write_reference(folder, estimate, is_beside, display)
+    with replacing(folder / f"{_prefix(is_beside)}error.png") as unfinished:
         Image.fromarray(error_map(frame, estimate, differs)).save(unfinished)
     return found
+
+
+def _write_reference(folder: Path, estimate: Estimate, is_beside: bool, display: Any) -> None:
+    path = folder / f"{_prefix(is_beside)}reference.png"
+    write_image(path, estimate.mean, display.exposure, display.tone_map)
+
+
+def _prefix(is_beside: bool) -> str:
+    return "method-" if is_beside else ""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 from sqlalchemy.orm import Session, sessionmaker
@@ -12,13 +14,14 @@ from sqlalchemy.orm import Session, sessionmaker
 from server.apart.passes import FIGURES
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
-from server.errors import BusyError
 from server.queues.work import Quota, Work
 from server.queues.work_queue import WorkQueue
 from server.records.tables import ComparisonRow
 from server.wire.bodies import TruthFigures, TruthRequest
 from server.wire.body import Body
 
+ANSWER_S = 1.5  # who asks how long it takes wants to know at once
+GUESSED_S_A_PIXEL = 5e-4  # of a pass, before any was measured: of the built-in scenes, by one core
 Comparing = Work[TruthRequest]
 _Kind = tuple[str, str, tuple[int, int] | None, str]
 
@@ -30,6 +33,13 @@ class Figures(Body):
     untraced: Annotated[list[str], Field(default_factory=list)]
     found: TruthFigures | None = None
     found_of_method: TruthFigures | None = None
+
+
+class Foreseen(NamedTuple):
+    """How long something will take. is_measured: judged by passes of the same view, not of others."""
+
+    seconds: float
+    is_measured: bool
 
 
 class ComparisonQueue(WorkQueue[TruthRequest]):
@@ -45,7 +55,9 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         """
         super().__init__(sessions, data / "truths", run, quota)
         self._pass_s: dict[_Kind, float] = {}
-        self._sampling = threading.Lock()
+        self._s_a_pixel = GUESSED_S_A_PIXEL
+        self._sampler, self._sampling = ThreadPoolExecutor(1, "relume-pace"), threading.Lock()
+        self._sample: Future[None] | None = None
 
     def steps(self, request: TruthRequest) -> int:
         """The passes."""
@@ -59,23 +71,41 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         """All of them take their time."""
         return False
 
-    def seconds(self, request: TruthRequest) -> float:
-        """What a comparison will take: as passes of this view took before, or as a small picture takes now.
+    def seconds(self, request: TruthRequest, num_pixels: int) -> Foreseen:
+        """What a comparison will take, told within `ANSWER_S` seconds.
 
-        Raises:
-            BusyError: another view is being tried out, and who asks would wait behind it.
-            CancelledError: the server closes.
+        As passes of this view took before, or as a small picture takes now; until that is done, and where another view
+        is being tried out, as passes of other views took.
+
+        Args:
+            num_pixels: of the picture that is compared.
         """
         key = _kind(request)
         if key not in self._pass_s:
-            if not self._sampling.acquire(blocking=False):
-                raise BusyError("another comparison is being estimated; ask again in a moment")
-            try:
-                step = Step("time of a pass", is_first=True, values={"request": request.model_dump(mode="json")})
-                self._pass_s[key] = self.run(step, lambda share: None, lambda: not self.is_closing)["seconds"]
-            finally:
-                self._sampling.release()
-        return request.passes * self._pass_s[key]
+            self._await_sample(key, request)
+        if key in self._pass_s:
+            self._s_a_pixel = self._pass_s[key] / num_pixels
+        pass_s = self._pass_s.get(key, num_pixels * self._s_a_pixel)
+        return Foreseen(request.passes * pass_s, is_measured=key in self._pass_s)
+
+    def _await_sample(self, key: _Kind, request: TruthRequest) -> None:
+        """Have a small picture made where none is being made, and wait for it a little. Raises what making it did."""
+
+        def sample() -> None:
+            step = Step("time of a pass", is_first=True, values={"request": request.model_dump(mode="json")})
+            self._pass_s[key] = self.run(step, lambda share: None, lambda: not self.is_closing)["seconds"]
+
+        with self._sampling:
+            if self._sample is None or self._sample.done():
+                self._sample = self._sampler.submit(sample)
+            pending = self._sample
+        with suppress(TimeoutError):
+            pending.result(ANSWER_S)
+
+    def close(self) -> None:
+        """See `WorkQueue`."""
+        super().close()
+        self._sampler.shutdown()
 
     def picture_path(self, identity: str, name: str) -> Path:
         """File of a picture, there or not: "error" or "reference" of the paths that were asked for, "method-error" or

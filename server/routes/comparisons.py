@@ -38,8 +38,9 @@ async def submit_comparison(
         await run_in_threadpool(_check, request, transfer)
         if request.dry_run:
             response.status_code = 200
-            seconds = await run_in_threadpool(services.comparisons.seconds, request)
-            return TruthPlanBody(passes=request.passes, seconds=seconds)
+            _, (width, height) = compared_from(request, transfer)
+            foreseen = await run_in_threadpool(services.comparisons.seconds, request, width * height)
+            return TruthPlanBody(passes=request.passes, **foreseen._asdict())
     await run_in_threadpool(services.access.quotas.check_room)
     identity = await run_in_threadpool(services.comparisons.submit, request, caller.name)
     response.headers["Location"] = f"/api/truths/{identity}"
@@ -99,11 +100,13 @@ def get_picture(
     truth: Id, name: Picture, services: Shared, passes: Annotated[int | None, Query(ge=0)] = None
 ) -> Download:
     """Where the frame differs, or the brute force so far, by the paths that were asked for or by those that the bake's
-    method follows; from the second pass on. `passes` only makes the address change when the picture does."""
+    method follows. Brute force from the first pass on, where the frame differs from the second. `passes` only makes the
+    address change when the picture does."""
     comparing = services.comparisons.get(truth)
     path = services.comparisons.picture_path(truth, name)
     if not path.exists():
-        raise NotReadyError(f"two passes are needed, {comparing.done} are done; wait a little")
+        needed = "one pass is" if name.endswith("reference") else "two passes are"
+        raise NotReadyError(f"{needed} needed, {comparing.done} are done; wait a little")
     return Download(path, media_type="image/png", headers={"Cache-Control": "no-store"})
 
 

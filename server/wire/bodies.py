@@ -333,10 +333,14 @@ class TruthRequest(Body):
 
 
 class TruthPlanBody(Body):
-    """The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn."""
+    """The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn.
+
+    `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment.
+    """
 
     passes: int
     seconds: float
+    is_measured: bool
 
 
 class TruthFigures(Body):

@@ -1,9 +1,10 @@
 """A frame compared with brute force over REST: figures, pictures, restart, deletion, bad requests."""
 
 import io
+import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,8 +13,11 @@ from PIL import Image
 from server_fakes import SIZE, BatchesHere, Control, FakeTransfer
 from session_client import Baked
 
+from relume.errors import CancelledError
 from relume.picture.transfer import Eyes
+from server.apart.steps import STEPS
 from server.app import create_app
+from server.queues.comparisons import GUESSED_S_A_PIXEL
 from server.settings import Settings
 
 WAIT_S = 60.0
@@ -79,7 +83,7 @@ def test_the_paths_of_the_method_alone_may_be_asked_for(client: TestClient, cont
     assert _brightness(client, f"{url}/reference.png") == _brightness(client, f"{url}/method-reference.png")
 
 
-@pytest.mark.parametrize(("is_upgraded", "asked"), [(False, [3, 4]), (True, [0, 1, 2, 3, 4])])
+@pytest.mark.parametrize(("is_upgraded", "asked"), [(False, [3, 4]), (True, [0, 0, 1, 2, 3, 4])])
 def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     settings: Settings,
     client: TestClient,
@@ -136,7 +140,8 @@ def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, cont
     assert resumed.json()["state"] in ("queued", "running")  # the queue may be quicker than the answer
     on = wait_until(client, url, lambda body: body["passes"] > passes + 1)
     assert on["seconds_left"] > 0
-    assert len(control.passes_asked) - len(set(control.passes_asked)) <= 3  # no finished pass was made again
+    whole = [index for index, (_, size) in zip(control.passes_asked, control.passes_from, strict=False) if size == SIZE]
+    assert len(whole) - len(set(whole)) <= 3  # no finished pass was made again
     assert client.delete(url, params={"forget": True}).status_code == 204
     assert client.post(f"{url}/resume").status_code == 404
 
@@ -183,7 +188,7 @@ def test_brute_force_has_the_light_paths_of_the_bake(
     monkeypatch.setattr(FakeTransfer, "__init__", _baked_by(method, FakeTransfer.__init__))
     control.may_trace.set()
     wait_until(client, submit(client, baked, 2), is_done)
-    assert control.reflections_asked == [method == "gather"] * 2
+    assert control.reflections_asked == [method == "gather"] * 3  # a small first one, and two passes
 
 
 def _baked_by(method: str, init: Callable[..., None], **also: Any) -> Callable[..., None]:
@@ -202,7 +207,7 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
     assert Image.open(io.BytesIO(client.get(f"{url}/error.png").content)).size == (40, 24)
     (frame_from,) = [eye for eye in control.frames_from if eye is not None]
     for seen_from, size in (frame_from, *control.passes_from):
-        assert size == (40, 24)
+        assert size in ((40, 24), (10, 6))  # before the first pass a small picture is made
         assert np.array_equal(seen_from.to_world, to_world)
         assert seen_from.yfov == pytest.approx(np.radians(40))
     request = {"bake": baked.bake, "view": "front", "camera": camera}
@@ -215,13 +220,62 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
         assert refused.status_code == 422, refused.text
 
 
-def test_an_estimate_does_not_wait_behind_another(client: TestClient, control: Control, baked: Baked) -> None:
-    control.may_trace.set()
+def test_an_estimate_waits_for_no_other_and_is_judged_by_other_views_until_it_is_timed(
+    client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.queues.comparisons.ANSWER_S", 0.01)
     question = {"bake": baked.bake, "view": "front", "passes": 4, "dry_run": True}
-    truths = client.app.state.services.comparisons  # type: ignore[attr-defined]
-    with truths._sampling:
-        refused = client.post("/api/truths", json=question)
-        assert (refused.status_code, refused.json()["title"]) == (503, "Too busy")
-    told = client.post("/api/truths", json=question).json()
-    with truths._sampling:  # what is known is told at once
-        assert client.post("/api/truths", json=question).json() == told
+    guessed = client.post("/api/truths", json=question)  # nothing may be traced
+    assert (guessed.status_code, guessed.json()["is_measured"]) == (200, False)
+    assert guessed.json()["seconds"] == pytest.approx(4 * GUESSED_S_A_PIXEL * SIZE[0] * SIZE[1])
+    assert client.post("/api/truths", json=question | {"paths": "method"}).json()["is_measured"] is False
+    control.may_trace.set()
+    client.app.state.services.comparisons._sample.result(WAIT_S)  # type: ignore[attr-defined]
+    measured = client.post("/api/truths", json=question).json()
+    assert measured["is_measured"] is True
+    assert client.post("/api/truths", json=question).json() == measured
+    assert len(control.passes_asked) == 1
+
+
+def test_there_is_a_picture_and_progress_while_the_first_pass_is_made(
+    client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    half_way = threading.Event()
+
+    def slow(shop: Any, tell: Callable[[float], None], cancelled: Callable[[], bool], **_: Any) -> None:
+        tell(0.5)
+        half_way.set()
+        while not cancelled():
+            time.sleep(0.01)
+        raise CancelledError("stopped")
+
+    monkeypatch.setitem(cast("dict[str, Any]", STEPS), "pass of a comparison", slow)
+    control.may_trace.set()
+    url = submit(client, baked, 2)
+    assert half_way.wait(WAIT_S)
+    body = client.get(url).json()
+    assert (body["passes"], body["progress"], body["found"]) == (0, 0.25, None)
+    for prefix in ("", "method-"):
+        picture = Image.open(io.BytesIO(client.get(f"{url}/{prefix}reference.png").content))
+        assert picture.size == (SIZE[0] // 4, SIZE[1] // 4)
+        assert client.get(f"{url}/{prefix}error.png").status_code == 409
+    client.delete(url)
+
+
+def test_brute_force_can_be_looked_at_after_one_pass(client: TestClient, control: Control, baked: Baked) -> None:
+    control.may_trace.set()
+    queue = client.app.state.services.comparisons  # type: ignore[attr-defined]
+    step = queue.step
+
+    def once(work: Any, timer: Any) -> Any:
+        if work.done:
+            raise CancelledError("one is enough")
+        return step(work, timer)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(queue, "step", once)
+        url = submit(client, baked, 1000)
+        wait_until(client, url, lambda body: body["passes"] == 1)
+        assert Image.open(io.BytesIO(client.get(f"{url}/reference.png").content)).size == SIZE
+        assert client.get(f"{url}/error.png").status_code == 409
+        client.delete(url)

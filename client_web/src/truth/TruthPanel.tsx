@@ -76,10 +76,24 @@ function Found({ body }: { body: TruthBody }) {
   );
 }
 
+/** Something to look at, of which nothing can be said yet. */
+function First({ body }: { body: TruthBody }) {
+  return (
+    <>
+      <img src={truthPicture(body.id, "reference", body.passes)} alt="Brute force" />
+      <p class="truth-scale">
+        {body.passes === 0 ? "A small brute force of few samples meanwhile." : "Brute force after one pass."} From the second pass
+        on it is compared.
+      </p>
+    </>
+  );
+}
+
 export function TruthPanel() {
   const panel = useRef<HTMLElement>(null);
   useReturnFocus(panel);
   const body = truth.value?.body;
+  const elapsed = truth.value === null ? 0 : (Date.now() - truth.value.since) / 1000; // it is asked for every second
   const isOld = truth.value !== null && truth.value.look !== judged();
   return (
     <aside ref={panel} class="truth beside-picture" aria-label="How true is this picture?">
@@ -95,9 +109,12 @@ export function TruthPanel() {
       )}
       {body !== undefined && (
         <>
-          <p>{progressWords(body)}</p>
-          {isGoingOn(body) && <progress max={1} value={body.progress} aria-label="Brute force" />}
+          <p>{progressWords(body, elapsed)}</p>
+          {isGoingOn(body) && (
+            <progress max={1} value={body.progress > 0 ? body.progress : undefined} aria-label="Brute force" />
+          )}
           {body.found !== null && <Found body={body} />}
+          {body.found === null && body.progress > 0 && <First body={body} />}
         </>
       )}
       {isOld && <p class="truth-old">The picture has changed since.</p>}

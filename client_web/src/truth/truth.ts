@@ -20,8 +20,16 @@ const KEY = "relume.truth";
 
 /** What a comparison would take; null while that is being found out. */
 export const truthPlan = signal<TruthPlanBody | "unknown" | null>(null);
-/** The comparison, and the look that it judges. */
-export const truth = signal<{ body: TruthBody; look: string } | null>(null);
+interface Asked {
+  body: TruthBody;
+  /** The look that it judges. */
+  look: string;
+  /** When this tab asked for it, or for going on: what has been done before counts for nobody who waits. */
+  since: number;
+}
+
+/** The comparison that is looked at. */
+export const truth = signal<Asked | null>(null);
 
 /** What the comparison depends on: the display of the look does not matter. */
 export function judged(): string {
@@ -63,18 +71,25 @@ export async function recallTruth(of: string | null): Promise<void> {
   followTruth();
   if (kept === null || body === null || truth.peek() !== null) return;
   if (body.bake !== of) return void forgetTruth(kept.id).catch(() => undefined);
-  truth.value = { body, look: kept.look };
+  truth.value = { body, look: kept.look, since: Date.now() };
   if (!truthOpen.peek()) togglePanel("truth");
   await attempt(() => follow(body.id));
 }
 
-/** Say how long it would take; nothing begins. */
+/** Say how long it would take; nothing begins. What other pictures tell is said until this one has been timed. */
 async function plan(): Promise<void> {
-  const request = asked();
   truthPlan.value = null;
-  // the time is told where it can be: a server that is busy with another estimate may be asked all the same
-  if (request !== null) truthPlan.value = await planTruth(request).catch(() => "unknown" as const);
+  for (let request = asked(); request !== null && isPlanning(); request = asked()) {
+    // the server may be away for a while
+    const found = await planTruth(request).catch(() => "unknown" as const);
+    if (!isPlanning()) return;
+    truthPlan.value = found;
+    if (found === "unknown" || found.is_measured) return;
+    await new Promise((done) => setTimeout(done, POLL_MS));
+  }
 }
+
+const isPlanning = () => truthOpen.peek() && truth.peek() === null;
 
 export async function askTruth(): Promise<void> {
   const request = asked();
@@ -82,7 +97,7 @@ export async function askTruth(): Promise<void> {
   await forget();
   await attempt(async () => {
     const body = await startTruth(request);
-    truth.value = { body, look: judged() };
+    truth.value = { body, look: judged(), since: Date.now() };
     await follow(body.id);
   });
 }
@@ -101,7 +116,7 @@ export async function goOnWithTruth(): Promise<void> {
   const known = truth.value;
   if (known === null) return;
   await attempt(async () => {
-    truth.value = { ...known, body: await resumeTruth(known.body.id) };
+    truth.value = { ...known, body: await resumeTruth(known.body.id), since: Date.now() };
     await follow(known.body.id);
   });
 }

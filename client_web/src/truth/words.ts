@@ -1,5 +1,5 @@
 /** What a comparison with brute force says, in sentences. */
-import type { TruthBody } from "../protocol";
+import type { TruthBody, TruthPlanBody } from "../protocol";
 import { formatForeseen, formatSeconds } from "../ui/scale";
 
 /** A share in per cent, with no more digits than its standard error lets it have. */
@@ -11,21 +11,26 @@ export function percent(share: number, error?: number): string {
 }
 
 /** How long it takes, before it begins. */
-export function planWords(plan: { passes: number; seconds: number } | "unknown" | null): string {
+export function planWords(plan: TruthPlanBody | "unknown" | null): string {
   if (plan === null) return "Finding out how long it takes…";
   if (plan === "unknown") return "How long it takes is not known now; it is said while it runs.";
-  return `${plan.passes} passes of brute force: ${formatForeseen(plan.seconds)}.`;
+  const how = plan.is_measured ? "" : ", judged by other pictures; this one is being timed";
+  return `${plan.passes} passes of brute force: ${formatForeseen(plan.seconds)}${how}.`;
 }
 
-type Progress = Pick<TruthBody, "state" | "passes" | "total" | "problem" | "seconds_left">;
+type Progress = Pick<TruthBody, "state" | "passes" | "total" | "progress" | "problem" | "seconds_left">;
 
-export function progressWords(truth: Progress): string {
+/** What it is at; `elapsed`: seconds that somebody has waited. */
+export function progressWords(truth: Progress, elapsed: number): string {
+  const soFar = `${Math.floor(elapsed)} s so far`;
   switch (truth.state) {
     case "queued":
-      return "Waits for its turn";
+      return `Waits for its turn, ${soFar}`;
     case "running": {
+      if (truth.progress === 0) return `Preparing the picture, ${soFar}`;
       const left = truth.seconds_left === null ? "" : `, ${formatSeconds(truth.seconds_left)} left`;
-      return `Brute force: pass ${Math.min(truth.passes + 1, truth.total)} of ${truth.total}${left}`;
+      const ofPass = Math.round(100 * Math.min(1, Math.max(0, truth.progress * truth.total - truth.passes)));
+      return `Brute force: pass ${Math.min(truth.passes + 1, truth.total)} of ${truth.total}, ${ofPass} % of it, ${soFar}${left}`;
     }
     case "ready":
       return `Brute force: ${truth.total} passes`;
