@@ -543,12 +543,14 @@ export interface LobeListsBody {
   widths: number;
 }
 
-/** A saved look in the list of them. */
+/** A saved look in the list of them. `created`: when it was saved first, which editors sort by. `thumbnail`: address of the picture of this version, relative to the server, null where there is none. */
 export interface LookEntry {
   name: string;
   etag: string;
+  created: string;
   modified: string;
   bytes: number;
+  thumbnail: string | null;
 }
 
 /** The complete look of each frame, and from where it is seen; null where no `path` was given. */

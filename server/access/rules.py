@@ -91,6 +91,8 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/looks": {"GET": VIEW},
     "/api/looks/{name}": {"GET": VIEW, "PUT": EDIT, "DELETE": EDIT},
     "/api/shares": {"GET": VIEW, "POST": EDIT},
+    "/api/looks/{name}/thumbnail": {"PUT": EDIT},
+    "/api/looks/{name}/thumbnail.webp": {"GET": VIEW},
     "/api/shares/{share}": {"GET": VIEW, "DELETE": EDIT},
 }
 

@@ -26,12 +26,25 @@ PARTS = tuple(Look.model_fields)
 
 @dataclass(frozen=True)
 class SavedLook:
-    """A look as it was saved; `etag` is quoted, as in the header."""
+    """A look as it was saved; times in seconds since 1970.
+
+    Attributes:
+        document: JSON, its members in the order in which they came.
+        etag: quoted, as in the header.
+        has_thumbnail: whether there is a picture of this version.
+    """
 
     name: str
     document: str
     etag: str
     modified: float
+    created: float
+    has_thumbnail: bool = False
+
+    @property
+    def num_bytes(self) -> int:
+        """Of the document, which is ASCII."""
+        return len(self.document)
 
 
 @dataclass(frozen=True)
@@ -41,6 +54,8 @@ class ListedLook:
     name: str
     etag: str
     modified: float
+    created: float
+    has_thumbnail: bool
     num_bytes: int
 
 
@@ -54,12 +69,12 @@ def check_name(name: str) -> str:
 
 
 def parse_document(body: bytes) -> str:
-    """A look document as canonical JSON. Raises TooLargeError, ParameterError."""
+    """A look document as compact JSON, in its own order: lights are listed in it. Raises TooLargeError, ParameterError."""
     if len(body) > MAX_LOOK_BYTES:
         raise TooLargeError(f"a look has at most {MAX_LOOK_BYTES:,} bytes; simplify its curves")
     try:
         document: Any = json.loads(body, parse_constant=_refuse_constant)
-        text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        text = json.dumps(document, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
         raise ParameterError("look", "not JSON", "a look document as JSON, every number finite") from None
     if not isinstance(document, dict):
@@ -84,9 +99,11 @@ class LookStore:
 
     def list(self) -> Sequence[ListedLook]:
         """All of them, newest first, without their documents: these may take gigabytes."""
-        columns = LookRow.name, LookRow.etag, LookRow.modified, func.length(LookRow.document)  # which is ASCII
+        has_thumbnail = func.coalesce(LookRow.thumbnail_of == LookRow.etag, False)
+        created = func.coalesce(LookRow.created, LookRow.modified)
+        columns = LookRow.name, LookRow.etag, LookRow.modified, created, has_thumbnail
         with self._sessions() as session:
-            rows = session.execute(select(*columns).order_by(LookRow.modified.desc(), LookRow.name))
+            rows = session.execute(select(*columns, func.length(LookRow.document)).order_by(LookRow.modified.desc(), LookRow.name))
             return [ListedLook(*row) for row in rows]
 
     def get(self, name: str) -> SavedLook:
@@ -103,15 +120,29 @@ class LookStore:
             found = select(LookRow.name).where(LookRow.document.contains(text, autoescape=True))
             return tuple(sorted(session.scalars(found)))
 
-    def put(self, name: str, document: str, if_match: str | None, if_none_match: str | None) -> tuple[SavedLook, bool]:
+    def put(
+        self,
+        name: str,
+        document: str,
+        if_match: str | None,
+        if_none_match: str | None,
+        created: float | None = None,
+    ) -> tuple[SavedLook, bool]:
         """Save a look; whether it is new.
 
+        Args:
+            name, document: checked. if_match, if_none_match: as the headers say.
+            created: its place among the others where it is new, as of one that had another name; None: now.
         Raises:
+            ParameterError: that is no time that has been.
             PreconditionRequiredError: it exists and the caller does not say which version it replaces.
             PreconditionFailedError: it is not at that version.
         """
         etag = '"' + hashlib.sha256(document.encode()).hexdigest()[:32] + '"'
-        saved = SavedLook(name, document, etag, time.time())
+        now = time.time()
+        if created is not None and not 0.0 <= created <= now:
+            raise ParameterError("created", created, "a time since 1970 that is not in the future")
+        saved = SavedLook(name, document, etag, now, now if created is None else created)
         if if_match is None:
             if self._insert(saved):
                 return saved, True
@@ -121,6 +152,20 @@ class LookStore:
         values = {"document": document, "etag": etag, "modified": saved.modified}
         self._change(name, if_match, update(LookRow).values(**values))
         return saved, False
+
+    def thumbnail(self, name: str) -> bytes:
+        """The picture of a look as it is, WebP. Raises NotFoundError."""
+        with self._sessions() as session:
+            row = session.get(LookRow, name)
+            if row is None or row.thumbnail is None or row.thumbnail_of != row.etag:
+                raise NotFoundError(f"there is no thumbnail of look {name!r}")
+            return row.thumbnail
+
+    def put_thumbnail(self, name: str, picture: bytes, if_match: str | None) -> None:
+        """Store a picture of a version of a look, WebP. Raises as `put` does where it is at another."""
+        if if_match is None:
+            raise PreconditionRequiredError("send If-Match with the version of the look that the thumbnail shows")
+        self._change(name, if_match, update(LookRow).values(thumbnail=picture, thumbnail_of=LookRow.etag))
 
     def delete(self, name: str, if_match: str | None) -> None:
         """Delete a look. Raises as `put` does."""
@@ -134,7 +179,9 @@ class LookStore:
             with self._sessions.begin() as session:
                 if (session.scalar(select(func.count()).select_from(LookRow)) or 0) >= MAX_LOOKS:
                     raise BusyError(f"{MAX_LOOKS:,} looks are saved; delete some first")
-                session.add(LookRow(**vars(saved)))
+                row = LookRow(name=saved.name, document=saved.document, etag=saved.etag)
+                row.modified, row.created = saved.modified, saved.created
+                session.add(row)
         except IntegrityError:
             return False
         return True
@@ -153,4 +200,5 @@ class LookStore:
 
 
 def _saved(row: LookRow) -> SavedLook:
-    return SavedLook(row.name, row.document, row.etag, row.modified)
+    created = row.modified if row.created is None else row.created
+    return SavedLook(row.name, row.document, row.etag, row.modified, created, row.thumbnail_of == row.etag)

@@ -1,6 +1,7 @@
 """What links carry: a look of a bake as somebody saw it, saved once and never changed.
 
-The id is the beginning of a hash of the content: the same picture shared twice is the same link.
+The id is the beginning of a hash of the content: the same picture shared twice is the same link. Its order is part of
+it, for lights are listed in the order in which they were added.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class ShareStore:
         Raises:
             TooLargeError, BusyError: it, or all of them together, would be too large. ParameterError: not finite.
         """
-        text = _canonical(document)
+        text = _as_json(document)
         name = base64.b32encode(hashlib.sha256(text.encode()).digest()).decode().lower()
         for length in range(ID_LENGTH, MAX_ID_LENGTH + 1):
             identity = name[:length]
@@ -114,9 +115,9 @@ class ShareStore:
         return True
 
 
-def _canonical(document: Mapping[str, Any]) -> str:
+def _as_json(document: Mapping[str, Any]) -> str:
     try:
-        text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        text = json.dumps(document, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
         raise ParameterError("/look", "not a number", "a look whose every number is finite") from None
     if len(text.encode()) > MAX_SHARE_BYTES:

@@ -9,7 +9,12 @@ from worker.database.models import Base
 
 
 class LookRow(Base):
-    """A saved look. `modified` in seconds since 1970."""
+    """A saved look.
+
+    Attributes:
+        created, modified: seconds since 1970; the first is None in rows of a relume that did not write it down.
+        thumbnail: WebP. thumbnail_of: the version that it shows; None where there is none.
+    """
 
     __tablename__ = "looks"
 
@@ -17,6 +22,9 @@ class LookRow(Base):
     document: Mapped[str] = mapped_column(Text)
     etag: Mapped[str]
     modified: Mapped[float]
+    created: Mapped[float | None]
+    thumbnail: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    thumbnail_of: Mapped[str | None]
 
 
 class ShareRow(Base):

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from typing import Annotated
+from urllib.parse import quote
 
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import JSONResponse
+from pydantic import AwareDatetime
 
 from relume.errors import ParameterError
+from server.files.moments import small_picture
 from server.openapi import LOOK
-from server.records.looks import SavedLook, check_name, parse_document
+from server.records.looks import ListedLook, SavedLook, check_name, parse_document
 from server.routes.paging import Paged, newest
 from server.services import Shared
-from server.wire.bodies import LookEntry, moment
+from server.wire.bodies import LookEntry, ThumbnailRequest, moment
 
 router = APIRouter(prefix="/api/looks", tags=["looks"])
 Etags = Annotated[str | None, Header(max_length=4096)]
@@ -23,8 +27,7 @@ LOOK_BODY = {"requestBody": {"required": True, "content": LOOK_CONTENT}}
 @router.get("")
 def list_looks(services: Shared, page: Paged) -> list[LookEntry]:
     """Names and versions, newest first."""
-    looks = page.cut(services.looks.list(), lambda look: newest(look.modified, look.name))
-    return [LookEntry.of(look, modified=moment(look.modified), bytes=look.num_bytes) for look in looks]
+    return [_entry(look) for look in page.cut(services.looks.list(), lambda look: newest(look.modified, look.name))]
 
 
 @router.get("/{name}", responses={200: {"content": LOOK_CONTENT}})
@@ -36,19 +39,46 @@ def get_look(name: str, services: Shared) -> Response:
 
 @router.put(
     "/{name}",
-    responses={201: {"description": "Created"}, 204: {"description": "Replaced"}},
+    responses={201: {"model": LookEntry, "description": "Created"}, 204: {"description": "Replaced"}},
     status_code=204,
     openapi_extra=LOOK_BODY,
 )
 async def put_look(
-    name: str, request: Request, services: Shared, if_match: Etags = None, if_none_match: Etags = None
+    name: str,
+    request: Request,
+    services: Shared,
+    if_match: Etags = None,
+    if_none_match: Etags = None,
+    created: AwareDatetime | None = None,
 ) -> Response:
-    """Save a look: 201 where it is new, 204 where it replaces the version that If-Match names."""
+    """Save a look: 201 where it is new, 204 where it replaces the version that If-Match names.
+
+    `created` is for one that is renamed, or comes back: it stands where it stood.
+    """
     if if_none_match not in (None, "*"):
         raise ParameterError("If-None-Match", if_none_match, "* or nothing")
     name, document = check_name(name), parse_document(await request.body())
-    look, is_new = await run_in_threadpool(services.looks.put, name, document, if_match, if_none_match)
-    return Response(status_code=201 if is_new else 204, headers=_headers(look))
+    since = None if created is None else created.timestamp()
+    look, is_new = await run_in_threadpool(services.looks.put, name, document, if_match, if_none_match, since)
+    if is_new:
+        return JSONResponse(_entry(look).model_dump(), 201, headers=_headers(look))
+    return Response(status_code=204, headers=_headers(look))
+
+
+@router.put("/{name}/thumbnail", status_code=204)
+def put_thumbnail(name: str, request: ThumbnailRequest, services: Shared, if_match: Etags = None) -> Response:
+    """Store a picture of the version that If-Match names; another version has none."""
+    services.looks.put_thumbnail(check_name(name), small_picture(request.picture), if_match)
+    return Response(status_code=204)
+
+
+@router.get(
+    "/{name}/thumbnail.webp", response_class=Response, responses={200: {"content": {"image/webp": {}}}}
+)
+def get_thumbnail(name: str, services: Shared) -> Response:
+    """The picture of a look as it is, at most 320 pixels a side."""
+    picture = services.looks.thumbnail(check_name(name))
+    return Response(picture, media_type="image/webp", headers={"Cache-Control": "no-cache"})
 
 
 @router.delete("/{name}", status_code=204)
@@ -56,6 +86,18 @@ def delete_look(name: str, services: Shared, if_match: Etags = None) -> Response
     """Delete the version that If-Match names."""
     services.looks.delete(check_name(name), if_match)
     return Response(status_code=204)
+
+
+def _entry(look: SavedLook | ListedLook) -> LookEntry:
+    address = f"/api/looks/{quote(look.name, safe='')}/thumbnail.webp?version={look.etag.strip(chr(34))}"
+    return LookEntry(
+        name=look.name,
+        etag=look.etag,
+        created=moment(look.created),
+        modified=moment(look.modified),
+        bytes=look.num_bytes,
+        thumbnail=address if look.has_thumbnail else None,
+    )
 
 
 def _headers(look: SavedLook) -> dict[str, str]:

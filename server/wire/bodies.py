@@ -12,6 +12,7 @@ from relume.look.model import Show
 from relume.remarks import Effect
 from server.wire.body import Body, Id, Name, WorkState
 from server.wire.cameras import CameraBody, CameraFrame
+from server.wire.comments import MAX_PICTURE_TEXT
 from server.wire.protocol import MAX_VIEWS_SHOWN
 from server.wire.renders import Side
 from worker.status import Phase
@@ -257,12 +258,21 @@ class DryRunBody(Body):
 
 
 class LookEntry(Body):
-    """A saved look in the list of them."""
+    """A saved look in the list of them. `created`: when it was saved first, which editors sort by. `thumbnail`: address
+    of the picture of this version, relative to the server, null where there is none."""
 
     name: str
     etag: str
+    created: str
     modified: str
     bytes: int
+    thumbnail: str | None
+
+
+class ThumbnailRequest(Body):
+    """A picture of a look: a PNG, JPEG or WebP in Base64, at most 1024 pixels a side; stored smaller."""
+
+    picture: Annotated[str, Field(max_length=MAX_PICTURE_TEXT)]
 
 
 class SharedPaths(Body):

@@ -41,6 +41,14 @@ def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
     assert (plain["solo"], plain["solo_light"], plain["paths"]) == (None, None, None)
 
 
+def test_a_link_keeps_the_order_in_which_lights_were_added(client: TestClient, baked: Baked) -> None:
+    lamp = {"kind": "point", "position": [0.0, 1.0, 0.0], "emission": [1.0, 1.0, 1.0]}
+    for names in (["Key", "Softbox", "Back"], ["Softbox", "Back", "Key"]):
+        made = client.post("/api/shares", json=body(baked, look={"lights": dict.fromkeys(names, lamp)}))
+        found = client.get(made.headers["location"])
+        assert list(found.json()["look"]["lights"]) == names
+
+
 def test_a_link_keeps_where_eyes_are(client: TestClient, baked: Baked) -> None:
     eyes = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0}}
     made = client.post("/api/shares", json=body(baked, eyes=eyes, sizes={"left": [90, 60]}))

@@ -1,0 +1,17 @@
+"""When looks were saved first, and their thumbnails."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0009"
+down_revision = "0007"
+is_additive = True
+
+
+def upgrade() -> None:
+    """From the revision before."""
+    op.add_column("looks", sa.Column("created", sa.Double(), nullable=True))
+    op.add_column("looks", sa.Column("thumbnail", sa.LargeBinary(), nullable=True))
+    op.add_column("looks", sa.Column("thumbnail_of", sa.String(), nullable=True))
