@@ -69,7 +69,10 @@ def check_name(name: str) -> str:
 
 
 def parse_document(body: bytes) -> str:
-    """A look document as compact JSON, in its own order: lights are listed in it. Raises TooLargeError, ParameterError."""
+    """A look document as compact JSON, in its own order: lights are listed in it.
+
+    Raises TooLargeError, ParameterError.
+    """
     if len(body) > MAX_LOOK_BYTES:
         raise TooLargeError(f"a look has at most {MAX_LOOK_BYTES:,} bytes; simplify its curves")
     try:

@@ -11,10 +11,11 @@ export interface LookStep extends Change {
   key?: string;
 }
 
-/** A look that was saved under a name. */
+/** A look that was saved under a name; `created`: when it was saved first, which is its place among the others. */
 export interface NamedLook {
   name: string;
   look: Partial<Look>;
+  created?: string | undefined;
 }
 
 /** One on the time line; `eye`: from where it is seen on a way from key to key. Angles in degrees. */

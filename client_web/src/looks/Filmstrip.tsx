@@ -16,7 +16,8 @@ import { IconButton } from "../ui/Button";
 import { EditableName } from "../ui/EditableName";
 import { Icon } from "../ui/Icon";
 import { completed, justSaved, markLook, saveLook, sideA } from "./compare";
-import { deleteLook, refreshShelf, renameLook, shelf, thumbnailOf, updateLook, variantKey, type SavedLook } from "./shelf";
+import { thumbnailOf, variantThumbnail } from "./namedThumbnails";
+import { deleteLook, refreshShelf, renameLook, shelf, updateLook, type SavedLook } from "./shelf";
 import { goTo } from "./undo";
 
 const MAX_STEPS = 40;
@@ -61,7 +62,7 @@ function SavedTile({ saved }: { saved: SavedLook }) {
         aria-pressed={shown}
         onClick={() => showSaved(saved.name, whole)}
       >
-        <Picture image={thumbnailOf(saved.name)} text={saved.name} />
+        <Picture image={thumbnailOf(saved.etag)} text={saved.name} />
         {sideA.value?.label === saved.name && <span class="mark">A</span>}
       </button>
       <span class="tile-actions">
@@ -99,7 +100,7 @@ function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }
         aria-pressed={shown}
         onClick={() => replaceLook(`Show ${name}`, whole)}
       >
-        <Picture image={thumbnailOf(variantKey(name))} text={name} />
+        <Picture image={variantThumbnail(name)} text={name} />
         {sideA.value?.label === name && <span class="mark">A</span>}
       </button>
       <span class="tile-actions">

@@ -18,7 +18,7 @@ import { scene } from "../state/scene";
 import { lookThumbnail } from "../state/thumbnails";
 import { attempt, note } from "../ui/toasts";
 import { thumbnail } from "./image";
-import { addLook, keepThumbnail, unusedName } from "./shelf";
+import { addLook, unusedName } from "./shelf";
 
 /** The look whose picture is kept as A, what it is called, and from where it was seen. */
 export const sideA = signal<{ look: Look; label: string; seen: Seen } | null>(null);
@@ -83,10 +83,9 @@ export async function saveLook(): Promise<void> {
   const image = isPartOfLook() ? lookThumbnail(current) : thumbnail(stage.active.pixels, current.display);
   const name = await attempt(unusedName);
   if (name === undefined) return;
-  if (image !== null) keepThumbnail(name, image); // else it gets one when it is shown whole
   filmstripOpen.value = true;
   justSaved.value = name;
-  await addLook(name, current);
+  await addLook(name, current, image); // without one it gets its own when it is shown whole
 }
 
 // until somebody keeps another picture, A is the one the scene opened with

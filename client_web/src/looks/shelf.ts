@@ -5,33 +5,19 @@ import type { NamedLook } from "../edit/history";
 import { ApiError, json, request } from "../net/api";
 import type { Look, LookEntry } from "../protocol";
 import { scene } from "../state/scene";
+import { lookThumbnail } from "../state/thumbnails";
 import { attempt } from "../ui/toasts";
 import { freeName } from "./names";
+import { fetchThumbnail, sendThumbnail, showThumbnail, thumbnailOf } from "./namedThumbnails";
 
 export interface SavedLook extends NamedLook {
   etag: string;
+  created: string;
 }
 
 export const shelf = signal<SavedLook[]>([]);
 const MAX_READ = 60;
 const path = (name: string) => `/api/looks/${encodeURIComponent(name)}`;
-const thumbnailKey = (name: string) => `relume.look.${scene.value?.id ?? ""}.${name}`;
-
-export function thumbnailOf(name: string): string | null {
-  return localStorage.getItem(thumbnailKey(name));
-}
-
-/** What a variant's thumbnail is kept under: no saved look has such a name. */
-export const variantKey = (name: string): string => `${scene.value?.id}/${name}`;
-
-export function keepThumbnail(name: string, image: string): void {
-  try {
-    localStorage.setItem(thumbnailKey(name), image);
-  } catch {
-    // the strip then shows the name alone
-  }
-}
-
 /** Whether a look speaks only of what this scene has, or can be given. */
 function fits(look: Partial<Look>): boolean {
   const known = new Set(scene.value?.materials.map((material) => material.name));
@@ -42,22 +28,23 @@ function fits(look: Partial<Look>): boolean {
   );
 }
 
-async function read(entry: LookEntry): Promise<SavedLook> {
-  const response = await request(path(entry.name));
-  return {
-    name: entry.name,
-    etag: response.headers.get("etag") ?? entry.etag,
-    look: (await response.json()) as Partial<Look>,
-  };
+async function read({ name, etag, created, thumbnail }: LookEntry): Promise<SavedLook> {
+  const response = await request(path(name));
+  if (thumbnail !== null && thumbnailOf(etag) === null) showThumbnail(etag, thumbnail);
+  return { name, etag: response.headers.get("etag") ?? etag, created, look: (await response.json()) as Partial<Look> };
+}
+
+/** In the order in which they were saved first: times of the server, all written alike. */
+function inOrder(looks: SavedLook[]): SavedLook[] {
+  return looks.sort((a, b) => (a.created < b.created ? -1 : Number(a.created > b.created)));
 }
 
 export async function refreshShelf(): Promise<void> {
   await attempt(async () => {
     const entries = (await (await request("/api/looks")).json()) as LookEntry[];
     const looks = await Promise.allSettled(entries.slice(0, MAX_READ).map(read));
-    shelf.value = looks.flatMap((result) =>
-      result.status === "fulfilled" && fits(result.value.look) ? [result.value] : [],
-    );
+    const found = looks.flatMap((result) => (result.status === "fulfilled" ? [result.value] : []));
+    shelf.value = inOrder(found.filter(({ look }) => fits(look)));
   });
 }
 
@@ -86,30 +73,39 @@ function etagOf(name: string): string | null {
   return shelf.value.find((entry) => entry.name === name)?.etag ?? null;
 }
 
-async function write({ name, look }: NamedLook, etag: string | null): Promise<void> {
+async function write({ name, look, created }: NamedLook, etag: string | null, image: string | null): Promise<void> {
   const headers: Record<string, string> = etag === null ? { "If-None-Match": "*" } : { "If-Match": etag };
-  const response = await request(path(name), json("PUT", look, headers)).catch((error: unknown) =>
+  const place = etag === null && created !== undefined ? `?created=${encodeURIComponent(created)}` : "";
+  const response = await request(path(name) + place, json("PUT", look, headers)).catch((error: unknown) =>
     conflict(error, name, etag === null),
   );
-  const saved = { name, etag: response.headers.get("etag") ?? "", look };
-  const known = shelf.value.some((entry) => entry.name === name);
-  shelf.value = known ? shelf.value.map((entry) => (entry.name === name ? saved : entry)) : [...shelf.value, saved];
+  const known = shelf.value.find((entry) => entry.name === name);
+  const since = known?.created ?? ((await response.json()) as LookEntry).created;
+  const saved = { name, etag: response.headers.get("etag") ?? "", created: since, look };
+  shelf.value = inOrder([...shelf.value.filter((entry) => entry !== known), saved]);
+  if (image !== null) showThumbnail(saved.etag, image);
+  await sendThumbnail(path(name), saved.etag);
 }
 
 async function erase(name: string): Promise<void> {
-  await request(path(name), { method: "DELETE", headers: { "If-Match": etagOf(name) ?? "*" } }).catch((error: unknown) =>
+  const etag = etagOf(name) ?? "*";
+  await fetchThumbnail(etag).catch(() => undefined); // it goes with the look, which may come back
+  await request(path(name), { method: "DELETE", headers: { "If-Match": etag } }).catch((error: unknown) =>
     conflict(error, name),
   );
   shelf.value = shelf.value.filter((entry) => entry.name !== name);
 }
 
-/** Put a saved look in the place of another; null where there is none. */
-export async function exchange(from: NamedLook | null, to: NamedLook | null): Promise<void> {
-  if (to !== null) await write(to, from?.name === to.name ? etagOf(to.name) : null);
-  if (from === null || from.name === to?.name) return;
-  const image = thumbnailOf(from.name);
-  if (to !== null && image !== null) keepThumbnail(to.name, image);
-  await erase(from.name);
+/** Put a saved look in the place of another; null where there is none. `image`: its thumbnail, where it has one. */
+export async function exchange(from: NamedLook | null, to: NamedLook | null, image: string | null = null): Promise<void> {
+  if (to !== null) await write({ created: from?.created, ...to }, from?.name === to.name ? etagOf(to.name) : null, image);
+  if (from !== null && from.name !== to?.name) await erase(from.name);
+}
+
+/** Give a saved look a thumbnail. */
+export function giveThumbnailTo({ name, etag }: SavedLook, image: string): void {
+  showThumbnail(etag, image);
+  void sendThumbnail(path(name), etag);
 }
 
 /** The change of the shelf that is under way, and those that wait for it. */
@@ -118,26 +114,32 @@ let underWay: Promise<void> | null = null;
 /** When no change is under way: each is a step of the history then. Null where none is. */
 export const settled = (): Promise<void> | null => underWay;
 
-async function change(label: string, before: NamedLook | null, after: NamedLook | null): Promise<void> {
+async function change(label: string, before: NamedLook | null, to: NamedLook | null, image: string | null): Promise<void> {
   await attempt(async () => {
-    await exchange(before, after);
-    history.record({ of: "shelf", label, before, after });
+    await exchange(before, to, image);
+    const saved = shelf.value.find(({ name }) => name === to?.name);
+    history.record({ of: "shelf", label, before, after: saved === undefined ? to : named(saved) });
     history.seal();
   });
 }
 
 /** Change the shelf when the changes before this are done: an undo in between would undo the step before. */
-async function perform(label: string, before: NamedLook | null, after: NamedLook | null): Promise<void> {
-  const mine = (underWay ?? Promise.resolve()).then(() => change(label, before, after));
+async function perform(
+  label: string,
+  before: NamedLook | null,
+  after: NamedLook | null,
+  image: string | null = null,
+): Promise<void> {
+  const mine = (underWay ?? Promise.resolve()).then(() => change(label, before, after, image));
   underWay = mine;
   await mine;
   if (underWay === mine) underWay = null;
 }
 
-const named = ({ name, look }: NamedLook): NamedLook => ({ name, look });
+const named = ({ name, look, created }: SavedLook): NamedLook => ({ name, look, created });
 
-export function addLook(name: string, look: Look): Promise<void> {
-  return perform(`Save ${name}`, null, { name, look });
+export function addLook(name: string, look: Look, image: string | null): Promise<void> {
+  return perform(`Save ${name}`, null, { name, look }, image);
 }
 
 export function deleteLook(saved: SavedLook): Promise<void> {
@@ -145,7 +147,7 @@ export function deleteLook(saved: SavedLook): Promise<void> {
 }
 
 export function updateLook(saved: SavedLook, look: Look): Promise<void> {
-  return perform(`Update ${saved.name}`, named(saved), { name: saved.name, look });
+  return perform(`Update ${saved.name}`, named(saved), { name: saved.name, look }, lookThumbnail(look));
 }
 
 export function renameLook(saved: SavedLook, name: string): Promise<void> {
