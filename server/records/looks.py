@@ -104,9 +104,10 @@ class LookStore:
         """All of them, newest first, without their documents: these may take gigabytes."""
         has_thumbnail = func.coalesce(LookRow.thumbnail_of == LookRow.etag, False)
         created = func.coalesce(LookRow.created, LookRow.modified)
-        columns = LookRow.name, LookRow.etag, LookRow.modified, created, has_thumbnail
+        num_bytes = func.length(LookRow.document)
+        columns = LookRow.name, LookRow.etag, LookRow.modified, created, has_thumbnail, num_bytes
         with self._sessions() as session:
-            rows = session.execute(select(*columns, func.length(LookRow.document)).order_by(LookRow.modified.desc(), LookRow.name))
+            rows = session.execute(select(*columns).order_by(LookRow.modified.desc(), LookRow.name))
             return [ListedLook(*row) for row in rows]
 
     def get(self, name: str) -> SavedLook:
