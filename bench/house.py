@@ -29,6 +29,7 @@ from worker.status import bake_id
 
 _START_S = 60.0
 SPEAKS = Subprotocol("relume.v1")
+OPENING = json.dumps({"type": "open"})
 
 
 @dataclass(frozen=True)
@@ -150,4 +151,5 @@ class SessionClient:
 def session(server: Server, bake: str) -> Iterator[SessionClient]:
     """Open a session on a bake."""
     with connect(server.session(bake), subprotocols=[SPEAKS], max_size=None, compression=None) as connection:
+        connection.send(OPENING)
         yield SessionClient(connection)

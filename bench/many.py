@@ -22,7 +22,7 @@ from websockets.asyncio.client import connect
 
 from bench.figure import Figure
 from bench.hands import Hand
-from bench.house import SPEAKS, House, Server, baked_house, serving
+from bench.house import OPENING, SPEAKS, House, Server, baked_house, serving
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume.bake import Recipe
 from relume.environments.studio import studio
@@ -100,7 +100,9 @@ async def _hands(
         for k in range(number):
             session = connect(server.session(house.bake), subprotocols=[SPEAKS], max_size=None, compression=None)
             slider, span = sliders[k % len(sliders)]
-            hands.append(Hand(await stack.enter_async_context(session), slider, span, 0.618 * k))
+            connection = await stack.enter_async_context(session)
+            await connection.send(OPENING)
+            hands.append(Hand(connection, slider, span, 0.618 * k))
         reading = [asyncio.create_task(hand.run()) for hand in hands]
         try:
             yield hands

@@ -42,6 +42,7 @@ CLIENT = Path(__file__).resolve().parent.parent / "client_web" / "src"
 HEAD = "// Written by `python -m server.typescript` from the server's models. Do not edit.\n"
 
 CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
+    connection.OpenMessage,
     protocol.EditMessage,
     protocol.ViewMessage,
     protocol.ViewsMessage,
@@ -128,6 +129,7 @@ def generate_protocol() -> str:
         value = getattr(protocol, name)
         parts.append(f"export const {name} = {literal(value)};")
     parts.append(f"export const MAX_PERSON_NAME = {rooms.MAX_PERSON_NAME};")
+    parts.append(f"export const ROOM_PREFIX = {rooms.ROOM_PREFIX};")
     parts.append(f"export const MAX_COMMENT = {comments.MAX_COMMENT};")
     parts.append(f"export const LUT_SIZE = {literal(SIZE)};")
     parts.append(f"export const LUT_GAIN = {literal(GAIN)};")

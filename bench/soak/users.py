@@ -82,7 +82,7 @@ class Users:
 
     def _edit(self, chance: random.Random) -> None:
         """A session by oneself: edits, a question, and an end in order or not."""
-        with self._session(self._bake, "") as session:
+        with self._session(self._bake) as session:
             self._drag(session, chance)
             session.send(json.dumps({"type": "probe", "x": 3, "y": 4}))
             _text(session, "probe")
@@ -91,8 +91,8 @@ class Users:
 
     def _share(self, chance: random.Random) -> None:
         """Two people in a room."""
-        query = f"?room={chance.randbytes(16).hex()}"
-        with self._session(self._bake, query) as ann, self._session(self._bake, query) as bob:
+        room = chance.randbytes(16).hex()
+        with self._session(self._bake, room) as ann, self._session(self._bake, room) as bob:
             _text(bob, "hello")
             self._drag(ann, chance)
             _text(bob, "shared")
@@ -103,7 +103,7 @@ class Users:
         scene = call(f"/api/built-ins/{self._passing}", {})["id"]
         bake = self._baked(scene, chance.choice((60, 90, 120)), size=chance.choice((64, 128)))
         if not self._stop.is_set():
-            with self._session(bake, "") as session:
+            with self._session(bake) as session:
                 self._drag(session, chance)
         call(f"/api/scenes/{scene}", method="DELETE")
 
@@ -138,9 +138,11 @@ class Users:
         return str(bake["id"])
 
     @contextmanager
-    def _session(self, bake: str, query: str) -> Iterator[ClientConnection]:
+    def _session(self, bake: str, room: str | None = None) -> Iterator[ClientConnection]:
+        query = "" if room is None else f"?room_prefix={room[:8]}"
         url = f"ws://127.0.0.1:{self._server.port}/api/bakes/{bake}/session{query}"
         with connect(url, subprotocols=[SPEAKS], max_size=None, max_queue=None, proxy=None) as session:
+            session.send(json.dumps({"type": "open", "room": room}))
             yield session
 
     @staticmethod

@@ -15,6 +15,8 @@ export const SURFACE_LAYOUT = 3;
 
 export const MAX_PERSON_NAME = 40;
 
+export const ROOM_PREFIX = 8;
+
 export const MAX_COMMENT = 2000;
 
 export const LUT_SIZE = 65;
@@ -128,6 +130,18 @@ export interface LooksRequest {
   between?: "parameters" | "map";
   path?: Turntable | EyePath | null;
   view?: string | null;
+}
+
+/** client → server: first message, and sent once. All of it may be left out; null is the same. `room`, or to watch only `watch`, names the room in which others share the look; the address then has the first eight characters of it as `room_prefix`. `seat`: token of the place that this client has in it. `name`: how to be called, where nobody logs in. `share`, or `look`: the shared or saved look to begin with. `resume`: token of a session that was lost. */
+export interface OpenMessage {
+  type: "open";
+  room?: string | null;
+  watch?: string | null;
+  seat?: string | null;
+  name?: string | null;
+  share?: string | null;
+  look?: string | null;
+  resume?: string | null;
 }
 
 /** One operation of a JSON Patch (RFC 6902) on the look. */
@@ -940,6 +954,7 @@ export interface ViewInfo {
 }
 
 export type ClientMessage =
+  | OpenMessage
   | EditMessage
   | ViewMessage
   | ViewsMessage

@@ -13,6 +13,8 @@ class FakeSocket {
   readyState = FakeSocket.OPEN;
   bufferedAmount = 0;
   sent: ClientMessage[] = [];
+  opening: ClientMessage | null = null;
+  onopen: () => void = () => undefined;
   role: "view" | "edit" = "edit";
   onmessage: (event: { data: string | ArrayBuffer }) => void = () => undefined;
   onclose: (event: { code: number; reason: string }) => void = () => undefined;
@@ -22,7 +24,9 @@ class FakeSocket {
   }
 
   send(text: string): void {
-    this.sent.push(JSON.parse(text) as ClientMessage);
+    const message = JSON.parse(text) as ClientMessage;
+    if (message.type === "open") this.opening = message;
+    else this.sent.push(message);
   }
 
   close(): void {
@@ -215,7 +219,19 @@ test("a server that is being stopped is left, and the look goes to the one that 
 
 test("a session begins with what it is asked to, each time it connects", () => {
   new Session("b1", handlers, () => ({ look: "Red & blue" })).connect();
-  expect(socket().url.href).toBe("ws://host/api/bakes/b1/session?look=Red+%26+blue");
+  socket().onopen();
+  expect(socket().opening).toEqual({ type: "open", look: "Red & blue", resume: null });
+  expect(socket().url.href).toBe("ws://host/api/bakes/b1/session");
+});
+
+test("of a room the address has what finds its server, and nothing that opens it", () => {
+  const room = "0123456789abcdef0123456789abcdef";
+  for (const asked of [{ room, seat: "s" }, { watch: room }]) {
+    new Session("b1", handlers, () => asked).connect();
+    socket().onopen();
+    expect(socket().opening).toEqual({ type: "open", ...asked, resume: null });
+    expect(socket().url.href).toBe("ws://host/api/bakes/b1/session?room_prefix=01234567");
+  }
 });
 
 test("a frame is acknowledged when it is on the screen", async () => {
@@ -238,7 +254,9 @@ describe("a connection that is lost", () => {
     edit(lost, SIGMA, 0.4);
     vi.advanceTimersByTime(10_000);
     expect(FakeSocket.opened).toHaveLength(2);
-    expect(socket().url.searchParams.get("resume")).toBe("token");
+    socket().onopen();
+    expect(socket().opening).toEqual({ type: "open", resume: "token" });
+    expect(socket().url.search).toBe("");
     expect(socket().sent).toEqual([]);
     socket().hello(structuredClone(accepted), 1);
     const [again] = socket().edits;
@@ -278,7 +296,8 @@ describe("a connection that is lost", () => {
       vi.advanceTimersByTime(10_000);
     }
     expect(FakeSocket.opened).toHaveLength(5);
-    expect(socket().url.searchParams.has("resume")).toBe(false);
+    socket().onopen();
+    expect(socket().opening).toEqual({ type: "open", resume: null });
   });
 });
 

@@ -97,6 +97,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
 }
 
 MESSAGES: Mapping[str, Role] = {
+    "open": VIEW,
     "edit": EDIT,
     "seen": VIEW,  # an edit of nothing but ways of looking: exposure, light paths, what is shown alone
     "touch": VIEW,  # who may edit has the curve frozen; who may not is told its values

@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from typing import Any
 
-from pydantic import ValidationError
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from relume.errors import ParameterError, ProtocolError, RelumeError
 from relume.picture.transfer import Eyes
 from relume.scene.placed_camera import placed_camera
 from server.access.rules import check_message
-from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem
+from server.errors import CLOSE_POLICY
+from server.live.reading import read_message
 from server.live.rooms.room import is_own_way
 from server.live.session_state import SessionState
 from server.live.state.pointers import check_held, find_curve
 from server.live.state.target import Eye
 from server.wire import protocol
-from server.wire.connection import PingMessage, PongMessage
+from server.wire.connection import OpenMessage, PingMessage, PongMessage
 from server.wire.rooms import PresenceMessage
 
 MAX_BAD_MESSAGES = 50
@@ -46,17 +45,9 @@ class Reception:
         while True:
             received = await self._websocket.receive()
             received_s = time.perf_counter()
-            text = _text_of(received)
-            if text is None:
-                await self._bad(ProtocolError("messages are JSON text; send text frames", 1003))
-                continue
-            try:
-                message = protocol.CLIENT_MESSAGE.validate_json(text)
-            except ValidationError as error:
-                await self._bad(message_problem(error, text))
-                continue
-            if isinstance(message, PingMessage):  # from here, so that no frame is waited for
-                await self._socket.send(PongMessage())
+            message = read_message(received)
+            if isinstance(message, protocol.Problem):
+                await self._bad(message)
                 continue
             if isinstance(message, PingMessage):  # from here, so that no frame is waited for
                 await self._socket.send(PongMessage())
@@ -68,7 +59,7 @@ class Reception:
                 await self._socket.refuse(error, revision)
             self._pending.news.set()
 
-    async def _bad(self, problem: Exception | protocol.Problem) -> None:
+    async def _bad(self, problem: protocol.Problem) -> None:
         """A message that no client of ours sends: said each time, forgiven a number of times."""
         self._num_bad += 1
         if self._num_bad > MAX_BAD_MESSAGES:
@@ -106,10 +97,12 @@ class Reception:
                 self._pending.evaluator = message.by
             case PresenceMessage():
                 self._present(message)
+            case OpenMessage():
+                raise ProtocolError("the session is open; send open once, as the first message", CLOSE_POLICY)
 
     def _present(self, message: PresenceMessage) -> None:
         if self._guest is None:
-            raise ProtocolError("nobody shares this session; open it with ?room=… to work together", CLOSE_POLICY)
+            raise ProtocolError("nobody shares this session; open one with a room to work together", CLOSE_POLICY)
         self._guest.present(message, self._caller.person)
 
     def _touch(self, message: protocol.TouchMessage) -> None:
@@ -129,7 +122,8 @@ class Reception:
                 self._traces.refused(received_s, str(error), {"revision": message.revision})
             raise
         if self._guest is not None:
-            target = self._guest.edited(target, [operation.model_dump(exclude_unset=True) for operation in message.patch])
+            patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
+            target = self._guest.edited(target, patch)
         self._pending.target = target
         if self._notes is not None:
             self._notes.note(operation.path for operation in message.patch)
@@ -185,14 +179,3 @@ def _kind(message: protocol.ClientMessage) -> str:
         case protocol.TouchMessage(curve=None):
             return "hold"
     return message.type
-
-
-def _text_of(message: Any) -> str | None:
-    """The text of a received message; None for a binary one."""
-    if message["type"] == "websocket.disconnect":
-        raise WebSocketDisconnect(message.get("code", 1005))
-    text: str | None = message.get("text")
-    size_bytes = len(message.get("bytes") or b"") if text is None else len(text.encode(errors="surrogatepass"))
-    if size_bytes > protocol.MAX_MESSAGE_BYTES:
-        raise ProtocolError(f"messages have at most {protocol.MAX_MESSAGE_BYTES} bytes; send less", CLOSE_TOO_BIG)
-    return text

@@ -21,7 +21,6 @@ from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.edit_notes import EditNotes
 from server.live.reception import Reception
-from server.live.rooms.door import PLACE
 from server.live.rooms.guest import Guest, Place
 from server.live.rooms.keeper import Keeper
 from server.live.rooms.rooms import Rooms
@@ -131,7 +130,7 @@ def _state(
 def _notes(audit: Audit, visit: Visit, bake: str, session: str) -> EditNotes | None:
     if not visit.caller.may_edit:
         return None
-    room = "" if visit.door is None else f", room {visit.door.watch[:PLACE]}…"  # enough to know it by, not to open it
+    room = "" if visit.door is None else f", room {visit.door.prefix}…"  # enough to know it by, not to open it
     return EditNotes(audit, visit.caller, f"/api/bakes/{bake}/session, {session}{room}")
 
 

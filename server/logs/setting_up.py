@@ -61,6 +61,11 @@ def _note(record: logging.LogRecord) -> bool:
     return True
 
 
+_OF_CONNECTIONS = "uvicorn.error", "websockets"
+"""Loggers that below a warning write down addresses with their queries, headers, and messages: all of them may hold
+tokens, and `server.logs.requests` says the rest."""
+
+
 def _is_news(record: logging.LogRecord) -> bool:
     """Not what uvicorn says of each WebSocket that is answered by a refusal: it takes that for no answer."""
     return record.name != "uvicorn.error" or "without completing handshake" not in record.getMessage()
@@ -78,3 +83,5 @@ def set_up(form: Format, level: str) -> None:
     root.handlers = [handler]
     logging.captureWarnings(True)  # they are lines of this log, too
     root.setLevel(handler.level)
+    for name in _OF_CONNECTIONS:
+        logging.getLogger(name).setLevel(max(logging.WARNING, handler.level))

@@ -21,41 +21,41 @@ _FORGOTTEN_S = 3600.0
 
 
 class RoomLeases:
-    """The leases of one server; may be used from any thread. Rooms are named by what opens them to watch."""
+    """The leases of one server; may be used from any thread. One is of all rooms whose names begin alike."""
 
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions, self._owner = sessions, new_owner()
 
-    def take(self, watch: str) -> bool:
+    def take(self, prefix: str) -> bool:
         """Take or renew one. False where another server that is alive has it."""
         row = RoomRow
-        asked = select(row.owner, row.heartbeat, epoch_s().label("now")).where(row.watch == watch)
+        asked = select(row.owner, row.heartbeat, epoch_s().label("now")).where(row.prefix == prefix)
         with self._sessions() as session:
             found = session.execute(asked).one_or_none()
         if found is None:
-            return self._add(watch)
+            return self._add(prefix)
         is_fresh = found.now - found.heartbeat <= ROOM_LEASE_S
         if found.owner != self._owner and is_fresh and may_run(found.owner):
             return False
-        unchanged = row.watch == watch, row.owner == found.owner, row.heartbeat == found.heartbeat
+        unchanged = row.prefix == prefix, row.owner == found.owner, row.heartbeat == found.heartbeat
         statement = update(row).where(*unchanged).values(owner=self._owner, heartbeat=epoch_s())
         with self._sessions.begin() as session:  # of two servers that come upon a dead one's lease one changes the row
             return cast("CursorResult[Any]", session.execute(statement)).rowcount > 0
 
-    def _add(self, watch: str) -> bool:
+    def _add(self, prefix: str) -> bool:
         try:
             with self._sessions.begin() as session:
-                session.add(RoomRow(watch=watch, owner=self._owner, heartbeat=epoch_s()))
+                session.add(RoomRow(prefix=prefix, owner=self._owner, heartbeat=epoch_s()))
         except IntegrityError:  # another server has added it in this moment
             return False
         return True
 
-    def keep(self, watches: Collection[str]) -> set[str]:
+    def keep(self, prefixes: Collection[str]) -> set[str]:
         """Renew these and give up all others. Returns those of them that another server has."""
         row, own = RoomRow, RoomRow.owner == self._owner
-        given_up, is_old = and_(own, row.watch.not_in(watches)), row.heartbeat < epoch_s() - _FORGOTTEN_S
+        given_up, is_old = and_(own, row.prefix.not_in(prefixes)), row.heartbeat < epoch_s() - _FORGOTTEN_S
         with self._sessions.begin() as session:
             session.execute(delete(row).where(or_(given_up, is_old)))
             session.execute(update(row).where(own).values(heartbeat=epoch_s()))
-            kept = set(session.scalars(select(row.watch).where(own)))
-        return {watch for watch in watches if watch not in kept and not self.take(watch)}
+            kept = set(session.scalars(select(row.prefix).where(own)))
+        return {prefix for prefix in prefixes if prefix not in kept and not self.take(prefix)}

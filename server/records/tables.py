@@ -84,12 +84,12 @@ class RoomRow(Base):
     """Which server has the rooms of a name, see `server.records.room_leases`; gone when nobody is in them.
 
     Attributes:
-        watch: what opens them to watch. owner, heartbeat: as of a work's lease.
+        prefix: what their names begin with. owner, heartbeat: as of a work's lease.
     """
 
     __tablename__ = "rooms"
 
-    watch: Mapped[str] = mapped_column(primary_key=True)
+    prefix: Mapped[str] = mapped_column("watch", primary_key=True)  # it held the whole name once
     owner: Mapped[str]
     heartbeat: Mapped[float]
 

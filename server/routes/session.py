@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import APIRouter
 from fastapi.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from relume.errors import NotFoundError, ParameterError, RelumeError, VersionMismatchError
+from relume.errors import NotFoundError, RelumeError, VersionMismatchError
 from relume.look import complete
 from relume.picture.transfer import Opened
 from server.access.roles import caller_of
@@ -24,17 +25,19 @@ from server.errors import (
     problem_response,
     row_of,
 )
+from server.live.reading import read_opening
 from server.live.rooms.door import door_of
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
 from server.live.visit import Visit
 from server.records.looks import check_name
-from server.records.shares import MAX_ID_LENGTH
 from server.routes.bakes import ready_bake
 from server.services import Services
 from server.wire.protocol import SUBPROTOCOL
+from server.wire.rooms import ROOM_PREFIX
 
 router = APIRouter()
+_PREFIX = re.compile(rf"[A-Za-z0-9_-]{{{ROOM_PREFIX}}}")
 
 
 @router.websocket("/api/bakes/{bake}/session")
@@ -47,7 +50,7 @@ async def session(websocket: WebSocket, bake: str) -> None:
     services: Services = websocket.app.state.services
     try:
         services.leave.check()
-        async with _having_room(services, websocket):
+        async with _having_room(services, _room_prefix(websocket)):
             await _accept(services, websocket, bake)
     except (LeavingError, ElsewhereError) as error:
         services.metrics.refused_sessions.labels(row_of(error).slug).inc()
@@ -55,16 +58,18 @@ async def session(websocket: WebSocket, bake: str) -> None:
 
 
 @asynccontextmanager
-async def _having_room(services: Services, websocket: WebSocket) -> AsyncIterator[None]:
-    """With the room that the session is to come into, if any, on this server."""
-    door = None
-    with suppress(ParameterError):  # that is said once it is accepted
-        door = door_of(websocket.query_params)
-    if door is None:
+async def _having_room(services: Services, prefix: str) -> AsyncIterator[None]:
+    """With the rooms of that prefix, if any, on this server."""
+    if not _PREFIX.fullmatch(prefix):  # that is said once it is accepted
         yield
         return
-    async with services.live.keeper.having(door.watch):
+    async with services.live.keeper.having(prefix):
         yield
+
+
+def _room_prefix(websocket: WebSocket) -> str:
+    """What the address says of a room: enough to find its server, not enough to open it."""
+    return str(websocket.query_params.get("room_prefix", ""))
 
 
 async def _accept(services: Services, websocket: WebSocket, bake: str) -> None:
@@ -88,15 +93,15 @@ async def _accept(services: Services, websocket: WebSocket, bake: str) -> None:
 async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
     caller = caller_of(websocket)
     with services.access.quotas.session(caller.name):
+        opening = await read_opening(websocket)
+        door = door_of(opening, _room_prefix(websocket))
         status = await run_in_threadpool(ready_bake, services, bake)
         async with services.transfers.using(status.id, services.bakes.store_path(status.id)) as transfer:
             if not transfer.views:
                 raise NotFoundError("this bake has no views; bake again")
-            asked = websocket.query_params
-            look = await run_in_threadpool(_look, services, transfer, asked.get("look"), asked.get("share"))
-            door = door_of(asked)
+            look = await run_in_threadpool(_look, services, transfer, opening.look, opening.share)
             caller = caller.watching() if door is not None and door.room is None else caller
-            visit = Visit(caller, asked.get("resume"), look, door)
+            visit = Visit(caller, opening.resume, look, door)
             await serve(services.live, websocket, status.id, transfer, visit)
 
 
@@ -105,5 +110,5 @@ def _look(services: Services, transfer: Opened, name: str | None, share: str | N
     if name is not None:
         return complete(json.loads(services.looks.get(check_name(name)).document), transfer.default_look)
     if share is not None:
-        return complete(services.shares.get(share[:MAX_ID_LENGTH]).document["look"], transfer.default_look)
+        return complete(services.shares.get(share).document["look"], transfer.default_look)
     return None

@@ -2,9 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from server.wire.message import Message
+from pydantic import Field
+
+from server.wire.message import Message, Name
+from server.wire.rooms import PersonName, RoomName
+
+Token = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class OpenMessage(Message):
+    """client → server: first message, and sent once. All of it may be left out; null is the same.
+
+    `room`, or to watch only `watch`, names the room in which others share the look; the address then has the first
+    eight characters of it as `room_prefix`. `seat`: token of the place that this client has in it. `name`: how to be
+    called, where nobody logs in. `share`, or `look`: the shared or saved look to begin with. `resume`: token of a
+    session that was lost."""
+
+    type: Literal["open"]
+    room: RoomName | None = None
+    watch: RoomName | None = None
+    seat: Token | None = None
+    name: PersonName | None = None
+    share: Token | None = None
+    look: Name | None = None
+    resume: Token | None = None
 
 
 class PingMessage(Message):

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 from relume.look.patch import MAX_OPERATIONS
 from relume.picture.fidelity import Word
 from relume.scene.checks import MAX_LIGHTS
-from server.wire.connection import LeavingMessage, PingMessage, PongMessage
+from server.wire.connection import LeavingMessage, OpenMessage, PingMessage, PongMessage
 from server.wire.message import Message, Name, PatchOperation, Pointer, Revision, RoleWord
 from server.wire.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, SharedMessage
 from worker.status import Phase
@@ -173,7 +173,8 @@ class EvaluateMessage(Message):
 
 
 ClientMessage = Annotated[
-    EditMessage
+    OpenMessage
+    | EditMessage
     | ViewMessage
     | ViewsMessage
     | FocusMessage

@@ -10,6 +10,10 @@ from server.wire.message import Message, Name, Revision, RoleWord
 
 MAX_PERSON_NAME = 40
 PersonName = Annotated[str, Field(min_length=1, max_length=MAX_PERSON_NAME)]
+ROOM_PREFIX = 8
+"""Characters of a room's name that stand in addresses, by which balancers choose a server; they open nothing."""
+MIN_ROOM, MAX_ROOM = 24, 64
+RoomName = Annotated[str, Field(min_length=MIN_ROOM, max_length=MAX_ROOM, pattern=r"^[A-Za-z0-9_-]+$")]
 
 
 class PresenceMessage(Message):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import pytest
 from anyio.from_thread import start_blocking_portal
 from fastapi.testclient import TestClient
-from session_client import SIGMA, THETA_H, Baked, open_session
+from session_client import SIGMA, THETA_H, TOGETHER, Baked, open_session
 
 from server.access.access import Access
 from server.access.audit import Entry
@@ -34,8 +34,8 @@ def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
 
 
 def test_editors_edit_and_the_audit_says_what(client: TestClient, baked: Baked, bearer: Bearer, access: Access) -> None:
-    query = "?room=" + "abcdefgh" * 4
-    with open_session(client, baked.bake, query=query, headers=bearer("edit", "Ann")) as session:
+    opening = {"room": "abcdefgh" * 4}
+    with open_session(client, baked.bake, opening=opening, headers=bearer("edit", "Ann")) as session:
         hello = session.text("hello")
         assert hello["role"] == "edit"
         session.edit(1, SIGMA, 0.3)
@@ -117,12 +117,12 @@ def test_how_viewers_look_is_their_own_and_no_edit(
     client: TestClient, baked: Baked, bearer: Bearer, access: Access
 ) -> None:
     ann, vera = bearer("edit", "Ann"), bearer("view", "Vera")
-    with open_session(client, baked.bake, query="?room=a", headers=ann) as editor:
+    with open_session(client, baked.bake, opening=TOGETHER, headers=ann) as editor:
         editor.text("hello")
-        with open_session(client, baked.bake, query="?room=a", headers=vera) as viewer:
+        with open_session(client, baked.bake, opening=TOGETHER, headers=vera) as viewer:
             viewer.send(type="edit", revision=1, patch=[SEEN])
             viewer.exact(1)
-            with open_session(client, baked.bake, query="?room=a", headers=bearer("edit", "Bob")) as late:
+            with open_session(client, baked.bake, opening=TOGETHER, headers=bearer("edit", "Bob")) as late:
                 assert late.text("hello")["look"]["display"]["exposure"] == 0.0
     assert access.audit.list() == []
 
@@ -134,12 +134,12 @@ def test_viewers_see_shared_and_saved_looks(client: TestClient, baked: Baked, be
     request = {"bake": baked.bake, "view": "front", "views": ["front"], "look": look}
     share = client.post("/api/shares", json=request, headers=editor).json()["id"]
     client.put("/api/looks/Blue", json=look, headers=editor)
-    for query in (f"?share={share}", "?look=Blue"):
-        with open_session(client, baked.bake, query=query, headers=viewer) as session:
+    for opening in ({"share": share}, {"look": "Blue"}):
+        with open_session(client, baked.bake, opening=opening, headers=viewer) as session:
             shown = session.text("hello")["look"]["materials"]["Paper"]["terms"]
             assert [term["color"] for term in shown] == [[0.25, 0.5, 0.75], [0.5, 0.5, 0.5]]
             session.exact(0)
-    gone = open_session(client, baked.bake, query="?share=aaaaaaaaaa", headers=viewer)
+    gone = open_session(client, baked.bake, opening={"share": "aaaaaaaaaa"}, headers=viewer)
     with gone as session, pytest.raises(ConnectionError, match="there is no shared look"):
         session.receive()
 

@@ -20,7 +20,6 @@ from relume.methods import sampled_views as direct
 from relume.scene import checks, companions, importer, zipped
 from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
 from server.files import moments
-from server.live.rooms import door
 from server.records import comments, looks, shares
 from server.settings import Settings
 from server.wire import bodies, protocol, renders, rooms
@@ -66,7 +65,9 @@ ROWS = {
     "words of a comment; side of its picture as it is sent; as it is kept": (
         f"{wire_comments.MAX_COMMENT:,} characters; {moments.MAX_SIDE:,}; {moments.KEPT_SIDE} pixels"
     ),
-    "name of somebody in a room; name of a room": f"{rooms.MAX_PERSON_NAME}; {door.MAX_ROOM} characters",
+    "name of somebody in a room; name of a room": (
+        f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"
+    ),
     "views shown at once; frames that are not acknowledged": (
         f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"
     ),

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from problems import problem_of
 from server_fakes import Control
 from server_fixtures import impatient
-from session_client import SIGMA, THETA_H, Baked, Session, open_session
+from session_client import SIGMA, THETA_H, Baked, Session, open_session, session_path
 from starlette.testclient import WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
 
@@ -235,14 +235,51 @@ def test_session_on_damaged_store_says_so(client: TestClient, baked: Baked) -> N
     assert closed.value.args[0] == 4410
 
 
-@pytest.mark.parametrize("token", ["", "x", "../..", "a" * 3000])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "no json",
+        '{"type": "open", "room": 1}',
+        '{"type": "open", "resume": ""}',
+        '{"type": "open", "seat": "' + "a" * 65 + '"}',
+        '{"type": "open", "token": "x"}',
+        '{"type": "ack", "frame": 1}',
+    ],
+)
+def test_a_session_that_does_not_begin_with_open_is_closed(client: TestClient, baked: Baked, text: str) -> None:
+    with client.websocket_connect(session_path(baked.bake, {}), ["relume.v1"]) as websocket:
+        websocket.send_text(text)
+        with pytest.raises(ConnectionError) as closed:
+            Session(websocket, acknowledges=False).receive()
+    assert closed.value.args[0] == 1008
+
+
+def test_a_client_that_says_nothing_is_closed(
+    client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.live.reading.OPEN_SECONDS", 0.05)
+    opened = client.websocket_connect(session_path(baked.bake, {}), ["relume.v1"])
+    with opened as websocket, pytest.raises(ConnectionError) as closed:
+        Session(websocket, acknowledges=False).receive()
+    assert closed.value.args == (1008, "no message within 0.05 s; send open first")
+
+
+def test_a_session_is_opened_once(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.send(type="open")
+        assert "send open once" in session.text("problem")["problem"]["detail"]
+        assert is_alive(session, 1)
+
+
+@pytest.mark.parametrize("token", ["x", "../..", "a" * 64])
 def test_unknown_resume_token_is_a_new_session(client: TestClient, baked: Baked, token: str) -> None:
-    with open_session(client, baked.bake, query=f"?resume={token}") as session:
+    with open_session(client, baked.bake, opening={"resume": token}) as session:
         assert not session.text("hello")["resumed"]
 
 
 def test_a_null_character_in_the_address_of_a_session_is_refused(client: TestClient, baked: Baked) -> None:
-    with pytest.raises(WebSocketDenialResponse) as refused, open_session(client, baked.bake, query="?resume=%00"):
+    path = f"/api/bakes/{baked.bake}/session?room_prefix=%00"
+    with pytest.raises(WebSocketDenialResponse) as refused, client.websocket_connect(path, ["relume.v1"]):
         pass
     assert refused.value.status_code == 422
     assert "null character" in refused.value.json()["detail"]

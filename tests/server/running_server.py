@@ -1,15 +1,18 @@
 """The server as uvicorn runs it, in a thread, on a real socket."""
 
+import json
 import socket
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from fastapi import FastAPI
 from server_fakes import SIZE, BatchesHere, Control, tiny_scene
 from server_fixtures import open_fake_bakes
+from websockets.sync.client import ClientConnection, connect
 
 from relume.bake import Recipe
 from server.app import create_app, stoppable
@@ -38,6 +41,14 @@ class Running:
 
 
 @contextmanager
+def open_socket(url: str, **opening: Any) -> Iterator[ClientConnection]:
+    """A session that has said `opening`, the fields of its first message."""
+    with connect(url, subprotocols=["relume.v1"], max_size=None, proxy=None) as session:
+        session.send(json.dumps({"type": "open", **opening}))
+        yield session
+
+
+@contextmanager
 def running_server(settings: Settings, control: Control) -> Iterator[Running]:
     settings.allowed_hosts = ["127.0.0.1"]
     app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
@@ -47,6 +58,8 @@ def running_server(settings: Settings, control: Control) -> Iterator[Running]:
         thread.start()
         while not process.started:
             time.sleep(0.01)
-        yield Running(app, process, thread, listening.getsockname()[1])
-        process.should_exit = True
-        thread.join()
+        try:
+            yield Running(app, process, thread, listening.getsockname()[1])
+        finally:
+            process.should_exit = True
+            thread.join()

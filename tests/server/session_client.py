@@ -2,7 +2,7 @@
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +12,7 @@ from fastapi.testclient import TestClient
 SIGMA = "/materials/Paper/terms/1/params/sigma"
 IOR = "/materials/Paper/terms/1/params/ior"
 THETA_H = "/materials/Paper/terms/1/curves/theta_h"
+NOTHING: Mapping[str, Any] = {}
 THETA_D = "/materials/Paper/terms/1/curves/theta_d"
 
 
@@ -76,10 +77,23 @@ class Session:
                 return frame
 
 
+TOGETHER = {"room": "together-on-one-look-here"}
+"""What opens a session in a room."""
+
+
 @contextmanager
 def open_session(
-    client: TestClient, bake: str, *, acknowledges: bool = True, query: str = "", **options: Any
+    client: TestClient, bake: str, *, acknowledges: bool = True, opening: Mapping[str, Any] = NOTHING, **options: Any
 ) -> Iterator[Session]:
+    """A session that has said `opening`, the fields of its first message."""
     options = {"subprotocols": ["relume.v1"], **options}
-    with client.websocket_connect(f"/api/bakes/{bake}/session{query}", **options) as websocket:
-        yield Session(websocket, acknowledges)
+    with client.websocket_connect(session_path(bake, opening), **options) as websocket:
+        session = Session(websocket, acknowledges)
+        session.send(type="open", **opening)
+        yield session
+
+
+def session_path(bake: str, opening: Mapping[str, Any]) -> str:
+    """The address of a session that will say this."""
+    room = opening.get("room") or opening.get("watch")
+    return f"/api/bakes/{bake}/session" + ("" if room is None else f"?room_prefix={room[:8]}")

@@ -48,6 +48,7 @@ def frames_of(client: TestClient, request: dict[str, Any], folder: Path) -> list
 @pytest.fixture(scope="module")
 def view(client: TestClient, bake: str) -> dict[str, Any]:
     with client.websocket_connect(f"/api/bakes/{bake}/session", subprotocols=["relume.v1"]) as session:
+        session.send_json({"type": "open"})
         found: dict[str, Any] = session.receive_json()["views"][0]
     return found
 

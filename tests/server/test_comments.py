@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from problems import problem_of
 from server_fakes import SIZE
-from session_client import Baked, open_session
+from session_client import TOGETHER, Baked, open_session
 
 from server.live.rooms.comment_news import CommentNews
 from server.live.rooms.rooms import Rooms
@@ -115,7 +115,7 @@ def test_a_scene_has_so_many_comments(
 
 
 def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
-    with open_session(client, baked.bake, query="?room=a") as ann:
+    with open_session(client, baked.bake, opening=TOGETHER) as ann:
         ann.text("hello")
         made = client.post(path, json=pin).json()
         assert ann.text("comments") == {"type": "comments"}
@@ -152,7 +152,7 @@ def test_rooms_are_told_of_what_another_server_took(
     monkeypatch.setattr("server.live.rooms.comment_news.EVERY_S", 1e9)  # the server's own looks once at most
     told: list[str] = []
     monkeypatch.setattr(services.live.rooms, "commented", told.append)
-    with open_session(client, baked.bake, query="?room=a") as ann:
+    with open_session(client, baked.bake, opening=TOGETHER) as ann:
         ann.text("hello")
         look()
         other = comments.CommentStore(services.comments._sessions)

@@ -14,11 +14,11 @@ from urllib.error import HTTPError
 
 import pytest
 import uvicorn
-from running_server import Running, running_server
+from running_server import Running, open_socket, running_server
 from server_fakes import Control
 from sse_starlette.sse import AppStatus
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 from server.running.leave import Leave
 from server.running.process import Process
@@ -38,10 +38,6 @@ def running(settings: Settings, control: Control) -> Iterator[Running]:
         yield running
 
 
-def open_socket(url: str) -> ClientConnection:
-    return connect(url, subprotocols=["relume.v1"], max_size=None)
-
-
 def text(session: ClientConnection, kind: str) -> dict[str, Any]:
     while True:
         received = session.recv(timeout=30)
@@ -58,8 +54,8 @@ def test_sessions_are_told_and_the_server_goes_when_they_have_left(running: Runn
         with pytest.raises(HTTPError, match="503") as refused:
             urllib.request.urlopen(f"http://127.0.0.1:{running.port}/readyz")
         assert "being stopped" in json.load(refused.value)["detail"]
-        with pytest.raises(InvalidStatus) as elsewhere:
-            open_socket(url)
+        with pytest.raises(InvalidStatus) as elsewhere, open_socket(url):
+            pass
         answer = elsewhere.value.response
         assert (answer.status_code, json.loads(answer.body)["type"]) == (503, "urn:relume:problem:leaving")
         edit = {"op": "replace", "path": "/materials/Paper/terms/1/params/sigma", "value": 0.3}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import urllib.request
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -12,22 +13,27 @@ from typing import Any
 import pytest
 from alone import run_alone
 from fastapi.testclient import TestClient
+from running_server import running_server
+from server_fakes import Control
 from session_client import Baked, open_session
+from websockets.sync.client import connect
 
 from cli.serve import tell
 from server.logs.context import BAKE, REQUEST, USER
 from server.logs.setting_up import Format, set_up
+from server.settings import Settings
 
 log = logging.getLogger("server.somewhere")
 
 
 @pytest.fixture(autouse=True)
 def _as_it_was() -> Iterator[None]:
-    root = logging.getLogger()
-    before = root.handlers, root.level
+    root, others = logging.getLogger(), [logging.getLogger(name) for name in ("uvicorn.error", "websockets")]
+    before, levels = root.handlers, [logger.level for logger in (root, *others)]
     yield
-    root.handlers = before[0]
-    root.setLevel(before[1])  # which forgets what loggers remember of it
+    root.handlers = before
+    for logger, level in zip((root, *others), levels, strict=True):
+        logger.setLevel(level)  # which forgets what loggers remember of it
 
 
 def logged(capsys: pytest.CaptureFixture[str], form: Format, say: Any) -> str:
@@ -104,7 +110,7 @@ def test_requests_and_sessions_are_lines_without_their_tokens(
 ) -> None:
     set_up("json", "info")
     client.get("/api/scenes?resume=secret", headers={"X-Request-ID": "r7"})
-    with open_session(client, baked.bake, query="?resume=secret", headers={"X-Request-ID": "r8"}) as session:
+    with open_session(client, baked.bake, opening={"resume": "secret"}, headers={"X-Request-ID": "r8"}) as session:
         hello = session.text("hello")
         session.exact(0)
     said = [line for line in capsys.readouterr().err.splitlines() if '"server.' in line]  # not the test client's own
@@ -112,3 +118,30 @@ def test_requests_and_sessions_are_lines_without_their_tokens(
     lines = {line["request"]: line for line in map(json.loads, said)}
     assert (lines["r7"]["method"], lines["r7"]["path"], lines["r7"]["status"]) == ("GET", "/api/scenes", 200)
     assert (lines["r8"]["session"], lines["r8"]["bake"]) == (hello["session"], baked.bake)
+
+
+@pytest.mark.parametrize("level", ["debug", "info"])
+def test_no_logger_writes_down_what_opens_anything(
+    settings: Settings, control: Control, capsys: pytest.CaptureFixture[str], level: str
+) -> None:
+    """Of the real server, whose libraries have much to say of connections."""
+    set_up("json", level)
+    settings.login = True
+    secret = "s3cret" * 4
+    with running_server(settings, control) as running:
+        token = running.app.state.services.access.tokens.add("Ann", "admin")
+        path = f"{running.baked_url()}?room_prefix={secret[:8]}"
+        headers = {"Authorization": f"Bearer {token}", "Cookie": f"relume_token={token}"}
+        opening = {"type": "open", "room": secret, "seat": secret, "resume": secret, "name": secret}
+        with connect(path, subprotocols=["relume.v1"], additional_headers=headers, proxy=None) as session:
+            session.send(json.dumps(opening))
+            hello = json.loads(session.recv())
+        with connect(f"{running.baked_url()}?resume={secret}", subprotocols=["relume.v1"], proxy=None) as refused:
+            refused.close()
+        url = f"http://127.0.0.1:{running.port}/api/scenes?resume={secret}"
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as answer:
+            assert answer.status == 200
+    said = capsys.readouterr().err
+    assert '"path": "/api/scenes"' in said
+    for each in (secret, token, hello["resume"], hello["room"]["seat"], hello["room"]["watch"]):
+        assert each not in said

@@ -7,10 +7,10 @@ import struct
 from collections.abc import Iterator
 
 import pytest
-from running_server import running_server
+from running_server import open_socket, running_server
 from server_fakes import Control
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
 from server.logs.setting_up import set_up
 from server.settings import Settings
@@ -22,10 +22,6 @@ def url(settings: Settings, control: Control) -> Iterator[str]:
     """Address of the session of a bake that is ready."""
     with running_server(settings, control) as running:
         yield running.baked_url()
-
-
-def open_socket(url: str) -> ClientConnection:
-    return connect(url, subprotocols=["relume.v1"], max_size=None)
 
 
 def test_session_runs_without_compression(url: str) -> None:

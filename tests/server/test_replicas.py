@@ -15,7 +15,8 @@ from replicas_proxy import proxied, proxied_by_one_name
 from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
-from server.live.rooms.door import MIN_PLACED, watch_of
+from server.live.rooms.door import watch_of
+from server.wire.rooms import MIN_ROOM, ROOM_PREFIX
 
 NUM_SERVERS = 3
 
@@ -62,7 +63,7 @@ def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> No
     rooms = [secrets.token_hex(16) for _ in range(12)]
     servers = {}
     for k, room in enumerate(rooms):
-        queries = (f"?room={room}", f"?name=Ann&room={room}&seat=x", f"?watch={watch_of(room)}")
+        queries = [f"?room_prefix={name[:ROOM_PREFIX]}" for name in (room, watch_of(room))]
         found = {session(proxy, f"{k:015d}{j}", query) for j, query in enumerate(queries)}
         assert len(found) == 1, room
         servers[room] = found.pop()
@@ -77,7 +78,8 @@ def test_all_of_a_room_come_to_one_server_where_one_name_means_all_of_them(tmp_p
             stack.enter_context(_server(number, address, port))
         named = stack.enter_context(proxied_by_one_name(tmp_path, addresses, port))
         rooms = [secrets.token_hex(16) for _ in range(12)]
-        found = [{session(named, f"{k:016x}", f"?room={room}") for _ in range(3)} for k, room in enumerate(rooms)]
+        queries = [f"?room_prefix={room[:ROOM_PREFIX]}" for room in rooms]
+        found = [{session(named, f"{k:016x}", query) for _ in range(3)} for k, query in enumerate(queries)]
     assert all(len(servers) == 1 for servers in found)
     assert len(set.union(*found)) > 1
 
@@ -86,7 +88,7 @@ def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
     bakes = [f"{k:016x}" for k in range(12)]
     found = {}
     for bake in bakes:
-        first, again = (session(proxy, bake, query) for query in ("", "?resume=abc"))
+        first, again = (session(proxy, bake, query) for query in ("", "?other=abc"))
         told = _get(f"http://127.0.0.1:{proxy}/api/bakes/{bake}/surface/points")
         assert first == again == told.split()[0]
         found[bake] = first
@@ -97,7 +99,7 @@ def test_whom_a_leaving_server_refuses_another_has_at_once(tmp_path: Path) -> No
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
         port = stack.enter_context(proxied(tmp_path, ports))
-        assert {session(port, "b", f"?room={secrets.token_hex(16)}") for _ in range(12)} == {"0"}
+        assert {session(port, "b", f"?room_prefix={secrets.token_hex(4)}") for _ in range(12)} == {"0"}
 
 
 def test_a_room_is_found_on_the_server_that_has_it_and_the_others_are_none_the_worse(tmp_path: Path) -> None:
@@ -105,7 +107,7 @@ def test_a_room_is_found_on_the_server_that_has_it_and_the_others_are_none_the_w
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=404 if number else None)) for number in range(NUM_SERVERS)]
         port = stack.enter_context(proxied(tmp_path, ports))
-        assert {session(port, "b", f"?room={secrets.token_hex(16)}") for _ in range(12)} == {"0"}
+        assert {session(port, "b", f"?room_prefix={secrets.token_hex(4)}") for _ in range(12)} == {"0"}
         assert _answers(port) == {"0", "404"}
 
 
@@ -140,8 +142,8 @@ def _get(url: str) -> str:
 
 
 def test_what_opens_a_room_to_watch_says_its_place_and_no_more() -> None:
-    long, short = "a" * MIN_PLACED, "a" * (MIN_PLACED - 1)
-    assert watch_of(long)[:8] == long[:8]
-    assert len(watch_of(long)) == len(watch_of(short)) == 32
-    assert not watch_of(short).startswith("aa")
-    assert watch_of(long)[8:] not in watch_of(long + "a")
+    room = "a" * MIN_ROOM
+    assert watch_of(room)[:ROOM_PREFIX] == room[:ROOM_PREFIX]
+    assert watch_of(room)[ROOM_PREFIX] != "a"
+    assert len(watch_of(room)) == 32
+    assert watch_of(room)[ROOM_PREFIX:] not in watch_of(room + "a")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import BatchesHere, Control
 from server_fixtures import open_fake_bakes
-from session_client import SIGMA, Baked, Session, open_session
+from session_client import SIGMA, TOGETHER, Baked, Session, open_session
 from sqlalchemy import select, update
 from starlette.testclient import WebSocketDenialResponse
 
@@ -19,7 +19,7 @@ from server.live.rooms.door import watch_of
 from server.records.tables import RoomRow
 from server.settings import Settings
 
-ROOM, WATCH = "?room=together", f"?watch={watch_of('together')}"
+WATCH = {"watch": watch_of(TOGETHER["room"])}
 RESTART = 1012
 LEASE_S = 600.0  # rounds are made by tests, however long those take
 
@@ -56,8 +56,8 @@ def look_around(server: TestClient) -> None:
     server.portal.call(services(server).live.keeper.look)
 
 
-def refusal(server: TestClient, baked: Baked, query: str) -> tuple[int, str]:
-    with pytest.raises(WebSocketDenialResponse) as refused, open_session(server, baked.bake, query=query):
+def refusal(server: TestClient, baked: Baked, opening: Mapping[str, str]) -> tuple[int, str]:
+    with pytest.raises(WebSocketDenialResponse) as refused, open_session(server, baked.bake, opening=opening):
         pass
     return refused.value.status_code, refused.value.json()["type"].rpartition(":")[2]
 
@@ -74,7 +74,7 @@ def expire(server: TestClient) -> None:
 
 def rooms(server: TestClient) -> list[str]:
     with services(server).bakes.ledger.sessions() as session:
-        return list(session.scalars(select(RoomRow.watch)))
+        return list(session.scalars(select(RoomRow.prefix)))
 
 
 def emptied(*servers: TestClient) -> None:
@@ -90,36 +90,37 @@ def emptied(*servers: TestClient) -> None:
 def test_a_room_of_one_server_is_nowhere_else_until_nobody_is_in_it(
     client: TestClient, other: TestClient, baked: Baked
 ) -> None:
-    with open_session(client, baked.bake, query=ROOM) as ann:
+    with open_session(client, baked.bake, opening=TOGETHER) as ann:
         assert created(ann)
         look_around(client)
-        assert refusal(other, baked, ROOM) == refusal(other, baked, WATCH) == (404, "elsewhere")
-        with open_session(other, baked.bake, query="?room=apart") as cleo, open_session(other, baked.bake) as dan:
+        assert refusal(other, baked, TOGETHER) == refusal(other, baked, WATCH) == (404, "elsewhere")
+        apart = {"room": "apart" * 5}
+        with open_session(other, baked.bake, opening=apart) as cleo, open_session(other, baked.bake) as dan:
             assert created(cleo)
             assert dan.text("hello")["room"] is None
-        with open_session(client, baked.bake, query=WATCH) as bob:
+        with open_session(client, baked.bake, opening=WATCH) as bob:
             assert not created(bob)
     emptied(client, other)
-    with open_session(other, baked.bake, query=ROOM) as bob:
+    with open_session(other, baked.bake, opening=TOGETHER) as bob:
         assert created(bob)
-        assert rooms(client) == [watch_of("together")]
+        assert rooms(client) == [TOGETHER["room"][:8]]
 
 
 def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
     client: TestClient, other: TestClient, baked: Baked
 ) -> None:
-    with open_session(client, baked.bake, query=ROOM) as ann:
+    with open_session(client, baked.bake, opening=TOGETHER) as ann:
         assert created(ann)
         expire(client)
-        with open_session(other, baked.bake, query=ROOM) as bob:
+        with open_session(other, baked.bake, opening=TOGETHER) as bob:
             assert created(bob)
             bob.edit(1, SIGMA, 0.31)
             bob.exact(1)
             for server in (other, client):
                 look_around(server)
             assert ann.text("leaving")["seconds"] == 0.2
-            assert refusal(client, baked, ROOM) == (404, "elsewhere")
-            with open_session(other, baked.bake, query=ROOM) as again:
+            assert refusal(client, baked, TOGETHER) == (404, "elsewhere")
+            with open_session(other, baked.bake, opening=TOGETHER) as again:
                 hello = again.text("hello")
                 assert not hello["room"]["created"]
                 assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
@@ -131,18 +132,31 @@ def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
 def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
     client: TestClient, other: TestClient, baked: Baked
 ) -> None:
-    with open_session(client, baked.bake, query=ROOM) as ann:
+    with open_session(client, baked.bake, opening=TOGETHER) as ann:
         ann.text("hello")
         assert client.portal is not None
         client.portal.call(services(client).leave.take)
         ann.text("leaving")
-        assert refusal(client, baked, ROOM) == (503, "leaving")
+        assert refusal(client, baked, TOGETHER) == (503, "leaving")
         emptied(other)
-        with open_session(other, baked.bake, query=ROOM) as again:
+        with open_session(other, baked.bake, opening=TOGETHER) as again:
             assert created(again)
 
 
+def test_a_session_is_opened_at_the_address_of_its_room(client: TestClient, baked: Baked) -> None:
+    for query in ("", "?room_prefix=elsewher", "?room_prefix=together-on"):
+        path = f"/api/bakes/{baked.bake}/session{query}"
+        with client.websocket_connect(path, ["relume.v1"]) as websocket:
+            session = Session(websocket, acknowledges=False)
+            session.send(type="open", **TOGETHER)
+            with pytest.raises(ConnectionError) as ended:
+                session.receive()
+        assert ended.value.args[0] == 1008
+        assert "together, as the room's name begins" in ended.value.args[1]
+
+
 def test_a_name_that_is_none_is_refused_as_ever(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, query="?room=%21") as session, pytest.raises(ConnectionError) as ended:
+    none = {"room": "!" * 24}
+    with open_session(client, baked.bake, opening=none) as session, pytest.raises(ConnectionError) as ended:
         session.receive()
     assert ended.value.args[0] == 1008

@@ -209,7 +209,7 @@ def test_solo_stays_until_an_edit_says_otherwise_and_is_no_part_of_the_look(
         session.exact(2)
     alone = frozenset({"environment", "Lamp"})
     assert control.solos[-2:] == [alone, alone]
-    with open_session(client, baked.bake, query=f"?resume={hello['resume']}") as session:
+    with open_session(client, baked.bake, opening={"resume": hello["resume"]}) as session:
         resumed = session.text("hello")
         assert resumed["solo"] == ["Lamp", "environment"]
         assert resumed["look"]["environment"] == hello["look"]["environment"]
@@ -353,7 +353,7 @@ def test_resume_brings_look_and_revision_back_once(client: TestClient, baked: Ba
         token = session.text("hello")["resume"]
         session.edit(7, SIGMA, 0.4)
         session.exact(7)
-    with open_session(client, baked.bake, query=f"?resume={token}") as session:
+    with open_session(client, baked.bake, opening={"resume": token}) as session:
         hello = session.text("hello")
         assert hello["resumed"]
         assert hello["revision"] == 7
@@ -361,7 +361,7 @@ def test_resume_brings_look_and_revision_back_once(client: TestClient, baked: Ba
         session.exact(7)
         session.edit(8, SIGMA, 0.3)
         session.exact(8)
-    with open_session(client, baked.bake, query=f"?resume={token}") as session:
+    with open_session(client, baked.bake, opening={"resume": token}) as session:
         assert not session.text("hello")["resumed"]
 
 

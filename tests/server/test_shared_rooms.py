@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, ExitStack
 from typing import Any
 
 import jsonpatch
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
-from session_client import IOR, SIGMA, Baked, Session, open_session
+from session_client import IOR, SIGMA, TOGETHER, Baked, Session, open_session
 
 from server.live.rooms.door import watch_of
 from server.settings import Settings
 
-ROOM = "?room=together"
+WATCH = {"watch": watch_of(TOGETHER["room"])}
 LOST = 1001
 EXPOSURE = "/display/exposure"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
@@ -24,6 +25,11 @@ EXTINCTION = "/materials/Paper/terms/1/params/extinction"
 def settings(settings: Settings) -> Settings:
     settings.max_sessions, settings.max_people, settings.max_rooms, settings.away_seconds = 8, 3, 2, 0.05
     return settings
+
+
+def joined(client: TestClient, baked: Baked) -> AbstractContextManager[Session]:
+    """A session in the room."""
+    return open_session(client, baked.bake, opening=TOGETHER)
 
 
 def told(session: Session, path: str) -> dict[str, Any]:
@@ -49,15 +55,16 @@ def picture(session: Session, revision: int, value: int) -> int:
     return int(frame.header["shared"])
 
 
-def refused(client: TestClient, baked: Baked, query: str) -> tuple[Any, ...]:
-    with open_session(client, baked.bake, query=query) as session, pytest.raises(ConnectionError) as ended:
+def refused(client: TestClient, baked: Baked, opening: Mapping[str, Any]) -> tuple[Any, ...]:
+    with open_session(client, baked.bake, opening=opening) as session, pytest.raises(ConnectionError) as ended:
         session.receive()
     return ended.value.args
 
 
 def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client: TestClient, baked: Baked) -> None:
     with ExitStack() as stack:
-        opened = (stack.enter_context(open_session(client, baked.bake, query=query)) for query in (ROOM, ROOM, ""))
+        contexts = joined(client, baked), joined(client, baked), open_session(client, baked.bake)
+        opened = (stack.enter_context(each) for each in contexts)
         ann = next(opened)
         assert ann.text("hello")["room"]["created"]
         bob, alone = opened
@@ -73,7 +80,7 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
         ann.edit(2, SIGMA, 0.4)
         news = told(bob, SIGMA)
         assert (news["revision"], news["shared"], news["by"], news["value"]) == (1, 3, [1], 0.4)
-        with open_session(client, baked.bake, query=ROOM) as late:
+        with joined(client, baked) as late:
             hello = late.text("hello")
             params, own = (
                 look["materials"]["Paper"]["terms"][1]["params"] for look in (hello["look"], hello["room"]["default"])
@@ -83,14 +90,14 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
 
 
 def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+    with joined(client, baked) as ann, joined(client, baked) as bob:
         ann.text("hello")
         bob.text("hello")
         for k in range(1, 21):
             ann.edit(k, SIGMA, 0.2 + k / 100)
             bob.edit(k, SIGMA, 0.6 + k / 100)
         has = [_sigma_after(session, own, 20) for session, own in ((ann, 0.2), (bob, 0.6))]
-        with open_session(client, baked.bake, query=ROOM) as late:
+        with joined(client, baked) as late:
             last = late.text("hello")["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"]
             late.edit(1, EXTINCTION, 1.9)
             for k, session in enumerate((ann, bob)):
@@ -112,21 +119,21 @@ def _sigma_after(session: Session, own: float, revision: int) -> float:
 
 
 def test_each_has_their_own_exposure_and_who_comes_begins_with_the_last(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+    with joined(client, baked) as ann, joined(client, baked) as bob:
         ann.text("hello")
         bob.text("hello")
         ann.edit(1, EXPOSURE, 2.0)
         ann.edit(2, SIGMA, 0.31)
         assert [each["path"] for each in told(bob, SIGMA)["patch"]] == [SIGMA]
-        with open_session(client, baked.bake, query=ROOM) as late:
+        with joined(client, baked) as late:
             assert late.text("hello")["look"]["display"]["exposure"] == 2.0
 
 
 def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, query=f"{ROOM}&name=Ann") as ann:
+    with open_session(client, baked.bake, opening={**TOGETHER, "name": "Ann"}) as ann:
         (first,) = ann.text("hello")["room"]["people"]
         assert (first["name"], first["role"], first["here"], first["material"]) == ("Ann", "admin", True, None)
-        with open_session(client, baked.bake, query=ROOM) as bob:
+        with joined(client, baked) as bob:
             room = bob.text("hello")["room"]
             assert (room["you"], [each["name"] for each in room["people"]]) == (2, ["Ann", "Guest 2"])
             bob.send(type="presence", name="Bob", material="Paper")
@@ -144,11 +151,11 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
 
 
 def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, query=ROOM) as ann:
+    with joined(client, baked) as ann:
         ann.text("hello")
-        with open_session(client, baked.bake, query=ROOM) as bob:
+        with joined(client, baked) as bob:
             seat = bob.text("hello")["room"]["seat"]
-            with open_session(client, baked.bake, query=f"{ROOM}&seat={seat}") as finer:
+            with open_session(client, baked.bake, opening={**TOGETHER, "seat": seat}) as finer:
                 assert finer.text("hello")["room"]["you"] == 2
                 bob.websocket.close(1000)
                 finer.send(type="presence", name="Bob")
@@ -162,7 +169,7 @@ def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> No
 def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.send(type="presence", name="Ann")
-        assert "?room=" in session.text("problem")["problem"]["detail"]
+        assert "with a room" in session.text("problem")["problem"]["detail"]
 
 
 class TestComingBack:
@@ -172,13 +179,13 @@ class TestComingBack:
         return settings
 
     def test_a_place_is_kept_and_the_room_with_it(self, client: TestClient, baked: Baked) -> None:
-        with open_session(client, baked.bake, query=ROOM) as ann:
+        with joined(client, baked) as ann:
             seat = ann.text("hello")["room"]["seat"]
             ann.send(type="presence", name="Ann")
             ann.edit(1, SIGMA, 0.31)
             ann.exact(1)
             ann.websocket.close(LOST)
-        with open_session(client, baked.bake, query=f"{ROOM}&seat={seat}") as again:
+        with open_session(client, baked.bake, opening={**TOGETHER, "seat": seat}) as again:
             hello = again.text("hello")
             assert (hello["room"]["you"], hello["room"]["created"], hello["revision"]) == (1, False, 0)
             assert [each["name"] for each in hello["room"]["people"]] == ["Ann"]
@@ -187,9 +194,9 @@ class TestComingBack:
     def test_a_lost_session_has_its_own_exposure_and_the_look_that_the_room_has_now(
         self, client: TestClient, baked: Baked
     ) -> None:
-        with open_session(client, baked.bake, query=ROOM) as ann, ExitStack() as stack:
+        with joined(client, baked) as ann, ExitStack() as stack:
             ann.text("hello")  # who comes later is not told what they begin with
-            bob = stack.enter_context(open_session(client, baked.bake, query=ROOM))
+            bob = stack.enter_context(joined(client, baked))
             hello = bob.text("hello")
             bob.edit(1, EXPOSURE, 1.0)
             bob.edit(2, SIGMA, 0.5)
@@ -198,30 +205,30 @@ class TestComingBack:
             stack.close()
             ann.edit(1, EXTINCTION, 1.9)
             ann.exact(1)
-            query = f"{ROOM}&seat={hello['room']['seat']}&resume={hello['resume']}"
-            with open_session(client, baked.bake, query=query) as again:
+            opening = {**TOGETHER, "seat": hello["room"]["seat"], "resume": hello["resume"]}
+            with open_session(client, baked.bake, opening=opening) as again:
                 back = again.text("hello")
                 params = back["look"]["materials"]["Paper"]["terms"][1]["params"]
                 assert (back["resumed"], back["revision"], back["look"]["display"]["exposure"]) == (True, 2, 1.0)
                 assert (params["sigma"], params["extinction"]) == (0.5, 1.9)
 
     def test_more_people_than_may_be_are_refused(self, client: TestClient, baked: Baked) -> None:
-        with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+        with joined(client, baked) as ann, joined(client, baked) as bob:
             ann.text("hello")
             bob.text("hello")
-            assert refused(client, baked, ROOM) == (1013, "2 people are in this room; one of them has to leave first")
+            code, reason = refused(client, baked, TOGETHER)
+            assert (code, reason) == (1013, "2 people are in this room; one of them has to leave first")
 
 
 def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -> None:
-    watch = watch_of("together")
-    assert refused(client, baked, f"?watch={watch}")[0] == 1013
+    assert refused(client, baked, WATCH)[0] == 1013
     with ExitStack() as stack:
-        ann = stack.enter_context(open_session(client, baked.bake, query=ROOM))
-        assert ann.text("hello")["room"]["watch"] == watch
-        vera = stack.enter_context(open_session(client, baked.bake, query=f"?watch={watch}"))
+        ann = stack.enter_context(joined(client, baked))
+        assert ann.text("hello")["room"]["watch"] == WATCH["watch"]
+        vera = stack.enter_context(open_session(client, baked.bake, opening=WATCH))
         hello = vera.text("hello")
         assert (hello["role"], hello["room"]["id"]) == ("view", None)
-        assert "together" not in str(hello)
+        assert TOGETHER["room"] not in str(hello)
         vera.exact(0)
         vera.edit(1, SIGMA, 0.9)
         problem = vera.text("problem")["problem"]
@@ -232,8 +239,9 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
 
 
 def test_names_are_bounded(client: TestClient, baked: Baked) -> None:
-    for query in ("?room=", "?room=a%20b", f"?room={'a' * 65}", "?watch=ä", f"{ROOM}&name={'a' * 41}"):
-        assert refused(client, baked, query)[0] == 1008
+    rooms = ("", "a" * 23, "a" * 65, "a b" * 10, "ä" * 24)
+    for opening in (*({"room": room} for room in rooms), {"watch": "ä" * 24}, {**TOGETHER, "name": "a" * 41}):
+        assert refused(client, baked, opening)[0] == 1008
 
 
 class Person:
@@ -265,7 +273,7 @@ class Person:
 def test_all_drag_at_once_and_all_have_the_same_look_in_the_end(client: TestClient, baked: Baked) -> None:
     rng = np.random.default_rng(4)
     with ExitStack() as stack:
-        opened = [stack.enter_context(open_session(client, baked.bake, query=ROOM)) for _ in range(2)]
+        opened = [stack.enter_context(joined(client, baked)) for _ in range(2)]
         people = [Person(session) for session in opened]
         for _ in range(60):
             for person, own in zip(people, (EXTINCTION, IOR), strict=True):
@@ -274,7 +282,7 @@ def test_all_drag_at_once_and_all_have_the_same_look_in_the_end(client: TestClie
         for person in people:
             while not person.is_confirmed:
                 person.hear()
-        late = stack.enter_context(open_session(client, baked.bake, query=ROOM))
+        late = stack.enter_context(joined(client, baked))
         everybodys = late.text("hello")["look"]
         for person in people:
             while person.look["materials"] != everybodys["materials"]:
@@ -283,14 +291,15 @@ def test_all_drag_at_once_and_all_have_the_same_look_in_the_end(client: TestClie
 
 def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, baked: Baked) -> None:
     with (
-        open_session(client, baked.bake, query="?room=a") as first,
-        open_session(client, baked.bake, query="?room=b") as second,
+        open_session(client, baked.bake, opening={"room": "a" * 24}) as first,
+        open_session(client, baked.bake, opening={"room": "b" * 24}) as second,
     ):
         first.text("hello")
         second.text("hello")
-        assert refused(client, baked, "?room=c") == (1013, "2 rooms are open; one of them has to be left first")
+        code, reason = refused(client, baked, {"room": "c" * 24})
+        assert (code, reason) == (1013, "2 rooms are open; one of them has to be left first")
     while True:  # those who have left have their place for a moment
-        with open_session(client, baked.bake, query="?room=c") as third:
+        with open_session(client, baked.bake, opening={"room": "c" * 24}) as third:
             message = third.websocket.receive()
             if message["type"] != "websocket.close":
                 break
@@ -298,7 +307,7 @@ def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, 
 
 def test_an_edit_that_cannot_be_shown_is_taken_back_for_all(client: TestClient, baked: Baked) -> None:
     rotation = "/environment/rotation"  # the bake cannot follow that
-    with open_session(client, baked.bake, query=ROOM) as ann, open_session(client, baked.bake, query=ROOM) as bob:
+    with joined(client, baked) as ann, joined(client, baked) as bob:
         ann.exact(0)
         bob.exact(0)
         ann.edit(1, EXTINCTION, 1.7)
@@ -307,7 +316,7 @@ def test_an_edit_that_cannot_be_shown_is_taken_back_for_all(client: TestClient, 
         assert ann.text("problem")["revision"] == 2
         ann.edit(3, SIGMA, 0.31)
         picture(bob, 0, 810)
-        with open_session(client, baked.bake, query=ROOM) as late:
+        with joined(client, baked) as late:
             look = late.text("hello")["look"]
         assert look["environment"]["rotation"] == 0.0
         assert look["materials"]["Paper"]["terms"][1]["params"]["extinction"] == 1.7

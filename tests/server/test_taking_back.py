@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
 
 import jsonpatch
@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import Control
-from session_client import IOR, SIGMA, Baked, Session, open_session
+from session_client import IOR, SIGMA, TOGETHER, Baked, Session, open_session
 
 from server.live.rooms.door import watch_of
 from server.settings import Settings
 
-ROOM, WATCH = "?room=together", f"?watch={watch_of('together')}"
+WATCH = {"watch": watch_of(TOGETHER["room"])}
 EXPOSURE, ROTATION = "/display/exposure", "/environment/rotation"  # the bake cannot follow the rotation
 COLOR = "/materials/Paper/terms/0/color"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
@@ -26,6 +26,11 @@ EXTINCTION = "/materials/Paper/terms/1/params/extinction"
 def settings(settings: Settings) -> Settings:
     settings.max_sessions = 8
     return settings
+
+
+def joined(client: TestClient, baked: Baked) -> AbstractContextManager[Session]:
+    """A session in the room."""
+    return open_session(client, baked.bake, opening=TOGETHER)
 
 
 class Client:
@@ -87,7 +92,7 @@ def waiting(client: TestClient) -> Iterator[None]:
 
 
 def rooms_look(client: TestClient, baked: Baked) -> dict[str, Any]:
-    with open_session(client, baked.bake, query=ROOM) as late:
+    with joined(client, baked) as late:
         look: dict[str, Any] = late.text("hello")["look"]
         return look
 
@@ -105,20 +110,28 @@ def in_a_view_that_cannot_follow(session: Session, control: Control) -> None:
     control.short_of_memory.add("left")
 
 
-@pytest.mark.parametrize("query", [ROOM, WATCH])
+def is_told_once(session: Session) -> None:
+    """Wait for the word that somebody's edit cannot be shown here."""
+    assert session.text("problem")["revision"] is None
+    session.send(type="ping")
+    while (message := session.receive()) != {"type": "pong"}:
+        assert not isinstance(message, dict) or message["type"] != "problem"
+
+
+@pytest.mark.parametrize("opening", [TOGETHER, WATCH])
 def test_an_edit_that_fails_for_the_edits_of_others_takes_none_of_them_back(
-    client: TestClient, baked: Baked, control: Control, query: str
+    client: TestClient, baked: Baked, control: Control, opening: dict[str, str]
 ) -> None:
     control.may_freeze.set()
-    with open_session(client, baked.bake, query=ROOM) as session, open_session(client, baked.bake, query=query) as vera:
+    with joined(client, baked) as session, open_session(client, baked.bake, opening=opening) as vera:
         ann = Client(session)
         in_a_view_that_cannot_follow(vera, control)
         ann.edit(IOR, 1.7)
         session.exact(1)
-        assert vera.text("problem")["revision"] is None
+        is_told_once(vera)
         for revision in (1, 2):
             vera.edit(revision, EXPOSURE, float(revision))
-            assert vera.text("problem")["revision"] is None
+            is_told_once(vera)
         ann.edit(SIGMA, 0.31)
         session.exact(2)
         look = rooms_look(client, baked)
@@ -130,20 +143,20 @@ def test_an_editor_whose_bake_cannot_follow_another_goes_on_editing(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     control.may_freeze.set()
-    with open_session(client, baked.bake, query=ROOM) as first, open_session(client, baked.bake, query=ROOM) as bob:
+    with joined(client, baked) as first, joined(client, baked) as bob:
         ann = Client(first)
         in_a_view_that_cannot_follow(bob, control)
         ann.edit(IOR, 1.7)
-        assert bob.text("problem")["revision"] is None
+        is_told_once(bob)
         bob.edit(1, SIGMA, 0.31)
-        assert bob.text("problem")["revision"] is None
+        is_told_once(bob)
         look = rooms_look(client, baked)
         assert (params(look)["ior"], params(look)["sigma"]) == (1.7, 0.31)
         ann.comes_to(look)
 
 
 def test_of_a_moment_only_what_failed_is_taken_back_and_every_client_knows(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, query=ROOM) as one, open_session(client, baked.bake, query=ROOM) as other:
+    with joined(client, baked) as one, joined(client, baked) as other:
         ann, bob = Client(one), Client(other)
         one.exact(0)
         other.exact(0)
@@ -164,7 +177,7 @@ def test_of_a_moment_only_what_failed_is_taken_back_and_every_client_knows(clien
 
 def test_what_others_have_put_on_top_goes_where_there_is_nothing_under_it(client: TestClient, baked: Baked) -> None:
     lamp = {"kind": "point", "position": [0.0, 1.0, 0.0]}
-    with open_session(client, baked.bake, query=ROOM) as one, open_session(client, baked.bake, query=ROOM) as other:
+    with joined(client, baked) as one, joined(client, baked) as other:
         ann, bob = Client(one), Client(other)
         one.exact(0)
         other.exact(0)
@@ -185,7 +198,7 @@ def test_what_others_have_put_on_top_goes_where_there_is_nothing_under_it(client
 
 
 def test_ways_of_looking_of_a_moment_that_failed_are_told_to_whose_they_are(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, query=ROOM) as session:
+    with joined(client, baked) as session:
         bob = Client(session)
         session.exact(0)
         with waiting(client):
@@ -202,7 +215,7 @@ def test_ways_of_looking_of_a_moment_that_failed_are_told_to_whose_they_are(clie
 def test_however_edits_that_fail_and_others_meet_all_have_the_same_look(client: TestClient, baked: Baked) -> None:
     rng = np.random.default_rng(7)
     with ExitStack() as stack:
-        opened = [stack.enter_context(open_session(client, baked.bake, query=ROOM)) for _ in range(3)]
+        opened = [stack.enter_context(joined(client, baked)) for _ in range(3)]
         people = [Client(session) for session in opened]
         for _ in range(80):
             person = people[rng.integers(3)]

@@ -118,7 +118,7 @@ def test_resume_brings_the_views_back(client: TestClient, baked: Baked) -> None:
         show_both(session)
         session.edit(1, SIGMA, 0.4)
         exact_of_all(session, 1)
-    with open_session(client, baked.bake, query=f"?resume={hello['resume']}") as session:
+    with open_session(client, baked.bake, opening={"resume": hello["resume"]}) as session:
         hello = session.text("hello")
         assert (hello["shown"], hello["view"]) == (["front", "left"], "left")
         assert exact_of_all(session, 1)[0].header["view"] == "left"

@@ -60,7 +60,7 @@ async function start(): Promise<void> {
 }
 
 function open(): void {
-  const place = placeFromUrl(location.search);
+  const place = placeFromUrl(location.search, location.hash);
   keepFocus();
   followNetwork();
   followName();

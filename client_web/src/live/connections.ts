@@ -1,5 +1,6 @@
 /** The connections to bakes: that whose pictures are shown, and one on a finer bake until its first picture is there. */
 import { Session, type SessionHandlers } from "../net/session";
+import type { Asked } from "../net/socket";
 import { Arrivals } from "../picture/arrival";
 import type { ClientMessage, HelloMessage } from "../protocol";
 import { offline } from "../state/connection";
@@ -8,13 +9,12 @@ import { scene } from "../state/scene";
 import { door, ownName, seatIn } from "../state/together";
 
 /** Of one who only looks: with what a session begins; of those who work together: the room, and the place in it. */
-function asked(): Record<string, string> {
+function asked(): ReturnType<Asked> {
   const of = scene.peek()?.id;
   const room = door.peek();
   if (room !== null && room.scene === of) {
     const { room: id, watch, share } = room;
-    const said = { ...(id !== null ? { room: id } : { watch }), share, seat: seatIn(room), name: ownName.peek() || null };
-    return Object.fromEntries(Object.entries(said).filter((entry): entry is [string, string] => entry[1] !== null));
+    return { ...(id !== null ? { room: id } : { watch }), share, seat: seatIn(room), name: ownName.peek() || null };
   }
   const { scene: watchedScene, ...look } = watched.peek() ?? { scene: null };
   return watchedScene !== null && watchedScene === of ? look : {};

@@ -1,5 +1,5 @@
 /** The transport of a live session: a WebSocket that connects again by itself, with the token that finds its look. */
-import { SUBPROTOCOL, type ClientMessage } from "../protocol";
+import { ROOM_PREFIX, SUBPROTOCOL, type ClientMessage, type OpenMessage } from "../protocol";
 import { backoffMs } from "./backoff";
 import { Heartbeat } from "./heartbeat";
 
@@ -16,7 +16,7 @@ const MAX_RESUMES = 3;
 export type Connection = "connecting" | "open" | "silent" | "reconnecting" | "closed";
 
 /** With what a session is to begin, and in which room. */
-export type Asked = () => Readonly<Record<string, string>>;
+export type Asked = () => Readonly<Omit<OpenMessage, "type" | "resume">>;
 
 export interface SocketHandlers {
   /** `reason`: what the server said where it has no room now. */
@@ -54,11 +54,14 @@ export class LiveSocket {
     this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
     const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);
     url.protocol = url.protocol.replace("http", "ws");
-    for (const [name, value] of Object.entries(this.asked())) url.searchParams.set(name, value);
-    if (this.resume !== null) url.searchParams.set("resume", this.resume);
+    // all else is said in a message: addresses are written into logs
+    const opening: OpenMessage = { type: "open", ...this.asked(), resume: this.resume };
+    const room = opening.room ?? opening.watch;
+    if (room != null) url.searchParams.set("room_prefix", room.slice(0, ROOM_PREFIX));
     this.socket?.close(1000); // one that hangs while it connects
     const socket = new WebSocket(url, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
+    socket.onopen = () => socket.send(JSON.stringify(opening));
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
       if (socket !== this.socket) return; // it was left for another one
       this.heartbeat.heard();

@@ -10,15 +10,17 @@ export interface Place {
   term: number;
   curve: string | null;
   light: string | null;
-  /** What opens the room that the look is shared in, to edit or only to watch. */
+  /** What opens the room that the look is shared in, to edit or only to watch. It stands in the fragment, which browsers
+   * send to nobody. */
   room: string | null;
   watch: string | null;
   /** The shared look that it begins with. */
   share: string | null;
 }
 
-export function placeFromUrl(search: string): Place {
+export function placeFromUrl(search: string, hash = ""): Place {
   const query = new URLSearchParams(search);
+  const secrets = new URLSearchParams(hash.slice(1));
   return {
     scene: query.get("scene"),
     bake: query.get("bake"),
@@ -28,18 +30,25 @@ export function placeFromUrl(search: string): Place {
     term: Math.max(0, Math.trunc(Number(query.get("term") ?? 0)) || 0),
     curve: query.get("curve"),
     light: query.get("light"),
-    room: query.get("room"),
-    watch: query.get("watch"),
+    room: secrets.get("room"),
+    watch: secrets.get("watch"),
     share: query.get("share"),
   };
 }
 
 export function placeToUrl(place: Place): string {
   const query = new URLSearchParams();
-  for (const key of ["scene", "bake", "view", "material", "curve", "light", "room", "watch"] as const) {
+  for (const key of ["scene", "bake", "view", "material", "curve", "light"] as const) {
     if (place[key] !== null && place[key] !== "") query.set(key, place[key]);
   }
   for (const view of place.beside) query.append("beside", view);
   if (place.material !== null && place.term > 0) query.set("term", String(place.term));
-  return query.size > 0 ? `?${query.toString()}` : "/";
+  const key = place.room !== null ? "room" : place.watch !== null ? "watch" : null;
+  const hash = key === null ? "" : `#${keyFragment(key, place[key] as string)}`;
+  return (query.size > 0 ? `?${query.toString()}` : "/") + hash;
+}
+
+/** What the fragment of an address says of a room. */
+export function keyFragment(kind: "room" | "watch", key: string): string {
+  return new URLSearchParams({ [kind]: key }).toString();
 }

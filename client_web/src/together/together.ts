@@ -1,6 +1,7 @@
 /** Working together: making a room, the links into it, and leaving it. */
 import { connect } from "../live/connect";
 import { saveShare } from "../looks/share";
+import { keyFragment } from "../scene/url";
 import { bake } from "../state/bakes";
 import { scene } from "../state/scene";
 import { door, people, you } from "../state/together";
@@ -35,7 +36,7 @@ export async function linkInto(kind: "edit" | "watch"): Promise<string | null> {
   if (key == null) return null;
   return (await attempt(async () => {
     const url = new URL((await saveShare()).url, location.href);
-    url.searchParams.set(kind === "edit" ? "room" : "watch", key);
+    url.hash = keyFragment(kind === "edit" ? "room" : "watch", key);
     return url.href;
   })) ?? null;
 }

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import re
 import unicodedata
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from relume.errors import ParameterError
-from server.wire.rooms import MAX_PERSON_NAME
-
-MAX_ROOM = 64
-PLACE, MIN_PLACED = 8, 24
-"""Characters of a name by which balancers choose a server, and how long a name has to be to have such."""
-_MAX_SEAT = 64
-_ROOM = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_ROOM}}}")
+from server.wire.connection import OpenMessage
+from server.wire.rooms import MAX_PERSON_NAME, ROOM_PREFIX
 
 
 @dataclass(frozen=True)
 class Door:
-    """What the address of a session says of a room.
+    """What the first message of a session says of a room.
 
     Attributes:
         room: its id; None for who has only what opens it to watch.
@@ -33,28 +26,36 @@ class Door:
     seat: str | None
     name: str | None
 
+    @property
+    def prefix(self) -> str:
+        """What of it stands in the address."""
+        return self.watch[:ROOM_PREFIX]
 
-def door_of(asked: Mapping[str, str]) -> Door | None:
-    """The door that a query names; None where it names none. Raises ParameterError."""
-    room, watch, seat = asked.get("room"), asked.get("watch"), asked.get("seat")
-    name = None if asked.get("name") is None else check_person(asked["name"])
-    for field, value in (("room", room), ("watch", watch)):
-        if value is not None and not _ROOM.fullmatch(value):
-            raise ParameterError(field, value[:80], f"1 to {MAX_ROOM} letters, digits, hyphens and underscores")
-    seat = None if seat is None else seat[:_MAX_SEAT]
-    if room is not None:
-        return Door(room, watch_of(room), seat, name)
-    return None if watch is None else Door(None, watch, seat, name)
+
+def door_of(opening: OpenMessage, room_prefix: str) -> Door | None:
+    """The door that a message names; None where it names none.
+
+    Args:
+        room_prefix: of the address.
+    Raises:
+        ParameterError: the name is not printable, or the address is one of other rooms.
+    """
+    name = None if opening.name is None else check_person(opening.name)
+    if opening.room is not None:
+        door = Door(opening.room, watch_of(opening.room), opening.seat, name)
+    elif opening.watch is not None:
+        door = Door(None, opening.watch, opening.seat, name)
+    else:
+        return None
+    if room_prefix != door.prefix:
+        allowed = f"{door.prefix}, as the room's name begins"
+        raise ParameterError("room_prefix of the address", room_prefix[:80], allowed)
+    return door
 
 
 def watch_of(room: str) -> str:
-    """What opens a room to watch.
-
-    It begins as a long name does, so that a balancer sends both to one server; the rest of the name nobody finds, and
-    of a short one nothing is shown.
-    """
-    hashed = hashlib.sha256(b"relume watch " + room.encode()).hexdigest()
-    return (room[:PLACE] if len(room) >= MIN_PLACED else hashed[:PLACE]) + hashed[PLACE:32]
+    """What opens a room to watch: it begins as the room's name does, and the rest of the name nobody finds."""
+    return room[:ROOM_PREFIX] + hashlib.sha256(b"relume watch " + room.encode()).hexdigest()[ROOM_PREFIX:32]
 
 
 def check_person(name: str) -> str:

@@ -105,9 +105,10 @@ class Guest:
                 other.follow(target, self._seat.number, changes)
         return target
 
-    def painting(self) -> None:
-        """The session's pictures are about to be given the newest look."""
-        self._painting = self._room.document
+    def painting(self, target: Target) -> None:
+        """The session's pictures are about to be given this look: the room's, or an older one that they could show."""
+        is_newest = target.shared == self._room.num_changes
+        self._painting = self._room.document if is_newest else self._painted
 
     def painted(self) -> None:
         """They can show it: none of the edits in it will be taken back."""

@@ -33,23 +33,26 @@ class Keeper:
         self._complaint = Complaint(log, "which server has a room cannot be told")
 
     @asynccontextmanager
-    async def having(self, watch: str) -> AsyncIterator[None]:
-        """For as long as a session is in a room, or tries to be. Raises ElsewhereError where another server has it."""
-        self._sessions[watch] += 1
+    async def having(self, prefix: str) -> AsyncIterator[None]:
+        """For as long as a session is in a room whose name begins so, or tries to be.
+
+        Raises ElsewhereError where another server has these rooms.
+        """
+        self._sessions[prefix] += 1
         try:
-            if not await self._take(watch):
+            if not await self._take(prefix):
                 raise ElsewhereError("another server has this room; come to it by way of the balancer, or try again")
             yield
         finally:
-            self._sessions[watch] -= 1
-            if not self._sessions[watch]:
-                del self._sessions[watch]
+            self._sessions[prefix] -= 1
+            if not self._sessions[prefix]:
+                del self._sessions[prefix]
 
-    async def _take(self, watch: str) -> bool:
+    async def _take(self, prefix: str) -> bool:
         async with self._alone:
             self._has_leases = True
             try:
-                return await asyncio.to_thread(self._leases.take, watch)
+                return await asyncio.to_thread(self._leases.take, prefix)
             except AWAY as error:  # the next round tries again
                 self._complaint.meet(error)
                 return True
@@ -64,7 +67,7 @@ class Keeper:
     async def look(self) -> None:
         """Keep what there is, if anything; who is in a room that another server has meanwhile has to go there."""
         async with self._alone:
-            held = set() if self._leave.is_taken else {*self._sessions, *self._rooms.watches()}
+            held = set() if self._leave.is_taken else {*self._sessions, *self._rooms.prefixes()}
             if not held and not self._has_leases:
                 return
             try:
@@ -74,8 +77,8 @@ class Keeper:
             except Exception as error:  # the database may be away for a while; the next look must come
                 self._complaint.meet(error)
                 return
-        for watch in lost:
-            self._rooms.lose(watch)
+        for prefix in lost:
+            self._rooms.lose(prefix)
 
     async def close(self) -> None:
         """Give up all."""

@@ -11,6 +11,7 @@ from server.errors import BusyError
 from server.live.rooms.door import Door
 from server.live.rooms.guest import Place
 from server.live.rooms.room import Room, seen_by
+from server.wire.rooms import ROOM_PREFIX
 
 Key = tuple[str, str]
 
@@ -48,13 +49,13 @@ class Rooms:
         """Ids of the scenes that people work on together."""
         return {scene for scene, _ in self._rooms}
 
-    def watches(self) -> set[str]:
-        """What opens the rooms to watch."""
-        return {watch for _, watch in self._rooms}
+    def prefixes(self) -> set[str]:
+        """What the names of the rooms begin with."""
+        return {watch[:ROOM_PREFIX] for _, watch in self._rooms}
 
-    def lose(self, watch: str) -> None:
-        """Another server has the rooms that this opens: who is in them hears of it, and nobody comes in any more."""
-        for key in [key for key in self._rooms if key[1] == watch]:
+    def lose(self, prefix: str) -> None:
+        """Another server has the rooms of this prefix: who is in them hears of it, and nobody comes in any more."""
+        for key in [key for key in self._rooms if key[1].startswith(prefix)]:
             self._rooms.pop(key).is_lost.set()
 
     def commented(self, scene: str) -> None:

@@ -155,7 +155,7 @@ class FrameLoop:
     def _newest(self) -> Target:
         """The look that the pictures are given next."""
         if self._guest is not None:
-            self._guest.painting()
+            self._guest.painting(self._pending.target)
         return self._pending.target
 
     def _accept(self, target: Target) -> None:
@@ -347,6 +347,5 @@ class FrameLoop:
                 without = None
             if self._pending.target is not target:
                 return
-        if without is not None:
-            self._pending.target = guest.taken_back(without)
+        self._pending.target = before if without is None else guest.taken_back(without)
         await self._socket.refuse(error, None if without is None else target.revision)

@@ -65,7 +65,7 @@ def test_a_room_goes_on_when_its_server_is_killed(
     with proxied(tmp_path, [server.port for server in servers]) as port:
         ann, bob = (Editor(page) for page in people)
         for editor in (ann, bob):
-            editor.page.goto(f"http://127.0.0.1:{port}/?scene={scene['id']}&room={ROOM}")
+            editor.page.goto(f"http://127.0.0.1:{port}/?scene={scene['id']}#room={ROOM}")
             editor.wait_until_exact()
         expect(ann.page.locator(".together .chip")).to_have_count(1)
         ann.choose("Ball", 1)
@@ -97,7 +97,7 @@ def test_a_room_goes_on_when_its_server_is_killed(
         time.sleep(_away_s() + 1.0)  # from now on nginx would send who names the room to its first server
         with opened_page(browser) as page:
             cleo = Editor(page)
-            cleo.page.goto(f"http://127.0.0.1:{port}/?scene={scene['id']}&room={ROOM}")
+            cleo.page.goto(f"http://127.0.0.1:{port}/?scene={scene['id']}#room={ROOM}")
             cleo.wait_until_exact()
             expect(cleo.page.locator(".together .chip")).to_have_count(2)
             floor_is(cleo, "0.350")
