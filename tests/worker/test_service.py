@@ -17,13 +17,14 @@ from relume.bake import Task
 from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
 from relume.store import bake_here, open_store
 from worker import lease, scenes
+from worker.database.models import BakeRow
 from worker.executor import Executors
 from worker.ledger import Ledger
 from worker.paths import staging_path
 from worker.scenes import delete_bakes, delete_scene, register_scene
 from worker.service import START_S, BakeService
 from worker.status import BakeStatus, TaskCost, bake_id
-from worker.tasks import Job
+from worker.tasks import Job, run_task
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -356,6 +357,35 @@ def test_scene_deleted_during_its_bake_ends_it(tmp_path: Path) -> None:
             assert list(changes)[-1:] in ([], [changes.latest])
         register_scene(service.data_dir, service.ledger, SCENE)
         assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
+
+
+def test_a_bake_that_another_process_has_taken_over_is_left_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    has_begun, may_go_on = threading.Event(), threading.Event()
+
+    def stand_still(job: Job, task: Task) -> TaskCost:
+        has_begun.set()
+        assert may_go_on.wait(30)
+        return run_task(job, task)
+
+    monkeypatch.setattr("worker.bake.run_task", stand_still)
+    with open_service(tmp_path) as service:
+        identity = service.submit(SCENE.id, RECIPE)
+        assert has_begun.wait(30)
+        elsewhere = BakeRow.__table__.update().values(owner="elsewhere/1/nonce/0", heartbeat=time.time() + 600)
+        with service.ledger.sessions.begin() as session:
+            session.execute(elsewhere)
+        may_go_on.set()
+        deadline = time.monotonic() + 30
+        while "was taken over by another process" not in caplog.text:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        status = service.get(identity)
+        assert (status.state, status.problem) == ("running", None)
+        assert service.ledger.finished_tasks(identity) == {}
+        assert staging_path(service.data_dir, identity).exists()
+        assert not service.store_path(identity).exists()
 
 
 def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
