@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import base64
 import struct
+import subprocess
+import sys
 import tracemalloc
 from typing import Any
 
+import DracoPy
 import numpy as np
 import pytest
 from hostile_scenes import refused
@@ -50,6 +53,34 @@ def test_draco_that_claims_other_numbers_is_refused_before_it_is_decoded(monkeyp
         assert "damaged" in refused(draco_glb(wrong + bytes(50)).bytes())
     for unread in (head[:6] + b"\1" + head[7:], head[:9] + b"\0\x80"):
         assert "npx @gltf-transform/cli copy" in refused(draco_glb(unread + bytes(50)).bytes())
+
+
+def test_draco_that_claims_more_than_it_can_hold_is_refused_before_it_is_decoded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    points, face = np.zeros((2_000_000, 3), np.float32), np.array([[0, 1, 2]], np.uint32)
+    options = {"quantization_bits": 1, "compression_level": 0, "preserve_order": True}
+    packed = DracoPy.encode(points, face, **options)
+    assert len(packed) < 100
+    glb = draco_glb(packed)
+    for accessor, count in ((0, len(points)), (1, len(points)), (2, 3)):
+        glb.document["accessors"][accessor]["count"] = count
+    monkeypatch.setattr("DracoPy.decode", lambda _: pytest.fail("it was decoded"))
+    assert "claims more than its Draco data can hold" in refused(glb.bytes())
+
+
+def test_attributes_that_draco_has_besides_end_in_words_within_a_limit_of_memory() -> None:
+    points, face = np.zeros((60_000, 3), np.float32), np.array([[0, 1, 2]], np.uint32)
+    options = {"quantization_bits": 1, "compression_level": 0, "preserve_order": True}
+    besides = {number: np.zeros((len(points), 127), np.uint8) for number in range(7, 57)}
+    packed = DracoPy.encode(points, face, generic_attributes=besides, **options)
+    limited = (
+        "import resource, sys; from relume.scene.gltf.packed import unpacked_draco; import DracoPy; "
+        "resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30)); "
+        "unpacked_draco(sys.stdin.buffer.read(), 3, 60_000, 'the mesh')"
+    )
+    ended = subprocess.run([sys.executable, "-c", limited], input=packed, capture_output=True, check=False)
+    assert ended.stderr.splitlines()[-1].startswith(b"relume.errors.SceneError: the mesh cannot be unpacked")
 
 
 @pytest.mark.parametrize("accessor", [0, 1, 2])

@@ -28,6 +28,9 @@ MESHOPT_RATIO = 1024
 DRACO_HEADER = struct.Struct("<5sBBBBH")
 DRACO_MESH, DRACO_SEQUENTIAL, DRACO_EDGEBREAKER = 1, 0, 1
 DRACO_METADATA = 0x8000
+# A plane that is divided regularly takes a byte for some 500 triangles, the more the larger it is.
+DRACO_RATIO = 4096
+DRACO_FREE = 1 << 20  # points and triangles of small data
 
 Array = NDArray[Any]
 
@@ -157,6 +160,8 @@ def _check_draco(data: bytes, num_corners: int, num_vertices: int, what: str) ->
     fits = num_points == num_vertices if method == DRACO_SEQUENTIAL else num_points <= num_vertices
     if 3 * num_faces != num_corners or not fits or num_faces > MAX_TRIANGLES or num_vertices > 3 * MAX_TRIANGLES:
         raise SceneError(f"{what} has other numbers of vertices or indices than its Draco data; export the scene again")
+    if max(num_faces, num_vertices) > max(DRACO_FREE, DRACO_RATIO * len(data)):
+        raise SceneError(f"{what} claims more than its Draco data can hold; export the scene again")
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
