@@ -97,6 +97,7 @@ GROUPS = (
     Group("bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),
     Group("bench.ray_saving", ("bake.ray_saving",)),
     Group("bench.store_size", ("store.bytes_per_view_sample",)),
+    Group("bench.plan_disk", ("plan.disk_ratio",)),
     Group("bench.plan", ("plan.memory_share", "plan.samples_share", "plan.store_share", "plan.rays_share")),
     Group("bench.mesh_files", ("import.obj", "import.ply")),
     Group("bench.workers", ("bake.two_workers_speedup",)),
@@ -119,6 +120,7 @@ GROUPS = (
     Group("bench.btf_true", ("btf.geometry_rmse", "btf.sphere_rmse", "btf.table_rmse")),
     Group("bench.btf_shown", ("btf.view_fps", "btf.light_ms", "btf.light_bytes")),
     Group("bench.btf_held", ("btf.held_ms",)),
+    Group("bench.btf_several", ("btf.several_ratio", "btf.five_vs_two")),
     Group("bench.in_out", ("in_out.phong_terms_per_exponent", "in_out.torrance_sparrow_terms_sigma2")),
     Group(
         "bench.surface",

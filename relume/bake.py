@@ -110,6 +110,8 @@ class Plan:
     Attributes:
         num_rays: shadow and camera rays.
         store_bytes: on disk, uncompressed.
+        disk_bytes: on disk, as a little of it takes; no bound. 0 where none was tried: then `store_bytes` counts.
+        scratch_bytes: of files that are there besides while it is baked.
         peak_bytes: memory of one worker process.
         lone_bytes: what of it one process takes while the others do without: of a step that is one task.
         work_s: about what one core takes that was measured once: plans are compared by it. 0 in plans of before.
@@ -121,6 +123,13 @@ class Plan:
     peak_bytes: int
     lone_bytes: int = 0
     work_s: float = 0.0
+    disk_bytes: int = 0
+    scratch_bytes: int = 0
+
+    @property
+    def planned_bytes(self) -> int:
+        """Of the finished store, on disk."""
+        return self.disk_bytes or self.store_bytes
 
 
 @dataclass(frozen=True)

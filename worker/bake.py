@@ -33,7 +33,7 @@ from relume.folders import folder_bytes
 from relume.replacing import remove_folder
 from relume.scene.model import Scene
 from relume.store import code_of, fill, open_store, publish
-from worker.budget import check_room
+from relume.store.room import check_room
 from worker.database.patience import Given, Result, patiently
 from worker.lease import HEARTBEAT_S, LeaseKeeper, log_lost
 from worker.ledger import Ledger
@@ -283,7 +283,7 @@ class BakeRunner:
     def _sentence(self, error: Exception) -> str:
         """What went wrong and what to do, in one line."""
         if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_no_room(error)):
-            needed = self._ask(self.ledger.bake, self.job.bake_id).plan.store_bytes
+            needed = self._ask(self.ledger.bake, self.job.bake_id).plan.planned_bytes
             missing = bytes_text(max(1_000_000, needed - folder_bytes(self._staging)))
             return f"disk full; free {missing}, then bake again; finished parts are kept"
         if isinstance(error, RelumeError):

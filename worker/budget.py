@@ -7,13 +7,12 @@ import shutil
 from pathlib import Path
 
 from relume.bake import Plan
-from relume.errors import DiskBudgetError, DiskFullError, MemoryBudgetError
+from relume.errors import DiskBudgetError, MemoryBudgetError
+from relume.store.room import RESERVE_BYTES
 
 REMEDY = "take fewer lights, a smaller size or fewer views at once"
 
-# Left for the server's own work and for the system.
-MEMORY_SHARE = 0.9
-DISK_RESERVE_BYTES = 64 << 20
+MEMORY_SHARE = 0.9  # the rest is left for the server's own work and for the system
 
 
 def available_bytes() -> int:
@@ -38,12 +37,6 @@ def _system_available_bytes() -> int:
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
-def check_room(data_dir: Path) -> None:
-    """Raise DiskFullError where a bake is to stop: without the rest of the disk the ledger could not even delete."""
-    if shutil.disk_usage(data_dir).free < DISK_RESERVE_BYTES:
-        raise DiskFullError("the store of a bake")
-
-
 def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
     """Refuse a plan that needs more memory or disk than there is.
 
@@ -60,6 +53,6 @@ def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
     if num_processes > 0 and needed > memory:
         what = f"the memory of this bake in {num_processes} process{'es' if num_processes > 1 else ''}"
         raise MemoryBudgetError(what, needed, memory, f"{REMEDY}, or a scene of fewer triangles")
-    free = max(0, shutil.disk_usage(data_dir).free - DISK_RESERVE_BYTES)
-    if plan.store_bytes > free:
-        raise DiskBudgetError("the store of this bake on disk", plan.store_bytes, free, f"free some disk, or {REMEDY}")
+    free, taken = max(0, shutil.disk_usage(data_dir).free - RESERVE_BYTES), plan.planned_bytes + plan.scratch_bytes
+    if taken > free:
+        raise DiskBudgetError("the store of this bake on disk", taken, free, f"free some disk, or {REMEDY}")

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -121,17 +122,24 @@ class BakeService:
         self.close()
 
     def plan(self, scene_id: str, recipe: Recipe) -> Plan:
-        """What a bake would cost, checked against this machine's memory and disk; traces nothing.
+        """What a bake would cost, checked against this machine's memory and disk.
+
+        A little of it is baked where its bound on disk is large: a second for the first plan of a scene.
 
         Raises:
             NotFoundError: there is no such scene.
             PlanError: the recipe does not fit the scene; MemoryBudgetError: it does not fit the machine.
             ParameterError: there is no such method.
         """
+        from relume.methods.disk import disk_of
+
         identity = self._known_scene(scene_id)
         with idle_timer.kept_awake():
             scene = recipe.seen(scene_of(self.data_dir, identity))
-            plan = self._method(recipe.method).plan(scene, recipe)
+            method = self._method(recipe.method)
+            plan = method.plan(scene, recipe)
+            disk = disk_of(method, scene, recipe, plan)
+        plan = replace(plan, disk_bytes=disk.store, scratch_bytes=disk.scratch)
         processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
         check_budget(plan, self.data_dir, processes)
         return plan

@@ -86,6 +86,11 @@ def texture_bytes(scene: Scene) -> int:
     return sum(texture.pixels.size * 2 for texture in _textures(scene))
 
 
+def distinct_textures(scene: Scene) -> list[Texture]:
+    """All textures and normal maps, each once, whatever materials have it."""
+    return list({id(texture): texture for texture in _textures(scene)}.values())
+
+
 def num_triangles(scene: Scene) -> int:
     """Of all meshes together."""
     return sum(len(mesh.faces) for mesh in scene.meshes)

@@ -83,7 +83,7 @@ class GatherMethod:
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
         bounds.check_gathering(recipe, MAX_CELLS)
-        direct, cells, (rays, _) = self._views.plan(scene, recipe), _num_cells(recipe), self._rays_of(recipe)
+        direct, cells, (rays, _) = self._views.plan(scene, recipe), num_cells(recipe), self._rays_of(recipe)
         points, bits = POINTS_A_CELL * cells, (recipe.num_lights + 7) // 8
         seen = most_seen(scene, recipe)
         num_rays = direct.num_rays + direct.num_view_samples * (rays + 2 * seen)
@@ -164,7 +164,7 @@ class GatherMethod:
 
     def _cells(self, scene: Scene, recipe: Recipe, store: StoreReader) -> Written:
         geometry = self._views.geometry_of(scene)
-        cells = choose_cells(scene, geometry, recipe.views, recipe.size, _num_cells(recipe))
+        cells = choose_cells(scene, geometry, recipe.views, recipe.size, num_cells(recipe))
         fields: dict[str, NDArray[Any]] = {**vars(cells), **cells.tree._asdict()}
         del fields["tree"]
         thrown = make_thrown(scene, geometry, store, cells.position)
@@ -201,7 +201,7 @@ class GatherMethod:
         return Written(arrays, num_rays, sum(part.trace_s for part in parts))
 
 
-def _num_cells(recipe: Recipe) -> int:
+def num_cells(recipe: Recipe) -> int:
     """As many as the pictures' pixels can tell apart, where the recipe does not say."""
     if recipe.gather_samples is not None:
         return recipe.gather_samples

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,12 +91,10 @@ class SurfaceMethod:
         checked = self._views.plan(scene, recipe)
         if not MIN_POINTS <= recipe.num_points <= MAX_POINTS:
             raise PlanError(f"{recipe.num_points} points were asked for; give {MIN_POINTS} to {MAX_POINTS:,}")
-        most_alike = _MOST_ALIKE * len(scene.materials)  # that cannot be shared, however few are asked for
-        points, bits = int(_MORE_POINTS * recipe.num_points) + most_alike, (recipe.num_lights + 7) // 8
+        points = _most_points(scene, recipe)
         num_cells, rays = _num_cells(recipe), _rays_of(recipe)
         of_cells = POINTS_A_CELL * num_cells
         nodes = most_nodes(bounds.num_triangles(scene), recipe.num_points)
-        triangles = bounds.num_triangles(scene)
         textures = bounds.texture_bytes(scene)
         alone = max(nodes * _MAKING_BYTES_A_NODE, moving_error.BYTES + points * moving_error.POINT_BYTES)
         num_rays = points * (recipe.num_lights + rays) + of_cells * (recipe.num_lights + RAYS_A_CELL_POINT)
@@ -104,17 +102,7 @@ class SurfaceMethod:
             num_view_samples=points,
             num_rays=num_rays,
             work_s=bounds.work_s(scene, num_rays, _RAY_NS, _TRIANGLE_US),
-            store_bytes=points * (_POINT_BYTES + 2 * rays + bits)
-            + of_cells * bits
-            + num_cells * _CELL_BYTES
-            + (4 + _VERTEX_BYTES) * nodes
-            + harmonic_bytes(points, num_cells)
-            + triangles * 10
-            + bounds.triangles_bytes(scene)
-            + bounds.corner_bytes(scene)
-            + textures
-            + bounds.lights_bytes(scene, recipe)
-            + (1 << 20),
+            store_bytes=sum(parts(scene, recipe)) + textures + (1 << 20),
             peak_bytes=checked.peak_bytes
             + alone
             + num_cells * _MAKING_BYTES_A_CELL
@@ -241,6 +229,38 @@ def _seen(geometry: Geometry, points: Points, targets: Targets, *, is_even: bool
         return trace_visibility(geometry.embree, points.position, points.normal, targets.directions)
     found = trace_coherent(geometry.embree, points.position, points.normal, targets)
     return Traced(found.visible, found.rays.traced, found.trace_s)
+
+
+class Parts(NamedTuple):
+    """Numbers of the parts of a store, textures apart."""
+
+    links: int
+    points: int
+    cells: int
+    nodes: int
+    harmonics: int
+    triangles: int
+    lights: int
+
+
+def parts(scene: Scene, recipe: Recipe) -> Parts:
+    """Bound the bytes of each part of a store before it is compressed."""
+    points, bits, num_cells = _most_points(scene, recipe), (recipe.num_lights + 7) // 8, _num_cells(recipe)
+    triangles = bounds.num_triangles(scene)
+    return Parts(
+        links=points * 2 * _rays_of(recipe),
+        points=points * (_POINT_BYTES + bits),
+        cells=POINTS_A_CELL * num_cells * bits + num_cells * _CELL_BYTES,
+        nodes=(4 + _VERTEX_BYTES) * most_nodes(triangles, recipe.num_points),
+        harmonics=harmonic_bytes(points, num_cells),
+        triangles=triangles * 10 + bounds.triangles_bytes(scene) + bounds.corner_bytes(scene),
+        lights=bounds.lights_bytes(scene, recipe),
+    )
+
+
+def _most_points(scene: Scene, recipe: Recipe) -> int:
+    most_alike = _MOST_ALIKE * len(scene.materials)  # that cannot be shared, however few are asked for
+    return int(_MORE_POINTS * recipe.num_points) + most_alike
 
 
 def _num_cells(recipe: Recipe) -> int:

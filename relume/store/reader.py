@@ -6,7 +6,6 @@ Zarr fills what it does not find; here a missing shard, a cut shard and a failed
 from __future__ import annotations
 
 import math
-import tempfile
 import threading
 from collections import Counter
 from collections.abc import Mapping
@@ -22,6 +21,7 @@ from relume.bake import ArraySpec
 from relume.errors import ChunkDamagedError, StoreError, StoreGoneError, StoreNotFoundError
 from relume.folders import folder_bytes
 from relume.store.files import read_json
+from relume.store.room import scratch_file
 from relume.store.schema import (
     MANIFEST_NAME,
     check_path,
@@ -76,7 +76,7 @@ class Reader:
 
     def scratch(self) -> IO[bytes]:
         """A file beside the arrays, of no name that anybody would read. See `relume.bake.TaskStore`."""
-        return tempfile.TemporaryFile(dir=self.path)
+        return scratch_file(self.path)
 
     def _rows(self, path: str, start: int, stop: int | None) -> NDArray[Any]:
         spec, array = self._open(path)

@@ -21,6 +21,7 @@ from zarr.storage import LocalStore
 from relume.bake import ArraySpec, Rows
 from relume.errors import StoreError
 from relume.store.files import read_json
+from relume.store.room import check_room
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
 
 # Level 1 keeps up with tracing on one thread; higher levels save little on visibility bits.
@@ -85,6 +86,7 @@ class StoreWriter:
             start: row of the array that the first of them becomes.
         Raises:
             StoreError: there is no such array, or the rows do not fit it or cut a shard in two.
+            DiskFullError: so little of the disk is left that a bake stops.
         """
         spec = self._spec(path)
         if spec is None:
@@ -97,6 +99,7 @@ class StoreWriter:
         if start % spec.shards[0] or (stop % spec.shards[0] and stop != spec.shape[0]):
             raise StoreError(f"rows {start}..{stop} of {path} cut a shard of {spec.shards[0]} rows; write whole shards")
         if rows.size:
+            check_room(self.path)
             array = cast("zarr.Array[Any]", self._root[path]).with_config({"write_empty_chunks": True})
             array[start:stop] = rows
 

@@ -49,7 +49,7 @@ def submit_bake(request: BakeRequest, services: Shared, caller: Who) -> JSONResp
         _check_quotas(request.scene, recipe, caller, services)
         identity = services.bakes.submit(request.scene, recipe, caller.name)
         status = services.bakes.get(identity)
-        services.access.quotas.own(caller.name, "bake", identity, status.plan.store_bytes)
+        services.access.quotas.own(caller.name, "bake", identity, status.plan.planned_bytes)
     services.metrics.bakes.inc()
     body = bake_body(status, services)
     return JSONResponse(body.model_dump(), 202, {"Location": f"/api/bakes/{identity}"})
@@ -65,7 +65,7 @@ def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services
     quotas.check_room()
     quotas.check_bakes(caller.name)
     if quotas.counts_bytes:
-        quotas.check_bytes(caller.name, services.bakes.plan(scene, recipe).store_bytes)
+        quotas.check_bytes(caller.name, services.bakes.plan(scene, recipe).planned_bytes)
 
 
 @router.get("")
@@ -200,7 +200,7 @@ def _plan(plan: Plan, services: Services) -> PlanBody:
     return PlanBody(
         view_samples=plan.num_view_samples,
         rays=plan.num_rays,
-        store_bytes=plan.store_bytes,
+        store_bytes=plan.planned_bytes,
         peak_bytes=plan.peak_bytes,
         seconds=services.bakes.seconds_for(plan),
     )

@@ -198,7 +198,8 @@ class BakeRequest(Body):
 
 
 class PlanBody(Body):
-    """What a bake will cost; upper bounds, but for `seconds`: judged by finished bakes, null where there are none."""
+    """What a bake will cost; upper bounds, but for `store_bytes`, on disk, as a little of it takes, rounded up; and
+    `seconds`: judged by finished bakes, null where there are none."""
 
     view_samples: int
     rays: int

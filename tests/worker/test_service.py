@@ -152,7 +152,7 @@ def test_where_the_ledger_has_no_room_to_delete_stores_make_some(
 def test_a_bake_leaves_the_rest_of_the_disk_to_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path) as service:
         with monkeypatch.context() as patch:
-            patch.setattr("worker.budget.DISK_RESERVE_BYTES", 1 << 60)
+            patch.setattr("relume.store.room.RESERVE_BYTES", 1 << 60)
             patch.setattr("worker.service.check_budget", lambda *_: None)
             status = follow(service, service.submit(SCENE.id, RECIPE))
             assert (status.state, (status.problem or "")[:9]) == ("failed", "disk full")

@@ -1,0 +1,69 @@
+"""plan.disk_ratio: disk that is planned for bakes ÷ disk that they take, the largest over scenes and methods.
+
+All built-in scenes and all of shared/data that can be imported, by all methods, in one size. A ratio below 1, a plan
+that is too small, fails the run.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from bench.figure import Figure, skipped
+from bench.scenes import shared_data
+from relume.bake import Recipe
+from relume.errors import RelumeError
+from relume.folders import folder_bytes
+from relume.methods.disk import disk_of
+from relume.methods.registry import METHODS
+from relume.scene.built_in import BUILT_IN
+from relume.scene.importer import import_scene
+from relume.scene.model import Scene
+from relume.store import bake_here
+
+NAME = "plan.disk_ratio"
+_FILES = ("scenes/*.glb", "scenes/*/*.glb", "scenes/*/*.gltf", "scenes/meshes/*.ply", "scenes/meshes/*.obj")
+_OF_GLASS = "conformance/**/*.glb"  # of those, the ones that have glass: plans of these were worst
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake all scenes by all methods; the largest ratio, and whose it is."""
+    if not tiny and not shared_data().is_dir():
+        return skipped((NAME,), "", "the folder of shared scenes is not here: set RELUME_SHARED_DATA")
+    size, lights, points = ((64, 48), 60, 2000) if tiny else ((320, 240), 300, 50_000)
+    ratios: dict[str, float] = {}
+    for scene in _scenes(tiny):
+        for name, method in sorted(METHODS.items()):
+            recipe = Recipe(name, (scene.cameras[0].name,), size, lights, num_points=points)
+            planned = disk_of(method, scene, recipe, method.plan(scene, recipe)).store
+            with tempfile.TemporaryDirectory() as folder:
+                taken = folder_bytes(bake_here(method, scene, recipe, Path(folder) / "s.zarr"))
+            ratios[f"{scene.name}, {name}"] = planned / taken
+    most, least = max(ratios, key=ratios.__getitem__), min(ratios, key=ratios.__getitem__)
+    if ratios[least] < 1:
+        raise AssertionError(f"{least} takes {1 / ratios[least]:.2f} times what was planned")
+    context = {"size": list(size), "lights": lights, "points": points, "bakes": len(ratios), "most": most}
+    least_of = {"least": least, "least_ratio": round(ratios[least], 2)}
+    each = {"ratios": {which: round(ratio, 2) for which, ratio in ratios.items()}}
+    return [Figure(NAME, ratios[most], "of what is taken", {**context, **least_of, **each})]
+
+
+def _scenes(tiny: bool) -> Iterator[Scene]:
+    for built_in in list(BUILT_IN.values())[: 1 if tiny else None]:
+        yield built_in.make()
+    if tiny:
+        return
+    for pattern in _FILES:
+        for path in sorted(shared_data().glob(pattern)):
+            yield from _imported(path)
+    for path in sorted(shared_data().glob(_OF_GLASS)):
+        yield from (scene for scene in _imported(path) if any(material.glass for material in scene.materials))
+
+
+def _imported(path: Path) -> Iterator[Scene]:
+    """A scene; none where its file is one of those that are refused."""
+    try:
+        yield import_scene(path, path.stem)
+    except RelumeError:
+        return
