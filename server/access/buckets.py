@@ -41,13 +41,13 @@ class Buckets:
 
     def wait_s(self, name: str) -> float:
         """Seconds until a call of this name may come; 0: now."""
-        return max(0.0, (1.0 - self._level(name)) / self._per_second)
+        return max(0.0, (1.0 - self.level(name)) / self._per_second)
 
     def take(self, name: str) -> float:
         """Take one call; seconds to wait where there is none, which takes nothing."""
         wait_s = self.wait_s(name)
         if wait_s == 0.0:
-            self._levels[name] = self._level(name) - 1.0, self._clock()
+            self._levels[name] = self.level(name) - 1.0, self._clock()
             self._levels.move_to_end(name)
             if len(self._levels) > MAX_BUCKETS:
                 self._levels.popitem(last=False)
@@ -55,8 +55,9 @@ class Buckets:
 
     def give_back(self, name: str) -> None:
         """What was taken last did not count after all."""
-        self._levels[name] = min(self._burst, self._level(name) + 1.0), self._clock()
+        self._levels[name] = min(self._burst, self.level(name) + 1.0), self._clock()
 
-    def _level(self, name: str) -> float:
+    def level(self, name: str) -> float:
+        """How many calls of this name may come at once."""
         level, at_s = self._levels.get(name, (self._burst, -math.inf))
         return min(self._burst, level + (self._clock() - at_s) * self._per_second)

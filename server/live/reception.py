@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from typing import Any
 
 from starlette.websockets import WebSocket
 
@@ -13,6 +14,7 @@ from relume.picture.transfer import Eyes
 from relume.scene.placed_camera import placed_camera
 from server.access.rules import check_message
 from server.errors import CLOSE_POLICY
+from server.live.pace import Pace
 from server.live.reading import read_message
 from server.live.rooms.room import is_own_way
 from server.live.session_state import SessionState
@@ -42,22 +44,30 @@ class Reception:
             WebSocketDisconnect: the client is gone.
             ProtocolError: the session must end; carries the close code.
         """
+        pace = Pace()
         while True:
             received = await self._websocket.receive()
             received_s = time.perf_counter()
-            message = read_message(received)
-            if isinstance(message, protocol.Problem):
-                await self._bad(message)
-                continue
-            if isinstance(message, PingMessage):  # from here, so that no frame is waited for
-                await self._socket.send(PongMessage())
-                continue
-            try:
-                self._take(message, received_s)
-            except RelumeError as error:
-                revision = message.revision if isinstance(message, protocol.EditMessage) else None
-                await self._socket.refuse(error, revision)
-            self._pending.news.set()
+            num_in_flight = self._window.num_in_flight
+            pace.begin()
+            await self._answer(received, received_s)
+            await pace.pause(is_due=self._window.num_in_flight < num_in_flight)
+
+    async def _answer(self, received: Any, received_s: float) -> None:
+        """Do what a message asks, or say why not."""
+        message = read_message(received)
+        if isinstance(message, protocol.Problem):
+            await self._bad(message)
+            return
+        if isinstance(message, PingMessage):  # from here, so that no frame is waited for
+            await self._socket.send(PongMessage())
+            return
+        try:
+            self._take(message, received_s)
+        except RelumeError as error:
+            revision = message.revision if isinstance(message, protocol.EditMessage) else None
+            await self._socket.refuse(error, revision)
+        self._pending.news.set()
 
     async def _bad(self, problem: protocol.Problem) -> None:
         """A message that no client of ours sends: said each time, forgiven a number of times."""

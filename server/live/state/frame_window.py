@@ -43,6 +43,11 @@ class FrameWindow:
         return num_alike < (1 if is_focused else MAX_FRAMES_IN_FLIGHT - 1)
 
     @property
+    def num_in_flight(self) -> int:
+        """Frames that were sent and not acknowledged yet."""
+        return len(self._in_flight)
+
+    @property
     def next_frame(self) -> int:
         """Id of the frame to be sent next."""
         return self._last_frame + 1

@@ -1,0 +1,130 @@
+"""flood.latency_ratio: another session's edit → frame beside flooding viewers ÷ alone, p50, the worse of one and four.
+
+A real server in its own process, the picture of `bench.session`. A client edits and waits for the frame, with a rest in
+between as a hand has. In turn, on the same session: alone, beside one and beside four viewers, each in a process of its
+own that sends messages as fast as its socket takes them, and comes back if it is told to go: acknowledgements, edits of
+the exposure, and edits that are refused, in turn.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+
+import numpy as np
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import connect
+
+from bench.figure import Figure
+from bench.house import SPEAKS, House, Server, SessionClient, baked_house, serving, session
+from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from relume.bake import Recipe
+from relume.environments.studio import studio
+from server.live.rooms.door import watch_of
+
+_SIGMA = "/materials/Teapot/terms/1/params/sigma"
+_KINDS = ("acknowledgements", "exposure", "refused")
+_REST_S = 0.02
+_BEFORE_S = 1.0  # until the flood has come
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, serve, edit alone and beside floods, in turn."""
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((512, 512), 1000, 3, 4.0)
+    scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
+    room = secrets.token_hex(16)
+    found: dict[tuple[str, int], list[float]] = {}
+    with (
+        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
+        serving(house) as server,
+        session(server, house.bake) as client,
+        _held(server, house, room),
+    ):
+        client.send(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
+        client.exact(0)
+        hand = _Hand(client)
+        hand.edit(seconds)  # what is made once is made
+        for _ in range(rounds):
+            for kind in _KINDS:
+                for number in (0, 1, 4):
+                    with _flooding(server, house, watch_of(room), kind, number):
+                        time.sleep(min(_BEFORE_S, seconds) if number else 0.0)
+                        found.setdefault((kind, number), []).extend(hand.edit(seconds))
+    quiet_ms = float(np.median([ms for (_, number), each in found.items() if number == 0 for ms in each]))
+    medians = {f"{kind}_{number}_ms": float(np.median(found[kind, number])) for kind in _KINDS for number in (1, 4)}
+    context = {"quiet_ms": quiet_ms, **medians, "rounds": rounds, "seconds": seconds, "size": list(size)}
+    return [Figure("flood.latency_ratio", max(medians.values()) / quiet_ms, "ratio", context)]
+
+
+class _Hand:
+    """Moves a slider a little, again and again."""
+
+    def __init__(self, client: SessionClient) -> None:
+        self._client, self._revision = client, 0
+
+    def edit(self, seconds: float) -> list[float]:
+        """Milliseconds of each edit until a frame shows it."""
+        found, until_s = [], time.perf_counter() + seconds
+        while not found or time.perf_counter() < until_s:
+            self._revision += 1
+            sigma = 0.2 + 0.15 * np.sin(2 * np.pi * self._revision / 90)
+            patch = [{"op": "replace", "path": _SIGMA, "value": round(float(sigma), 5)}]
+            sent_s = time.perf_counter()
+            self._client.send(type="edit", revision=self._revision, patch=patch, hand=_SIGMA)
+            while (frame := self._client.frame()) is None or frame[0]["revision"] < self._revision:
+                pass
+            found.append(1e3 * (time.perf_counter() - sent_s))
+            time.sleep(_REST_S)
+        return found
+
+
+@contextmanager
+def _held(server: Server, house: House, room: str) -> Iterator[None]:
+    """An editor who does nothing is in the room, so that others can watch."""
+    address = f"{server.session(house.bake)}?room_prefix={room[:8]}"
+    with connect(address, subprotocols=[SPEAKS], max_size=None, max_queue=None, compression=None) as editor:
+        editor.send(json.dumps({"type": "open", "room": room}))
+        SessionClient(editor).exact(0)
+        yield
+
+
+@contextmanager
+def _flooding(server: Server, house: House, watch: str, kind: str, number: int) -> Iterator[None]:
+    address = f"{server.session(house.bake)}?room_prefix={watch[:8]}"
+    spawning = get_context("spawn")
+    viewers = [spawning.Process(target=flood, args=(address, watch, kind), daemon=True) for _ in range(number)]
+    for viewer in viewers:
+        viewer.start()
+    try:
+        yield
+    finally:
+        for viewer in viewers:
+            viewer.kill()
+            viewer.join()
+
+
+def flood(address: str, watch: str, kind: str) -> None:
+    """Send as fast as can be, until killed."""
+    while True:
+        with (
+            suppress(WebSocketException, OSError),
+            connect(address, subprotocols=[SPEAKS], max_size=None, compression=None) as viewer,
+        ):
+            viewer.send(json.dumps({"type": "open", "watch": watch}))
+            threading.Thread(target=deque, args=(viewer, 0), daemon=True).start()  # reads all, and keeps nothing
+            for revision in range(1, 1_000_000_000):
+                viewer.send(json.dumps(_message(kind, revision)))
+
+
+def _message(kind: str, revision: int) -> dict[str, object]:
+    if kind == "acknowledgements":
+        return {"type": "ack", "frame": 1}
+    path = "/display/exposure" if kind == "exposure" else _SIGMA
+    patch = [{"op": "replace", "path": path, "value": revision % 7 / 10}]
+    return {"type": "edit", "revision": revision, "patch": patch}

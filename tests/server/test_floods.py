@@ -1,0 +1,151 @@
+"""Sessions that send as much as they can: others go on, and who does not stop is told to go."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from running_server import open_socket, running_server
+from server_fakes import Control
+from session_client import SIGMA, Baked, open_session
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
+
+from relume.errors import ProtocolError
+from server.live import pace as pacing
+from server.live.pace import AT_ONCE, PATIENCE_S, PER_SECOND, SHARE, WORK_AT_ONCE_S, Pace
+from server.live.reception import Reception
+from server.settings import Settings
+
+
+class Clock:
+    """Seconds that pass while something sleeps, or works."""
+
+    def __init__(self) -> None:
+        self.now_s = self.worked_s = 0.0
+        self.sleeps: list[float] = []
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    async def sleep(self, seconds: float) -> None:
+        self.now_s += seconds
+        self.sleeps.append(seconds)
+
+
+def after(clock: Clock, num: int, work_s: float = 0.0, rest_s: float = 0.0, *, is_due: bool = False) -> None:
+    """Take so many messages, each of which takes `work_s` and comes `rest_s` after the one before was taken."""
+    pace = Pace(clock, lambda: clock.worked_s, clock.sleep)
+
+    async def take() -> None:
+        for _ in range(num):
+            clock.now_s += rest_s
+            pace.begin()
+            clock.now_s += work_s
+            clock.worked_s += work_s
+            await pace.pause(is_due=is_due)
+
+    with pytest.raises(StopIteration):  # it waits for nothing but the clock
+        take().send(None)
+
+
+def test_a_burst_is_taken_at_once_and_others_have_a_turn_after_each_message() -> None:
+    clock = Clock()
+    after(clock, AT_ONCE)
+    assert clock.sleeps == [0.0] * AT_ONCE
+
+
+def test_more_than_that_waits() -> None:
+    clock = Clock()
+    after(clock, AT_ONCE + 1000)
+    assert clock.now_s == pytest.approx(1000 / PER_SECOND, rel=0.01)
+
+
+def test_hands_that_move_at_each_frame_never_wait() -> None:
+    clock = Clock()
+    after(clock, 20_000, rest_s=1 / 240)
+    assert set(clock.sleeps) == {0.0}
+
+
+def test_what_acknowledges_frames_is_not_counted() -> None:
+    clock = Clock()
+    after(clock, 20_000, is_due=True)
+    assert set(clock.sleeps) == {0.0}
+
+
+def test_messages_that_take_long_have_a_share_of_the_loop() -> None:
+    clock = Clock()
+    after(clock, 1000, work_s=0.01)
+    assert clock.now_s == pytest.approx((1000 * 0.01 - WORK_AT_ONCE_S) / SHARE, rel=0.01)
+
+
+def test_a_hand_that_moves_in_a_large_scene_never_waits() -> None:
+    clock = Clock()
+    after(clock, 20_000, work_s=0.002, rest_s=1 / 60)
+    assert set(clock.sleeps) == {0.0}
+
+
+def test_who_goes_on_sending_too_much_is_told_to_go() -> None:
+    clock = Clock()
+    with pytest.raises(ProtocolError, match="more than 500 a second for 10 s") as ended:
+        after(clock, 1_000_000)
+    assert ended.value.close_code == 1008
+    assert PATIENCE_S <= clock.now_s < PATIENCE_S + 2
+
+
+def test_messages_that_are_refused_count_as_well(
+    client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("PER_SECOND", 50.0), ("AT_ONCE", 10), ("PATIENCE_S", 0.1)):
+        monkeypatch.setattr(pacing, name, value)
+    with open_session(client, baked.bake) as session:
+        for _ in range(200):
+            session.edit(1, SIGMA, 99.0)
+        with pytest.raises(ConnectionError) as ended:
+            session.text("never")
+    assert ended.value.args[0] == 1008
+    assert "too many messages" in ended.value.args[1]
+
+
+def test_another_sessions_message_is_taken_before_a_flood_is(
+    settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what came to the server while it was at something else."""
+    taken: list[str] = []
+    take, is_held = Reception._take, False
+
+    def take_late(self: Reception, message: Any, received_s: float) -> None:
+        nonlocal is_held
+        taken.append(message.type)
+        if not is_held:
+            is_held = True
+            time.sleep(0.5)  # all that the test sends is there then
+        take(self, message, received_s)
+
+    monkeypatch.setattr(Reception, "_take", take_late)
+    with running_server(settings, control) as running:
+        url = running.baked_url()
+        with open_socket(url) as flooding, open_socket(url) as other:
+            for session in (flooding, other):
+                assert json.loads(session.recv())["type"] == "hello"
+            for _ in range(400):
+                flooding.send('{"type":"stream","format":"hdr"}')
+            other.send('{"type":"focus","view":"front"}')
+            while taken.count("stream") < 400:
+                time.sleep(0.01)
+    assert "focus" in taken[:200]
+
+
+def test_a_flood_over_a_real_socket_ends(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pacing, "PATIENCE_S", 0.3)
+    gone = pytest.raises(ConnectionClosed)  # with 1008, unless what is not read any more resets the connection
+    with running_server(settings, control) as running, open_socket(running.baked_url()) as session, gone:
+        flood(session)
+
+
+def flood(session: ClientConnection) -> None:
+    for _ in range(1_000_000):
+        session.send('{"type":"ack","frame":1}')
