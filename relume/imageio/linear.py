@@ -20,6 +20,7 @@ F32 = NDArray[np.float32]
 MAX_EXPANSION = 1_000  # deflate packs zeros 1,032 : 1; no photograph comes near it
 FREE_BYTES = 64 << 20  # may be claimed by any file, however small
 EXR_MAGIC = b"\x76\x2f\x31\x01"
+oiio.attribute("try_all_readers", 0)  # else what the reader of a suffix refuses goes to twenty others
 CheckSize = Callable[[int, int], None]
 ChooseRows = Callable[[int, int], int]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from relume.bake import ArraySpec
@@ -34,6 +34,10 @@ MAX_DIMENSIONS = 5
 # What a task creates without announcing it is read whole or in long runs: chunks of about this size suit both.
 UNANNOUNCED_CHUNK_BYTES = 512 << 10
 UNANNOUNCED_CHUNKS_A_SHARD = 32  # a shard is in memory while it is written, as it is and compressed
+
+# Zarr runs whatever codec is named, with what is said of it; a store may come from where others can write.
+CODECS = ("bytes", "zstd", "crc32c")
+INDEX_CODECS = ("bytes", "crc32c")
 
 _SEGMENT = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
@@ -79,6 +83,7 @@ def spec_from_metadata(path: str, metadata: Mapping[str, Any]) -> ArraySpec:
         (codec,) = metadata["codecs"]
         if codec["name"] != "sharding_indexed":
             raise StoreError(f"array {path} is not sharded; bake the scene again")
+        inner, index = (_names(codec["configuration"][key]) for key in ("codecs", "index_codecs"))
         spec = ArraySpec(
             path,
             tuple(metadata["shape"]),
@@ -88,7 +93,13 @@ def spec_from_metadata(path: str, metadata: Mapping[str, Any]) -> ArraySpec:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise StoreError(f"array {path} has unreadable metadata ({error}); bake the scene again") from error
+    if (inner, index) != (CODECS, INDEX_CODECS) or metadata.get("storage_transformers"):
+        raise StoreError(f"array {path} is packed by other codecs than relume's; bake the scene again")
     return check_spec(spec)
+
+
+def _names(codecs: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    return tuple(str(codec["name"]) for codec in codecs)
 
 
 def num_shards(spec: ArraySpec) -> int:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from relume.environments.reading import read_environment
 from relume.errors import SceneError
+from relume.imageio.linear import read_pixels
 
 
 def hdr(width: int, height: int, pixels: bytes = b"") -> bytes:
@@ -140,6 +141,18 @@ EXR = _exr_file()
 
 def test_changed_exr_is_good_to_begin_with() -> None:
     np.testing.assert_array_equal(read_environment(EXR, "sky").radiance, np.full((8, 16, 3), 0.5, np.float32))
+
+
+@pytest.mark.parametrize("kind", ["png", "tga", "bmp", "tif", "pnm", "sgi", "dpx"])
+@pytest.mark.parametrize("suffix", [".exr", ".hdr"])
+def test_no_other_reader_has_a_try_at_what_is_no_hdr_and_no_exr(tmp_path: Path, kind: str, suffix: str) -> None:
+    path = tmp_path / f"a.{kind}"
+    output = oiio.ImageOutput.create(str(path))
+    assert output.open(str(path), oiio.ImageSpec(8, 8, 3, oiio.UINT8))
+    assert output.write_image(np.zeros((8, 8, 3), np.uint8))
+    output.close()
+    with pytest.raises(SceneError, match="not what its first bytes say"):
+        read_pixels(path.read_bytes(), suffix, "it", lambda width, height: None)
 
 
 def test_environment_refuses_missing_files(tmp_path: Path) -> None:

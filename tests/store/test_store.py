@@ -193,6 +193,30 @@ def test_absurd_metadata_is_refused_before_anything_is_allocated(tmp_path: Path,
         open_store(store)
 
 
+@pytest.mark.parametrize("place", ["codecs", "index_codecs"])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["bytes", "gzip", "crc32c"],
+        ["bytes", "numcodecs.zfpy"],
+        ["transpose", "bytes", "zstd", "crc32c"],
+        ["bytes", "zstd"],  # without a checksum
+        [],
+        None,
+    ],
+)
+def test_what_names_other_codecs_than_relumes_is_not_handed_to_them(
+    tmp_path: Path, place: str, names: list[str] | None
+) -> None:
+    store = build(tmp_path)
+    document = json.loads((store / SPEC.path / "zarr.json").read_text())
+    configuration = document["codecs"][0]["configuration"]
+    configuration[place] = None if names is None else [{"name": name, "configuration": {}} for name in names]
+    edit_json(store / SPEC.path / "zarr.json", codecs=document["codecs"])
+    with pytest.raises(StoreError, match=r"other codecs|unreadable metadata"):
+        open_store(store)
+
+
 @pytest.mark.parametrize(
     "text", ["", "[]", "{", '{"files": 3}', '{"files": [{"path": "../x", "bytes": 1}]}', "[" * 9999]
 )
