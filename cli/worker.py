@@ -36,8 +36,10 @@ def worker(
     set_up(settings.log_format, settings.log_level)
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: asked.set())
-    more = {"num_workers": processes, "shares": settings.turns}
-    with private_files(), BakeService(settings.data, settings.database_url, **more):
+    with (
+        private_files(),
+        BakeService(settings.data, settings.database_url, num_workers=processes, shares=settings.turns),
+    ):
         typer.echo("waiting for bakes", err=True)
         asked.wait()
     return 0
