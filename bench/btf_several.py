@@ -27,9 +27,9 @@ from relume.btf.shelf import STORE, BtfRecord, keep
 from relume.btf.values import Values
 from relume.look import Look, validate
 from relume.memory import Memory
+from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.picture import MovingPicture
-from relume.picture.transfer import Opened
 from relume.scene.built_in import built_in
 from relume.store import bake_here
 from relume.synthetic.make import GEOMETRIES
@@ -47,7 +47,8 @@ def measure(tiny: bool) -> list[Figure]:
         folder, memory = Path(name), Memory(4 << 30)
         asset_memory.use(memory)
         records = _records(folder, side)
-        transfer = open_bake(bake_here(METHODS["surface"], built_in("still_life"), recipe, folder / "s.zarr"), memory)
+        store = bake_here(METHODS["surface"], built_in("still_life"), recipe, folder / "s.zarr")
+        transfer: Any = open_bake(store, memory)
         sessions = [_Session(transfer, records[:num]) for num in (0, 2, _NUM)]
         for number in range(edits):
             for session in sessions:
@@ -66,7 +67,7 @@ def measure(tiny: bool) -> list[Figure]:
 class _Session:
     """A picture of the still life, some of its materials covered."""
 
-    def __init__(self, transfer: Opened, records: Sequence[BtfRecord]) -> None:
+    def __init__(self, transfer: MovingViews, records: Sequence[BtfRecord]) -> None:
         self._transfer, self._records = transfer, records
         self._picture, self.seconds = MovingPicture(transfer, "front", is_watched=True), list[float]()
         self._picture.set_look(self._look((0.5, 0.5, 0.5)))

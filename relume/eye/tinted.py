@@ -141,12 +141,12 @@ class Form(NamedTuple):
 
     Attributes:
         chance: of their rays, see `relume.points.Points`. (m,) float32
-        count: how many share what one sample was. (m,)
-        shown: what each shows of the channels, times `count`. (m, 3) float32
+        num: how many share what one sample was. (m,)
+        shown: what each shows of the channels, times `num`. (m, 3) float32
     """
 
     chance: F32
-    count: NDArray[np.int64]
+    num: NDArray[np.int64]
     shown: F32
 
 
@@ -168,7 +168,7 @@ class Split:
                 chosen = np.arange(start, stop, dtype=np.uint32)
                 if kind:
                     lit = _is_lit(tints[start:stop])
-                    chosen = chosen[lit.any(axis=1) if by_channel else lit[:, kind - 1]]
+                    chosen = chosen[np.asarray(lit.any(axis=1)) if by_channel else lit[:, kind - 1]]
                 rows.append(chosen)
                 kinds.append(np.full(len(chosen), kind, np.int8))
         self.row, self._kind = np.concatenate(rows), np.concatenate(kinds)
@@ -177,7 +177,7 @@ class Split:
         """How some samples that follow each other show light."""
         kind, tints = self._kind[rows].astype(np.int64), self._tints[self.row[rows]]
         lit = _is_lit(tints)
-        is_split = lit.any(axis=1)
+        is_split = np.asarray(lit.any(axis=1))
         if self._by_channel:
             shown = np.where(is_split[:, None], NUM_CHANNELS * np.eye(NUM_CHANNELS, dtype=np.float32)[kind], 1)
             count = np.where(is_split, NUM_CHANNELS, 1)
@@ -215,7 +215,7 @@ class SplitColumn:
         form = self._split.form(rows)
         if self._name == "chance":
             return form.chance
-        return np.asarray(whole / form.count if self._name == "weight" else whole * form.shown, self.dtype)
+        return np.asarray(whole / form.num if self._name == "weight" else whole * form.shown, self.dtype)
 
     def __array__(self, dtype: Any = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)

@@ -260,7 +260,7 @@ def _sorted_samples(eye: Eye, chosen: Chosen) -> dict[str, NDArray[Any]]:
 
 def _split(
     eye: Eye, columns: Mapping[str, Column], most: int, *, by_channel: bool
-) -> tuple[dict[str, SplitColumn], int]:
+) -> tuple[dict[str, Any], int]:
     """Split samples that light reaches through tinted glass; none where they were too many.
 
     Args:

@@ -42,7 +42,7 @@ _MARGIN = 1.4
 _FINER = 1 / 3  # power with which edges are fewer for each pixel in a larger picture; a tuft of blades has 0.3
 _REST_BYTES = 64 << 10  # of metadata
 _SCRATCH_ROW_BYTES = 200  # of a sample while samples are sorted
-_SHARES = (0.22, 0.6, 0.6, 0.45, 0.8, 0.8, 1.0)  # of the bound of each of `relume.methods.surface.Parts`
+_SHARES = (0.22, 0.6, 0.6, 0.4, 0.8, 0.8, 1.0)  # of the bound of each of `relume.methods.surface.Parts`
 _ROWS_TRIED, _PLACES = 16, 8  # of a texture: rows beside each other, and how often
 
 

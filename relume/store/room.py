@@ -7,12 +7,9 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, cast
+from typing import IO, Any, cast
 
 from relume.errors import DiskFullError
-
-if TYPE_CHECKING:
-    from collections.abc import Buffer
 
 RESERVE_BYTES = 64 << 20  # left for the server's own work and for the system
 _BUFFER_BYTES = 1 << 20
@@ -31,9 +28,9 @@ class _Scratch(io.FileIO):
         super().__init__(handle, "r+b")
         self._folder = folder
 
-    def write(self, piece: Buffer, /) -> int | None:
+    def write(self, piece: Any, /) -> int:
         check_room(self._folder)
-        return super().write(piece)
+        return super().write(piece) or 0
 
 
 def scratch_file(folder: Path) -> IO[bytes]:

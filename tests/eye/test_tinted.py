@@ -129,7 +129,7 @@ def test_a_sample_is_split_by_the_tints_that_reach_it():
     form = split.form(slice(0, len(split.row)))
     np.testing.assert_array_equal(split.row, [0, 1, 2, 3, 1, 3, 2, 3])
     np.testing.assert_array_equal(form.chance, [0, *UP_TO_GROUP[[0, 0, 0, 1, 1, 2, 2]]])
-    np.testing.assert_array_equal(form.count, [1, 2, 2, 3, 2, 3, 2, 3])
+    np.testing.assert_array_equal(form.num, [1, 2, 2, 3, 2, 3, 2, 3])
     red, green, blue = (np.array(tint, np.float32) for tint in (RED, GREEN, BLUE))
     wanted = [np.ones(3), 1 - green, 1 - blue, 1 - red, green, red - blue, blue, blue]
-    np.testing.assert_allclose(form.shown / form.count[:, None], wanted, atol=1e-6)
+    np.testing.assert_allclose(form.shown / form.num[:, None], wanted, atol=1e-6)
