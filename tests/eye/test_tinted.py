@@ -133,3 +133,20 @@ def test_a_sample_is_split_by_the_tints_that_reach_it():
     red, green, blue = (np.array(tint, np.float32) for tint in (RED, GREEN, BLUE))
     wanted = [np.ones(3), 1 - green, 1 - blue, 1 - red, green, red - blue, blue, blue]
     np.testing.assert_allclose(form.shown / form.num[:, None], wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("of", [POLISHED, WHITE], ids=["polished", "matt"])
+def test_a_lamp_that_a_look_adds_behind_tinted_glass_shows_its_tint(of, tmp_path):
+    """Its shadow rays pass as those of the bake do: a lamp is one light, also to a matt floor."""
+    scene = floor_under(pane("pane", 1), of=of, tints=[GREEN])
+
+    def lit(document):
+        document["lights"]["Lamp"] = {"kind": "point", "position": [0.0, 6.0, -3.0], "emission": [90.0, 90.0, 90.0]}
+        document["environment"]["scale"] = 0.0
+
+    picture, _ = rendered(scene, tmp_path, lit)
+    pixels = picture.reshape(-1, 3)
+    bright = pixels[pixels.max(axis=1) > 0.1 * pixels.max()]
+    assert len(bright) > 3
+    of_each = bright / bright.max(axis=1, keepdims=True)
+    np.testing.assert_allclose(of_each, np.tile(np.divide(GREEN, 0.95), (len(bright), 1)), atol=0.02)
