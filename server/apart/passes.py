@@ -60,16 +60,16 @@ def make_frame(
         eye = compared_from(asked, transfer) if transfer.eyes is Eyes.FREE else None
         frame = shop.library.render(transfer, asked.view, _look(asked, transfer), cancelled=cancelled, eye=eye)
         kept = frame, {paths: Estimate.nothing(*frame.shape[:2]) for paths in dict.fromkeys((asked.paths, "method"))}
-        _write_first(shop, where, transfer, asked, kept[0].shape[1::-1], cancelled)
+        _write_first(shop, where, transfer, asked, kept[0], cancelled)
         _keep(where, *kept)
     return {"passes": kept[1]["method"].passes}
 
 
 def _write_first(
-    shop: Workshop, folder: Path, transfer: Opened, asked: TruthRequest, size: tuple[int, ...], cancelled: Cancelled
+    shop: Workshop, folder: Path, transfer: Opened, asked: TruthRequest, frame: F32, cancelled: Cancelled
 ) -> None:
     """Write small pictures of brute force, of few samples: a pass may take minutes."""
-    look, small = _look(asked, transfer), tuple(max(1, side // _SAMPLE) for side in size)
+    look, small = _look(asked, transfer), _small(frame.shape[1], frame.shape[0])
     truth = _pass(shop, transfer, asked, look, small, 0, lambda share: None, cancelled, spp=_FIRST_SPP)
     for paths in dict.fromkeys((asked.paths, "method")):
         estimate = Estimate.nothing(*truth.pictures[paths].shape[:2]).add(truth.pictures[paths])
@@ -113,9 +113,13 @@ def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: 
     asked = TruthRequest.model_validate(request)
     transfer = shop.transfer(asked.bake)
     look, (_, (width, height)) = _look(asked, transfer), compared_from(asked, transfer)
-    size = max(1, width // _SAMPLE), max(1, height // _SAMPLE)
+    size = _small(width, height)
     scale = width * height / (size[0] * size[1])
     return {"seconds": sampled(lambda told: _pass(shop, transfer, asked, look, size, 0, told, cancelled), scale)}
+
+
+def _small(width: int, height: int) -> tuple[int, int]:
+    return max(1, width // _SAMPLE), max(1, height // _SAMPLE)
 
 
 def _look(request: TruthRequest, transfer: Opened) -> Any:
