@@ -19,6 +19,9 @@ from worker.database.faults import AWAY
 if TYPE_CHECKING:
     from server.settings import Settings
 
+PROXY_AGAIN_S = 900.0
+"""Only the proxy knows whether somebody whom it named may still be here: after this time they come by it again."""
+
 
 class Access:
     """Tokens and who they are, quotas, and the audit, of one database."""
@@ -38,13 +41,13 @@ class Access:
         Raises:
             LoginError: the token has run out or was revoked.
         """
-        while caller.token is None or await self._is_valid(caller.token):
+        while await self.may_stay(caller):
             await asyncio.sleep(REMEMBERED_S)
         raise LoginError("your token has run out or was revoked; log in with another one")
 
-    async def _is_valid(self, token: str) -> bool:
-        """Whether it is; while the database is away what is open goes on."""
+    async def may_stay(self, caller: Caller) -> bool:
+        """Whether what a caller has open may go on; while the database is away it does."""
         try:
-            return await run_sync(self.tokens.is_valid, token)
+            return caller.token is None or await run_sync(self.tokens.is_valid, caller.token)
         except AWAY:
             return True

@@ -14,6 +14,7 @@ from sqlalchemy import delete, func, select, update
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.errors import bytes_text
+from server.access.roles import Caller
 from server.access.tables import OwnedRow
 from server.errors import BusyError, NearlyFullError, QuotaError
 from server.library.disk import free_bytes
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 Kind = Literal["upload", "scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
 _ACTIVE = ("queued", "running")
+MAX_STREAMS_EACH = 32
+"""Streams of events that one caller may have open."""
 
 
 class Quotas:
@@ -39,7 +42,7 @@ class Quotas:
 
     def __init__(self, sessions: sessionmaker[Session], settings: Settings) -> None:
         self._sessions, self.settings = sessions, settings
-        self._lock, self._open = threading.Lock(), Counter[str]()
+        self._lock, self._open, self._streams = threading.Lock(), Counter[str](), Counter[str]()
         self._is_full = False
         self.deciding = threading.Lock()
 
@@ -65,6 +68,21 @@ class Quotas:
             with self._lock:
                 self._open[who] -= 1
                 self._open += Counter()  # forgets those who have none
+
+    @contextmanager
+    def stream(self, caller: Caller) -> Iterator[None]:
+        """One stream of events of somebody, of whom is not known by name of an address. Raises QuotaError."""
+        who = f"name {caller.name}" if caller.name else f"address {caller.address}"
+        with self._lock:
+            if self._streams[who] >= MAX_STREAMS_EACH:
+                raise QuotaError(f"you follow as many bakes as may be, {MAX_STREAMS_EACH}; close a stream, or poll")
+            self._streams[who] += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._streams[who] -= 1
+                self._streams += Counter()
 
     @property
     def counts_bytes(self) -> bool:

@@ -14,9 +14,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import RelumeError
 from relume.picture.transfer import AnyView, Eyes, Opened
-from server.access.access import Access
+from server.access.access import PROXY_AGAIN_S, Access
 from server.access.audit import Audit
-from server.errors import CLOSE_NORMAL, ElsewhereError, close_code_of, problem_of, row_of
+from server.errors import CLOSE_NORMAL, ElsewhereError, LoginError, close_code_of, problem_of, row_of
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.live.edit_notes import EditNotes
@@ -184,6 +184,8 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
         asyncio.create_task(services.access.until_revoked(state.caller)),
         asyncio.create_task(_say_goodbye(services, state.socket)),
     ]
+    if state.caller.by == "proxy":
+        tasks.append(asyncio.create_task(_send_by_the_proxy(services, state.socket)))
     if state.notes is not None:
         tasks.append(asyncio.create_task(state.notes.run()))
     if state.guest is not None:
@@ -202,6 +204,14 @@ async def _say_goodbye(services: SessionServices, socket: ClientSocket) -> None:
     await services.leave.taken()
     await socket.send(LeavingMessage(seconds=services.drain_seconds))
     await asyncio.Event().wait()
+
+
+async def _send_by_the_proxy(services: SessionServices, socket: ClientSocket) -> None:
+    """Have a client whom a proxy named come by it again. Raises LoginError if it does not go."""
+    await asyncio.sleep(PROXY_AGAIN_S)
+    await socket.send(LeavingMessage(seconds=services.drain_seconds))
+    await asyncio.sleep(services.drain_seconds)
+    raise LoginError("the proxy that named you has to do so again; open the session again")
 
 
 async def _send_after(services: SessionServices, guest: Guest, socket: ClientSocket) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import AsyncIterator
 from contextlib import suppress
@@ -12,6 +13,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from sse_starlette import EventSourceResponse, ServerSentEvent
+from starlette.types import Receive, Scope, Send
 
 from relume.bake import Plan, Recipe
 from relume.environments.thumbnail import thumbnail
@@ -19,6 +21,7 @@ from relume.errors import NotFoundError
 from relume.imageio.files import png_bytes
 from relume.picture.transfer import Eyes, Transfer
 from relume.scene.placed_camera import placed_camera
+from server.access.access import PROXY_AGAIN_S
 from server.access.roles import Caller, Who
 from server.errors import NotReadyError
 from server.files.png import FOREVER, PngResponse
@@ -96,15 +99,30 @@ def get_bake(bake: Id, services: Shared) -> BakeBody:
     "/{bake}/events", response_class=EventSourceResponse,
     name="bake_events", responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
 )
-async def bake_events(bake: Id, services: Shared) -> EventSourceResponse:
-    """Every change as a server-sent event `bake` with the same body as GET; ends with the bake."""
+async def bake_events(bake: Id, services: Shared, caller: Who) -> EventSourceResponse:
+    """Every change as a server-sent event `bake` with the same body as GET; ends with the bake, or with the token."""
     await run_in_threadpool(services.bakes.get, bake)
-    return EventSourceResponse(_events(bake, services), headers={"Cache-Control": "no-store"})
+    return _Events(bake, services, caller)
 
 
-async def _events(bake: str, services: Services) -> AsyncIterator[ServerSentEvent]:
+class _Events(EventSourceResponse):
+    """A stream that is counted until it has ended, however it ends."""
+
+    def __init__(self, bake: str, services: Services, caller: Caller) -> None:
+        super().__init__(_events(bake, services, caller), headers={"Cache-Control": "no-store"})
+        self._counted = services.access.quotas.stream(caller)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it, as `EventSourceResponse` does. Raises QuotaError before anything is sent."""
+        with self._counted:
+            await super().__call__(scope, receive, send)
+
+
+async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterator[ServerSentEvent]:
+    """For as long as the caller may stay; whom a proxy named comes by it again after a while."""
     told: BakeStatus | None = None
-    while told is None or not told.final:
+    until_s = time.monotonic() + (PROXY_AGAIN_S if caller.by == "proxy" else math.inf)
+    while (told is None or not told.final) and time.monotonic() < until_s and await services.access.may_stay(caller):
         try:
             status = await run_in_threadpool(services.bakes.get, bake)
         except NotFoundError:  # deleted with its scene
