@@ -143,10 +143,12 @@ def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> N
 
 
 def test_who_has_not_the_turn_says_nothing_of_the_database(
-    bakes: BakeService, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    lock, steps, rounds = bakes.data_dir / module._LOCK, Steps(bakes.data_dir), threading.Semaphore(0)
-    ahead = looking(bakes, steps)
+    monkeypatch.setattr(module, "ROUND_S", 0.02)
+    bakes = BakeService(tmp_path)  # not started: it would ask the database itself
+    lock, rounds = bakes.data_dir / module._LOCK, threading.Semaphore(0)
+    ahead = looking(bakes, Steps(bakes.data_dir))
     turn = ahead._turn
 
     @contextmanager
@@ -162,11 +164,12 @@ def test_who_has_not_the_turn_says_nothing_of_the_database(
             ahead.start()
             for _ in range(3):
                 assert rounds.acquire(timeout=60)
-        ahead.close()
+            ahead.close()
         said = [record.getMessage() for record in caplog.records]
         assert [line.split(" (")[0] for line in said] == ["the database does not answer"]
         database_away.well()
         assert "that is over" in caplog.text
+    bakes.close()
 
 
 @contextmanager
