@@ -48,6 +48,7 @@ def connect(url: str) -> Engine:
     else:
         if parsed.database:
             Path(parsed.database).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            Path(parsed.database).touch(mode=0o600)  # SQLite would let everybody read it
         # of connections beside the five that are kept SQLite keeps the file open: its locks are of the process
         engine = create_engine(parsed)
         event.listen(engine, "connect", _set_up_sqlite)
