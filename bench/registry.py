@@ -103,6 +103,8 @@ GROUPS = (
     Group("bench.workers", ("bake.two_workers_speedup",)),
     Group("bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),
     Group("bench.refusal", ("import.refusal_ms",)),
+    Group("bench.slow_readers", ("slow_readers.mb",)),
+    Group("bench.entering", ("rooms.enter_s",)),
     Group("bench.load", ("load.drag_beside_renders_ratio",)),
     Group("bench.many", ("load.aggregate_ratio", "load.frame_cost_ratio")),
     Group("bench.flood", ("flood.latency_ratio",)),

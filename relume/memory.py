@@ -58,6 +58,18 @@ class _Kept:
     num_bytes: int
 
 
+class _Making:
+    """Of one key, as long as somebody makes it or waits for that.
+
+    Attributes:
+        too_large: what was made and is not kept, for those who wait: each would make it again.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.too_large: _Kept | None = None
+
+
 class _Part(OrderedDict[Hashable, Sized]):
     """Entries, the one that was used longest ago first."""
 
@@ -82,8 +94,8 @@ class _Room:
     def __init__(self, budget_bytes: int) -> None:
         self.budget_bytes = budget_bytes
         self.lock = threading.Lock()
-        # a lock lives as long as somebody makes or waits: all who want a key share one
-        self.making: WeakValueDictionary[Hashable, threading.Lock] = WeakValueDictionary()
+        # one lives as long as somebody makes or waits: all who want a key share it
+        self.making: WeakValueDictionary[Hashable, _Making] = WeakValueDictionary()
         self.lasting, self.passing = _Part(), _Part()
         self.reserved_bytes = 0
 
@@ -188,20 +200,23 @@ class Memory:
             MemoryBudgetError: it alone is larger than the budget.
         """
         self.check(num_bytes)
-        with self._making(key):
+        making = self._making(key)
+        with making.lock:
             found = self.find(key, kind)
             return found if found is not None else self._insert(key, num_bytes, make)
 
     def keep(self, key: Key, make: Callable[[], Value]) -> Value:
-        """What `make` makes, made once while there is room for it; larger than the budget, it is not kept.
+        """What `make` makes, made once while there is room for it; larger than the budget, it is not kept, and those
+        who wait for it at the same time get the same.
 
         For what a picture cannot do without, however small the budget. Nobody may write to what is kept.
 
         Args:
             key: the path of a store or a word for what is no bake's; in words what it is; what tells it from others.
         """
-        with self._making(key):
-            found = self.find(key, _Kept)
+        making = self._making(key)
+        with making.lock:
+            found = self.find(key, _Kept) or making.too_large
             if found is not None:
                 known: Value = found.value
                 return known
@@ -209,11 +224,13 @@ class Memory:
             kept = _Kept(made, str(key[1]), held_bytes(made))
             if kept.num_bytes <= self.budget_bytes:
                 self._insert(key, kept.num_bytes, lambda: kept)
+            else:
+                making.too_large = kept
             return made
 
-    def _making(self, key: Hashable) -> threading.Lock:
+    def _making(self, key: Hashable) -> _Making:
         with self._room.lock:
-            return self._room.making.setdefault(key, threading.Lock())
+            return self._room.making.setdefault(key, _Making())
 
     def _insert(self, key: Hashable, num_bytes: int, make: Callable[[], Entry]) -> Entry:
         room, is_kept = self._room, True

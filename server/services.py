@@ -20,11 +20,13 @@ from server.apart.ahead import Ahead
 from server.apart.pool import Pool
 from server.apart.step import Batches
 from server.apart.thumbnails import Thumbnails
+from server.files.answers import Answers
 from server.files.importers import Importers
 from server.files.importing import remove_strays
 from server.files.intake import Intake
 from server.library.caretaker import Caretaker
 from server.library.disk import free_bytes
+from server.library.once import Once
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
@@ -60,6 +62,8 @@ class Services:
 
     Attributes:
         leave: whether the server is taking it. access: who may do what, how much of it, and the audit.
+        pictures: makes small pictures, and what else takes its time and several may ask for at once.
+        answers: large ones.
         intake: has files read, and takes over what comes of it.
     """
 
@@ -79,9 +83,13 @@ class Services:
     transfers: TransferPool
     caretaker: Caretaker
     thumbnails: Thumbnails
+    pictures: Once
+    answers: Answers
     live: SessionServices
     intake: Intake
 
+
+NUM_PICTURES = 2
 
 OpenLibrary = Callable[[int, int], Library]
 OpenBakes = Callable[[Settings], BakeService]
@@ -128,10 +136,14 @@ async def open_services(
         service = await asyncio.to_thread(bakes, settings)
         at_end(service.close)
         batch, sessions = batches(settings, library), service.ledger.sessions
-        at_end(batch.close)
         access = Access(sessions, settings)
         transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
         thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
+        at_end(thumbnails.close)
+        at_end(batch.close)  # before them: they wait for it
+        pictures, answers = Once(NUM_PICTURES, "relume-picture"), Answers(settings.data)
+        at_end(pictures.close)
+        at_end(answers.close)
         caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
         _watch_memory(metrics, library, transfers)
         _watch_work(metrics, settings, service, batch, leave)
@@ -149,10 +161,10 @@ async def open_services(
         if settings.importer_at_start:
             importers.start()
         rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
-        keeper = Keeper(rooms, RoomLeases(sessions), leave)
+        keeper = Keeper(rooms, RoomLeases(sessions), leave, threads.news)
         ends.push_async_callback(keeper.close)
         ends.callback(rooms.close)
-        for work in (caretaker.run(), CommentNews(rooms, comments.marks).run(), keeper.run()):
+        for work in (caretaker.run(), CommentNews(rooms, comments.marks, threads.news).run(), keeper.run()):
             beside(work)
         yield Services(
             settings=settings,
@@ -169,6 +181,8 @@ async def open_services(
             transfers=transfers,
             caretaker=caretaker,
             thumbnails=thumbnails,
+            pictures=pictures,
+            answers=answers,
             live=_live(settings, metrics, traces, library, threads, service, access, leave, rooms, keeper),
             intake=Intake(settings, service.ledger, access.quotas, importers),
         )
@@ -214,7 +228,7 @@ def _live(
         resumes=ResumeStore(settings.resume_seconds),
         rooms=rooms,
         keeper=keeper,
-        bake_news=BakeNews(service.bakes),
+        bake_news=BakeNews(service.bakes, threads.news),
         access=access,
         leave=leave,
         ack_seconds=settings.ack_seconds,

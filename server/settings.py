@@ -19,12 +19,19 @@ RoleName = Literal["view", "edit", "admin"]
 
 
 def _quarter_of_memory() -> int:
-    """A quarter of the machine's memory in bytes, at most 6 GiB."""
-    try:
-        total_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (ValueError, OSError, AttributeError):  # not every system tells
-        total_bytes = 4 * GIB
-    return min(total_bytes // 4, 6 * GIB)
+    """A quarter of the memory of the machine or the container in bytes, at most 6 GiB."""
+    return min(_memory() // 4, 6 * GIB)
+
+
+def _third_of_memory() -> int:
+    """What one import may take where two run at once, at most 8 GiB; the program itself takes one."""
+    return max(GIB, min(_memory() // 3, 8 * GIB))
+
+
+def _memory() -> int:
+    from worker.budget import machine_bytes  # loads much that other settings do without
+
+    return machine_bytes()
 
 
 _HOST_NAME = re.compile(r"(?=.*[A-Za-z])[A-Za-z0-9_]([A-Za-z0-9_.-]{0,251}[A-Za-z0-9_])?")
@@ -92,7 +99,9 @@ class Settings(BaseSettings):
         default=60.0, gt=0, description="how long the place of somebody whose connection is lost is kept"
     )
     import_seconds: int = Field(default=300, ge=1, description="time a scene import may take")
-    import_bytes: int = Field(default=8 * GIB, gt=0, description="address space a scene import may use")
+    import_bytes: int = Field(
+        default_factory=_third_of_memory, gt=0, description="address space a scene import may use"
+    )
     importer_at_start: bool = Field(default=True, description="whether what imports need is loaded before the first")
     ack_seconds: float = Field(default=30.0, gt=0, description="how long a client may leave frames unacknowledged")
     resume_seconds: float = Field(default=600.0, gt=0, description="how long a lost session can be resumed")

@@ -14,16 +14,53 @@ REMEDY = "take fewer lights, a smaller size or fewer views at once"
 
 MEMORY_SHARE = 0.9  # the rest is left for the server's own work and for the system
 
+_GROUPS = Path("/sys/fs/cgroup")
+_OWN_GROUPS = Path("/proc/self/cgroup")
+
+
+def machine_bytes() -> int:
+    """Memory that the machine has, or that the control group (a container) allows this process in all."""
+    try:
+        machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (ValueError, OSError, AttributeError):  # not every system tells
+        machine = 4 << 30
+    return min([machine, *(limit for limit, _ in _groups())])
+
 
 def available_bytes() -> int:
     """Memory that may be taken now: the system's, or what the control group (a container) still allows."""
-    available = _system_available_bytes()
-    group = Path("/sys/fs/cgroup")
+    return min([_system_available_bytes(), *(max(0, limit - used) for limit, used in _groups())])
+
+
+def _groups() -> list[tuple[int, int]]:
+    """Limit and use of memory of this process's control groups that have one, of version 2 and 1, bytes."""
+    found = []
+    for folder, limit, used in _group_folders():
+        try:
+            found.append((int((folder / limit).read_text()), int((folder / used).read_text())))
+        except (OSError, ValueError):  # none there, or "max"
+            continue
+    return found
+
+
+def _group_folders() -> list[tuple[Path, str, str]]:
+    """Where they may be: in a container the group is the root of what is seen, else it and all above it count."""
+    found = []
     try:
-        limit, used = (int((group / name).read_text()) for name in ("memory.max", "memory.current"))
-    except (OSError, ValueError):  # no control group, or "max"
-        return available
-    return min(available, max(0, limit - used))
+        lines = _OWN_GROUPS.read_text().splitlines()
+    except OSError:  # not Linux
+        return []
+    for line in lines:
+        number, controllers, path = line.split(":", 2)
+        if number == "0":
+            root, names = _GROUPS, ("memory.max", "memory.current")
+        elif "memory" in controllers.split(","):
+            root, names = _GROUPS / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes")
+        else:
+            continue
+        own = root / path.lstrip("/")
+        found += [(folder, *names) for folder in (own, *own.parents) if folder == root or root in folder.parents]
+    return found
 
 
 def _system_available_bytes() -> int:

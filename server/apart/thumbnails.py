@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-import asyncio
-from dataclasses import dataclass
 from pathlib import Path
 
 from relume.code_version import image_code
 from server.apart.step import RunStep, Step
+from server.library.once import Once
+
+NUM_WAITING = 2
+"""Threads that wait for steps: others have to wait for their turn there anyway."""
 
 
-@dataclass(frozen=True)
 class Thumbnails:
     """Files in a folder, made where they are missing.
 
-    Attributes:
+    Args:
         run: does steps.
     """
 
-    folder: Path
-    run: RunStep
+    def __init__(self, folder: Path, run: RunStep) -> None:
+        self._folder, self._run = folder, run
+        self._once = Once(NUM_WAITING, "relume-thumbnail")
+
+    def close(self) -> None:
+        """Paint no more; no step may be under way that is not ended."""
+        self._once.close()
 
     async def find(self, bake: str) -> Path:
         """The file of a ready bake's thumbnail, painted where it is missing; somebody waits for it.
@@ -29,18 +35,18 @@ class Thumbnails:
         """
         path = self.path(bake)
         if not path.exists():
-            await asyncio.to_thread(self.paint, bake, is_first=True)
+            await self._once.make(bake, lambda: self.paint(bake, is_first=True))
         return path
 
     def path(self, bake: str) -> Path:
         """Where the thumbnail of a bake is, or will be."""
-        return self.folder / f"{bake}-{image_code()}.webp"
+        return self._folder / f"{bake}-{image_code()}.webp"
 
     def paint(self, bake: str, *, is_first: bool) -> None:
         """Paint the thumbnail of a ready bake. is_first: whether somebody waits. Raises what `RunStep` does."""
         path = self.path(bake)
         values = {"bake": bake, "path": str(path)}
-        self.run(Step("thumbnail of a bake", is_first, values), lambda share: None, lambda: True)
-        for other in self.folder.glob(f"{bake}-*.webp"):  # of other code
+        self._run(Step("thumbnail of a bake", is_first, values), lambda share: None, lambda: True)
+        for other in self._folder.glob(f"{bake}-*.webp"):  # of other code
             if other != path:
                 other.unlink(missing_ok=True)

@@ -13,13 +13,15 @@ from relume.parallel import do_long_work, make_frame
 
 P = ParamSpec("P")
 T = TypeVar("T")
+NUM_NEWS = 2
 NUM_LONG = 8  # more than cores: a view that is opened must not wait until others have frozen theirs
 
 
 class Threads:
-    """The two pools of an app.
+    """The pools of an app.
 
     Attributes:
+        news: for short questions to the database that must not wait for anything else: whose a room is, what is new.
         turns: of sessions at the pool for quick steps, in the order in which they asked.
     """
 
@@ -28,11 +30,13 @@ class Threads:
         self.quick = ThreadPoolExecutor(num_quick, "relume-frame")
         self.turns = asyncio.Semaphore(num_quick)
         self.long = ThreadPoolExecutor(NUM_LONG, "relume-long", do_long_work)
+        self.news = ThreadPoolExecutor(NUM_NEWS, "relume-news")
 
     def close(self) -> None:
         """Take no more work; what runs is finished."""
         self.quick.shutdown(wait=True, cancel_futures=True)
         self.long.shutdown(wait=True, cancel_futures=True)
+        self.news.shutdown(wait=True, cancel_futures=True)
 
 
 class OneAtATime:

@@ -129,7 +129,8 @@ async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterato
             return
         if status != told:
             told = status
-            yield ServerSentEvent(bake_body(status, services).model_dump_json(), event="bake")
+            body = await run_in_threadpool(bake_body, status, services)
+            yield ServerSentEvent(body.model_dump_json(), event="bake")
         else:
             await asyncio.sleep(EVENT_POLL_S)
 
@@ -146,7 +147,7 @@ def cancel_bake(bake: Id, services: Shared, forget: bool = False) -> Response:
 
 
 @router.get("/{bake}/views/{view}/materials.png", response_class=PngResponse, name="get_material_ids")
-async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: Shared) -> PngResponse:
+async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: Shared) -> Response:
     """16-bit grey PNG: which material each pixel shows, in the scene's order; 65535 is background."""
     await run_in_threadpool(ready_bake, services, bake)
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
@@ -155,8 +156,8 @@ async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], ser
         if transfer.eyes is Eyes.FREE:
             raise NotFoundError(f"the eye of view {view[:80]!r} moves; ask what a pixel shows by a probe")
         seen = cast("Transfer", transfer).views[view]
-        png = await run_in_threadpool(lambda: png_bytes(seen.material_ids()))
-    return PngResponse(png, headers=FOREVER)
+        key, media_type = (bake, view, "materials"), PngResponse.media_type
+        return await services.answers.stream(key, lambda: png_bytes(seen.material_ids()), media_type, FOREVER)
 
 
 @router.get("/{bake}/environment.png", response_class=PngResponse, name="get_own_environment")
@@ -164,7 +165,7 @@ async def own_environment(bake: Id, services: Shared) -> PngResponse:
     """The light that the scene came with, as small as those of /api/environments."""
     await run_in_threadpool(ready_bake, services, bake)
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
-        png = await run_in_threadpool(lambda: thumbnail(transfer.radiance_of(None)))
+        png = await services.pictures.make(("environment", bake), lambda: thumbnail(transfer.radiance_of(None)))
     return PngResponse(png, headers=FOREVER)
 
 

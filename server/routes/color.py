@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated
 
+import numpy as np
 from fastapi import APIRouter, Query, Response
+from numpy.typing import NDArray
 
 from relume.errors import NotFoundError
 from relume.imageio.ocio.current import current
 from relume.imageio.ocio.view import MAX_NAME, OcioView
 from server.files.png import FOREVER
+from server.services import Shared
 from server.wire.body import Id
 from server.wire.color import ColorBody, DisplayBody, ViewBody
 
@@ -41,9 +44,13 @@ def describe_color() -> ColorBody:
 
 
 @router.get("/{config}/lut", response_class=LutResponse)
-def get_lut(config: Id, display: ViewName, view: ViewName) -> LutResponse:
+async def get_lut(config: Id, display: ViewName, view: ViewName, services: Shared) -> Response:
     """A view as a table of 65 x 65 x 65 x 3 numbers of 16 bits (docs/api.md)."""
     known = current()
     if known is None or known.id != config:
         raise NotFoundError("the server has another colour config now; ask /api/color again")
-    return LutResponse(known.table(OcioView(display, view)).astype("<u2").tobytes(), headers=FOREVER)
+
+    def make() -> NDArray[np.uint16]:
+        return known.table(OcioView(display, view)).astype("<u2")
+
+    return await services.answers.stream((config, display, view), make, LutResponse.media_type, FOREVER)

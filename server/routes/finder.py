@@ -61,7 +61,8 @@ async def place(scene: Id, pixel: FinderPixel, services: Shared) -> PlaceBody:
 
 async def _finder(scene: str, services: Services) -> Finder:
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
-    return await run_in_threadpool(services.live.library.finder, scene_path(services.settings.data, record.id))
+    folder = scene_path(services.settings.data, record.id)
+    return await services.pictures.make(("finder", folder), lambda: services.live.library.finder(folder))
 
 
 def _camera(frame: CameraFrame) -> Camera:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Annotated, Any
 
-import numpy as np
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 from numpy.typing import NDArray
@@ -43,13 +43,13 @@ async def describe_surface(bake: Id, services: Shared, response: Response, layou
 @router.get("/{bake}/surface/{array}", response_class=ArrayResponse)
 async def surface_array(
     bake: Id, array: Annotated[str, Path(max_length=64)], services: Shared, layout: Layout = None
-) -> ArrayResponse:
+) -> Response:
     """One of them: so many texels of 1, 2 or 4 numbers (docs/api.md)."""
     await run_in_threadpool(ready_bake, services, bake)
     async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
         _, arrays = services.live.library.shader_arrays(_moving(transfer))
-        content = await run_in_threadpool(_bytes_of, arrays, array)
-    return ArrayResponse(content, headers=FOREVER)
+        make = partial(_array_of, arrays, array)
+        return await services.answers.stream((bake, array), make, ArrayResponse.media_type, FOREVER)
 
 
 def _moving(transfer: Opened) -> Opened:
@@ -58,7 +58,7 @@ def _moving(transfer: Opened) -> Opened:
     return transfer
 
 
-def _bytes_of(arrays: Mapping[str, Callable[[], NDArray[Any]]], name: str) -> bytes:
+def _array_of(arrays: Mapping[str, Callable[[], NDArray[Any]]], name: str) -> NDArray[Any]:
     if name not in arrays:
         raise NotFoundError(f"there is no array {name[:40]!r}; there are {', '.join(arrays)}")
-    return np.ascontiguousarray(arrays[name]()).tobytes()
+    return arrays[name]()

@@ -129,7 +129,7 @@ def test_one_that_a_session_shows_stays_until_the_session_is_forgotten(client, s
     assert (open_now.status_code, lost.status_code) == (409, 409)
     assert "a session of bake 0123456789abcdef" in open_now.json()["detail"]
     assert resumes.take(token, "0123456789abcdef", time.monotonic()) is not None
-    assert resumes.naming(sent["texture"], time.monotonic()) == []
+    assert resumes.looks(time.monotonic()) == []
 
 
 def test_what_an_image_of_metalness_makes_is_listed_and_goes_with_it(client):

@@ -1,14 +1,19 @@
 """An app over a fake library and real bakes of a fake method, all in a folder of the test."""
 
+import asyncio
 import math
 import shutil
+import threading
+import traceback
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import SIZE, BatchesHere, Control, FakeMethod, tiny_scene
 from session_client import Baked
+from sqlalchemy import Engine, event
 
 from relume.bake import Recipe
 from server.app import create_app
@@ -60,12 +65,33 @@ def open_fake_bakes(settings: Settings) -> BakeService:
     return BakeService(settings.data, settings.database_url, methods={"direct": FakeMethod()}, shares=settings.turns)
 
 
+@contextmanager
+def no_database_on_the_loop() -> Iterator[None]:
+    """Fails where the event loop of a server waits for its database, and all sessions with it."""
+    asked: list[str] = []
+
+    def look(connection: object, cursor: object, statement: str, *_: object) -> None:
+        if asyncio._get_running_loop() is None or threading.current_thread() is threading.main_thread():
+            return
+        calls = traceback.extract_stack()[:-1]
+        if not any("/tests/" in call.filename for call in calls):  # tests ask what they like
+            ours = [call for call in calls if "/site-packages/" not in call.filename]
+            asked.append(f"{statement.splitlines()[0]}\n" + "".join(traceback.format_list(ours[-6:])))
+
+    event.listen(Engine, "before_cursor_execute", look)
+    try:
+        yield
+    finally:
+        event.remove(Engine, "before_cursor_execute", look)
+    assert not asked, "\n".join(asked)
+
+
 @pytest.fixture
 def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
     monkeypatch.setattr("server.live.state.frame_window.SLOW_S", math.inf)  # a busy machine is no slow link
     monkeypatch.setattr("server.live.sending.coefficient_budget.MIN_COEFFICIENTS", 512)  # nor does it take more steps
     app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
-    with TestClient(app, raise_server_exceptions=False) as client:
+    with no_database_on_the_loop(), TestClient(app, raise_server_exceptions=False) as client:
         yield client
 
 

@@ -6,6 +6,7 @@ import asyncio
 import base64
 import io
 import logging
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,7 @@ def test_where_nothing_is_asked_nothing_is_said_of_the_database(
 
     async def look_for_a_while() -> None:
         with pytest.raises(TimeoutError):
-            await asyncio.wait_for(CommentNews(Rooms(1, 1, 1.0), lambda _: {}).run(), 0.1)
+            await asyncio.wait_for(CommentNews(Rooms(1, 1, 1.0), lambda _: {}, ThreadPoolExecutor(1)).run(), 0.1)
 
     run_alone(look_for_a_while())
     assert caplog.records == []
@@ -144,7 +145,7 @@ def test_rooms_are_told_of_what_another_server_took(
     client: TestClient, baked: Baked, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     services = client.app.state.services  # type: ignore[attr-defined]
-    news = CommentNews(services.live.rooms, services.comments.marks)
+    news = CommentNews(services.live.rooms, services.comments.marks, services.threads.news)
 
     def look() -> None:
         client.portal.call(news.look)  # type: ignore[union-attr]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Collection, Mapping
+from concurrent.futures import Executor
 
 from server.live.rooms.rooms import Rooms
 from worker.database.faults import Complaint
@@ -20,11 +21,11 @@ class CommentNews:
     """Looks again and again, for as long as the server runs; the database is asked only while there are rooms.
 
     Args:
-        marks: of some scenes.
+        marks: of some scenes. threads: that they are asked for in; nothing slow may run there.
     """
 
-    def __init__(self, rooms: Rooms, marks: Callable[[Collection[str]], Marks]) -> None:
-        self._rooms, self._marks = rooms, marks
+    def __init__(self, rooms: Rooms, marks: Callable[[Collection[str]], Marks], threads: Executor) -> None:
+        self._rooms, self._marks, self._threads = rooms, marks, threads
         self._known: Marks = {}
         self._complaint = Complaint(log, "whether there are new comments cannot be told")
 
@@ -42,7 +43,8 @@ class CommentNews:
     async def look(self) -> None:
         """Tell the rooms of those scenes whose comments have changed since the last look."""
         scenes = self._rooms.scenes()
-        before, self._known = self._known, await asyncio.to_thread(self._marks, scenes) if scenes else {}
+        ask = asyncio.get_running_loop().run_in_executor
+        before, self._known = self._known, await ask(self._threads, self._marks, scenes) if scenes else {}
         for scene, mark in self._known.items():
             if scene in before and before[scene] != mark:
                 self._rooms.commented(scene)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Executor
 from contextlib import asynccontextmanager, suppress
+from typing import TypeVar
 
 from server.errors import ElsewhereError
 from server.live.rooms.rooms import Rooms
@@ -17,6 +19,7 @@ from worker.database.faults import AWAY, Complaint
 log = logging.getLogger(__name__)
 
 EVERY_S = 1.0
+Asked, T = TypeVar("Asked"), TypeVar("T")
 
 
 class Keeper:
@@ -24,9 +27,11 @@ class Keeper:
 
     Args:
         leave: when the server takes leave its rooms are anybody's.
+        threads: that leases are taken in; nothing slow may run there.
     """
 
-    def __init__(self, rooms: Rooms, leases: RoomLeases, leave: Leave) -> None:
+    def __init__(self, rooms: Rooms, leases: RoomLeases, leave: Leave, threads: Executor) -> None:
+        self._threads = threads
         self._rooms, self._leases, self._leave = rooms, leases, leave
         self._sessions, self._has_leases = Counter[str](), False
         self._alone = asyncio.Lock()  # what is taken is not given up by a round that has not heard of it
@@ -52,7 +57,7 @@ class Keeper:
         async with self._alone:
             self._has_leases = True
             try:
-                return await asyncio.to_thread(self._leases.take, prefix)
+                return await self._ask(self._leases.take, prefix)
             except AWAY as error:  # the next round tries again
                 self._complaint.meet(error)
                 return True
@@ -71,7 +76,7 @@ class Keeper:
             if not held and not self._has_leases:
                 return
             try:
-                lost = await asyncio.to_thread(self._leases.keep, held)
+                lost = await self._ask(self._leases.keep, held)
                 self._has_leases = bool(held)
                 self._complaint.well()
             except Exception as error:  # the database may be away for a while; the next look must come
@@ -80,7 +85,10 @@ class Keeper:
         for prefix in lost:
             self._rooms.lose(prefix)
 
+    async def _ask(self, question: Callable[[Asked], T], about: Asked) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._threads, question, about)
+
     async def close(self) -> None:
         """Give up all."""
         with suppress(*AWAY):  # then the leases run out
-            await asyncio.to_thread(self._leases.keep, ())
+            await self._ask(self._leases.keep, ())

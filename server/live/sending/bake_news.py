@@ -6,6 +6,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 
 from server.live.state.client_socket import ClientSocket
 from server.wire.protocol import BakeMessage
@@ -17,10 +18,14 @@ POLL_S = 0.5
 
 
 class BakeNews:
-    """Looks into the ledger, which other processes write too: once for all sessions on a scene."""
+    """Looks into the ledger, which other processes write too: once for all sessions on a scene.
 
-    def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]]) -> None:
-        self._list_bakes = list_bakes
+    Args:
+        list_bakes: of a scene. threads: that they are asked for in; nothing slow may run there.
+    """
+
+    def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]], threads: Executor) -> None:
+        self._list_bakes, self._threads = list_bakes, threads
         self._looks: dict[str, tuple[float, asyncio.Task[Sequence[BakeStatus]]]] = {}
         self._complaint = Complaint(log, "sessions are not told of finer bakes")
 
@@ -44,7 +49,7 @@ class BakeNews:
 
     async def _ask(self, scene: str) -> Sequence[BakeStatus]:
         try:
-            found = await asyncio.to_thread(self._list_bakes, scene)
+            found = await asyncio.get_running_loop().run_in_executor(self._threads, self._list_bakes, scene)
         except AWAY as error:  # for a while; the picture needs it not
             self._complaint.meet(error)
             return ()

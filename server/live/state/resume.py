@@ -5,7 +5,6 @@ A client often notices a broken connection long before the server does, so live 
 
 from __future__ import annotations
 
-import json
 import secrets
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -66,8 +65,7 @@ class ResumeStore:
         del self._kept[token]
         return kept if kept.until_s >= now_s else None
 
-    def naming(self, text: str, now_s: float) -> list[str]:
-        """Bakes of sessions, open or lost and awaited, in whose look some text stands; one for each session."""
+    def looks(self, now_s: float) -> list[tuple[str, dict[str, Any]]]:
+        """The bake and the look of each session, open or lost and awaited; these documents are never written to."""
         looks = [(bake, look.document) for bake, look, _ in self._live.values()]
-        looks += [(kept.bake, kept.document) for kept in self._kept.values() if kept.until_s >= now_s]
-        return [bake for bake, document in looks if text in json.dumps(document)]
+        return looks + [(kept.bake, kept.document) for kept in self._kept.values() if kept.until_s >= now_s]

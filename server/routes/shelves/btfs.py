@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Response
-from fastapi.concurrency import run_in_threadpool
 
 from relume.btf.shelf import STORE, BtfRecord, get_record, records
 from server.files.png import A_DAY, PngResponse
@@ -33,8 +32,8 @@ def get_btf(material: Id, services: Shared) -> BtfBody:
 @router.get("/{material}/thumbnail.png", response_class=PngResponse)
 async def get_btf_thumbnail(material: Id, services: Shared) -> PngResponse:
     """A ball that is covered with it."""
-    record = get_record(btfs_path(services.settings.data), material)
-    png = await run_in_threadpool(thumbnail_of, record)
+    folder = btfs_path(services.settings.data)
+    png = await services.pictures.make((folder, material), lambda: thumbnail_of(get_record(folder, material)))
     return PngResponse(png, headers=A_DAY)
 
 

@@ -56,12 +56,15 @@ def get_environment(environment: AnyId, services: Shared) -> EnvironmentBody:
 
 
 @router.get("/{environment}/thumbnail.png", response_class=PngResponse, name="get_environment_thumbnail")
-def get_thumbnail(environment: AnyId, services: Shared) -> PngResponse:
+async def get_thumbnail(environment: AnyId, services: Shared) -> PngResponse:
     """A small tone-mapped picture, 192 × 96."""
-    if environment in BUILT_IN:
-        png = _built_in_thumbnail(environment)
-    else:
-        png = thumbnail_path(environments_path(services.settings.data), environment).read_bytes()
+
+    def make() -> bytes:
+        if environment in BUILT_IN:
+            return _built_in_thumbnail(environment)
+        return thumbnail_path(environments_path(services.settings.data), environment).read_bytes()
+
+    png = await services.pictures.make(("environment", environment), make)
     return PngResponse(png, headers=A_DAY)
 
 

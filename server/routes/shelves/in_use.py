@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
@@ -27,10 +28,11 @@ async def remove_unused(
         NotFoundError: it is not there. InUseError: it is named; nothing is removed.
     """
     said = f'"{store.prefix}{identity}"'
-    sessions = services.live.resumes.naming(said, time.monotonic())  # of the event loop
+    looks = services.live.resumes.looks(time.monotonic())  # of the event loop
 
     def remove() -> None:
         store.path(folder, identity)  # whatever its files are like
+        sessions = [bake for bake, document in looks if said in json.dumps(document)]
         _check_unused(called or f"{store.what} {identity}", said, services, sessions)
         store.remove(folder, identity)
         services.access.quotas.disown(kind, identity)

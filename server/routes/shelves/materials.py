@@ -51,8 +51,8 @@ def get_measured(material: Id, services: Shared) -> MeasuredBody:
 @router.get("/{material}/thumbnail.png", response_class=PngResponse, name="get_measured_thumbnail")
 async def get_thumbnail(material: Id, services: Shared) -> PngResponse:
     """A ball of the material."""
-    record = get_record(materials_path(services.settings.data), material)
-    png = await run_in_threadpool(thumbnail_of, record)
+    folder = materials_path(services.settings.data)
+    png = await services.pictures.make((folder, material), lambda: thumbnail_of(get_record(folder, material)))
     return PngResponse(png, headers=A_DAY)
 
 

@@ -1,0 +1,74 @@
+"""rooms.enter_s: from the request for a session in a room to its first message, beside thumbnails and a full batch.
+
+A real server over a baked scene that has no thumbnail. The one batch process renders pictures that take longer than
+the measurement; so many clients ask for the missing thumbnail, and wait; then a few sessions enter rooms of their own,
+one after another. The figure is the longest of them, `quiet_s` that of the same before anybody asked for anything.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import threading
+import time
+import urllib.request
+from contextlib import suppress
+
+from websockets.sync.client import connect
+
+from bench.figure import Figure
+from bench.house import SPEAKS, House, Server, baked_house, serving
+from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from relume.bake import Recipe
+from relume.environments.studio import studio
+
+_NAME = "rooms.enter_s"
+_THUMBNAILS = 8
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, serve, enter."""
+    size, num_lights, frames, rooms = ((32, 32), 30, 2, 2) if tiny else ((512, 512), 1000, 400, 5)
+    scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
+    with (
+        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
+        serving(house, {"RELUME_AHEAD": "false"}) as server,
+    ):
+        _enter(server, house)  # loads what the first session loads
+        quiet_s = max(_enter(server, house) for _ in range(rooms))
+        _fill(server, house, frames)
+        asking = [threading.Thread(target=_ask, args=(server, house), daemon=True) for _ in range(_THUMBNAILS)]
+        for thread in asking:
+            thread.start()
+        time.sleep(0.1 if tiny else 2.0)  # they all wait now
+        beside_s = max(_enter(server, house) for _ in range(rooms))
+        waiting = sum(thread.is_alive() for thread in asking)
+    context = {"quiet_s": quiet_s, "rooms": rooms, "thumbnails": _THUMBNAILS, "thumbnails_waiting_at_end": waiting}
+    return [Figure(_NAME, beside_s, "s", context)]
+
+
+def _enter(server: Server, house: House) -> float:
+    """Seconds to the first message in a new room."""
+    began = time.perf_counter()
+    address = f"{server.session(house.bake)}?room={secrets.token_hex(16)}&name=Ann"
+    with connect(address, subprotocols=[SPEAKS], max_size=None, compression=None, open_timeout=120) as connection:
+        connection.recv(120)
+        return time.perf_counter() - began
+
+
+def _ask(server: Server, house: House) -> None:
+    with suppress(OSError):  # the server ends before it is painted
+        urllib.request.urlopen(f"http://127.0.0.1:{server.port}/api/scenes/{house.scene}/thumbnail.webp").close()
+
+
+def _fill(server: Server, house: House, frames: int) -> None:
+    """A batch whose pictures are all different."""
+    curve = {"materials": {"Teapot": {"terms": [{"model": "cook_torrance", "params": {"sigma": 0.1}}]}}}
+    looks = []
+    for frame in range(frames):
+        curve["materials"]["Teapot"]["terms"][0]["params"] = {"sigma": 0.1 + 0.3 * frame / frames}  # type: ignore[index]
+        looks.append(json.loads(json.dumps(curve)))
+    body = json.dumps({"bake": house.bake, "view": "front", "looks": looks, "format": "png"}).encode()
+    headers = {"Content-Type": "application/json"}
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}/api/renders", body, headers)
+    urllib.request.urlopen(request).close()
