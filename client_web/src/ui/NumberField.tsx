@@ -40,7 +40,7 @@ export function NumberField({ value, label, minimum, maximum, step, whole = fals
     if (next !== null) {
       const taken = Math.min(maximum, Math.max(minimum, next));
       if (taken !== next)
-        note(`${label} goes from ${formatNumber(minimum)} to ${formatNumber(maximum)}: ${formatNumber(next)} became ${formatNumber(taken)}.`);
+        note(`${label}: ${formatNumber(next)} is beyond ${formatNumber(minimum)} to ${formatNumber(maximum)}; it became ${formatNumber(taken)}.`);
       // a number that was typed is a step by itself
       history.seal();
       put(next);

@@ -55,3 +55,20 @@ def test_words_go_on_after_a_click_that_pins_them_elsewhere(editor: Editor) -> N
     editor.canvas.click(position={"x": 200, "y": 200})
     expect(words).to_be_focused()
     expect(words).to_have_value("Too bright")
+
+
+def test_who_shares_a_look_has_one_name_everywhere(editor: Editor) -> None:
+    """In the list of people, and as the author of a comment: where nobody logs in, the server names them."""
+    page = editor.page
+    page.locator(".together > button").press("Enter")
+    page.get_by_role("button", name="Share this look live").click()
+    name = page.locator(".people .who").inner_text()
+    page.keyboard.press("Escape")
+    page.keyboard.press("n")
+    panel = page.get_by_role("complementary", name="Comments")
+    panel.get_by_role("textbox").fill("whose?")
+    panel.get_by_role("textbox").press("Control+Enter")
+    assert name.startswith("Guest ")
+    expect(panel.locator(".comment-head")).to_contain_text(name)
+    panel.get_by_role("button", name="Delete comment 1").press("Enter")
+    expect(panel.locator(".comment")).to_have_count(0)
