@@ -97,19 +97,23 @@ def _shaded(
         rows = shaded.rows(num) * np.asarray(document["color"])
         image = images.get(named["texture"]) if named["texture"] is not None else None
         if image is not None:
-            rows = rows * _looked_up(image, receivers)
+            rows = rows * _looked_up(image, np.asarray(receivers.uv))
         radiance += rows if wanted.outgoing is None else rows * wanted.outgoing.T
     return radiance
 
 
-def _looked_up(image: Texture, receivers: Receivers) -> F32:
-    """The values of an image on a ball, which it goes round as BTFs do; blurred, as a ball is small. (n, 3)"""
+def _looked_up(image: Texture, uv: F32) -> F32:
+    """The values of an image on a ball, which it goes round as BTFs do; blurred, as a ball is small. (n, 3)
+
+    Args:
+        uv: places in it, in the first two columns. (n, 2 or more)
+    """
     step = -(-max(image.pixels.shape[:2]) // _MOST_TEXELS)
     values = decode(image.pixels[::step, ::step], image.coding)
     blocks = -(-max(values.shape[:2]) // _FEWEST_TEXELS)
     height, width = (max(1, side // blocks) for side in values.shape[:2])
     whole = values[: height * blocks, : width * blocks]
     blurred = whole.reshape(height, len(whole) // height, width, whole.shape[1] // width, 3)
-    u, v = (np.asarray(receivers.uv[:, k], np.float64) % 1.0 for k in range(2))
+    u, v = (np.asarray(uv[:, k], np.float64) % 1.0 for k in range(2))
     column, row = (u * width).astype(int) % width, (v * height).astype(int) % height
     return np.asarray(blurred.mean(axis=(1, 3))[row, column], np.float32)
