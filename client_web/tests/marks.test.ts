@@ -59,6 +59,7 @@ test("a picture of before the newest edit says so until one of after it is there
   expect(words()).toEqual([]); // nothing flickers under a hand
   vi.advanceTimersByTime(200);
   expect(words()).toEqual(["Updating…"]);
+  fidelity.value = "preview";
   isOutdated.value = false;
-  expect(words()).toEqual([]);
+  expect(words()).toEqual(["Preview"]);
 });

@@ -5,7 +5,7 @@ import { exporting, exportingWords } from "../looks/rendering";
 import { cancelBake } from "../net/api";
 import { bakingWords, hasProgress, useElapsed } from "../scene/baking";
 import { limits } from "../seen/limits";
-import { coming } from "../state/bakes";
+import { coming, method } from "../state/bakes";
 import { connection, freezing, retryInMs } from "../state/connection";
 import { settled } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
@@ -26,7 +26,7 @@ function pictureWords(): string {
   if (look.value === null || connection.value !== "open") return "";
   if (!settled.value && playing.value) return "playing";
   if (!settled.value) return moves.value ? "approximate until the eye rests" : "refining…";
-  return bakedLight.value ? "exact ✓" : "exact for this bake ✓";
+  return bakedLight.value && method.value !== "direct" ? "exact ✓" : "exact for this bake ✓";
 }
 
 function bakeWords(elapsed: number): string {

@@ -1,6 +1,6 @@
 /** How near the picture is to its look, in the picture's corner: said where it is not exact for longer than a blink, so
  * that nothing flickers while a hand drags. */
-import { computed, effect, signal } from "@preact/signals";
+import { computed, effect, signal, untracked } from "@preact/signals";
 import type { Fidelity } from "../protocol";
 import { DEFAULT_METHOD, wordsOf } from "../scene/methods";
 import { method } from "../state/bakes";
@@ -59,14 +59,6 @@ function say(): void {
   if (now !== "exact") rough.value = now;
 }
 
-/** The picture is of before the newest edit, for longer than a blink. */
-const isLate = signal(false);
-effect(() => {
-  const timer = isOutdated.value ? setTimeout(() => (isLate.value = true), SHOWN_AFTER_MS) : undefined;
-  if (!isOutdated.value) isLate.value = false;
-  return () => clearTimeout(timer);
-});
-
 const isRough = computed(() => fidelity.value !== "exact");
 effect(() => {
   if (settled.value) rough.value = null;
@@ -75,6 +67,17 @@ effect(() => {
   const timer = isRough.value ? setTimeout(say, SHOWN_AFTER_MS) : undefined;
   return () => clearTimeout(timer);
 });
+/** The picture is of before the newest edit, for longer than a blink. */
+const isLate = signal(false);
+effect(() => {
+  const timer = isOutdated.value ? setTimeout(() => (isLate.value = true), SHOWN_AFTER_MS) : undefined;
+  if (!isOutdated.value && isLate.peek()) {
+    isLate.value = false;
+    untracked(say); // the word that was there goes on with the next, which is not waited for
+  }
+  return () => clearTimeout(timer);
+});
+
 // a word that is there changes when another one has held
 effect(() => {
   const timer = fidelity.value !== rough.peek() && rough.peek() !== null ? setTimeout(say, SHOWN_AFTER_MS) : undefined;
