@@ -85,7 +85,9 @@ def _ball(steps: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_objects_and_materials_are_meshes_of_their_own(tmp_path: Path) -> None:
-    (tmp_path / "m.mtl").write_text("newmtl red\nKd 1 0 0\nKs 0.2\nNs 90\n\nnewmtl metal\nKd .9 .8 .7\nPm 1\nPr .3\n")
+    (tmp_path / "m.mtl").write_text(
+        "newmtl red\nKd 1 0 0\nKs .2 0 0\nNs 90\n\nnewmtl metal\nKd .9 .8 .7\nPm 1\nPr .3\n"
+    )
     path = tmp_path / "thing.obj"
     path.write_text(SQUARE + "mtllib m.mtl\no Box\nusemtl red\nf 1 2 3\nusemtl metal\nf 1 3 4\no Lid\nf 2 3 4\n")
     scene = import_scene(path, "thing", LIGHT)
@@ -93,7 +95,7 @@ def test_objects_and_materials_are_meshes_of_their_own(tmp_path: Path) -> None:
     assert [mesh.material for mesh in scene.meshes] == [0, 1, 1]
     red, metal = scene.materials
     assert [term["model"] for term in red.terms] == ["lambert", "blinn_phong"]
-    assert red.terms[1]["color"] == [0.2, 0.2, 0.2]
+    assert red.terms[1]["color"] == [0.2, 0.0, 0.0]
     assert red.terms[1]["params"] == {"exponent": 90.0}
     assert metal.terms[0]["color"] == [0, 0, 0]
     assert metal.terms[1]["params"] == {"roughness": 0.3, "f0": [0.9, 0.8, 0.7]}

@@ -18,7 +18,8 @@ from relume.scene.gltf.cameras import framing_camera
 from relume.scene.gltf.names import unique_name
 from relume.scene.lights import F64, LightCollector
 from relume.scene.mesh_files.corners import Corners, make_mesh
-from relume.scene.mesh_files.mtl import Described, MaterialMaker, read_library
+from relume.scene.mesh_files.mtl import MaterialMaker, read_library
+from relume.scene.mesh_files.mtl_dialects import Described
 from relume.scene.mesh_files.obj import Obj, read_obj
 from relume.scene.mesh_files.ply import read_ply
 from relume.scene.model import F32, Coding, Light, Material, Mesh, Scene, Texture
@@ -64,6 +65,7 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
         number = numbers[material]
         mesh = make_mesh(corners, own_name, number, materials[number], f"mesh {own_name!r}", warnings)
         meshes.extend([] if mesh is None else [mesh])
+    maker.warn_of_gloss()
     collector = LightCollector(warnings)
     lit = collector.shine(materials, emissions, meshes)
     return _scene(name, meshes, lit, environment, warnings, collector.lights)

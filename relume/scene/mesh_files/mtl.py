@@ -1,44 +1,36 @@
-"""Material libraries of OBJ files: Kd as lambert, Ks and Ns as blinn_phong, Pr and Pm as ggx, Ke as radiance.
+"""Material libraries of OBJ files: numbers and images by keyword, and materials made from them.
 
-Wavefront's Material Library File format (illumination model 2: Ks (n·h)^Ns), and the common PBR extension of it.
+Wavefront's Material Library File format, and the common PBR extension of it.
 """
 
 from __future__ import annotations
 
 import posixpath
-from dataclasses import dataclass, field, replace
-from typing import Any
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.registry import TERMS
 from relume.errors import SceneError
 from relume.imageio.decoding import U8, Decoder
-from relume.remarks import Remark, simplified, wrong
+from relume.remarks import Remark, simplified, unused, wrong
 from relume.scene.companions import Companions
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import NOISE
-from relume.scene.gltf.terms import Over, Surface, dielectric_share, make_terms
+from relume.scene.mesh_files.mtl_dialects import Described, Gloss, dialect_of, gray_terms, terms_of
 from relume.scene.model import Coding, Material, Opacity, Texture
 from relume.scene.opacity import make_opacity
 
 F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20
 MAX_MATERIALS = 1_000
-GREY = [0.6, 0.6, 0.6]
 NUMBERS = {"Kd": 3, "Ks": 3, "Ke": 3, "Ns": 1, "Pr": 1, "Pm": 1, "d": 1, "Tr": 1}
+MINOR_NUMBERS = {"Ka": 3, "illum": 1, "Pc": 1, "Pcr": 1, "Ps": 1, "aniso": 1}  # nothing is refused for these
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-clamp": 1}
 OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1}
-
-
-@dataclass
-class Described:
-    """One `newmtl`: its numbers, and the names of its images by keyword, as the file in `folder` gives them."""
-
-    folder: str = ""
-    numbers: dict[str, list[float]] = field(default_factory=dict)
-    maps: dict[str, str] = field(default_factory=dict)
+BUMPS = ("norm", "map_Bump", "map_bump", "bump")
+USED_MAPS = {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", *BUMPS}
+HARMLESS_MAPS = {"map_Ka", "map_aat"}  # of ambient light, and how to smooth the edges of images
 
 
 def read_library(data: bytes, folder: str = "") -> dict[str, Described]:
@@ -52,15 +44,20 @@ def read_library(data: bytes, folder: str = "") -> dict[str, Described]:
     if len(data) > MAX_LIBRARY_BYTES:
         raise SceneError(f"the material file is larger than {MAX_LIBRARY_BYTES >> 20} MB; export it again")
     materials: dict[str, Described] = {}
-    material = Described()
-    for line in data.decode("utf-8", "replace").splitlines():
+    lines = data.decode("utf-8", "replace").splitlines()
+    dialect = dialect_of(lines)
+    material = Described(dialect=dialect)
+    for line in lines:
         word, _, rest = line.strip().partition(" ")
         if word == "newmtl":
-            material = materials[rest.strip()[:1_000]] = Described(folder)
+            material = materials[rest.strip()[:1_000]] = Described(folder, dialect)
             if len(materials) > MAX_MATERIALS:
                 raise SceneError(f"the material file has more than {MAX_MATERIALS:,} materials; remove some")
         elif word in NUMBERS:
             material.numbers[word] = _numbers(rest.split(), NUMBERS[word], word)
+        elif word in MINOR_NUMBERS:
+            with suppress(SceneError):
+                material.numbers[word] = _numbers(rest.split(), MINOR_NUMBERS[word], word)
         elif word.startswith("map_") or word in ("bump", "norm", "disp", "refl"):
             material.maps[word] = _image_name(rest.split())
     return materials
@@ -95,19 +92,22 @@ class MaterialMaker:
         self._decoder = Decoder()
         self._names: dict[str, int] = {}
         self._pixels: dict[str, U8 | None] = {}
+        self._glosses: dict[str, Gloss] = {}
 
     def make(self, name: str, described: Described | None) -> Material:
         """One material under a name of its own; grey where nothing is known of it. Raises SceneError."""
         own_name = unique_name(name or "material", self._names)
         what = f"material {own_name!r}"
         if described is None:
-            return Material(own_name, make_terms(_plastic(np.array(GREY), 0.0, 0.5, {}), Over()))
+            return Material(own_name, gray_terms())
         textures = self._textures(described, what)
         self._warn_of_the_rest(described, what)
-        normal_map = self._image(described, "norm", f"the normal map of {what}", Coding("normal"))
+        normal_map = self._normal_map(described, what)
         opacity = self._opacity(described, what)
         roughness = self._roughness(described, textures, what)
-        terms = _terms(described, textures, roughness, has_normal_map=normal_map is not None)
+        terms, gloss = terms_of(described, textures, roughness, has_normal_map=normal_map is not None)
+        if gloss is not None:
+            self._glosses[own_name] = gloss
         return Material(own_name, terms, textures, normal_map, opacity=opacity)
 
     def _roughness(self, described: Described, textures: dict[str, Texture], what: str) -> float | None:
@@ -165,37 +165,52 @@ class MaterialMaker:
                 data = self._companions.read(name, what)  # some exporters name it as the scene sees it
             self._pixels[path] = None if data is None else self._decoder.decode(data, what)
         if self._pixels[path] is None:
-            shown = name[:60].encode("ascii", "replace").decode()
-            self._warnings.append(wrong(f"{what} ({shown!r}) is not beside the scene; it is left out"))
+            self._warnings.append(wrong(f"{what} ({_shown(name)!r}) is not beside the scene; it is left out"))
         return self._pixels[path]
 
+    def _normal_map(self, described: Described, what: str) -> Texture | None:
+        """That of `norm`, or of a bump map whose image is one; heights are said to be lost."""
+        for keyword in (keyword for keyword in BUMPS if described.maps.get(keyword)):
+            called = f"the normal map of {what}" if keyword == "norm" else f"{keyword} of {what}"
+            try:
+                texture = self._image(described, keyword, called, Coding("normal"))
+            except SceneError as error:
+                if keyword == "norm":
+                    raise
+                self._warnings.append(wrong(f"{error}; until then it is left out"))
+                continue
+            if texture is None or keyword == "norm" or holds_normals(texture.pixels):
+                return texture
+            name = _shown(described.maps[keyword])
+            self._warnings.append(wrong(f"{called} ({name!r}) is a map of heights; it is left out, give a normal map"))
+        return None
+
     def _warn_of_the_rest(self, described: Described, what: str) -> None:
-        for keyword in sorted(described.maps.keys() - {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", "norm"}):
-            self._warnings.append(simplified(f"{keyword[:40]} of {what} is not used"))
+        for keyword in sorted(described.maps.keys() - USED_MAPS):
+            say = unused if keyword in HARMLESS_MAPS else wrong
+            name = _shown(described.maps[keyword])
+            self._warnings.append(say(f"{keyword[:40]} of {what} ({name!r}) is not used"))
+        lost = [word for word in ("Ps", "aniso") if described.numbers.get(word, [0.0])[0] > 0]
+        self._warnings.extend(simplified(f"{word} of {what} is not used") for word in lost)
+
+    def warn_of_gloss(self) -> None:
+        """Say once for all materials that were made how Ks was read, where it was not read as it stands."""
+        for gloss in Gloss:
+            names = [name for name, found in self._glosses.items() if found is gloss]
+            if names:
+                more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+                self._warnings.append(simplified(f"Ks of material {names[0]!r}{more} {gloss.value}"))
 
 
-def _terms(
-    described: Described, textures: dict[str, Texture], roughness: float | None, *, has_normal_map: bool
-) -> tuple[dict[str, Any], ...]:
-    numbers = described.numbers
-    base = numbers.get("Kd", GREY)
-    if "diffuse" in textures and not any(base):
-        base = [1.0, 1.0, 1.0]  # exporters write zeros where they mean the image
-    if roughness is not None or "Pm" in numbers:
-        metallic = min(numbers.get("Pm", [0.0])[0], 1.0)
-        surface = _plastic(np.array(base), metallic, 0.5 if roughness is None else roughness, textures)
-        return make_terms(replace(surface, has_normal_map=has_normal_map), Over())
-    diffuse = {"model": "lambert", "color": base, "texture": "diffuse" if "diffuse" in textures else None}
-    tint = numbers.get("Ks", [0.0, 0.0, 0.0])
-    if not any(tint):
-        return (diffuse,)
-    exponent = TERMS["blinn_phong"].parameter("exponent")
-    held = float(np.clip(numbers.get("Ns", [exponent.default])[0], exponent.minimum, exponent.maximum))
-    gloss = {"model": "blinn_phong", "color": np.clip(tint, 0, 1).tolist(), "params": {"exponent": held}}
-    return (diffuse, gloss | {"texture": "specular" if "specular" in textures else None})
+def holds_normals(pixels: U8) -> bool:
+    """Whether an image, (height, width, 3 or 4), holds unit vectors about +z, as normal maps do and heights do not."""
+    step = 1 + max(pixels.shape[:2]) // 512  # these tell it as well as all
+    vectors = pixels[::step, ::step, :3].reshape(-1, 3) / np.float32(127.5) - 1
+    x, y, z = vectors.mean(axis=0)
+    length = np.abs(np.linalg.norm(vectors, axis=1) - 1).mean()
+    return bool(z > 0.5 and max(abs(x), abs(y)) < 0.25 and length < 0.15)
 
 
-def _plastic(base: F64, metallic: float, roughness: float, textures: dict[str, Texture]) -> Surface:
-    """A dielectric of index 1.5, or a metal, or between. base: (3,)"""
-    f0 = 0.04 + (base - 0.04) * metallic
-    return Surface(base * (1 - metallic), f0, 1.0, roughness, dielectric_share(0.04, 1.0), textures)
+def _shown(name: str) -> str:
+    """The end of a file's name, which tells more than its beginning, in ASCII."""
+    return ("…" if len(name) > 60 else "") + name[-60:].encode("ascii", "replace").decode()
