@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from datetime import UTC, datetime
 from typing import Annotated
 
 import typer
 
 from cli.options import Data
+from cli.terminal.printing import Json, print_result
 from cli.tokens import open_access
 
 
@@ -16,12 +16,10 @@ def audit(
     data: Data = None,
     last: Annotated[int, typer.Option("--last", min=1, max=1_000, help="How many changes.")] = 50,
     who: Annotated[str | None, typer.Option("--who", help="Only of this user.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Show what was changed, and by whom; the newest last."""
     for entry in reversed(open_access(data, is_used=True).audit.list(last, who=who)):
-        if as_json:
-            typer.echo(json.dumps(vars(entry)))
-            continue
         at = datetime.fromtimestamp(entry.at, UTC).strftime("%Y-%m-%d %H:%M:%S")
-        typer.echo(f"{at}  {entry.who:20}  {entry.what}  {entry.object}  {entry.status}  {entry.request}")
+        line = f"{at}  {entry.who:20}  {entry.what}  {entry.object}  {entry.status}  {entry.request}"
+        print_result(vars(entry), line, as_json=as_json)

@@ -8,23 +8,31 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cli.options import Data, SceneName, Scheduler, Size, parse_size, read_camera
+from cli.options import Data, DryRun, SceneName, Scheduler, Size, parse_size, read_camera
+from cli.terminal.printing import Json, note, print_result, size_text
 
 if TYPE_CHECKING:
     from relume.bake import Recipe
     from server.settings import Settings
     from worker.cameras import Views
+    from worker.scenes import SceneRecord
     from worker.service import BakeService
     from worker.status import BakeStatus
+
+Method = Literal["direct", "gather", "surface"]
+Preset = Literal["preview", "good", "final"]
 
 
 def bake(
     scene: SceneName,
-    method: Annotated[str, typer.Option(help="Transfer method.")] = "direct",
+    method: Annotated[Method, typer.Option(help="Transfer method.")] = "direct",
+    preset: Annotated[
+        Preset, typer.Option(help="How fine: preview 320x240 and 300 lights, good 640x480, 2000, final 1024x768, 4000.")
+    ] = "good",
     view: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="View to bake, several times for several; else all.")
     ] = None,
@@ -33,7 +41,7 @@ def bake(
         typer.Option(metavar="FILE.json", help='View from here: {"name", "to_world": 16 numbers, "yfov": degrees}.'),
     ] = None,
     size: Size = None,
-    lights: Annotated[int | None, typer.Option(metavar="N", help="Triangles of light. [default: 2000]")] = None,
+    lights: Annotated[int | None, typer.Option(metavar="N", help="Triangles of light. [default: by --preset]")] = None,
     points: Annotated[
         int | None, typer.Option(metavar="N", help="Points of a moving view, method surface. [default: 50000]")
     ] = None,
@@ -50,34 +58,68 @@ def bake(
         bool, typer.Option(help="Bake here and show it; --no-watch leaves it to a running server and returns.")
     ] = True,
     scheduler: Scheduler = None,
+    dry_run: DryRun = False,
+    as_json: Json = False,
     data: Data = None,
 ) -> int:
-    """Queue a bake and follow it. The same recipe twice is the same bake; an interrupted one goes on where it stopped.
+    """Queue a bake and follow it; print its id.
+
+    The same recipe twice is the same bake; an interrupted one goes on where it stopped.
 
     This process bakes, unless a server on the same data folder is quicker to take it. Ctrl-C asks whether to keep going
     in the background or to cancel.
     """
     from cli.data_folder import find_scene, open_bakes, open_settings
+    from cli.naming import spelled
+    from cli.terminal.documents import bake_document
     from worker.cameras import chosen_views
 
     settings = open_settings(data, scheduler=scheduler)
     service = open_bakes(settings)
     try:
         record = find_scene(service.ledger, scene)
-        views = chosen_views(service.ledger, record, [*(view or ()), *(read_camera(path) for path in camera or ())])
-        recipe = _recipe(method, views, size, lights, points, relightable)
+        named = [spelled(name, _view_names(service, record)) for name in view or ()]
+        views = chosen_views(service.ledger, record, [*named, *(read_camera(path) for path in camera or ())])
+        recipe = _recipe(method, preset, views, size, lights, points, relightable)
         recipe = replace(recipe, gather_samples=gather_samples, gather_rays=gather_rays)
-        identity = service.submit(record.id, recipe)
-        if not watch:
-            typer.echo(identity)
+        if dry_run:
+            _print_plan(service, record, recipe, as_json=as_json)
             return 0
-        return _watch(service, settings, identity, record.name)
+        identity = service.submit(record.id, recipe)
+        if watch:
+            return _watch(service, settings, identity, record.name, as_json=as_json)
+        print_result(bake_document(service.get(identity), service), identity, as_json=as_json)
+        return 0
     finally:
         service.close()
 
 
+def _view_names(service: BakeService, record: SceneRecord) -> list[str]:
+    """Names of views that a bake of a scene may show: its own, and those of cameras that people placed."""
+    from worker.cameras import kept_cameras
+
+    return [*record.views, *(camera.name for camera in kept_cameras(service.ledger, record.id))]
+
+
+def _print_plan(service: BakeService, record: SceneRecord, recipe: Recipe, *, as_json: bool) -> None:
+    """Say what a bake would cost, as POST /api/bakes does with `dry_run`."""
+    from cli.terminal.documents import plan_document, plan_lines, recipe_document, recipe_text
+    from worker.status import bake_id
+
+    plan, identity = service.plan(record.id, recipe), bake_id(record.id, recipe)
+    document = {"id": identity, "recipe": recipe_document(recipe), "plan": plan_document(plan, service)}
+    lines = [f"would bake {record.name}: {recipe_text(recipe)}", *plan_lines(plan, service)]
+    print_result(document, identity, as_json=as_json, details=lines)
+
+
 def _recipe(
-    method: str, views: Views, size: str | None, lights: int | None, points: int | None, relightable: bool
+    method: str,
+    preset: Preset,
+    views: Views,
+    size: str | None,
+    lights: int | None,
+    points: int | None,
+    relightable: bool,
 ) -> Recipe:
     from relume.bake import Recipe
     from relume.errors import ParameterError
@@ -87,15 +129,16 @@ def _recipe(
         raise ParameterError("--lights", lights, "a number of at least 1")
     if points is not None and points < 1:
         raise ParameterError("--points", points, "a number of at least 1")
-    preset, (names, cameras) = PRESETS["good"], views
-    pixels = parse_size(size) if size else preset.size
-    num_lights, num_points = lights or preset.num_lights, points_of(method, points)
+    fineness, (names, cameras) = PRESETS[preset], views
+    pixels = parse_size(size) if size else fineness.size
+    num_lights, num_points = lights or fineness.num_lights, points_of(method, points)
     return Recipe(method, names, pixels, num_lights, relightable, cameras, num_points)
 
 
-def _watch(service: BakeService, settings: Settings, identity: str, label: str) -> int:
+def _watch(service: BakeService, settings: Settings, identity: str, label: str, *, as_json: bool) -> int:
     from cli.follow import follow
     from cli.interrupts import noted_interrupts
+    from cli.terminal.documents import bake_document
 
     began = time.monotonic()
     try:
@@ -105,24 +148,24 @@ def _watch(service: BakeService, settings: Settings, identity: str, label: str) 
                 status = follow(changes, label, asked.is_set)
     except KeyboardInterrupt:
         return _interrupted(service, settings, identity)
-    return _report(status, settings, time.monotonic() - began)
-
-
-def _report(status: BakeStatus, settings: Settings, seconds: float) -> int:
-    """Say how it ended; the id alone goes to stdout."""
-    from worker.paths import bake_path
-    from worker.storage import fetched
-
     if status.state != "ready":
         typer.echo(f"relume: the bake {status.state}: {status.problem or 'somebody stopped it'}", err=True)
         return 1
-    typer.echo(status.id)
-    typer.echo(f"{status.bytes / 1e6:,.1f} MB in {seconds:.1f} s", err=True)
+    print_result(bake_document(status, service), status.id, as_json=as_json)
+    _report(status, settings, time.monotonic() - began)
+    return 0
+
+
+def _report(status: BakeStatus, settings: Settings, seconds: float) -> None:
+    """Say how well it went."""
+    from worker.paths import bake_path
+    from worker.storage import fetched
+
+    note(f"{size_text(status.bytes)} in {seconds:.1f} s")
     if status.recipe.method == "direct":
         _report_rays(fetched(bake_path(settings.data, status.id)))
     if status.recipe.method == "surface":
         _report_moving_error(fetched(bake_path(settings.data, status.id)))
-    return 0
 
 
 def _report_rays(store: Path) -> None:
@@ -130,10 +173,9 @@ def _report_rays(store: Path) -> None:
     from relume.store import open_store
 
     rays = read_rays(open_store(store))
-    typer.echo(
+    note(
         f"{rays.traced / 1e6:,.1f} of {rays.full / 1e6:,.1f} M shadow rays traced, the others predicted; "
-        f"wrong by the bake's own check: {100 * rays.wrong_share:.2g} %",
-        err=True,
+        f"wrong by the bake's own check: {100 * rays.wrong_share:.2g} %"
     )
 
 
@@ -144,7 +186,7 @@ def _report_moving_error(store: Path) -> None:
     found = read_moving_error(open_store(store))
     if found is not None:
         off, deviation = 100 * found.value, 100 * found.standard_error
-        typer.echo(f"while the eye moves: {off:.1f} ± {deviation:.1f} % off (RMS of surfaces); at rest exact", err=True)
+        note(f"while the eye moves: {off:.1f} ± {deviation:.1f} % off (RMS of surfaces); at rest exact")
 
 
 def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:

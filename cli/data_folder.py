@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cli.naming import spelled
 from relume.errors import NotFoundError
 
 if TYPE_CHECKING:
@@ -85,19 +86,24 @@ def open_bakes(settings: Settings) -> BakeService:
     return BakeService(settings.data, settings.database_url, settings.scheduler)
 
 
+def check_used(settings: Settings) -> None:
+    """Raise ParameterError where a data folder has neither a ledger nor anything that was imported."""
+    from relume.errors import ParameterError
+    from server.library.shelves import shelves
+
+    used = settings.data / "relume.db", *(folder for _, folder in shelves(settings.data))
+    if not settings.database and not any(path.exists() for path in used):
+        raise ParameterError("--data", str(settings.data), "a folder that relume has used; this one is empty")
+
+
 def find_scene(ledger: Ledger, name: str) -> SceneRecord:
     """A scene by id, start of an id, or name. Raises NotFoundError where there is none or more than one."""
+    from cli.naming import pick
     from worker.scenes import list_scenes
 
-    scenes = list_scenes(ledger)
-    exact = [scene for scene in scenes if name in (scene.id, scene.name)]
-    found = exact or [scene for scene in scenes if len(name) >= 4 and scene.id.startswith(name)]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise NotFoundError(f"{len(found)} scenes are called {name!r}; give one of {', '.join(s.id for s in found)}")
-    known = ", ".join(f"{scene.id} ({scene.name})" for scene in scenes[:10]) or "none yet"
-    raise NotFoundError(f"there is no scene {name[:80]!r}; known are: {known}; relume import adds one")
+    scenes = {scene.id: scene for scene in list_scenes(ledger)}
+    known = [(scene.id, scene.name) for scene in scenes.values()]
+    return scenes[pick("scene", name, known, "relume import adds one")]
 
 
 def find_shown(
@@ -115,6 +121,7 @@ def find_shown(
         scene = find_scene(service.ledger, name)
         return scene, *find_bake(service, scene, view, moves=moves)
     bake = called[0]
+    view = None if view is None else spelled(view, bake.recipe.views)
     _check_shown(bake, view, moves)
     return find_scene(service.ledger, bake.scene), bake, view or bake.recipe.views[0]
 
@@ -145,6 +152,7 @@ def find_bake(
     if moves:
         ready = [bake for bake in ready if bake.recipe.method in MOVING]
     known = dict.fromkeys((*scene.views, *(baked for bake in ready for baked in bake.recipe.views)))
+    view = None if view is None else spelled(view, known)
     if view is not None and view not in known:
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(known)[:400]}")
     fitting = [bake for bake in ready if view is None or view in bake.recipe.views]
@@ -155,8 +163,18 @@ def find_bake(
     return finest, view or finest.recipe.views[0]
 
 
-def complete_look(partial: dict[str, Any], default: dict[str, Any]) -> Look:
-    """A checked look from what a file says and the scene's default. Raises ParameterError."""
+def complete_look(partial: dict[str, Any], default: dict[str, Any], name: str = "--look") -> Look:
+    """A checked look from what a file says and the scene's default.
+
+    Args:
+        partial, default: documents. name: of the look, in messages.
+    Raises:
+        ParameterError: naming the look and the place in it.
+    """
+    from relume.errors import ParameterError
     from relume.look import complete, validate
 
-    return validate(complete(partial, default), default)
+    try:
+        return validate(complete(partial, default), default)
+    except ParameterError as error:
+        raise ParameterError(f"{name}: {error.name}", error.value, error.allowed) from None

@@ -5,21 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-
+from cli.terminal.progress import progress
 from worker.board import Subscription
 from worker.status import PHASE_WORDS, BakeStatus
 
 
 def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = lambda: False) -> BakeStatus:
     """Show progress until the bake ends, and return its last status. Raises KeyboardInterrupt when `interrupted`."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[detail]}"))
-    with Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task(label, total=1.0, detail="")
+    with progress(label) as tell:
         while not (status := changes.latest).final:
-            progress.update(bar, completed=status.progress, detail=detail(status))
+            tell(status.progress, detail(status))
             changes.get(timeout=0.5)
             if interrupted():
                 raise KeyboardInterrupt

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Data
+from cli.options import Data, check_readable
+from cli.terminal.printing import Json, print_result
+from relume.remarks import EFFECTS
 
 if TYPE_CHECKING:
-    from relume.scene.model import Scene
+    from relume.scene.model import Material, Scene
 
 
 def import_scene(
@@ -25,13 +28,19 @@ def import_scene(
     name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
     built_in: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="In place of a file: still_life, cornell_box, lamplit_cornell_box, …"),
+        typer.Option(metavar="NAME", help="In place of a file: a scene made by code; relume list built-ins has them."),
     ] = None,
     ground: Annotated[bool, typer.Option("--ground", help="Put it on a ground, which catches its shadows.")] = False,
+    as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Register a scene; print its id, what was understood, and a warning for each thing that was not."""
+    """Register a scene; print its id, and what was read of it.
+
+    What was not read is a warning each: "wrong" is missing or looks other than the file says, "simplified" looks much
+    the same, "unused" does not change the picture.
+    """
     from cli.data_folder import open_bakes, open_settings
+    from cli.terminal.documents import scene_document
     from relume.scene.ground import with_ground
     from worker.scenes import get_scene, register_scene
 
@@ -40,24 +49,48 @@ def import_scene(
     service = open_bakes(open_settings(data))
     try:
         record = get_scene(service.ledger, register_scene(service.data_dir, service.ledger, scene))
+        bakes = service.bakes(record.id)
     finally:
         service.close()
+    print_result(scene_document(record, bakes), record.id, as_json=as_json, details=_read(scene))
+    for warning in sorted(record.warnings, key=lambda remark: EFFECTS.index(remark.effect)):
+        typer.echo(f"warning, {warning.effect}: {warning}", err=True)
+
+
+def _read(scene: Scene) -> Iterator[str]:
+    """What was read of a file, a line each."""
     height, width, _ = scene.environment.radiance.shape
-    typer.echo(record.id)
-    typer.echo(f"  {record.num_triangles:,} triangles in {len(scene.meshes):,} meshes")
-    for material in record.materials:
-        typer.echo(f"  material {material['name']}: {' + '.join(str(term['model']) for term in material['terms'])}")
-    typer.echo(f"  views: {', '.join(record.views)}")
-    if record.variants:
-        typer.echo(f"  variants: {', '.join(record.variants)}")
-    typer.echo(f"  light: {scene.environment.name}, {width} × {height}")
-    for warning in record.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    low = [min(float(mesh.positions[:, axis].min()) for mesh in scene.meshes) for axis in range(3)]
+    high = [max(float(mesh.positions[:, axis].max()) for mesh in scene.meshes) for axis in range(3)]
+    sides = " × ".join(f"{b - a:.3g}" for a, b in zip(low, high, strict=True))
+    yield f"  {scene.name}: {sum(len(mesh.faces) for mesh in scene.meshes):,} triangles in {len(scene.meshes):,} meshes"
+    yield f"  {sides} m, +Y is up"
+    for material in scene.materials:
+        yield f"  material {material.name}: {', '.join(_parts(material))}"
+    yield f"  views: {', '.join(camera.name for camera in scene.cameras)}"
+    if scene.lights:
+        yield f"  lights: {', '.join(light.name for light in scene.lights)}"
+    if scene.variants:
+        yield f"  variants: {', '.join(scene.variants)}"
+    yield f"  environment: {scene.environment.name}, {width} × {height}"
+
+
+def _parts(material: Material) -> Iterator[str]:
+    """What a material is made of."""
+    yield " + ".join(str(term["model"]) for term in material.terms) or "no terms"
+    if material.textures:
+        yield f"textures of {' and '.join(sorted(material.textures))}"
+    if material.normal_map is not None:
+        yield "a normal map"
+    if material.opacity is not None:
+        yield "holes"
+    if material.glass is not None:
+        yield "glass"
 
 
 def _find(file: Path | None, environment: Path | None, name: str | None, made_by_code: str | None) -> Scene:
     from relume.environments.reading import read_environment
-    from relume.errors import ParameterError
+    from relume.errors import ParameterError, PlanError
     from relume.scene.built_in import built_in
     from relume.scene.importer import import_scene as read_scene
 
@@ -66,6 +99,8 @@ def _find(file: Path | None, environment: Path | None, name: str | None, made_by
             raise ParameterError("--built-in", made_by_code, "alone: such a scene has its own light and name")
         return built_in(made_by_code)
     if file is None:
-        raise ParameterError("FILE.glb", "nothing", "a scene file, or --built-in NAME")
+        raise PlanError("nothing to import; give a scene file, or --built-in NAME")
+    if environment is not None:
+        check_readable("--environment", environment)
     light = None if environment is None else read_environment(environment, environment.stem)
-    return read_scene(file, name or file.stem, light)
+    return read_scene(check_readable("FILE", file), name or file.stem, light)

@@ -27,31 +27,18 @@ def noted_interrupts() -> Iterator[threading.Event]:
 
 
 def until_interrupted(what: str, work: Callable[[Callable[[float], object], Callable[[], bool]], Made]) -> Made:
-    """Do long work with a bar in the terminal, its rate and the time that is left.
+    """Do long work and show how far it is.
 
     Args:
         what: it is, in words. work: told whom to tell the share that is done, and whom to ask whether to stop.
     Raises:
         KeyboardInterrupt: it was interrupted, and has stopped.
     """
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
+    from cli.terminal.progress import progress
     from relume.errors import CancelledError
 
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
-    )  # fmt: skip
-    with noted_interrupts() as asked, Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task(what, total=1.0)
+    with noted_interrupts() as asked, progress(what) as tell:
         try:
-            return work(lambda share: progress.update(bar, completed=share), asked.is_set)
+            return work(tell, asked.is_set)
         except CancelledError:
             raise KeyboardInterrupt from None

@@ -6,6 +6,8 @@ import logging
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
@@ -16,7 +18,6 @@ from cli import (
     bench,
     demo,
     environment_import,
-    environment_list,
     import_scene,
     render,
     serve,
@@ -24,27 +25,39 @@ from cli import (
     worker,
 )
 from cli.keeping import backup, restore
-from cli.ledger import draft, upgrade
+from cli.ledger import cancel, delete, draft, listing, status, upgrade
 from cli.material import exporting, importing, making
 from cli.sentence import sentence
+from cli.terminal.printing import is_quiet
 from cli.truth import reference
+
+
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        typer.echo(version("relume"))
+        raise typer.Exit
+
 
 app = typer.Typer(
     name="relume",
-    help="Edit materials and lights in the finished picture, with its real shadows, while you drag a curve.",
     epilog="Data lie in the folder that RELUME_DATA names, else in your user data folder. "
-    "Every command takes --verbose: then a failure shows its trace.",
+    "Every command takes --verbose: then a failure shows its trace; and --quiet: then neither progress nor notes are "
+    "shown, results and warnings are.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("demo")(demo.demo)
+app.command("demo", short_help="Bake, serve and open the built-in scene.")(demo.demo)
 app.command("import")(import_scene.import_scene)
+app.command("list")(listing.list_things)
 app.command("bake")(bake.bake)
+app.command("status")(status.status)
+app.command("cancel")(cancel.cancel)
 app.command("render")(render.render)
-app.command("serve")(serve.serve)
-app.command("worker")(worker.worker)
+app.command("delete")(delete.delete)
+app.command("serve", short_help="Serve the editor and the API.")(serve.serve)
+app.command("worker", short_help="Bake for others until stopped.")(worker.worker)
 app.command("backup")(backup.backup)
 app.command("restore")(restore.restore)
 app.command("reference")(reference.reference)
@@ -56,7 +69,7 @@ token.command("list")(tokens.token_list)
 token.command("revoke")(tokens.token_revoke)
 app.add_typer(token, name="token")
 materials = typer.Typer(
-    help="Measured materials, and textures that look different from every side.",
+    help="Measured materials, and textures of many views.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -66,7 +79,6 @@ materials.command("export")(exporting.material_export)
 app.add_typer(materials, name="material")
 environments = typer.Typer(help="Light that a look may name.", no_args_is_help=True, rich_markup_mode=None)
 environments.command("import")(environment_import.environment_import)
-environments.command("list")(environment_list.environment_list)
 app.add_typer(environments, name="environment")
 ledger = typer.Typer(help="The database of scenes, bakes and looks.", no_args_is_help=True, rich_markup_mode=None)
 ledger.command("upgrade")(upgrade.ledger_upgrade)
@@ -74,16 +86,27 @@ ledger.command("draft")(draft.ledger_draft)
 app.add_typer(ledger, name="ledger")
 
 INTERRUPTED = 130
+FOR_ALL = ("--verbose", "--quiet")
+
+
+@app.callback()
+def root(
+    is_version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version, and end.")
+    ] = False,
+) -> None:
+    """Edit materials and lights in the finished picture, with its real shadows, while you drag a curve."""
 
 
 def main(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; a failure is one line on stderr."""
     verbose = "--verbose" in arguments
+    is_quiet.set("--quiet" in arguments)
     handler = logging.StreamHandler()
     handler.setLevel(logging.INFO if verbose else logging.ERROR)  # of the handler: libraries set their loggers' own
     logging.basicConfig(level=handler.level, format="%(levelname)s %(name)s: %(message)s", handlers=[handler])
     try:
-        result = app([a for a in arguments if a != "--verbose"], prog_name="relume", standalone_mode=False)
+        result = app([a for a in arguments if a not in FOR_ALL], prog_name="relume", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         return INTERRUPTED
     except typer.Exit as done:
@@ -91,7 +114,7 @@ def main(arguments: Sequence[str]) -> int:
     except Exception as error:
         if verbose:
             traceback.print_exc()
-        typer.echo(f"relume: {sentence(error)}", err=True)
+        typer.echo(f"relume: {sentence(error, arguments)}", err=True)
         return error.exit_code if isinstance(error, TyperException) else 1
     return result if isinstance(result, int) else 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,6 +28,7 @@ Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Width a
 LookFile = Annotated[
     Path | None, typer.Option("--look", metavar="LOOK.json", help="Look document, may be partial; else the default.")
 ]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Check all of it and say what would be done; do nothing.")]
 Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="tcp://…", help="Dask scheduler to bake on; else processes of this machine."),
@@ -43,30 +45,44 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
+def check_readable(option: str, path: Path) -> Path:
+    """The same path. Raises ParameterError where there is no file, or none that may be read."""
+    try:
+        with path.open("rb"):
+            return path
+    except OSError as error:
+        raise ParameterError(option, str(path), f"a file that exists and can be read ({error.strerror})") from None
+
+
 def read_look(path: Path | None) -> dict[str, object]:
-    """A look document from a file; an empty one where there is no file. Raises ParameterError, OSError."""
+    """A look document from a file; an empty one where there is no file. Raises ParameterError."""
     if path is None:
         return {}
-    document = _read_json("--look", path)
+    document = read_json("--look", path)
     if not isinstance(document, dict):
-        raise ParameterError("--look", path.name, "a file with a JSON object")
+        raise ParameterError("--look", str(path), "a file with a JSON object")
     return document
 
 
 def read_camera(path: Path) -> PlacedCamera:
-    """A camera from a file. Raises ParameterError, OSError."""
+    """A camera from a file. Raises ParameterError."""
     from relume.scene.placed_camera import read_placed
 
-    return read_placed(_read_json("--camera", path))
+    return read_placed(read_json("--camera", path))
 
 
-def _read_json(option: str, path: Path) -> object:
-    with path.open("rb") as file:
-        text = file.read(MAX_DOCUMENT_BYTES + 1)
+def read_json(option: str, path: Path | None) -> object:
+    """A JSON document of bounded size, from a file, or from stdin where there is none. Raises ParameterError."""
+    if path is None:
+        text = sys.stdin.buffer.read(MAX_DOCUMENT_BYTES + 1)
+    else:
+        with check_readable(option, path).open("rb") as file:
+            text = file.read(MAX_DOCUMENT_BYTES + 1)
+    where = "-" if path is None else str(path)
     if len(text) > MAX_DOCUMENT_BYTES:
-        raise ParameterError(option, path.name, f"a file of at most {MAX_DOCUMENT_BYTES >> 20} MB")
+        raise ParameterError(option, where, f"at most {MAX_DOCUMENT_BYTES >> 20} MB of JSON")
     try:
         document: object = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ParameterError(option, path.name, f"a JSON file; {error}") from None
+        raise ParameterError(option, where, f"a JSON document; {error}") from None
     return document

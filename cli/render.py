@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.options import BakeName, Data, LookFile, View, read_look
+from cli.options import BakeName, Data, DryRun, View
+from cli.pictures.looks import Looks
+from cli.pictures.plans import Turns
+from cli.terminal.printing import Json, note, print_result
 
 if TYPE_CHECKING:
-    from relume.exr.layers import Layering
-    from relume.methods.stills import Stills
-    from relume.picture.transfer import Opened
-    from worker.scenes import SceneRecord
+    from cli.pictures.files import ExrOptions
+    from cli.pictures.painting import Shown
+    from cli.pictures.plans import Planned, Turn
     from worker.service import BakeService
-    from worker.status import BakeStatus
-
-Turns = Literal["eye", "object", "environment"]
-Output = Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp|DIR", help="Where to write the picture, or frames.")]
 
 
 def render(
     bake: BakeName,
-    output: Output,
-    look: LookFile = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            metavar="FILE.exr|.png|.webp",
+            help="Where to write the picture; of several looks with {look} in it, which stands for the name of each. "
+            "Of a turntable: a folder, or FILE.mp4.",
+        ),
+    ],
+    look: Looks = None,
     view: View = None,
     layers: Annotated[bool, typer.Option("--layers", help="EXR: add a layer for each light and light path.")] = False,
     light_groups: Annotated[
@@ -37,71 +43,82 @@ def render(
     ] = None,
     turntable: Annotated[
         int | None,
-        typer.Option(metavar="N", help="N frames once around as PNG, of a moving bake, into a folder."),
+        typer.Option(metavar="N", help="N frames once around: PNG files in a folder, or a video."),
     ] = None,
     turns: Annotated[
-        Turns,
-        typer.Option(help="Turntable: what turns; before an eye that stays, the object, or the environment alone."),
-    ] = "eye",
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the frames that are in the folder.")] = False,
+        Turns | None,
+        typer.Option(help="Turntable: what turns; the eye, or before it the object, or the light. [default: eye]"),
+    ] = None,
+    fps: Annotated[int | None, typer.Option(min=1, max=120, help="Video: frames a second. [default: 25]")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Leave out what is written already.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Moving bakes: as it looks while the eye moves.")] = False,
+    dry_run: DryRun = False,
+    as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render one exact frame of a bake, or a turntable."""
-    from cli.data_folder import complete_look, open_bakes, open_settings
-    from cli.picture import check_output, check_shown, save, save_exr
-    from cli.turntable import check_frames, render_turntable
-    from relume.errors import ParameterError
-    from relume.exr.attributes import Origin
-    from relume.render.image import render_image
-    from server.wire.renders import Animation, Turntable
+    """Render exact frames of one look, of many, or all around.
 
-    if turntable is None:
-        check_output(output)
-    else:
-        check_frames(output, turntable, resume)
-    is_exr = turntable is None and output.suffix.lower() == ".exr"
-    if (layers or light_groups or full_float or color_space) and not is_exr:
-        raise ParameterError(
-            "--output", output.name, "a file name that ends in .exr, for layers, --float, --color-space"
-        )
-    layering = _layering(layers, light_groups)
-    partial = read_look(look)
+    Prints the names of the files that were written.
+    """
+    from cli.data_folder import open_bakes, open_settings
+    from cli.pictures.files import exr_options
+    from cli.pictures.looks import read_looks
+    from cli.pictures.plans import check_target, plan_files, turn_of
+    from server.records.looks import LookStore
+
+    turn = turn_of(turntable, turns, fps)
+    check_target(output, turn, resumes=resume)
+    exr = exr_options(output, layers=layers, light_groups=light_groups, full_float=full_float, color_space=color_space)
     service = open_bakes(open_settings(data))
     try:
-        is_moved = turntable is not None and turns != "environment"
-        of = _open(service, bake, view, moves=is_moved, quick=quick)
-        document = complete_look(partial, of.transfer.default_look)
-        check_shown(output, document)
-        if document.environment.map is not None:
-            typer.echo("note: shadows were baked before this light was known: small lamps' are less exact", err=True)
-        if turntable is not None:
-            asked = Animation(bake=of.shown.id, looks=[partial], path=Turntable(turntable=turntable, turns=turns))
-            render_turntable(of.transfer, of.view, asked, output, of.stills)
-        elif is_exr:
-            origin = Origin(of.scene.id, of.scene.name, of.shown.id)
-            precision: Literal["half", "float"] = "float" if full_float else "half"
-            save_exr(output, of.transfer, of.view, document, origin, layering, precision, of.stills, color_space)
-        else:
-            image = render_image(of.transfer, of.view, document, for_display=True, stills=of.stills)
-            save(output, image, document)
+        planned = plan_files(read_looks(look or (), LookStore(service.ledger.sessions)), output, turn)
+        of = _open(service, bake, view, moves=turn is not None and turn.turns != "environment", quick=quick)
+        documents = _check(of, planned, turn)
+        if not dry_run:
+            _write(of, planned, turn, exr, resumes=resume)
     finally:
         service.close()
+    for one, document in zip(planned, documents, strict=True):
+        print_result(document | {"dry_run": dry_run}, str(one.path), as_json=as_json)
 
 
-class _Shown(NamedTuple):
-    """What is rendered: a bake of a scene, opened, one of its views, and what makes exact pictures of moved eyes."""
+def _check(of: Shown, planned: Sequence[Planned], turn: Turn | None) -> list[dict[str, Any]]:
+    """What is written, as JSON. Raises ParameterError before anything is where a look, or the turntable, cannot be."""
+    from cli.pictures.painting import check_turntable
+    from cli.pictures.plans import complete_plan
 
-    scene: SceneRecord
-    shown: BakeStatus
-    view: str
-    transfer: Opened
-    stills: Stills | None
+    view = of.transfer.views[of.view]
+    looks = [complete_plan(one, of.transfer.default_look) for one in planned]
+    if any(look.environment.map is not None for look in looks):
+        note("note: shadows were baked before this light was known: small lamps' are less exact")
+    if turn is not None:
+        check_turntable(of, planned[0], turn)
+    about = {"scene": of.scene.id, "bake": of.bake.id, "view": of.view, "size": [view.width, view.height]}
+    frames = 1 if turn is None else turn.frames
+    return [{"path": str(one.path), "look": one.look, **about, "frames": frames} for one in planned]
 
 
-def _open(service: BakeService, bake: str, view: str | None, *, moves: bool, quick: bool) -> _Shown:
+def _write(of: Shown, planned: Sequence[Planned], turn: Turn | None, exr: ExrOptions, *, resumes: bool) -> None:
+    """Paint all that is planned, and say how far it is."""
+    from cli.pictures.painting import paint, paint_turntable
+    from cli.pictures.plans import complete_plan
+    from cli.terminal.progress import part_of, progress
+
+    with progress("render") as tell:
+        if turn is not None:
+            paint_turntable(of, planned[0], turn, tell)
+            return
+        for number, one in enumerate(planned):
+            words = f"{one.look}, {number + 1} of {len(planned)}" if len(planned) > 1 else ""
+            if not (resumes and one.path.exists()):
+                look = complete_plan(one, of.transfer.default_look)
+                paint(of, look, one.path, exr, part_of(tell, number, len(planned), words))
+
+
+def _open(service: BakeService, bake: str, view: str | None, *, moves: bool, quick: bool) -> Shown:
     """Open what was asked for, and say what its pictures are not."""
     from cli.data_folder import find_shown
+    from cli.pictures.painting import Shown
     from relume.memory import Memory
     from relume.methods.moving_views import MovingViews
     from relume.methods.registry import open_bake
@@ -112,19 +129,10 @@ def _open(service: BakeService, bake: str, view: str | None, *, moves: bool, qui
     scene, shown, view_name = find_shown(service, bake, view, moves=moves)
     transfer = open_kept(service.store_path(shown.id), lambda store: open_bake(store, Memory(4 << 30)))
     if not shown.is_current:
-        typer.echo(f"note: another version of relume made this bake; anew: relume bake {scene.id}", err=True)
+        note(f"note: another version of relume made this bake; anew: relume bake {scene.id}")
     stills = None
     if isinstance(transfer, MovingViews) and quick:
-        typer.echo("note: the picture is approximate, as while the eye moves; exact: without --quick", err=True)
+        note("note: the picture is approximate, as while the eye moves; exact: without --quick")
     elif isinstance(transfer, MovingViews):
         stills = Stills(transfer.lit, scene_of(service.data_dir, scene.id))
-    return _Shown(scene, shown, view_name, transfer, stills)
-
-
-def _layering(layers: bool, light_groups: bool) -> Layering:
-    """Which layers are asked for, see `relume.exr.layers`. Raises ParameterError."""
-    from relume.errors import ParameterError
-
-    if layers and light_groups:
-        raise ParameterError("--layers", "with --light-groups", "one of the two: each are the whole picture")
-    return "light_groups" if light_groups else layers
+    return Shown(scene, shown, view_name, transfer, stills)

@@ -1,19 +1,36 @@
-"""A failure as people read it."""
+"""A failure as people read it: the name of what is wrong as it was typed, what was given, and what is allowed."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+from itertools import takewhile
+
 from typer.exceptions import TyperException
 
+from relume.errors import ParameterError
 
-def sentence(error: Exception) -> str:
-    """What went wrong, in one line."""
+_INVALID = re.compile(r"Invalid value for '?(?P<name>[^':]+)'?: (?:Value error, )?(?P<why>.+?)\.?", re.DOTALL)
+_NO_CHOICE = re.compile(r"(?P<given>.+) is not (?P<allowed>one of .+)", re.DOTALL)
+_MISSING = re.compile(r"Missing \w+ '(?P<name>[^']+)'")
+_SHOULD = "Input should be "
+
+
+def sentence(error: Exception, arguments: Sequence[str] = ()) -> str:
+    """What went wrong, in one line.
+
+    Args:
+        error: of any kind. arguments: of the command, whose options are called as they were typed.
+    """
     from sqlalchemy.exc import DBAPIError
 
     from relume.errors import RelumeError
     from worker.database.faults import told
 
     if isinstance(error, TyperException):
-        text = error.format_message() or "nothing to do; see relume --help"
+        text = _usage(error, arguments)
+    elif isinstance(error, ParameterError):
+        text = str(_as_typed(error, arguments))
     elif isinstance(error, RelumeError):
         text = str(error)
     elif isinstance(error, OSError) and error.strerror:
@@ -25,3 +42,40 @@ def sentence(error: Exception) -> str:
     else:
         text = f"{type(error).__name__}: {str(error) or 'a defect'}; --verbose shows the trace"
     return " ".join(text.split())
+
+
+def _as_typed(error: ParameterError, arguments: Sequence[str]) -> ParameterError:
+    """The same, of a parameter that an option was given for, by the name of the option."""
+    option = "--" + error.name.replace("_", "-")
+    is_typed = any(argument.partition("=")[0] == option for argument in arguments)
+    return ParameterError(option, error.value, error.allowed) if is_typed else error
+
+
+def _usage(error: TyperException, arguments: Sequence[str]) -> str:
+    """What the parser of the command line says, in the words of all other failures."""
+    text = error.format_message() or "nothing to do; see relume --help"
+    if (missing := _MISSING.match(text)) is not None:
+        return f"{missing['name']} is missing; give it, as {_command(arguments)} --help says"
+    found = _INVALID.fullmatch(text)
+    if found is None:
+        return text
+    name, why = found["name"], found["why"]
+    if (choice := _NO_CHOICE.fullmatch(why)) is not None:
+        return f"{name} is {choice['given']}; give {choice['allowed']}"
+    allowed = re.sub(r"^(greater|less) than", r"a number \1 than", why.removeprefix(_SHOULD).partition(", unable")[0])
+    return f"{name} is {_value_of(name, arguments)!r}; give {allowed}" if why.startswith(_SHOULD) else f"{name}: {why}"
+
+
+def _command(arguments: Sequence[str]) -> str:
+    """The command as it was typed, without what follows its name."""
+    return " ".join(["relume", *takewhile(lambda word: not word.startswith("-"), arguments[:1])])
+
+
+def _value_of(option: str, arguments: Sequence[str]) -> str:
+    """What was given for an option; the last one counts."""
+    given = ""
+    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+        name, is_joined, value = argument.partition("=")
+        if name == option:
+            given = value if is_joined else following
+    return given

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.options import Data
+from cli.terminal.printing import Json, moment, note, print_result
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,48 +21,63 @@ RoleOption = Annotated[str, typer.Option("--role", metavar="ROLE", help="view, e
 Days = Annotated[float | None, typer.Option("--days", help="How long it opens anything; for ever where not given.")]
 
 
-def token_add(name: Name, role: RoleOption = "view", days: Days = None, data: Data = None) -> None:
+def token_add(
+    name: Name, role: RoleOption = "view", days: Days = None, as_json: Json = False, data: Data = None
+) -> None:
     """Hand out a token; it is shown this once."""
     access = open_access(data)
     text = access.tokens.add(name, role, days)
-    _write_down(access, f"token add --role {role}", name)
-    typer.echo(text)
-    typer.echo("Keep it: it is shown this once. RELUME_LOGIN=true makes the server ask for tokens.", err=True)
+    write_down(access, f"token add --role {role}", name)
+    print_result({"name": name, "role": role, "token": text}, text, as_json=as_json)
+    if not as_json:
+        note("Keep it: it is shown this once. RELUME_LOGIN=true makes the server ask for tokens.")
 
 
-def token_list(data: Data = None) -> None:
+def token_list(as_json: Json = False, data: Data = None) -> None:
     """List the tokens that were handed out."""
     now = datetime.now(UTC).timestamp()
     for token in open_access(data, is_used=True).tokens.all():
         state = "valid" if token.is_valid(now) else "revoked" if token.revoked is not None else "run out"
         until = "" if token.expires is None else f"  until {_day(token.expires)}"
-        typer.echo(f"{token.id}  {token.role.word:5}  {state:7}  {_day(token.created)}  {token.name}{until}")
+        document = {
+            "id": token.id,
+            "name": token.name,
+            "role": token.role.word,
+            "state": state,
+            "created": moment(token.created),
+            "expires": None if token.expires is None else moment(token.expires),
+        }
+        line = f"{token.id}  {token.role.word:5}  {state:7}  {_day(token.created)}  {token.name}{until}"
+        print_result(document, line, as_json=as_json)
 
 
 def token_revoke(
     name: Annotated[str, typer.Argument(metavar="NAME|ID", help="As relume token list shows it.")], data: Data = None
 ) -> None:
-    """Revoke a token: within seconds it opens nothing, and its sessions end."""
+    """Revoke a token.
+
+    Within seconds it opens nothing, and its sessions end.
+    """
     access = open_access(data)
     access.tokens.revoke(name)
-    _write_down(access, "token revoke", name)
+    write_down(access, "token revoke", name)
 
 
 def open_access(data: Path | None, *, is_used: bool = False) -> Access:
     """Tokens and audit of a data folder. Raises ParameterError where `is_used` is to be and nothing is there yet."""
-    from cli.data_folder import open_settings
-    from relume.errors import ParameterError
+    from cli.data_folder import check_used, open_settings
     from server.access.access import Access
     from worker.database import open_database
     from worker.ledger import Ledger
 
     settings = open_settings(data)
-    if is_used and not settings.database and not (settings.data / "relume.db").exists():
-        raise ParameterError("--data", str(settings.data), "a folder that relume has used; this one is empty")
+    if is_used:
+        check_used(settings)
     return Access(Ledger(open_database(settings.database_url)).sessions, settings)
 
 
-def _write_down(access: Access, what: str, thing: str) -> None:
+def write_down(access: Access, what: str, thing: str) -> None:
+    """Note in the audit what somebody at this machine's shell has changed."""
     from server.access.audit import Change
 
     access.audit.add(Change(f"{getpass.getuser()} (shell)", "admin", "", what, thing, 0, ""))

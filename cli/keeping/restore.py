@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.keeping.backup import BackupFolder
+from cli.keeping.backup import print_snapshot
 from cli.options import Data
+from cli.terminal.printing import Json
 from cli.tokens import open_access
 
 if TYPE_CHECKING:
@@ -16,16 +18,18 @@ if TYPE_CHECKING:
 
 
 def restore(
-    folder: BackupFolder,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of backups that relume backup wrote.")],
     snapshot: Annotated[str | None, typer.Option(metavar="NAME", help="Which one; else the newest.")] = None,
     revoke_tokens: Annotated[
         bool, typer.Option("--revoke-tokens", help="Revoke all tokens in it; some were revoked since.")
     ] = False,
+    as_json: Json = False,
     data: Data = None,
 ) -> int:
-    """Restore a backup into an empty data folder and an empty ledger, of SQLite or PostgreSQL, all of it checked.
+    """Restore a backup into an empty data folder and ledger.
 
-    An interrupted one is gone on with by the same command; until it is finished nothing works on the folder.
+    The ledger is of SQLite or PostgreSQL, and all is checked. An interrupted restore is gone on with by the same
+    command; until it is finished nothing works on the folder.
     """
     from cli.data_folder import open_settings, private_files
     from cli.keeping.transfer_bar import transfer_bar
@@ -35,8 +39,7 @@ def restore(
     settings = open_settings(data)
     with transfer_bar("restoring") as begin, private_files():
         done, damaged = restore_into(Shelf(folder), snapshot, settings.data.resolve(), settings.database_url, begin)
-    typer.echo(done.name)
-    typer.echo(f"{len(done.files):,} files, {sum(kept.num_bytes for kept in done.all) / 1e6:,.1f} MB", err=True)
+    print_snapshot(done, [*done.left_out, *damaged], as_json=as_json)
     for sentence in done.left_out:
         typer.echo(f"was left out: {sentence}", err=True)
     for sentence in damaged:

@@ -1,25 +1,27 @@
-"""Shows how far a copy is: bytes, rate, time left."""
+"""Shows how far a copy is, in bytes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
-from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn, TransferSpeedColumn
+from cli.terminal.printing import size_text
+from cli.terminal.progress import progress
 
 
 @contextmanager
 def transfer_bar(label: str) -> Iterator[Callable[[int], Callable[[int], None]]]:
     """Yields what begins a bar of so many bytes, in place of the one before, and returns whom to tell of copies."""
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn()
-    )  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task(label, total=None)
+    with progress(label) as tell:
 
         def begin(num_bytes: int) -> Callable[[int], None]:
-            progress.reset(bar, total=num_bytes)
-            return lambda done: progress.advance(bar, done)
+            done = 0
+
+            def advance(more: int) -> None:
+                nonlocal done
+                done += more
+                tell(done / max(1, num_bytes), f"{size_text(done)} of {size_text(num_bytes)}")
+
+            return advance
 
         yield begin

@@ -11,7 +11,10 @@ import typer
 def ledger_draft(
     message: Annotated[str, typer.Argument(metavar="MESSAGE", help="What the revision does, in a few words.")],
 ) -> None:
-    """For developers: write the revision that the tables of the code need beyond the newest; look it through."""
+    """For developers: write the next revision of the tables.
+
+    It brings the newest one to the tables of the code; look it through.
+    """
     import server.access.tables  # the server's, beside the worker's
     import server.records.tables  # noqa: F401
     from worker.database import open_database

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import typer
-
 from cli.options import Data
+from cli.terminal.printing import Json, print_result
 
 
-def ledger_upgrade(data: Data = None) -> None:
-    """Upgrade the ledger for this relume, when no older one uses it; make a backup before.
+def ledger_upgrade(as_json: Json = False, data: Data = None) -> None:
+    """Upgrade the ledger for this relume; make a backup before.
 
-    Servers do by themselves what only adds to a ledger; this does what they leave to people.
+    No older relume may use it any more. Servers do by themselves what only adds to a ledger; this does the rest.
     """
     from cli.data_folder import open_settings
     from worker.database.opening import connect
@@ -21,6 +20,6 @@ def ledger_upgrade(data: Data = None) -> None:
         made = upgrade(engine, by_hand=True)
     finally:
         engine.dispose()
-    for revision, what in made:
-        typer.echo(f"{revision}: {what}")
-    typer.echo(f"the ledger is at revision {newest_revision()}")
+    document = {"revision": newest_revision(), "made": [revision for revision, _ in made]}
+    lines = [*(f"{revision}: {what}" for revision, what in made), f"the ledger is at revision {newest_revision()}"]
+    print_result(document, "\n".join(lines), as_json=as_json)

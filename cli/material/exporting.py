@@ -8,15 +8,20 @@ from typing import Annotated
 import typer
 
 from cli.options import Data, read_look
+from cli.terminal.printing import Json, print_result
 
 
 def material_export(
     look: Annotated[Path, typer.Argument(metavar="LOOK.json", help="Look document; may be partial.")],
     material: Annotated[str, typer.Argument(metavar="MATERIAL", help="Name of a material that the look names.")],
     output: Annotated[Path, typer.Option(metavar="FILE.binary", help="Where to write it.")],
+    as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Write an edited material as a MERL file, for other renderers; any isotropic terms will do."""
+    """Write an edited material as a MERL file.
+
+    For other renderers; any isotropic terms will do.
+    """
     from cli.data_folder import open_settings
     from relume.brdf.merl_grid import sample_terms
     from relume.errors import ParameterError
@@ -33,3 +38,4 @@ def material_export(
         raise ParameterError("MATERIAL", material, "the name of a material whose terms stand in the look")
     document = complete({"materials": {material: found}}, default_look([Material(material, ())]))
     write_merl(output, sample_terms(document["materials"][material]["terms"]))
+    print_result({"path": str(output), "material": material}, str(output), as_json=as_json)

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cli.options import Data
+from cli.options import Data, check_readable
+from cli.terminal.printing import Json
 
 _BTFS = (".zip", ".btf")
 
@@ -22,37 +23,41 @@ def material_import(
     ],
     name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
     error: Annotated[float, typer.Option(help="Of a BTF: relative RMS that compression may miss.")] = 0.05,
+    as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Import a measured material; print its name in looks, and how well it is kept."""
+    """Import a measured material; print its name in looks.
+
+    Beside it stand its terms, and how well it is kept.
+    """
     from cli.data_folder import open_settings
-    from cli.material.words import tell_terms
+    from cli.material.words import print_material
     from relume.asset_store import check_name
     from relume.measured.asset_store import keep
     from worker.paths import materials_path
 
+    check_readable("FILE", file)
     folder, called = open_settings(data).data, check_name(name or file.stem)
     if file.suffix.lower() in _BTFS:
-        _import_btf(folder, file, called, error)
+        _import_btf(folder, file, called, error, as_json=as_json)
         return
     record = keep(materials_path(folder), file, called)
-    tell_terms(record)
-    for model, errors in (
-        ("measured_lv + measured_hd", record.lobes_error),
-        ("measured_hf", record.homomorphic_error),
-    ):
-        typer.echo(f"  {model}: curves alone err by {', '.join(f'{error:.1%}' for error in errors)} (red, green, blue)")
+    known = (("measured_lv + measured_hd", record.lobes_error), ("measured_hf", record.homomorphic_error))
+    lines = [
+        f"  {model}: curves alone err by {', '.join(f'{one:.1%}' for one in errors)} (red, green, blue)"
+        for model, errors in known
+    ]
+    print_material(record, lines, as_json=as_json)
 
 
-def _import_btf(folder: Path, file: Path, name: str, bound: float) -> None:
+def _import_btf(folder: Path, file: Path, name: str, bound: float, *, as_json: bool) -> None:
     from cli.interrupts import until_interrupted
-    from cli.material.words import tell
+    from cli.material.words import print_btf
     from relume.btf.importing import import_btf
     from worker.paths import btfs_path
 
-    tell(
-        until_interrupted(
-            file.name,
-            lambda progress, cancelled: import_btf(btfs_path(folder), file, name, bound, progress, cancelled),
-        )
+    record = until_interrupted(
+        file.name,
+        lambda progress, cancelled: import_btf(btfs_path(folder), file, name, bound, progress, cancelled),
     )
+    print_btf(record, as_json=as_json)

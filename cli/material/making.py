@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cli.options import Data
+from cli.terminal.printing import Json
 
 
 def material_make_btf(
@@ -26,15 +27,17 @@ def material_make_btf(
         typer.Option(help="Of a file: side of the square that repeats along x and z, metres; else the box about it."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="What to call it.")] = None,
+    as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render a small geometry from 81 sides in light from 81 sides, and keep it as a material. Nothing is measured.
+    """Render a small geometry from all sides, as a material.
 
-    What was rendered when it is interrupted is still there when it is begun again.
+    From 81 sides in light from 81 sides; nothing is measured. What was rendered when it is interrupted is still there
+    when it is begun again.
     """
     from cli.data_folder import open_settings
     from cli.interrupts import until_interrupted
-    from cli.material.words import tell
+    from cli.material.words import print_btf
     from relume.asset_store import check_name
     from relume.synthetic.make import GEOMETRIES, MESH, Made, make_btf
     from worker.paths import btfs_path
@@ -48,4 +51,4 @@ def material_make_btf(
         f"{geometry}, {size}×{size} texels",
         lambda progress, stopped: make_btf(folder, wanted, called, progress, stopped),
     )
-    tell(record)
+    print_btf(record, as_json=as_json)

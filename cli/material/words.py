@@ -5,23 +5,26 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-import typer
+from cli.terminal.printing import print_result
 
 if TYPE_CHECKING:
     from relume.btf.shelf import BtfRecord
     from relume.measured.asset_store import MaterialRecord
 
 
-def tell_terms(record: BtfRecord | MaterialRecord) -> None:
-    """Print its name in looks, and its terms."""
-    typer.echo(record.data)
-    typer.echo(f"  {json.dumps({'terms': record.terms()})}")
+def print_material(record: BtfRecord | MaterialRecord, lines: list[str], *, as_json: bool) -> None:
+    """Print its name in looks, its terms, and how well it is kept.
+
+    Args:
+        record: of the material. lines: that say how well. as_json: whether JSON was asked for.
+    """
+    terms = record.terms()
+    document = {"id": record.id, "data": record.data, "name": record.name, "terms": terms}
+    details = [f"  {json.dumps({'terms': terms})}", *lines]
+    print_result(document, record.data, as_json=as_json, details=details)
 
 
-def tell(record: BtfRecord) -> None:
-    """Print its name in looks, its terms, and how well it is kept."""
-    tell_terms(record)
-    typer.echo(
-        f"  {record.clusters} clusters × {record.components} components, 1:{record.ratio:.0f}, "
-        f"{record.error[-1]:.1%} relative RMS"
-    )
+def print_btf(record: BtfRecord, *, as_json: bool) -> None:
+    """Print a BTF's name in looks, its terms, and how well it is kept."""
+    kept = f"  {record.clusters} clusters × {record.components} components, 1:{record.ratio:.0f}, "
+    print_material(record, [f"{kept}{record.error[-1]:.1%} relative RMS"], as_json=as_json)

@@ -152,6 +152,26 @@ def sentences(subject: Subject, truth: Traced, paths: str) -> Iterator[str]:
     yield from (f"left out by brute force, too: {what}" for what in truth.untraced)
 
 
+def document(subject: Subject, truth: Traced) -> dict[str, Any]:
+    """What `sentences` says, as JSON.
+
+    Args:
+        subject: with the frame, where one is compared. truth: passes of it.
+    """
+    from dataclasses import asdict
+
+    from relume.reference.truth import compare
+
+    compared = {} if subject.frame is None else truth.estimates
+    return {
+        "view": subject.view,
+        "size": list(subject.size),
+        "left_out": list(truth.left_out),
+        "untraced": list(truth.untraced),
+        "found": {name: asdict(compare(subject.frame, estimate)[0]) for name, estimate in compared.items()},
+    }
+
+
 def _found(found: Comparison) -> str:
     noise = f"noise of brute force {percent(found.noise)}"
     if found.error is None or found.standard_error is None:

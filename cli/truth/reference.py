@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 import typer
 
 from cli.options import Data, LookFile, SceneName, Size, View
-from cli.render import Output
+from cli.terminal.printing import Json, note, print_result
 
 
 def reference(
     scene: SceneName,
-    output: Output,
+    output: Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp", help="Where to write the picture.")],
     spp: Annotated[int, typer.Option(metavar="N", min=1, max=1 << 20, help="Samples per pixel.")],
     look: LookFile = None,
     view: View = None,
@@ -29,14 +29,16 @@ def reference(
     compare: Annotated[
         bool, typer.Option("--compare", help="Say how far the scene's finest bake is from it, by both kinds of paths.")
     ] = False,
+    as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render by brute force: every texel of the light, visibility traced, paths between surfaces; nothing baked."""
-    from rich.console import Console
-    from rich.progress import Progress
+    """Render by brute force, and compare a bake with it.
 
-    from cli.picture import check_output, check_shown, save
-    from cli.truth.passes import find_baked, find_subject, sentences, traced
+    Every texel of the light counts, visibility is traced, and so are paths between surfaces; nothing is baked.
+    """
+    from cli.pictures.files import check_output, check_shown, save
+    from cli.terminal.progress import progress
+    from cli.truth.passes import document, find_baked, find_subject, sentences, traced
     from relume.errors import ParameterError
 
     check_output(output)
@@ -48,9 +50,12 @@ def reference(
         subject = find_subject(data, scene, look, view, camera, size, method, needs_bake=paths == "method")
     check_shown(output, subject.look)
     whose = paths if method is None else "method"
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task("reference", total=1.0)
-        truth = traced(subject, spp, whose, lambda share: progress.update(bar, completed=share))
+    with progress("reference") as tell:
+        truth = traced(subject, spp, whose, tell)
     save(output, truth.estimates[whose].mean, subject.look)
+    if as_json:
+        print_result({"path": str(output), "spp": spp, **document(subject, truth)}, "", as_json=True)
+        return
+    (note if compare else typer.echo)(str(output))
     for line in sentences(subject, truth, whose):
         typer.echo(line, err=not compare)

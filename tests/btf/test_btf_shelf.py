@@ -180,7 +180,8 @@ def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
     data = tmp_path / "data"
     arguments = ["material", "make-btf", "pebbles", "--size", "8", "--grid", "1", "--data", str(data)]
     assert main(arguments) == 0
-    name, terms, words = capsys.readouterr().out.splitlines()
+    told = capsys.readouterr()
+    name, terms, words = told.out.strip(), *told.err.splitlines()[-2:]
     assert json.loads(terms)["terms"][0] == {"model": "measured_btf", "data": name, "texture": None}
     assert "relative RMS" in words
     assert main(["material", "make-btf", "wool", "--data", str(data)]) == 1

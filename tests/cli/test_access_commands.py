@@ -45,7 +45,7 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["add", "Ann", "--role", "boss"], "relume: role is 'boss'; give view, edit, admin\n"),
+        (["add", "Ann", "--role", "boss"], "relume: --role is 'boss'; give view, edit, admin\n"),
         (["add", " Ann"], "relume: name is ' Ann'; give 1 to 80 printable characters\n"),
         (["revoke", "Eve"], "relume: there is no valid token 'Eve'; relume token list shows them\n"),
     ],

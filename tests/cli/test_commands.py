@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
@@ -76,7 +77,23 @@ def test_help_loads_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for command in ("demo", "import", "bake", "render", "serve", "worker", "backup", "restore", "reference", "bench"):
+    for command in [
+        "demo",
+        "import",
+        "list",
+        "bake",
+        "status",
+        "cancel",
+        "render",
+        "delete",
+        "serve",
+        "worker",
+        "backup",
+        "restore",
+        "reference",
+        "bench",
+        "audit",
+    ]:
         assert re.search(rf"^  {command} ", done.stdout, re.MULTILINE)
 
 
@@ -98,20 +115,23 @@ def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.Cap
         (["bake", "quad", "--size", "0x9"], "640x480"),
         (["bake", "quad", "--size", "99999x99999"], "pixels"),
         (["bake", "quad", "--lights", "0"], "at least 1"),
-        (["bake", "quad", "--lights", "many"], "valid integer"),
+        (["bake", "quad", "--lights", "many"], "--lights is 'many'; give a valid integer"),
+        (["bake", "quad", "--lights=many"], "--lights is 'many'; give a valid integer"),
         (["bake", "quad", "--gather-rays", "100"], "direct"),
         (["bake", "quad", "--method", "gather", "--gather-rays", "9"], "16 to 4,096"),
         (["bake", "quad", "--method", "surface", "--gather-samples", "9"], "64 to"),
-        (["bake", "quad", "--method", "magic"], "direct"),
+        (["bake", "quad", "--method", "magic"], "--method is 'magic'; give one of 'direct', 'gather', 'surface'"),
+        (["bake", "quad", "--preset", "best"], "--preset is 'best'; give one of 'preview', 'good', 'final'"),
         (["bake", "quad", "--view", "top"], "front"),
-        (["import", "no-such-file.glb"], "no-such-file.glb"),
-        (["import"], "--built-in"),
+        (["import", "/no/such-file.glb"], "FILE is '/no/such-file.glb'; give a file that exists"),
+        (["import", "a.glb", "--environment", "/no/sky.hdr"], "--environment is '/no/sky.hdr'; give a file"),
+        (["import"], "nothing to import; give a scene file, or --built-in NAME"),
         (["import", "--built-in", "nowhere"], "cornell_box"),
         (["import", "--built-in", "interior", "--name", "mine"], "alone"),
         (["reference", "nowhere", "--spp", "4", "--output", "x.exr"], "no scene"),
-        (["reference", "quad", "--spp", "0", "--output", "x.exr"], "spp"),
+        (["reference", "quad", "--spp", "0", "--output", "x.exr"], "--spp is '0'; give a number greater than"),
         (["worker", "--scheduler", "nonsense"], "tcp://"),
-        (["serve", "--port", "0"], "port"),
+        (["serve", "--port", "0"], "--port is '0'; give a number greater than or equal to 1"),
         (["serve", "--data", "postgresql://ann:secret@db/relume"], "RELUME_DATABASE"),
         (["worker", "--data", "sqlite:////tmp/relume.db"], "RELUME_DATABASE"),
         (["serve", "--host", "0.0.0.0"], "RELUME_LOGIN=true"),
@@ -128,6 +148,18 @@ def test_failure_is_one_line_on_stderr(
     assert words in err
     assert "Traceback" not in err
     assert "secret" not in err
+
+
+def test_a_summary_is_never_cut_short(capsys: pytest.CaptureFixture[str]) -> None:
+    for group in ([], ["token"], ["material"], ["environment"], ["ledger"]):
+        assert main([*group, "--help"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert [line for line in lines if line.endswith("...") and "Usage" not in line] == []
+
+
+def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"{version('relume')}\n"
 
 
 def test_verbose_shows_the_trace(data: Path, capsys: pytest.CaptureFixture[str]) -> None:

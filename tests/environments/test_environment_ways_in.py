@@ -160,7 +160,7 @@ def test_command_line_imports_lists_and_renders(tmp_path, dusk_file, capsys):
     name = capsys.readouterr().out.strip()
     (record,) = records(tmp_path / "environments")
     assert (record.map, record.name) == (name, "Evening")
-    assert main(["environment", "list", *home]) == 0
+    assert main(["list", "environments", *home]) == 0
     listed = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in listed] == ["studio", "clear_sky", "sunset", "overcast", name]
     for path, said in ((tmp_path / "none.hdr", "file that exists"), (tmp_path / "bad.hdr", "neither Radiance")):

@@ -33,10 +33,10 @@ def home(tmp_path_factory):
 
 def test_command_line_takes_a_file_in_and_gives_the_edited_one_out(home, red, tmp_path, capsys):
     assert main(["material", "import", str(red), "--name", "Red paint", "--data", str(home)]) == 0
-    told = capsys.readouterr().out.splitlines()
+    told = capsys.readouterr()
     (record,) = records(home / "materials")
-    assert (told[0], record.name) == (record.data, "Red paint")
-    terms = json.loads(told[1])["terms"]
+    assert (told.out, record.name) == (f"{record.data}\n", "Red paint")
+    terms = json.loads(told.err.splitlines()[0])["terms"]
     terms[0]["color"] = [0.5, 2.0, 1.0]
     look, output = tmp_path / "look.json", tmp_path / "edited.binary"
     look.write_text(json.dumps({"materials": {"Wall": {"terms": terms}}}))

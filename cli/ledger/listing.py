@@ -1,0 +1,167 @@
+"""`relume list`: what there is to be named on the command line, in looks and in REST calls."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from cli.options import Data
+from cli.terminal.printing import Json, moment, print_result
+
+if TYPE_CHECKING:
+    from cli.ledger.acting import Opened
+    from relume.btf.shelf import BtfRecord
+    from relume.measured.asset_store import MaterialRecord
+
+Kind = Literal["scenes", "bakes", "looks", "environments", "materials", "images", "renders", "built-ins"]
+Row = tuple[dict[str, Any], str]
+"""A thing as JSON, and as a line that begins with what names it."""
+
+
+def list_things(
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to list.", show_default=True)] = "scenes",
+    scene: Annotated[str | None, typer.Option("--scene", metavar="SCENE", help="Bakes: of this scene alone.")] = None,
+    state: Annotated[
+        str | None, typer.Option("--state", metavar="STATE", help="Bakes and renders: in this state alone.")
+    ] = None,
+    as_json: Json = False,
+    data: Data = None,
+) -> None:
+    """List scenes, bakes, looks and all else that has a name.
+
+    The newest comes first; what names a thing stands in front of its line.
+    """
+    from cli.ledger.acting import opened
+    from relume.errors import ParameterError
+
+    if scene is not None and kind != "bakes":
+        raise ParameterError("--scene", scene, f"none with {kind}: bakes alone are of a scene")
+    if state is not None and kind not in ("bakes", "renders"):
+        raise ParameterError("--state", state, f"none with {kind}: bakes and renders alone have one")
+    if kind == "built-ins":
+        rows = _built_ins()
+    elif kind == "bakes":
+        with opened(data) as there:
+            rows = list(_bakes(there, scene, state))
+    else:
+        with opened(data) as there:
+            rows = [row for row in LISTS[kind](there) if state in (None, row[0].get("state"))]
+    for document, line in rows:
+        print_result(document, line, as_json=as_json)
+
+
+def _scenes(there: Opened) -> Iterator[Row]:
+    from cli.terminal.documents import scene_document
+    from worker.scenes import list_scenes
+
+    bakes = there.service.bakes()
+    for record in list_scenes(there.service.ledger):
+        own = [status for status in bakes if status.scene == record.id]
+        line = f"{record.id}  {record.num_triangles:>10,} triangles  {len(own):>3} bakes  {record.name}"
+        yield scene_document(record, own), line
+
+
+def _bakes(there: Opened, scene: str | None, state: str | None) -> Iterator[Row]:
+    from cli.data_folder import find_scene
+    from cli.terminal.documents import bake_document, recipe_text
+    from worker.scenes import list_scenes
+
+    names = {record.id: record.name for record in list_scenes(there.service.ledger)}
+    only = None if scene is None else find_scene(there.service.ledger, scene).id
+    for status in there.service.bakes(only):
+        if state in (None, status.state):
+            name = names.get(status.scene, status.scene)
+            line = f"{status.id}  {status.state:9}  {status.progress:>4.0%}  {name}: {recipe_text(status.recipe)}"
+            yield bake_document(status, there.service), line
+
+
+def _looks(there: Opened) -> Iterator[Row]:
+    from server.records.looks import LookStore
+
+    for look in LookStore(there.service.ledger.sessions).list():
+        modified = moment(look.modified)
+        document = {"name": look.name, "etag": look.etag, "modified": modified, "bytes": len(look.document.encode())}
+        yield document, f"{look.name}  {modified[:16]}"
+
+
+def _environments(there: Opened) -> Iterator[Row]:
+    from relume.environments.asset_store import records
+    from relume.environments.built_in import BUILT_IN
+    from worker.paths import environments_path
+
+    for name, (label, _) in BUILT_IN.items():
+        yield {"id": name, "map": name, "name": label, "created": None, "warnings": []}, f"{name:20}  {label}"
+    for record in records(environments_path(there.settings.data)):
+        created, warnings = moment(record.created), list(record.warnings)
+        document = {"id": record.id, "map": record.map, "name": record.name, "created": created, "warnings": warnings}
+        yield document, f"{record.map:20}  {record.name}"
+
+
+def _materials(there: Opened) -> Iterator[Row]:
+    from relume.btf import shelf
+    from relume.measured import asset_store
+    from worker.paths import btfs_path, materials_path
+
+    found: list[MaterialRecord | BtfRecord] = [
+        *asset_store.records(materials_path(there.settings.data)),
+        *shelf.records(btfs_path(there.settings.data)),
+    ]
+    for record in found:
+        created, terms = moment(record.created), record.terms()
+        document = {"id": record.id, "data": record.data, "name": record.name, "created": created, "terms": terms}
+        yield document, f"{record.data:21}  {record.name}"
+
+
+def _images(there: Opened) -> Iterator[Row]:
+    from relume.images.shelf import records
+    from worker.paths import images_path
+
+    for record in records(images_path(there.settings.data)):
+        document = {"id": record.id, "texture": record.texture, "name": record.name, "created": moment(record.created)}
+        yield document, f"{record.texture:22}  {record.name}"
+
+
+def _renders(there: Opened) -> Iterator[Row]:
+    """As the ledger has them; how far a server is within a frame it alone knows."""
+    from sqlalchemy import select
+
+    from server.records.tables import RenderRow
+    from server.wire.renders import RenderRequest
+
+    with there.service.ledger.sessions() as session:
+        rows = list(session.scalars(select(RenderRow).order_by(RenderRow.created.desc())))
+    for row in rows:
+        request = RenderRequest.model_validate(json.loads(row.request))
+        document = {
+            "id": row.id,
+            "bake": request.bake,
+            "view": request.view,
+            "format": request.format,
+            "size": request.size,
+            "state": row.state,
+            "done": row.done,
+            "total": request.num_frames,
+            "problem": row.problem,
+            "created": moment(row.created),
+        }
+        done = f"{row.done} of {request.num_frames} frames"
+        yield document, f"{row.id}  {row.state:9}  {done}  {request.name or request.view}, {request.format}"
+
+
+def _built_ins() -> list[Row]:
+    from relume.scene.built_in import BUILT_IN
+
+    return [({"name": name, "label": one.label}, f"{name:22}  {one.label}") for name, one in BUILT_IN.items()]
+
+
+LISTS: dict[str, Callable[[Opened], Iterator[Row]]] = {
+    "scenes": _scenes,
+    "looks": _looks,
+    "environments": _environments,
+    "materials": _materials,
+    "images": _images,
+    "renders": _renders,
+}

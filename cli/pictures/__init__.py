@@ -1,0 +1,1 @@
+"""Pictures that commands make: of which looks, where to, and how they are painted."""

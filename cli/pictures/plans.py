@@ -1,0 +1,117 @@
+"""What `relume render` is to write, checked before hours of work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from cli.pictures.files import FORMATS, check_output, check_shown
+from relume.errors import ParameterError
+
+if TYPE_CHECKING:
+    from cli.pictures.looks import NamedLook
+    from relume.look import Look
+
+LOOK = "{look}"
+VIDEO = ".mp4"
+NO_FOLDERS = (*FORMATS, ".mov", ".avi", ".webm", ".mkv", ".gif", ".jpg", ".jpeg", ".tif", ".tiff")
+Turns = Literal["eye", "object", "environment"]
+
+
+class Turn(NamedTuple):
+    """A turntable: frames once around, what turns, and frames a second of a video."""
+
+    frames: int
+    turns: Turns = "eye"
+    fps: int = 25
+
+
+class Planned(NamedTuple):
+    """One file, or folder of frames.
+
+    Attributes:
+        look: what it is called. document: as it was given, perhaps partial. path: of the file or folder.
+    """
+
+    look: str
+    document: dict[str, Any]
+    path: Path
+
+
+def turn_of(frames: int | None, turns: Turns | None, fps: int | None) -> Turn | None:
+    """The turntable that is asked for. Raises ParameterError where there is none, and something is asked of it."""
+    from server.wire.renders import MAX_FRAMES
+
+    if frames is None:
+        for option, given in (("--turns", turns), ("--fps", fps)):
+            if given is not None:
+                raise ParameterError(option, given, "--turntable N with it: nothing turns without")
+        return None
+    if not 1 <= frames <= MAX_FRAMES:
+        raise ParameterError("--turntable", frames, f"1 to {MAX_FRAMES:,} frames")
+    return Turn(frames, turns or "eye", fps or 25)
+
+
+def check_target(output: Path, turn: Turn | None, *, resumes: bool) -> None:
+    """Raise ParameterError where what is asked for could not be written there."""
+    suffix = output.suffix.lower()
+    if turn is None:
+        if suffix == VIDEO:
+            raise ParameterError("--output", str(output), "a picture's name; a video needs --turntable N")
+        check_output(output)
+        return
+    if suffix in NO_FOLDERS:
+        raise ParameterError("--output", str(output), f"a folder for the numbered frames, or a name ending in {VIDEO}")
+    if not output.parent.is_dir():
+        raise ParameterError("--output", str(output), "something in a folder that exists")
+    if suffix == VIDEO:
+        from server.files.video import check_encoder
+
+        check_encoder()
+    elif output.exists() and not output.is_dir():
+        raise ParameterError("--output", str(output), "a folder, which the numbered frames go into")
+    if not resumes and any(frames_folder(output).glob("*.png")):
+        raise ParameterError("--output", str(output), "an empty folder; --resume goes on with what is there")
+
+
+def frames_folder(output: Path) -> Path:
+    """Where the frames of a turntable lie; those of a video beside it, until it is made."""
+    return output.with_name(output.name + ".frames") if output.suffix.lower() == VIDEO else output
+
+
+def plan_files(looks: Sequence[NamedLook], output: Path, turn: Turn | None) -> list[Planned]:
+    """Which look goes where.
+
+    Args:
+        looks: all of them. output: as it was given; {look} in it stands for the name of each.
+        turn: a turntable, which is of one look.
+    Raises:
+        ParameterError: several looks would be written to one file.
+    """
+    if len(looks) > 1 and turn is not None:
+        raise ParameterError("--look", f"{len(looks)} looks", "one with --turntable")
+    if len(looks) > 1 and LOOK not in output.name:
+        raise ParameterError("--output", str(output), f"a file name with {LOOK} in it, for the {len(looks)} looks")
+    planned = [Planned(look.name, look.document, _path_of(look.name, output)) for look in looks]
+    for number, one in enumerate(planned):
+        if one.path in (other.path for other in planned[:number]):
+            raise ParameterError("--look", one.look, f"looks of different names: two would be written to {one.path}")
+    return planned
+
+
+def complete_plan(planned: Planned, default: dict[str, Any]) -> Look:
+    """The complete look of a file. Raises ParameterError naming the look."""
+    from cli.data_folder import complete_look
+
+    look = complete_look(planned.document, default, f"look {planned.look!r}")
+    check_shown(planned.path, look)
+    return look
+
+
+def _path_of(look: str, output: Path) -> Path:
+    if LOOK not in output.name:
+        return output
+    from server.files.downloads import safe_stem
+
+    return output.with_name(output.name.replace(LOOK, safe_stem(look)))

@@ -1,0 +1,1 @@
+"""What commands print: results, and how far they are."""

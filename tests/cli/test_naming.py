@@ -1,0 +1,49 @@
+"""Names as people type them."""
+
+from __future__ import annotations
+
+import pytest
+
+from cli.naming import pick, spelled
+from relume.errors import NotFoundError
+
+KNOWN = [("aaaa1111", "Still life"), ("bbbb2222", "still-life 2"), ("cccc3333", "Box"), ("dddd4444", "box")]
+
+
+@pytest.mark.parametrize(
+    ("given", "identity"),
+    [
+        ("still_life", "aaaa1111"),
+        ("STILL LIFE", "aaaa1111"),
+        ("Still-Life", "aaaa1111"),
+        (" still  life ", "aaaa1111"),
+        ("\uff33till life", "aaaa1111"),  # a full-width S
+        ("still life 2", "bbbb2222"),
+        ("aaaa", "aaaa1111"),
+        ("cccc3333", "cccc3333"),
+        ("Box", "cccc3333"),
+        ("box", "dddd4444"),
+    ],
+)
+def test_a_thing_is_found_by_its_id_its_name_and_spellings_of_it(given: str, identity: str) -> None:
+    assert pick("scene", given, KNOWN, "import one") == identity
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("BOX", "'BOX' names 2 scenes; give one of cccc3333 \\(Box\\), dddd4444 \\(box\\)"),
+        ("aaa", "there is no scene 'aaa'; known are: aaaa1111 \\(Still life\\), .*; import one"),
+        ("", "there is no scene ''"),
+    ],
+)
+def test_what_cannot_be_told_apart_is_said(given: str, said: str) -> None:
+    with pytest.raises(NotFoundError, match=said):
+        pick("scene", given, KNOWN, "import one")
+
+
+def test_a_spelling_becomes_the_name_only_where_there_is_one() -> None:
+    assert spelled("FRONT", ["front", "back"]) == "front"
+    assert spelled("Front", ["front", "Front"]) == "Front"
+    assert spelled("FRONT", ["front", "Front"]) == "FRONT"
+    assert spelled("top", ["front"]) == "top"

@@ -1,0 +1,270 @@
+"""What pipelines do by commands: list, plan, follow, cancel and delete, and read all of it as JSON."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from tiny_scenes import still_life
+
+from cli.main import main
+from cli.tokens import open_access
+from relume.environments.model import Environment
+from relume.scene.archive import make_scene
+from relume.scene.model import Camera, Material, Mesh
+from server.records.looks import LookStore
+from server.wire.bodies import BakeBody, DryRunBody, SceneBody
+from worker.scenes import register_scene
+from worker.service import BakeService
+
+TINY = ["--size", "32x24", "--lights", "100"]
+RED = {"materials": {"White": {"terms": [{"model": "lambert", "color": [1.0, 0.0, 0.0]}]}}}
+BLUE = {"materials": {"White": {"terms": [{"model": "lambert", "color": [0.0, 0.0, 1.0]}]}}}
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data folder with a scene, "Quad": a white square that fills the picture; baked, and saved looks of it."""
+    folder = tmp_path_factory.mktemp("data")
+    positions = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
+    normals, zeros = np.tile(np.array([[0, 0, 1]], np.float32), (4, 1)), np.zeros((4, 4), np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    mesh = Mesh("quad", positions, normals, zeros, zeros[:, :2].copy(), faces, 0)
+    camera = np.eye(4)
+    camera[2, 3] = 1.5
+    material = Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
+    light = Environment("white", np.ones((16, 32, 3), np.float32))
+    scene = make_scene("Quad one", [mesh], [material], [Camera("Front", camera, 0.8)], light)
+    service = BakeService(folder)
+    register_scene(folder, service.ledger, scene)
+    looks = LookStore(service.ledger.sessions)
+    looks.put("Red night", json.dumps(RED), None, None)
+    looks.put("Blue", json.dumps(BLUE), None, None)
+    service.close()
+    assert main(["bake", "quad_one", "--view", "front", *TINY, "--data", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture
+def run(baked: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[Any]:
+    """Runs a command on the folder: its exit code, stdout and stderr."""
+    capsys.readouterr()
+
+    def command(*words: str, data: Path = baked) -> tuple[int, str, str]:
+        code = main([*words, "--data", str(data)])
+        return code, *capsys.readouterr()
+
+    return command
+
+
+def parsed(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_lists_begin_each_line_with_what_names_a_thing(run: Any) -> None:
+    (scene,) = parsed(run("list", "--json")[1])
+    assert set(scene) == set(SceneBody.model_fields) - {"thumbnail"}
+    assert run("list")[1].startswith(f"{scene['id']} ")
+    (bake,) = parsed(run("list", "bakes", "--json")[1])
+    assert set(bake) == set(BakeBody.model_fields)
+    assert (bake["scene"], bake["id"], bake["state"]) == (scene["id"], scene["bakes"][0], "ready")
+    assert run("list", "bakes", "--scene", "QUAD-ONE", "--state", "ready")[1].startswith(bake["id"])
+    assert run("list", "bakes", "--state", "failed")[1] == ""
+    assert [look["name"] for look in parsed(run("list", "looks", "--json")[1])] == ["Blue", "Red night"]
+    environments = [line.split()[0] for line in run("list", "environments")[1].splitlines()]
+    assert environments[:2] == ["studio", "clear_sky"]
+    for kind in ("materials", "images", "renders"):
+        assert run("list", kind, "--json")[:2] == (0, "")
+    assert "cornell_box" in [line.split()[0] for line in run("list", "built-ins")[1].splitlines()]
+
+
+def test_a_list_takes_filters_only_where_they_mean_something(run: Any) -> None:
+    assert "--scene is 'quad'" in run("list", "looks", "--scene", "quad")[2]
+    assert "--state is 'ready'" in run("list", "scenes", "--state", "ready")[2]
+
+
+def test_a_dry_run_says_what_it_costs_and_queues_nothing(run: Any) -> None:
+    code, text, _ = run("bake", "quad one", "--preset", "preview", "--dry-run", "--json")
+    (plan,) = parsed(text)
+    assert code == 0
+    assert set(plan) == set(DryRunBody.model_fields)
+    assert (plan["recipe"]["size"], plan["recipe"]["lights"]) == ([320, 240], 300)
+    assert plan["plan"]["store_bytes"] > 0
+    assert len(run("list", "bakes")[1].splitlines()) == 1
+    code, text, said = run("bake", "quad one", "--preset", "final", "--lights", "9", "--dry-run")
+    assert text.strip() not in ("", plan["id"])
+    assert "1024×768, 9 lights" in said
+    assert "on the disk" in said
+
+
+def test_the_same_bake_again_is_one_line_of_json(run: Any) -> None:
+    (bake,) = parsed(run("bake", "quad one", "--view", "FRONT", *TINY, "--json")[1])
+    assert set(bake) == set(BakeBody.model_fields)
+    assert bake["state"] == "ready"
+    assert parsed(run("status", "quad one", "--json")[1])[0]["id"] == bake["id"]
+    code, text, said = run("status", "--json")
+    assert code == 0, said
+    (all_,) = parsed(text)
+    assert (all_["scenes"], all_["bakes"], all_["active"]) == (1, {"ready": 1}, [])
+    assert f"{bake['id']}  ready  100%" in run("status", bake["id"][:10])[1]
+
+
+def test_a_queued_bake_is_cancelled_and_deleted_and_the_audit_knows(run: Any, baked: Path) -> None:
+    _, text, _ = run("bake", "quad one", "--size", "24x16", "--lights", "50", "--no-watch")
+    bake = text.strip()
+    assert f"{bake}  queued" in run("list", "bakes", "--state", "queued")[1]
+    assert run("cancel", bake)[:2] == (0, f"{bake}\n")
+    code, text, said = run("cancel", bake)
+    assert (code, text, said) == (0, "", f"bake {bake} was cancelled already\n")
+    assert run("delete", "bake", bake)[2] == (
+        f"relume: there is no terminal to ask at; give --yes to delete bake {bake} "
+        "(direct, 24×16, 50 lights, views Front)\n"
+    )
+    assert parsed(run("delete", "bake", bake, "--yes", "--json")[1]) == [{"kind": "bake", "id": bake}]
+    assert "no scene" in run("status", bake)[2]
+    noted = [(change.what, change.object) for change in open_access(baked).audit.list(2)]
+    assert noted == [("delete bake", bake), ("cancel bake", bake)]
+
+
+def test_what_is_ready_cannot_be_cancelled(run: Any) -> None:
+    code, text, said = run("cancel", "quad one")
+    assert (code, text) == (1, "")
+    assert "is ready; nothing to cancel" in said
+
+
+def test_a_scene_goes_with_its_bakes_and_looks_by_their_names(tmp_path: Path, run: Any) -> None:
+    service = BakeService(tmp_path)
+    scene = register_scene(tmp_path, service.ledger, still_life())
+    LookStore(service.ledger.sessions).put("Red night", json.dumps(RED), None, None)
+    service.close()
+    bake = run("bake", "Still_Life", "--size", "16x12", "--lights", "50", "--no-watch", data=tmp_path)[1].strip()
+    assert run("delete", "look", "red_night", "--yes", data=tmp_path)[1] == "Red night\n"
+    assert run("list", "looks", data=tmp_path)[1] == ""
+    assert run("delete", "scene", "still life", "--yes", data=tmp_path)[1] == f"{scene}\n"
+    assert (run("list", data=tmp_path)[1], run("list", "bakes", data=tmp_path)[1]) == ("", "")
+    assert not (tmp_path / "scenes" / scene).exists()
+    assert "no scene" in run("cancel", bake, data=tmp_path)[2]
+    assert "built-in ones stay" in run("delete", "environment", "sunset", "--yes", data=tmp_path)[2]
+
+
+@pytest.mark.parametrize("command", [["list"], ["status"], ["cancel", "x"], ["delete", "look", "x"]])
+def test_a_folder_that_nobody_has_used_is_said(run: Any, tmp_path: Path, command: list[str]) -> None:
+    code, _, said = run(*command, data=tmp_path / "typo")
+    assert code == 1
+    assert "a folder that relume has used" in said
+
+
+def mean_of(path: Path) -> list[int]:
+    return [int(value) for value in np.asarray(Image.open(path))[..., :3].reshape(-1, 3).mean(axis=0)]
+
+
+def test_many_looks_are_rendered_in_one_go(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "looks"
+    folder.mkdir()
+    (folder / "a red.json").write_text(json.dumps(RED))
+    (folder / "b.json").write_text(json.dumps(BLUE))
+    (folder / "notes.txt").write_text("no look")
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(json.dumps([RED, BLUE]).encode())))
+    given = [word for look in (str(folder), "red_night", "-") for word in ("--look", look)]
+    template = str(tmp_path / "{look}.png")
+    code, text, _ = run("render", "quad one", *given, "--output", template)
+    assert code == 0
+    names = ["a-red", "b", "Red-night", "0000", "0001"]
+    assert text.splitlines() == [str(tmp_path / f"{name}.png") for name in names]
+    for name, is_red in zip(names, (True, False, True, True, False), strict=True):
+        red, _, blue = mean_of(tmp_path / f"{name}.png")
+        assert (red > blue) == is_red
+
+
+def test_a_resumed_batch_leaves_out_what_is_written(run: Any, tmp_path: Path) -> None:
+    (tmp_path / "Blue.png").write_bytes(b"there already")
+    words = ["--look", "Blue", "--look", "Red night", "--output", str(tmp_path / "{look}.png"), "--json"]
+    code, text, _ = run("render", "quad one", *words, "--resume")
+    assert code == 0
+    assert [one["look"] for one in parsed(text)] == ["Blue", "Red night"]
+    assert (tmp_path / "Blue.png").read_bytes() == b"there already"
+    assert mean_of(tmp_path / "Red-night.png")[0] > 0
+
+
+def test_a_dry_run_of_a_render_checks_all_and_writes_nothing(run: Any, tmp_path: Path) -> None:
+    words = ["--look", "Blue", "--output", str(tmp_path / "{look}.exr"), "--dry-run"]
+    (document,) = parsed(run("render", "quad one", *words, "--json")[1])
+    assert (document["path"], document["look"]) == (str(tmp_path / "Blue.exr"), "Blue")
+    assert (document["size"], document["frames"], document["dry_run"]) == ([32, 24], 1, True)
+    (tmp_path / "bad.json").write_text('{"materials": {"Nope": {}}}')
+    code, _, said = run("render", "quad one", *words, "--look", str(tmp_path / "bad.json"))
+    assert code == 1
+    assert "look 'bad': /materials is 'Nope'; give a material of this scene: 'White'" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.json"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--look", "Blue", "--look", "Red night", "--output", "x.png"], "{look}"),
+        (["--look", "Blue", "--look", "blue", "--output", "{look}.png"], "two would be written to Blue.png"),
+        (["--look", "Blue", "--look", "Red night", "--turntable", "2", "--output", "round"], "one with --turntable"),
+        (["--look", "Green", "--output", "x.png"], "no saved look; saved are: 'Blue', 'Red night'"),
+        (["--look", "/no/look.json", "--output", "x.png"], "--look is '/no/look.json'; give a file that exists"),
+        (["--output", "x.mp4"], "a video needs --turntable"),
+        (["--turns", "object", "--output", "x.png"], "--turns is 'object'; give --turntable N with it"),
+        (["--fps", "10", "--output", "x.png"], "--fps is 10; give --turntable N with it"),
+        (["--turntable", "2", "--output", "x.png"], "a folder for the numbered frames, or a name ending in .mp4"),
+        (["--turntable", "2", "--output", "x.mov"], "a folder for the numbered frames, or a name ending in .mp4"),
+        (["--float", "--output", "x.png"], "--output is 'x.png'; give a file name that ends in .exr"),
+    ],
+)
+def test_what_cannot_be_rendered_is_one_sentence(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, text, error = run("render", "quad one", *words)
+    assert (code, text) == (1, "")
+    assert said in error
+    assert len(error.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_turntable_becomes_a_video_and_what_was_written_is_printed(run: Any, tmp_path: Path) -> None:
+    words = ["--turntable", "3", "--turns", "environment", "--fps", "3"]
+    code, text, _ = run("render", "quad one", *words, "--output", str(tmp_path / "x.mp4"))
+    assert (code, text) == (0, f"{tmp_path / 'x.mp4'}\n")
+    assert (tmp_path / "x.mp4").read_bytes()[4:8] == b"ftyp"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]  # its frames are not needed any more
+    code, text, _ = run("render", "quad one", *words[:4], "--output", str(tmp_path / "round"))
+    assert (code, text) == (0, f"{tmp_path / 'round'}\n")
+    assert sorted(path.name for path in (tmp_path / "round").iterdir()) == ["0000.png", "0001.png", "0002.png"]
+
+
+def test_quiet_leaves_results_alone(run: Any, tmp_path: Path) -> None:
+    look = tmp_path / "look.json"
+    look.write_text('{"environment": {"map": "sunset"}}')
+    words = ["render", "quad one", "--look", str(look), "--output", str(tmp_path / "x.png")]
+    assert "small lamps' are less exact" in run(*words)[2]
+    assert run(*words, "--quiet") == (0, f"{tmp_path / 'x.png'}\n", "")
+
+
+def test_an_import_prints_its_id_and_what_was_read(run: Any, tmp_path: Path) -> None:
+    (tmp_path / "m.mtl").write_text("newmtl M\nKd .5 0 0\nKs .5 .5 .5\nNs 18\nmap_Bump gone.png\nmap_Ka x.png\n")
+    (tmp_path / "t.obj").write_text("mtllib m.mtl\nv 0 0 0\nv 2 0 0\nv 0 1 0\nusemtl M\nf 1 2 3\n")
+    code, text, said = run("import", str(tmp_path / "t.obj"), data=tmp_path / "data")
+    assert code == 0
+    assert len(text.strip()) == 16
+    assert "  2 × 1 × 0 m, +Y is up" in said
+    assert "  material M: lambert + ggx" in said
+    assert [line.partition(":")[0] for line in said.splitlines() if "warning" in line] == [
+        "warning, wrong",
+        "warning, simplified",
+        "warning, unused",
+    ]
+    (scene,) = parsed(run("import", str(tmp_path / "t.obj"), "--json", data=tmp_path / "data")[1])
+    assert scene["id"] == text.strip()
+    assert {remark["effect"] for remark in scene["remarks"]} == {"wrong", "simplified", "unused"}
