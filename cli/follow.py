@@ -6,16 +6,25 @@ import time
 from collections.abc import Callable
 
 from cli.terminal.progress import progress
+from relume.errors import NotFoundError
 from worker.board import Subscription
 from worker.status import PHASE_WORDS, BakeStatus
 
 
 def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = lambda: False) -> BakeStatus:
-    """Show progress until the bake ends, and return its last status. Raises KeyboardInterrupt when `interrupted`."""
+    """Show progress until the bake ends, and return its last status.
+
+    Args:
+        changes: of the bake. label: of the progress. interrupted: asked now and then.
+    Raises:
+        KeyboardInterrupt: `interrupted` said so. NotFoundError: somebody has deleted the bake.
+    """
     with progress(label) as tell:
         while not (status := changes.latest).final:
             tell(status.progress, detail(status))
             changes.get(timeout=0.5)
+            if changes.is_closed:
+                raise NotFoundError(f"bake {status.id} was deleted; import the scene again where it is gone, too")
             if interrupted():
                 raise KeyboardInterrupt
     return status

@@ -89,15 +89,16 @@ def _parts(material: Material) -> Iterator[str]:
 
 
 def _find(file: Path | None, environment: Path | None, name: str | None, made_by_code: str | None) -> Scene:
+    from cli.naming import spelled
     from relume.environments.reading import read_environment
     from relume.errors import ParameterError, PlanError
-    from relume.scene.built_in import built_in
+    from relume.scene.built_in import BUILT_IN, built_in
     from relume.scene.importer import import_scene as read_scene
 
     if made_by_code is not None:
         if any(given is not None for given in (file, environment, name)):
             raise ParameterError("--built-in", made_by_code, "alone: such a scene has its own light and name")
-        return built_in(made_by_code)
+        return built_in(spelled(made_by_code, BUILT_IN))
     if file is None:
         raise PlanError("nothing to import; give a scene file, or --built-in NAME")
     if environment is not None:

@@ -17,11 +17,15 @@ log = logging.getLogger(__name__)
 
 
 class Subscription:
-    """Changes of one bake, the state at the time of asking first. Close it, or use it as a context manager."""
+    """Changes of one bake, the state at the time of asking first. Close it, or use it as a context manager.
+
+    Attributes:
+        latest: the newest state. is_closed: no change follows: it was closed, as where the bake was deleted.
+    """
 
     def __init__(self, board: StatusBoard, bake_id: str, first: BakeStatus) -> None:
         self.bake_id = bake_id
-        self.latest = first
+        self.latest, self.is_closed = first, False
         self._board = board
         self._changes: queue.SimpleQueue[BakeStatus | None] = queue.SimpleQueue()
         self._changes.put(first)
@@ -49,6 +53,7 @@ class Subscription:
     def close(self) -> None:
         """End the subscription; an iterator over it ends too."""
         self._board.remove(self)
+        self.is_closed = True
         self._changes.put(None)
 
     def __enter__(self) -> Subscription:

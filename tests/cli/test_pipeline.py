@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +14,17 @@ import pytest
 from PIL import Image
 from tiny_scenes import still_life
 
+from cli.follow import follow
 from cli.main import main
 from cli.tokens import open_access
+from relume.bake import Recipe
 from relume.environments.model import Environment
+from relume.errors import NotFoundError
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Material, Mesh
 from server.records.looks import LookStore
 from server.wire.bodies import BakeBody, DryRunBody, SceneBody
-from worker.scenes import register_scene
+from worker.scenes import delete_scene, register_scene
 from worker.service import BakeService
 
 TINY = ["--size", "32x24", "--lights", "100"]
@@ -132,6 +136,16 @@ def test_a_queued_bake_is_cancelled_and_deleted_and_the_audit_knows(run: Any, ba
     assert noted == [("delete bake", bake), ("cancel bake", bake)]
 
 
+def test_whoever_follows_a_bake_hears_that_it_is_deleted(tmp_path: Path) -> None:
+    with closing(BakeService(tmp_path)) as service:  # which runs nothing
+        scene = register_scene(tmp_path, service.ledger, still_life())
+        bake = service.submit(scene, Recipe("direct", ("front",), (16, 16), 50))
+        with service.subscribe(bake) as changes:
+            delete_scene(tmp_path, service.ledger, scene)
+            with pytest.raises(NotFoundError, match=f"bake {bake} was deleted"):
+                follow(changes, "still life")
+
+
 def test_what_is_ready_cannot_be_cancelled(run: Any) -> None:
     code, text, said = run("cancel", "quad one")
     assert (code, text) == (1, "")
@@ -143,7 +157,8 @@ def test_a_scene_goes_with_its_bakes_and_looks_by_their_names(tmp_path: Path, ru
     scene = register_scene(tmp_path, service.ledger, still_life())
     LookStore(service.ledger.sessions).put("Red night", json.dumps(RED), None, None)
     service.close()
-    bake = run("bake", "Still_Life", "--size", "16x12", "--lights", "50", "--no-watch", data=tmp_path)[1].strip()
+    bake = run("bake", "Still_Life", "--size", "16x16", "--lights", "50", "--no-watch", data=tmp_path)[1].strip()
+    assert run("list", "bakes", data=tmp_path)[1].startswith(f"{bake}  queued")
     assert run("delete", "look", "red_night", "--yes", data=tmp_path)[1] == "Red night\n"
     assert run("list", "looks", data=tmp_path)[1] == ""
     assert run("delete", "scene", "still life", "--yes", data=tmp_path)[1] == f"{scene}\n"

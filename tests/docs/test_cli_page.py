@@ -1,0 +1,43 @@
+"""docs/cli.md: each command that it shows is there and takes the options that it is shown with."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from cli.main import main
+from cli.pictures.looks import MAX_LOOKS
+from worker.presets import PRESETS
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cli.md").read_text(encoding="utf-8")
+GROUPS = ("environment", "material", "token", "ledger")
+
+
+def shown() -> list[list[str]]:
+    """The words of every command in a block of the page."""
+    blocks = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines()]
+    return [shlex.split(part, comments=True)[1:] for line in lines for part in re.findall(r"relume [^\n]*", line)]
+
+
+@pytest.mark.parametrize("words", shown(), ids=" ".join)
+def test_a_command_that_is_shown_takes_what_it_is_shown_with(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    depth = 2 if words[0] in GROUPS else 1
+    assert main([*words[:depth], "--help"]) == 0
+    described = capsys.readouterr().out
+    for option in (word for word in words[depth:] if word.startswith("--")):
+        assert re.search(rf"{option}\b", described)
+
+
+def test_the_presets_are_those_of_the_code() -> None:
+    rows = dict(re.findall(r"^\| `(\w+)`[^|]*\| (\d+×\d+ \| [\d,]+) \|$", PAGE, re.MULTILINE))
+    assert rows == {name: f"{p.size[0]}×{p.size[1]} | {p.num_lights:,}" for name, p in PRESETS.items()}
+
+
+def test_the_limit_of_looks_is_that_of_the_code() -> None:
+    assert f"{MAX_LOOKS:,} at most" in PAGE
