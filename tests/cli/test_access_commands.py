@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,20 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
     ]
     assert all(line["who"].endswith("(shell)") for line in lines)
     assert "token revoke  Ann" in run(capsys, tmp_path, "audit", "--last", "1")[1]
+
+
+def test_tokens_are_told_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = json.loads(run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--json")[1])
+    found = open_access(tmp_path).tokens.find(made["token"])
+    assert found is not None
+    assert json.loads(run(capsys, tmp_path, "token", "list", "--json")[1]) == {
+        "id": found.id,
+        "name": "Ann",
+        "role": "edit",
+        "state": "valid",
+        "created": datetime.fromtimestamp(found.created, UTC).isoformat(),
+        "expires": None,
+    }
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sqlite3
 import stat
@@ -10,6 +11,7 @@ import sys
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -88,6 +90,20 @@ def test_what_is_kept_is_for_its_own_user_alone(tmp_path: Path) -> None:
     assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
     assert kept
     assert {stat.S_IMODE(path.stat().st_mode) & 0o077 for path in kept} == {0}
+
+
+def test_backups_are_told_as_json(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def told(*words: str) -> dict[str, Any]:
+        assert main([*words, "--json"]) in (0, 1)
+        document: dict[str, Any] = json.loads(capsys.readouterr().out)
+        return document
+
+    backups = str(tmp_path / "backups")
+    assert told("ledger", "upgrade")["revision"] == newest_revision()
+    made = told("backup", backups)
+    assert (made["files"], len(made["left_out"])) == (0, 2)
+    assert told("backup", backups, "--verify") == {"name": made["name"], "files": 1, "damaged": []}
+    assert told("restore", backups, "--data", str(tmp_path / "new"))["name"] == made["name"]
 
 
 def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from relume.environments.model import Environment
 from relume.scene.importer import import_scene
-from relume.scene.model import Material, Scene
+from relume.scene.model import Coding, Material, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"
@@ -229,6 +229,14 @@ def test_a_bump_map_that_holds_normals_is_a_normal_map(tmp_path: Path, keyword: 
     scene = scene_of(tmp_path, f"newmtl M\nKd 1 1 1\n{keyword} tiles.png\n")
     assert scene.materials[0].normal_map is not None
     assert scene.warnings == ()
+
+
+@pytest.mark.parametrize(("option", "strength"), [("", 1.0), ("-bm 0.5", 0.5), ("-bm strong", 1.0)])
+def test_a_normal_map_is_as_strong_as_the_file_says(tmp_path: Path, option: str, strength: float) -> None:
+    (tmp_path / "tiles.png").write_bytes(image("normals"))
+    material = material_of(tmp_path, f"newmtl M\nKd 1 1 1\nmap_Bump {option} tiles.png\n")
+    assert material.normal_map is not None
+    assert material.normal_map.coding == Coding("normal", (strength, strength, 1.0))
 
 
 @pytest.mark.parametrize(

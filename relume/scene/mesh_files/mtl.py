@@ -29,6 +29,7 @@ MINOR_NUMBERS = {"Ka": 3, "illum": 1, "Pc": 1, "Pcr": 1, "Ps": 1, "aniso": 1}  #
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-clamp": 1}
 OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1}
 BUMPS = ("norm", "map_Bump", "map_bump", "bump")
+MAX_STRENGTH = 100.0
 USED_MAPS = {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", *BUMPS}
 HARMLESS_MAPS = {"map_Ka", "map_aat"}  # of ambient light, and how to smooth the edges of images
 
@@ -60,6 +61,9 @@ def read_library(data: bytes, folder: str = "") -> dict[str, Described]:
                 material.numbers[word] = _numbers(rest.split(), MINOR_NUMBERS[word], word)
         elif word.startswith("map_") or word in ("bump", "norm", "disp", "refl"):
             material.maps[word] = _image_name(rest.split())
+            with suppress(SceneError, ValueError, IndexError):
+                words = rest.split()
+                material.strengths[word] = _numbers(words[words.index("-bm") + 1 :], 1, "-bm")[0]
     return materials
 
 
@@ -172,8 +176,9 @@ class MaterialMaker:
         """That of `norm`, or of a bump map whose image is one; heights are said to be lost."""
         for keyword in (keyword for keyword in BUMPS if described.maps.get(keyword)):
             called = f"the normal map of {what}" if keyword == "norm" else f"{keyword} of {what}"
+            strength = min(described.strengths.get(keyword, 1.0), MAX_STRENGTH)
             try:
-                texture = self._image(described, keyword, called, Coding("normal"))
+                texture = self._image(described, keyword, called, Coding("normal", (strength, strength, 1.0)))
             except SceneError as error:
                 if keyword == "norm":
                     raise

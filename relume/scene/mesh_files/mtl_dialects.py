@@ -57,12 +57,14 @@ class Gloss(Enum):
 
 @dataclass
 class Described:
-    """One `newmtl`: its numbers, and the names of its images by keyword, as the file in `folder` gives them."""
+    """One `newmtl`: its numbers, and the names of its images by keyword, as the file in `folder` gives them; and how
+    strong its bump maps are, where that is said."""
 
     folder: str = ""
     dialect: Dialect = Dialect.COMMON
     numbers: dict[str, list[float]] = field(default_factory=dict)
     maps: dict[str, str] = field(default_factory=dict)
+    strengths: dict[str, float] = field(default_factory=dict)
 
 
 def dialect_of(lines: Sequence[str]) -> Dialect:
