@@ -31,7 +31,8 @@ class Cords(NamedTuple):
 def cords(folder: Path) -> Path:
     """Two cords of unlike colours a metre, one of them shining, their piles uneven; of few faces, as light between them
     takes longest."""
-    (folder / "m.mtl").write_text("newmtl a\nKd 0.6 0.4 0.2\nillum 1\nnewmtl b\nKd 0.1 0.3 0.4\nKs 0.1 0.1 0.1\nNs 9\n")
+    shining = "newmtl b\nKd 0.1 0.3 0.4\nKs 0.1 0.1 0.1\nNs 9\nillum 3\n"  # a mirror's Ks is read as it stands
+    (folder / "m.mtl").write_text(f"newmtl a\nKd 0.6 0.4 0.2\nillum 1\n{shining}")
     v, u = np.meshgrid(*[np.linspace(0, 1, STEPS + 1)] * 2, indexing="ij")
     height = 0.08 * np.sin(2 * np.pi * u) ** 2 + 0.02 * np.cos(2 * np.pi * (u + 2 * v))
     lines = ["mtllib m.mtl", *(f"v {x} {y} {-z}" for x, y, z in zip(u.flat, height.flat, v.flat, strict=True))]
