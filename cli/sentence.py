@@ -46,9 +46,12 @@ def sentence(error: Exception, arguments: Sequence[str] = ()) -> str:
 
 def _as_typed(error: ParameterError, arguments: Sequence[str]) -> ParameterError:
     """The same, of a parameter that an option was given for, by the name of the option."""
+    typed = {argument.partition("=")[0] for argument in arguments}
     option = "--" + error.name.replace("_", "-")
-    is_typed = any(argument.partition("=")[0] == option for argument in arguments)
-    return ParameterError(option, error.value, error.allowed) if is_typed else error
+    for spelling in (option, option.removesuffix("s")):  # of several views each is given by an option of its own
+        if spelling in typed:
+            return ParameterError(spelling, error.value, error.allowed)
+    return error
 
 
 def _usage(error: TyperException, arguments: Sequence[str]) -> str:

@@ -152,23 +152,27 @@ def sentences(subject: Subject, truth: Traced, paths: str) -> Iterator[str]:
     yield from (f"left out by brute force, too: {what}" for what in truth.untraced)
 
 
-def document(subject: Subject, truth: Traced) -> dict[str, Any]:
-    """What `sentences` says, as JSON.
+def document(subject: Subject, truth: Traced, paths: str) -> dict[str, Any]:
+    """What `sentences` says as JSON, by the names that REST has in a comparison.
 
     Args:
         subject: with the frame, where one is compared. truth: passes of it.
+        paths: whose are asked for, where none is.
     """
     from dataclasses import asdict
 
     from relume.reference.truth import compare
 
-    compared = {} if subject.frame is None else truth.estimates
+    estimates = {} if subject.frame is None else truth.estimates
+    found = {name: asdict(compare(subject.frame, estimate)[0]) for name, estimate in estimates.items()}
+    is_told = subject.frame is not None or paths == "method"
     return {
         "view": subject.view,
         "size": list(subject.size),
-        "left_out": list(truth.left_out),
+        "left_out": list(truth.left_out) if is_told else [],
         "untraced": list(truth.untraced),
-        "found": {name: asdict(compare(subject.frame, estimate)[0]) for name, estimate in compared.items()},
+        "found": found.get("all"),
+        "found_of_method": found.get("method"),
     }
 
 

@@ -54,7 +54,7 @@ def reference(
         truth = traced(subject, spp, whose, tell)
     save(output, truth.estimates[whose].mean, subject.look)
     if as_json:
-        print_result({"path": str(output), "spp": spp, **document(subject, truth)}, "", as_json=True)
+        print_result({"path": str(output), "spp": spp, **document(subject, truth, whose)}, "", as_json=True)
         return
     (note if compare else typer.echo)(str(output))
     for line in sentences(subject, truth, whose):

@@ -122,7 +122,7 @@ def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.Cap
         (["bake", "quad", "--method", "surface", "--gather-samples", "9"], "64 to"),
         (["bake", "quad", "--method", "magic"], "--method is 'magic'; give one of 'direct', 'gather', 'surface'"),
         (["bake", "quad", "--preset", "best"], "--preset is 'best'; give one of 'preview', 'good', 'final'"),
-        (["bake", "quad", "--view", "top"], "front"),
+        (["bake", "quad", "--view", "top"], "--view is 'top'; give some of front"),
         (["import", "/no/such-file.glb"], "FILE is '/no/such-file.glb'; give a file that exists"),
         (["import", "a.glb", "--environment", "/no/sky.hdr"], "--environment is '/no/sky.hdr'; give a file"),
         (["import"], "nothing to import; give a scene file, or --built-in NAME"),

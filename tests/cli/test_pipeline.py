@@ -24,7 +24,7 @@ from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Material, Mesh
 from server.records.looks import LookStore
 from server.wire.bodies import BakeBody, DryRunBody, SceneBody
-from worker.scenes import delete_scene, register_scene
+from worker.scenes import register_scene
 from worker.service import BakeService
 
 TINY = ["--size", "32x24", "--lights", "100"]
@@ -141,7 +141,7 @@ def test_whoever_follows_a_bake_hears_that_it_is_deleted(tmp_path: Path) -> None
         scene = register_scene(tmp_path, service.ledger, still_life())
         bake = service.submit(scene, Recipe("direct", ("front",), (16, 16), 50))
         with service.subscribe(bake) as changes:
-            delete_scene(tmp_path, service.ledger, scene)
+            service.ledger.delete_bakes([bake])
             with pytest.raises(NotFoundError, match=f"bake {bake} was deleted"):
                 follow(changes, "still life")
 

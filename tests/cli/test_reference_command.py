@@ -1,5 +1,6 @@
 """`relume reference`: which light paths it traces, and what it says of a bake's frame."""
 
+import json
 import re
 from pathlib import Path
 
@@ -69,6 +70,11 @@ def test_a_bake_is_compared_with_both_kinds_of_paths(
     assert of_method is not None
     assert float(of_method[1]) < 5
     assert left_out.startswith("left out by the method: Light that surfaces reflect")
+    assert main([*ASKED, str(look), "--spp", "256", "--output", output, "--compare", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["path"], document["size"]) == (output, [32, 24])
+    assert document["found"]["error"] == pytest.approx(float(found[1]) / 100, rel=0.2)
+    assert document["found_of_method"]["rmse"] < document["found"]["rmse"]
     assert main([*ASKED, str(look), "--spp", "4", "--output", output, "--compare", "--size", "8x6"]) == 1
     assert "a bake has its own" in capsys.readouterr().err
 
