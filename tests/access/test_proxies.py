@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from alone import run_alone
 from fastapi.testclient import TestClient
+from server_fakes import SIZE
+from session_client import Baked
 
 from server.access.access import Access
 from server.access.openness import check_openness
@@ -64,6 +66,13 @@ class TestNames:
         assert client.get("/api/me", headers=token).status_code == 200
         with access.quotas.session("proxy:Ann"), access.quotas.session("Ann"):
             assert access.quotas.num_sessions == 2
+
+    def test_other_people_read_the_name_alone(self, client: TestClient, baked: Baked, settings: Settings) -> None:
+        settings.proxy_roles["Ann"] = "edit"
+        pin = {"bake": baked.bake, "view": "front", "x": 1, "y": 2, "size": SIZE, "text": "Too bright"}
+        path = f"/api/scenes/{baked.scene}/comments"
+        made = proxy(client).post(path, json=pin, headers={"X-Forwarded-User": "Ann"})
+        assert (made.status_code, made.json()["author"]) == (201, "Ann")
 
     def test_no_token_is_called_as_a_proxy_calls_people(self, access: Access) -> None:
         with pytest.raises(Exception, match="does not begin with proxy:"):

@@ -329,6 +329,26 @@ def test_a_setting_that_cannot_be_is_one_sentence(
     assert line.startswith(f"relume: {said}")
 
 
+def test_what_a_server_writes_is_for_its_own_user_alone(
+    data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    masks: list[int] = []
+
+    def noted(*_: object, **__: object) -> None:
+        masks.append(os.umask(0o077))
+
+    monkeypatch.setattr("server.app.serve", noted)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = str(probe.getsockname()[1])
+    before = os.umask(0o022)
+    try:
+        assert main(["serve", "--data", str(data), "--port", port]) == 0
+        assert os.umask(0o022) == 0o022
+    finally:
+        os.umask(before)
+    assert masks == [0o077]
+
+
 def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])

@@ -17,7 +17,9 @@ from server.running import connection
 from server.settings import Settings
 
 HEAD = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\n"
-BODY = b"PUT /api/looks/Red HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 100\r\n\r\n{"
+BODY = (
+    b"PUT /api/looks/Red HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{"
+)
 
 
 @pytest.fixture
@@ -87,9 +89,9 @@ class TestTime:
         assert answer.startswith(b"HTTP/1.1 200")
         assert b"HTTP/1.1 408" in answer
 
-    def test_who_waits_for_an_answer_is_not_cut_off(
-        self, running: Running, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    @pytest.fixture
+    def late(self, monkeypatch: pytest.MonkeyPatch) -> threading.Event:
+        """Set when a deadline has passed."""
         late, looked = threading.Event(), connection.Connection._late
 
         def noted(self: connection.Connection) -> None:
@@ -97,6 +99,21 @@ class TestTime:
             late.set()
 
         monkeypatch.setattr(connection.Connection, "_late", noted)
+        return late
+
+    def test_a_body_that_goes_on_coming_may_take_its_time(
+        self, running: Running, late: threading.Event, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(connection, "MIN_BODY_BYTES_PER_SECOND", 1)
+        with socket.create_connection(("127.0.0.1", running.port), timeout=60) as asking:
+            asking.sendall(BODY + b" " * 60)
+            assert late.wait(60)
+            asking.sendall(b" " * 38 + b"}")
+            assert asking.recv(100).startswith(b"HTTP/1.1 201")
+
+    def test_who_waits_for_an_answer_is_not_cut_off(
+        self, running: Running, late: threading.Event, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         library = running.app.state.services.looks
         monkeypatch.setattr(library, "list", lambda *_: (late.wait(60), [])[1])
         request = HEAD.replace(b"/livez", b"/api/looks") + b"\r\n"
