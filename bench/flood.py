@@ -10,39 +10,37 @@ from __future__ import annotations
 
 import json
 import secrets
-import threading
 import time
-from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from multiprocessing import get_context
 
 import numpy as np
-from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from bench.figure import Figure
+from bench.flooding import KINDS, flood
 from bench.house import SPEAKS, House, Server, SessionClient, baked_house, serving, session
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume.bake import Recipe
 from relume.environments.studio import studio
+from relume.errors import PlanError
 from server.live.rooms.door import watch_of
 
 _SIGMA = "/materials/Teapot/terms/1/params/sigma"
-_KINDS = ("acknowledgements", "exposure", "refused")
 _REST_S = 0.02
-_BEFORE_S = 1.0  # until the flood has come
+_START_S = 60.0
 
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, edit alone and beside floods, in turn."""
-    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((512, 512), 1000, 3, 4.0)
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((512, 512), 1000, 1, 3.0)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     room = secrets.token_hex(16)
     found: dict[tuple[str, int], list[float]] = {}
     with (
         baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
-        serving(house) as server,
+        serving(house, {"RELUME_MAX_PEOPLE": "64"}) as server,  # those that were killed keep their place for a while
         session(server, house.bake) as client,
         _held(server, house, room),
     ):
@@ -51,13 +49,12 @@ def measure(tiny: bool) -> list[Figure]:
         hand = _Hand(client)
         hand.edit(seconds)  # what is made once is made
         for _ in range(rounds):
-            for kind in _KINDS:
+            for kind in KINDS:
                 for number in (0, 1, 4):
                     with _flooding(server, house, watch_of(room), kind, number):
-                        time.sleep(min(_BEFORE_S, seconds) if number else 0.0)
                         found.setdefault((kind, number), []).extend(hand.edit(seconds))
     quiet_ms = float(np.median([ms for (_, number), each in found.items() if number == 0 for ms in each]))
-    medians = {f"{kind}_{number}_ms": float(np.median(found[kind, number])) for kind in _KINDS for number in (1, 4)}
+    medians = {f"{kind}_{number}_ms": float(np.median(found[kind, number])) for kind in KINDS for number in (1, 4)}
     context = {"quiet_ms": quiet_ms, **medians, "rounds": rounds, "seconds": seconds, "size": list(size)}
     return [Figure("flood.latency_ratio", max(medians.values()) / quiet_ms, "ratio", context)]
 
@@ -70,7 +67,8 @@ class _Hand:
 
     def edit(self, seconds: float) -> list[float]:
         """Milliseconds of each edit until a frame shows it."""
-        found, until_s = [], time.perf_counter() + seconds
+        until_s = time.perf_counter() + seconds
+        found: list[float] = []
         while not found or time.perf_counter() < until_s:
             self._revision += 1
             sigma = 0.2 + 0.15 * np.sin(2 * np.pi * self._revision / 90)
@@ -98,33 +96,16 @@ def _held(server: Server, house: House, room: str) -> Iterator[None]:
 def _flooding(server: Server, house: House, watch: str, kind: str, number: int) -> Iterator[None]:
     address = f"{server.session(house.bake)}?room_prefix={watch[:8]}"
     spawning = get_context("spawn")
-    viewers = [spawning.Process(target=flood, args=(address, watch, kind), daemon=True) for _ in range(number)]
+    begun = [spawning.Event() for _ in range(number)]
+    viewers = [spawning.Process(target=flood, args=(address, watch, kind, each), daemon=True) for each in begun]
     for viewer in viewers:
         viewer.start()
     try:
+        for each in begun:
+            if not each.wait(_START_S):
+                raise PlanError("the server takes nothing of a flood")
         yield
     finally:
         for viewer in viewers:
             viewer.kill()
             viewer.join()
-
-
-def flood(address: str, watch: str, kind: str) -> None:
-    """Send as fast as can be, until killed."""
-    while True:
-        with (
-            suppress(WebSocketException, OSError),
-            connect(address, subprotocols=[SPEAKS], max_size=None, compression=None) as viewer,
-        ):
-            viewer.send(json.dumps({"type": "open", "watch": watch}))
-            threading.Thread(target=deque, args=(viewer, 0), daemon=True).start()  # reads all, and keeps nothing
-            for revision in range(1, 1_000_000_000):
-                viewer.send(json.dumps(_message(kind, revision)))
-
-
-def _message(kind: str, revision: int) -> dict[str, object]:
-    if kind == "acknowledgements":
-        return {"type": "ack", "frame": 1}
-    path = "/display/exposure" if kind == "exposure" else _SIGMA
-    patch = [{"op": "replace", "path": path, "value": revision % 7 / 10}]
-    return {"type": "edit", "revision": revision, "patch": patch}

@@ -10,8 +10,8 @@ from relume.errors import ProtocolError
 from server.access.buckets import Buckets
 from server.errors import CLOSE_POLICY
 
-PER_SECOND, AT_ONCE = 500.0, 500
-"""More than a hand makes that moves at each frame of a fast screen, or a program that edits at each frame."""
+PER_SECOND, AT_ONCE = 200.0, 400
+"""More than a hand makes that moves at each frame of a fast screen."""
 PATIENCE_S = 10.0
 """Who sends more for so long is told to go."""
 SHARE, WORK_AT_ONCE_S = 0.15, 0.3
@@ -45,7 +45,8 @@ class Pace:
         """Before the next message: let others go on, and wait if there was too much.
 
         Args:
-            is_due: the message acknowledged a frame; so the server says how many of these come, and they do not count.
+            is_due: the message acknowledged a frame: it does not count, and allows one more. So the server itself says
+                how fast a program may edit that waits for frames.
         Raises:
             ProtocolError: there were too many for too long; carries the close code.
         """
@@ -59,5 +60,7 @@ class Pace:
         spent_s = self._work_clock() - self._begun_s
         self._work_s = min(WORK_AT_ONCE_S, self._work_s + SHARE * rested_s) - spent_s
         await self._sleep(max(0.0, -self._work_s / SHARE))
+        if is_due:
+            self._bucket.give_back("")
         while not is_due and (wait_s := self._bucket.take("")) > 0.0:
             await self._sleep(max(wait_s, _LEAST_S))

@@ -67,7 +67,8 @@ class Reception:
         except RelumeError as error:
             revision = message.revision if isinstance(message, protocol.EditMessage) else None
             await self._socket.refuse(error, revision)
-        self._pending.news.set()
+        else:
+            self._pending.news.set()
 
     async def _bad(self, problem: protocol.Problem) -> None:
         """A message that no client of ours sends: said each time, forgiven a number of times."""

@@ -12,6 +12,7 @@ from typing import Any
 from fastapi import FastAPI
 from server_fakes import SIZE, BatchesHere, Control, tiny_scene
 from server_fixtures import open_fake_bakes
+from websockets import Subprotocol
 from websockets.sync.client import ClientConnection, connect
 
 from relume.bake import Recipe
@@ -43,7 +44,7 @@ class Running:
 @contextmanager
 def open_socket(url: str, **opening: Any) -> Iterator[ClientConnection]:
     """A session that has said `opening`, the fields of its first message."""
-    with connect(url, subprotocols=["relume.v1"], max_size=None, proxy=None) as session:
+    with connect(url, subprotocols=[Subprotocol("relume.v1")], max_size=None, proxy=None) as session:
         session.send(json.dumps({"type": "open", **opening}))
         yield session
 

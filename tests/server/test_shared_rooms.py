@@ -150,6 +150,19 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
         assert len(found) == 1 or len(people(ann, lambda them: len(them) == 1)) == 1
 
 
+def test_who_comes_is_told_while_frames_wait(client: TestClient, baked: Baked) -> None:
+    turns = client.app.state.services.threads.turns  # type: ignore[attr-defined]
+    assert client.portal is not None
+    with joined(client, baked) as ann:
+        ann.exact(0)
+        while not turns.locked():
+            client.portal.call(turns.acquire)
+        with joined(client, baked) as bob:
+            bob.text("hello")
+            assert [each["number"] for each in people(ann, lambda them: len(them) == 2)] == [1, 2]
+            client.portal.call(turns.release)
+
+
 def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> None:
     with joined(client, baked) as ann:
         ann.text("hello")

@@ -46,6 +46,8 @@ class ClientSocket:
             return
 
     def _patience(self) -> _Patience:
+        if self._websocket.application_state is WebSocketState.DISCONNECTED:  # another task has found that out
+            raise WebSocketDisconnect(1006)
         return _Patience(self._send_seconds)
 
 
