@@ -83,8 +83,8 @@ def _looks(there: Opened) -> Iterator[Row]:
 
     for look in LookStore(there.service.ledger.sessions).list():
         modified = moment(look.modified)
-        document = {"name": look.name, "etag": look.etag, "created": moment(look.created), "modified": modified}
-        document["bytes"] = look.num_bytes
+        times = {"created": moment(look.created), "modified": modified}
+        document = {"name": look.name, "etag": look.etag, **times, "bytes": look.num_bytes}
         yield document, f"{look.name}  {modified[:16]}"
 
 

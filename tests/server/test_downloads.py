@@ -22,7 +22,7 @@ DATA = bytes(range(100))
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     path, app = tmp_path_factory.mktemp("downloads") / "a.bin", FastAPI()
     path.write_bytes(DATA)
-    errors.install(app)
+    errors.install(app, lambda path: [])
 
     @app.get("/file", response_class=Download)
     def get_file() -> Download:

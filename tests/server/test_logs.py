@@ -109,14 +109,14 @@ def test_requests_and_sessions_are_lines_without_their_tokens(
     client: TestClient, baked: Baked, capsys: pytest.CaptureFixture[str]
 ) -> None:
     set_up("json", "info")
-    client.get("/api/scenes?resume=secret", headers={"X-Request-ID": "r7"})
+    client.get("/livez?resume=secret", headers={"X-Request-ID": "r7"})
     with open_session(client, baked.bake, opening={"resume": "secret"}, headers={"X-Request-ID": "r8"}) as session:
         hello = session.text("hello")
         session.exact(0)
     said = [line for line in capsys.readouterr().err.splitlines() if '"server.' in line]  # not the test client's own
     assert "secret" not in "".join(said)
     lines = {line["request"]: line for line in map(json.loads, said)}
-    assert (lines["r7"]["method"], lines["r7"]["path"], lines["r7"]["status"]) == ("GET", "/api/scenes", 200)
+    assert (lines["r7"]["method"], lines["r7"]["path"], lines["r7"]["status"]) == ("GET", "/livez", 200)
     assert (lines["r8"]["session"], lines["r8"]["bake"]) == (hello["session"], baked.bake)
 
 
@@ -138,10 +138,10 @@ def test_no_logger_writes_down_what_opens_anything(
             hello = json.loads(session.recv())
         with connect(f"{running.baked_url()}?resume={secret}", subprotocols=["relume.v1"], proxy=None) as refused:
             refused.close()
-        url = f"http://127.0.0.1:{running.port}/api/scenes?resume={secret}"
+        url = f"http://127.0.0.1:{running.port}/livez?resume={secret}"
         with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as answer:
             assert answer.status == 200
     said = capsys.readouterr().err
-    assert '"path": "/api/scenes"' in said
+    assert '"path": "/livez"' in said
     for each in (secret, token, hello["resume"], hello["room"]["seat"], hello["room"]["watch"]):
         assert each not in said
