@@ -63,11 +63,8 @@ def _ask(server: Server, house: House) -> None:
 
 def _fill(server: Server, house: House, frames: int) -> None:
     """A batch whose pictures are all different."""
-    curve = {"materials": {"Teapot": {"terms": [{"model": "cook_torrance", "params": {"sigma": 0.1}}]}}}
-    looks = []
-    for frame in range(frames):
-        curve["materials"]["Teapot"]["terms"][0]["params"] = {"sigma": 0.1 + 0.3 * frame / frames}  # type: ignore[index]
-        looks.append(json.loads(json.dumps(curve)))
+    terms = [{"model": "cook_torrance", "params": {"sigma": 0.1 + 0.3 * frame / frames}} for frame in range(frames)]
+    looks = [{"materials": {"Teapot": {"terms": [term]}}} for term in terms]
     body = json.dumps({"bake": house.bake, "view": "front", "looks": looks, "format": "png"}).encode()
     headers = {"Content-Type": "application/json"}
     request = urllib.request.Request(f"http://127.0.0.1:{server.port}/api/renders", body, headers)

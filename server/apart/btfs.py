@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from relume.errors import CancelledError
 from relume.picture.jobs import Cancelled, Progress
 from relume.replacing import replacing
 from relume.synthetic.make import MESH, Made, make_btf
+from server.apart.btf_images import ImagesApart
 from server.apart.workshop import Workshop
+from server.settings import Settings
 from server.wire.btfs import BtfRequest
 from worker.paths import btfs_path
 
@@ -50,7 +53,10 @@ def make(
 
 def _made(asked: BtfRequest, where: Path, shelf: Path, turn: _Turn) -> BtfRecord:
     if asked.geometry is None:
-        return import_btf(shelf, where / SENT, asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING)
+        limits = Settings()  # of the environment, which is the server's
+        with closing(ImagesApart(where / SENT, limits.import_bytes, limits.import_seconds)) as images:
+            how = asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING, images
+            return import_btf(shelf, where / SENT, *how)
     mesh = where / SENT if asked.geometry == MESH else None
     wanted = Made(asked.geometry, asked.size, _GRID, asked.error, mesh, asked.period)
     return make_btf(shelf, wanted, asked.name, turn.tell, turn.is_over, where / _MAKING)

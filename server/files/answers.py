@@ -28,7 +28,7 @@ class _File:
     """An answer in a file without a name, which goes with the last who reads it."""
 
     def __init__(self, folder: Path, content: Content) -> None:
-        with memoryview(np.ascontiguousarray(content) if isinstance(content, np.ndarray) else content) as data:
+        with np.ascontiguousarray(content).data if isinstance(content, np.ndarray) else memoryview(content) as data:
             self.num_bytes = data.nbytes
             self._file: IO[bytes] = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  (closed below)
             finalize(self, self._file.close)

@@ -12,6 +12,7 @@ from btf_zips import zipped
 from fastapi.testclient import TestClient
 from server_fakes import Control
 
+from relume.btf.compress import Images
 from relume.btf.importing import import_btf
 from relume.errors import CancelledError
 from server.settings import Settings
@@ -149,7 +150,7 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
     has_begun, has_ended, found = threading.Event(), threading.Event(), []
 
     def slow(folder: Path, file: Path, name: str, bound: float, tell: Callable[[float], object],
-             cancelled: Callable[[], bool], making: Path) -> Any:  # fmt: skip
+             cancelled: Callable[[], bool], making: Path, images: Images) -> Any:  # fmt: skip
         found.append(making.exists())
         if not has_begun.is_set():
             making.mkdir()
@@ -159,7 +160,7 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
                 time.sleep(0.01)
             has_ended.set()
             raise CancelledError("stopped")
-        return import_btf(folder, file, name, bound, tell, cancelled, making)
+        return import_btf(folder, file, name, bound, tell, cancelled, making, images)
 
     monkeypatch.setattr("server.apart.btfs.import_btf", slow)
     url = send(client, zipped(tmp_path / "a.zip"))

@@ -19,7 +19,8 @@ from worker.database.faults import AWAY, Complaint
 log = logging.getLogger(__name__)
 
 EVERY_S = 1.0
-Asked, T = TypeVar("Asked"), TypeVar("T")
+Asked = TypeVar("Asked")
+T = TypeVar("T")
 
 
 class Keeper:
