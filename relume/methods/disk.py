@@ -38,7 +38,7 @@ from relume.store.writer import create_store
 SMALL_BYTES = 32 << 20  # plans up to that are as they are bounded
 _PIXELS, _LIGHTS, _CELLS = 64 * 48, 300, 256  # of what is tried
 _VIEWS = 4  # that are tried
-_MARGIN = 1.4
+_MARGIN = 1.3
 _FINER = 1 / 3  # power with which edges are fewer for each pixel in a larger picture; a tuft of blades has 0.3
 _REST_BYTES = 64 << 10  # of metadata
 _SCRATCH_ROW_BYTES = 200  # of a sample while samples are sorted
@@ -116,14 +116,13 @@ def _tried(make: Callable[[], BakeMethod], cells_of: Callable[[Recipe], int]) ->
 
 
 def _small(recipe: Recipe) -> Recipe:
-    """What is tried in the place of a recipe."""
+    """What is tried in the place of a recipe: the same for all sizes and numbers of lights."""
     width, height = recipe.size
     scale = min(1.0, math.sqrt(_PIXELS / (width * height)))
     step = -(-len(recipe.views) // _VIEWS)
     views, size = recipe.views[::step], (max(16, round(width * scale)), max(16, round(height * scale)))
-    lights = min(_LIGHTS, recipe.num_lights)
     cells = _CELLS if recipe.method == "gather" else None
-    return replace(recipe, views=views, size=size, num_lights=lights, gather_samples=cells)
+    return replace(recipe, views=views, size=size, num_lights=_LIGHTS, gather_samples=cells)
 
 
 def _rates(method: BakeMethod, scene: Scene, small: Recipe) -> NDArray[np.float64]:
