@@ -108,7 +108,7 @@ GROUPS = (
     Group("bench.load", ("load.drag_beside_renders_ratio",)),
     Group("bench.many", ("load.aggregate_ratio", "load.frame_cost_ratio")),
     Group("bench.flood", ("flood.latency_ratio",)),
-    Group("bench.demo", ("demo.bake_s", "demo.first_picture_s")),
+    Group("bench.demo", ("demo.preview_s", "demo.bake_s", "demo.first_picture_s")),
     Group("bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
     Group("bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
     Group(

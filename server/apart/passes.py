@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 SPP = 64
 FIGURES = "figures.json"
-_FIRST_SPP = 16
-_SAMPLE = 4  # times as wide as its sample is a picture whose pace is not known
+_FIRST, _FIRST_SPP = 4, 16  # times as wide as the first pictures is the whole one
+_SAMPLE = 8  # times as wide as its sample is a picture whose pace is not known
 _Estimates = dict[str, Estimate]  # by whose paths: "all", "method"
 
 
@@ -69,7 +69,7 @@ def _write_first(
     shop: Workshop, folder: Path, transfer: Opened, asked: TruthRequest, frame: F32, cancelled: Cancelled
 ) -> None:
     """Write small pictures of brute force, of few samples: a pass may take minutes."""
-    look, small = _look(asked, transfer), _small(frame.shape[1], frame.shape[0])
+    look, small = _look(asked, transfer), _smaller(_FIRST, frame.shape[1], frame.shape[0])
     truth = _pass(shop, transfer, asked, look, small, 0, lambda share: None, cancelled, spp=_FIRST_SPP)
     for paths in dict.fromkeys((asked.paths, "method")):
         estimate = Estimate.nothing(*truth.pictures[paths].shape[:2]).add(truth.pictures[paths])
@@ -113,13 +113,13 @@ def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: 
     asked = TruthRequest.model_validate(request)
     transfer = shop.transfer(asked.bake)
     look, (_, (width, height)) = _look(asked, transfer), compared_from(asked, transfer)
-    size = _small(width, height)
+    size = _smaller(_SAMPLE, width, height)
     scale = width * height / (size[0] * size[1])
     return {"seconds": sampled(lambda told: _pass(shop, transfer, asked, look, size, 0, told, cancelled), scale)}
 
 
-def _small(width: int, height: int) -> tuple[int, int]:
-    return max(1, width // _SAMPLE), max(1, height // _SAMPLE)
+def _smaller(factor: int, width: int, height: int) -> tuple[int, int]:
+    return max(1, width // factor), max(1, height // factor)
 
 
 def _look(request: TruthRequest, transfer: Opened) -> Any:
