@@ -15,9 +15,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("relume", "worker", "server", "cli")
-MOST_FILES = 22
-LARGER: dict[str, int] = {}
-"""Folders that hold more files than `MOST_FILES`, and how many."""
 AGAINST = {
     ("relume.scene.lights", "relume.scene.gltf"),
 }
@@ -95,13 +92,6 @@ def test_rooms_import_each_other_in_one_direction() -> None:
 def test_arrows_that_are_gone_are_not_listed_any_more() -> None:
     found = arrows()
     assert {(room, target) for room, target in AGAINST if target in found[room]} == AGAINST
-
-
-def test_folders_are_small_enough_to_be_looked_over() -> None:
-    files: dict[str, int] = defaultdict(int)
-    for path in modules().values():
-        files[path.parent.relative_to(ROOT).as_posix()] += 1
-    assert {folder: count for folder, count in files.items() if count > MOST_FILES} == LARGER
 
 
 def test_files_of_tests_have_names_of_their_own() -> None:
