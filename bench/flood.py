@@ -34,7 +34,7 @@ _START_S = 60.0
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, edit alone and beside floods, in turn."""
-    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((512, 512), 1000, 1, 3.0)
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((512, 512), 1000, 3, 4.0)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     room = secrets.token_hex(16)
     found: dict[tuple[str, int], list[float]] = {}
