@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from relume import asset_memory
 from relume.bake import Recipe
 from relume.btf.compress import compress
 from relume.btf.eigen import EigenBtf
@@ -26,7 +25,7 @@ from relume.btf.rings import ubo_rings
 from relume.btf.shelf import STORE, BtfRecord, keep
 from relume.btf.values import Values
 from relume.look import Look, validate
-from relume.memory import Memory
+from relume.memory import Memory, use_for_assets
 from relume.methods.moving_views import MovingViews
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.picture import MovingPicture
@@ -45,7 +44,7 @@ def measure(tiny: bool) -> list[Figure]:
     recipe = Recipe("surface", ("front",), size, 300, num_points=points)
     with tempfile.TemporaryDirectory() as name, STORE.at(Path(name) / "btfs"):
         folder, memory = Path(name), Memory(4 << 30)
-        asset_memory.use(memory)
+        use_for_assets(memory)
         records = _records(folder, side)
         store = bake_here(METHODS["surface"], built_in("still_life"), recipe, folder / "s.zarr")
         transfer: Any = open_bake(store, memory)

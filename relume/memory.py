@@ -11,16 +11,18 @@ import threading
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
 from weakref import WeakValueDictionary
 
 from relume.errors import MemoryBudgetError
 from relume.resident import held_bytes
 
+_ASSETS_BYTES = 1 << 30  # of a memory for assets alone
 PASSING_SHARE = 8  # what is made in passing pushes out what lasts up to the budget over this
 
-ASSETS = "assets"  # owner of what is made of files that looks of any bake name: see `relume.asset_memory`
+ASSETS = "assets"  # owner of what is made of files that looks of any bake name: see `stored`
 
 Key = tuple[Hashable, ...]
 
@@ -36,6 +38,7 @@ class Sized(Protocol):
 
 Entry = TypeVar("Entry", bound=Sized)
 Value = TypeVar("Value")
+Arguments = ParamSpec("Arguments")
 
 
 class Holder(NamedTuple):
@@ -284,3 +287,47 @@ def _holder(key: Hashable, entry: Sized) -> Holder:
     path = Path(owner) if isinstance(owner, str) else Path()
     stores = (folder.stem for folder in (path, *path.parents) if folder.suffix == ".zarr")
     return Holder(kind, next(stores, ""))
+
+
+class _Assets:
+    """The memory of what is made of files that looks name: its own, until a process opens bakes with one."""
+
+    memory = Memory(_ASSETS_BYTES)
+
+
+def use_for_assets(memory: Memory) -> None:
+    """Store in this memory from now on what is made of files that looks name: BTFs, images, measured materials."""
+    _Assets.memory = memory
+
+
+def stored(kind: str) -> Callable[[Callable[Arguments, Value]], Callable[Arguments, Value]]:
+    """Have what a function makes of such files stored by its arguments, as long as there is room for it.
+
+    People have as many and as large ones as they like, so that no fixed number of them fits.
+
+    Args:
+        kind: names it among all that is stored, e.g. "BTF file"; one for each function.
+    """
+
+    def decorate(make: Callable[Arguments, Value]) -> Callable[Arguments, Value]:
+        @wraps(make)
+        def found(*args: Arguments.args, **named: Arguments.kwargs) -> Value:
+            return stored_as(kind, args, lambda: make(*args, **named))
+
+        return found
+
+    return decorate
+
+
+def stored_as(kind: str, key: tuple[Any, ...], make: Callable[[], Value]) -> Value:
+    """What `make` makes, stored under a key as `stored` does by arguments.
+
+    Args:
+        kind: as of `stored`. key: tells it from others of its kind. make: called where it is not there.
+    """
+    return _Assets.memory.keep((ASSETS, kind, *key), make)
+
+
+def is_stored(kind: str, *args: Hashable) -> bool:
+    """Whether what a function of that kind makes of these arguments is there now."""
+    return _Assets.memory.holds((ASSETS, kind, *args))

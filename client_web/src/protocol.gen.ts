@@ -674,7 +674,7 @@ export interface PlaceBody {
   position: number[] | null;
 }
 
-/** What a bake will cost; upper bounds, but for `seconds`: judged by finished bakes, null where there are none. */
+/** What a bake will cost; upper bounds, but for `store_bytes`, on disk, as a little of it takes, rounded up; and `seconds`: judged by finished bakes, null where there are none. */
 export interface PlanBody {
   view_samples: number;
   rays: number;

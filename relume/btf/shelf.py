@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.asset_memory import stored
 from relume.asset_store import AssetStore
 from relume.btf.compress import MOST_CLUSTERS, MOST_COMPONENTS, MOST_TEXELS
 from relume.btf.eigen import I8, MOST_HEIGHT, U8, EigenBtf
 from relume.btf.packing import cluster_bits, largest, packed, packed_bytes, unpacked
 from relume.btf.rings import rings_of
 from relume.errors import MaterialError
+from relume.memory import stored
 
 STORE = AssetStore("BTF", "btf:", "btf.json", MaterialError, max_entries=100)
 _PACKED = "packed.npy"

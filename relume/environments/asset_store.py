@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from relume.asset_memory import stored
 from relume.asset_store import AssetStore
 from relume.environments.model import Environment
 from relume.environments.reading import read_environment
 from relume.errors import SceneError
+from relume.memory import stored
 from relume.remarks import Remark, remark_of
 
 STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)

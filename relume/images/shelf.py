@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.asset_memory import stored
 from relume.brdf.channels import IMAGES, NormalMap, is_image
 from relume.color import srgb_encode
 from relume.imageio.files import png_bytes, to_bytes
 from relume.images.reading import MAX_SIDE, read_image
+from relume.memory import stored
 from relume.remarks import Remark, remark_of
 from relume.scene.model import WRAPS, Coding, Texture
 

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from relume.asset_memory import stored
 from relume.asset_store import AssetStore
 from relume.errors import MaterialError
 from relume.measured.factors import factorise
 from relume.measured.lookup import F32, NUM_KNOTS, table_of
 from relume.measured.merl import F64, SHAPE, read_merl
+from relume.memory import stored
 
 STORE = AssetStore("measured material", "merl:", "material.json", MaterialError, max_entries=500)
 _SOURCE, _TABLE = "measured.binary", "table.npy"

@@ -22,9 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume import asset_memory
 from relume.bake import BakeMethod, Plan, Recipe
 from relume.folders import folder_bytes
+from relume.memory import stored_as
 from relume.methods import bounds
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod, num_cells
@@ -102,7 +102,7 @@ def _tried(make: Callable[[], BakeMethod], cells_of: Callable[[Recipe], int]) ->
     def find(scene: Scene, recipe: Recipe) -> Disk:
         small, cells = _small(recipe), cells_of(recipe)
         key = (scene.id, *(camera.name for camera in scene.cameras), small)
-        kept: NDArray[np.float64] = asset_memory.keep("trial bake", key, lambda: _rates(make(), scene, small))
+        kept: NDArray[np.float64] = stored_as("trial bake", key, lambda: _rates(make(), scene, small))
         rates, num_pixels = Rates(*kept.tolist()), recipe.size[0] * recipe.size[1]
         fewer = min(1.0, rates.pixels / num_pixels) ** (_FINER / 2)
         samples = (1 + max(0.0, rates.samples - 1) * fewer) * num_pixels * len(recipe.views)

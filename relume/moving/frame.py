@@ -240,7 +240,11 @@ def _are_covered_alike(before: Materials, after: Materials) -> bool:
 
 
 def shows_texels(transfer: MovingTransfer, materials: Materials, seen: Seen, part: Part) -> bool:
-    """Whether any ray of a part of a picture sees a material that a BTF covers."""
+    """Whether any ray of a part of a picture sees a material that a BTF covers.
+
+    Args:
+        transfer: of the bake. materials: of the look. seen: by the rays of the picture. part: of it.
+    """
     if not materials.covers.shown:
         return False
     face = seen.hits.face if part.rays is None else seen.hits.face[part.rays]

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.asset_memory import stored
 from relume.basis.bands import MAX_ANGLE
 from relume.brdf.channels import channel_of
 from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
+from relume.memory import stored
 from relume.parallel import for_steps
 from relume.points import ALIKE
 from relume.reference.covers import Cover, cover

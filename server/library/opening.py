@@ -20,9 +20,8 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         cache_bytes: that it holds at most. floor_bytes: of them, of bakes that nobody uses.
     """
     # Imported here because they load compiled kernels, which a process that only describes the API can do without.
-    from relume import asset_memory
     from relume.code_version import image_code
-    from relume.memory import Memory
+    from relume.memory import Memory, use_for_assets
     from relume.methods.registry import open_bake
     from relume.methods.stills import Stills
     from relume.moving.picture import MovingPicture
@@ -61,7 +60,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
 
     image_code()  # of what runs now: its files may be exchanged while it does
     memory = Memory(cache_bytes)
-    asset_memory.use(memory)
+    use_for_assets(memory)
     return Library(
         open_transfer=lambda path: open_kept(path, lambda store: open_bake(store, memory)),
         open_in_passing=lambda path: open_kept(path, lambda store: open_bake(store, memory.passing)),

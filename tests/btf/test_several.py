@@ -11,7 +11,7 @@ import pytest
 from test_texels import CAMERA, GREY, SIZE
 from tiny_scenes import quad, scene_of, studio
 
-from relume import asset_memory
+from relume import memory as memories
 from relume.bake import Recipe
 from relume.brdf.terms import btf as term
 from relume.btf.shelf import btf, keep
@@ -57,7 +57,7 @@ def strips():
 def opened(request, strips, tmp_path, monkeypatch):
     """A bake, in a memory that has nothing yet."""
     memory = Memory(1 << 30)
-    monkeypatch.setattr(asset_memory._Process, "memory", memory)
+    monkeypatch.setattr(memories._Assets, "memory", memory)
     recipe = Recipe(request.param, ("front",), SIZE, 100, num_points=800)
     return open_bake(bake_here(METHODS[request.param], strips, recipe, tmp_path / "s.zarr"), memory)
 

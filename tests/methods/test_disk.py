@@ -11,7 +11,7 @@ import pytest
 from shared_bakes import unmeasured
 from tiny_scenes import looking, quad, scene_of, sphere, studio
 
-from relume import asset_memory
+from relume import memory as memories
 from relume.bake import Recipe
 from relume.errors import DiskBudgetError, DiskFullError
 from relume.folders import folder_bytes
@@ -48,7 +48,7 @@ def glasses():
 
 @pytest.fixture(autouse=True)
 def nothing_was_tried(monkeypatch):
-    monkeypatch.setattr(asset_memory._Process, "memory", Memory(1 << 20))
+    monkeypatch.setattr(memories._Assets, "memory", Memory(1 << 20))
 
 
 def planned(scene, recipe):

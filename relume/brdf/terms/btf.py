@@ -13,13 +13,13 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from relume.asset_memory import stored
 from relume.brdf.term import Parameter, Term
 from relume.btf.average import mean_brdf
 from relume.btf.compress import MOST_COMPONENTS
 from relume.btf.eigen import F32, EigenBtf
 from relume.btf.shelf import STORE, btf
 from relume.errors import ParameterError
+from relume.memory import stored
 
 
 @dataclass(frozen=True, eq=False)

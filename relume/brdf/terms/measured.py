@@ -16,12 +16,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from relume.asset_memory import stored
 from relume.basis.bands import MAX_ANGLE
 from relume.brdf.term import F64, Angle, Curve, Params, Term
 from relume.errors import ParameterError
 from relume.measured.asset_store import STORE, material
 from relume.measured.lookup import NUM_KNOTS, THETA_D, THETA_H, THETA_I, THETA_O, Part, quotients
+from relume.memory import stored
 
 _ROWS = {Angle.THETA_I: THETA_I, Angle.THETA_H: THETA_H, Angle.THETA_D: THETA_D, Angle.THETA_O: THETA_O}
 

@@ -16,13 +16,13 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.asset_memory import is_stored, stored
 from relume.basis.zernike import in_basis
 from relume.brdf.registry import TERMS
 from relume.brdf.terms.btf import Texels
 from relume.btf.eigen import LARGEST, EigenBtf
 from relume.btf.rings import Rings, taps_numpy
 from relume.btf.shelf import btf
+from relume.memory import is_stored, stored
 from relume.moving.relief.numbers import AXIS_OF, FUNCTIONS, LANE_OF, NUM_FUNCTIONS, NUMBERS, WIDTH
 from relume.parallel import for_ranges
 from relume.uncounted import UNCOUNTED
