@@ -81,5 +81,5 @@ def test_a_is_the_kept_picture_and_b_the_live_one(editor: Editor) -> None:
     expect(hold).to_have_attribute("aria-pressed", "false")
     page.keyboard.press("?")
     compare = page.get_by_role("dialog", name="Keyboard map").locator("dl", has_text="Compare")
-    expect(compare).to_contain_text("Show A while heldc")
+    expect(compare).to_contain_text("Show A while heldC")
     expect(compare).to_contain_text("Swap A and Bx")
