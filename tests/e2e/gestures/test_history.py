@@ -82,4 +82,4 @@ def test_a_is_the_kept_picture_and_b_the_live_one(editor: Editor) -> None:
     page.keyboard.press("?")
     compare = page.get_by_role("dialog", name="Keyboard map").locator("dl", has_text="Compare")
     expect(compare).to_contain_text("Show A while heldC")
-    expect(compare).to_contain_text("Swap A and Bx")
+    expect(compare).to_contain_text("Swap A and BX")
