@@ -42,7 +42,7 @@ def test_two_edit_one_look_and_a_third_watches(editor: Editor, others: tuple[Pag
     together = link(ann, "work together")
     people(ann.page)
     watch = link(ann, "watch only")
-    assert ann.page.evaluate("new URLSearchParams(location.search).get('room')") not in watch
+    assert ann.page.evaluate("new URLSearchParams(location.hash.slice(1)).get('room')") not in watch
 
     bob, vera = Editor(bob_page), Editor(vera_page)
     bob_page.goto(together)
