@@ -127,6 +127,15 @@ def test_how_viewers_look_is_their_own_and_no_edit(
     assert access.audit.list() == []
 
 
+def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked, bearer: Bearer) -> None:
+    with open_session(client, baked.bake, opening=TOGETHER, headers=bearer("edit", "Ann")) as ann:
+        seat = ann.text("hello")["room"]["seat"]
+        opening = {**TOGETHER, "seat": seat}
+        with open_session(client, baked.bake, opening=opening, headers=bearer("view", "Vera")) as vera:
+            found = vera.text("hello")["room"]
+            assert [(each["name"], each["role"]) for each in found["people"]] == [("Ann", "edit"), ("Vera", "view")]
+
+
 def test_viewers_see_shared_and_saved_looks(client: TestClient, baked: Baked, bearer: Bearer) -> None:
     editor, viewer = bearer("edit"), bearer("view")
     blue = [{"model": "lambert", "color": [0.25, 0.5, 0.75]}, {"model": "cook_torrance", "color": [0.5, 0.5, 0.5]}]

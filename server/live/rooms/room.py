@@ -63,7 +63,7 @@ class Room:
     def sit(self, door: Door, caller: Caller) -> Seat:
         """The place that a session comes back to, or a new one. Raises BusyError where there is none."""
         seat = self._seats.get(door.seat or "")
-        if seat is None:
+        if seat is None or (caller.name and seat.name != caller.name):
             seat = self._new_seat(door, caller)
         if seat.leaving is not None:
             seat.leaving.cancel()
