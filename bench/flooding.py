@@ -20,7 +20,12 @@ _BEFORE_S = 2.0  # until the server has taken what it takes of a burst
 
 
 def flood(address: str, watch: str, kind: str, begun: Event) -> None:
-    """Send as fast as can be, until killed; says when it has been at it for a while."""
+    """Send as fast as can be, until killed.
+
+    Args:
+        address: of the session. watch: opens its room to a viewer. kind: one of `KINDS`.
+        begun: set when it has been at it for a while.
+    """
     block = b"".join(_frame(_message(kind, revision)) for revision in range(1, _AT_ONCE))
     threading.Timer(_BEFORE_S, begun.set).start()
     while True:

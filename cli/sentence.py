@@ -11,7 +11,7 @@ from typer.exceptions import TyperException
 from relume.errors import ParameterError
 
 _INVALID = re.compile(r"Invalid value for '?(?P<name>[^':]+)'?: (?:Value error, )?(?P<why>.+?)\.?", re.DOTALL)
-_NO_CHOICE = re.compile(r"(?P<given>.+) is not (?P<allowed>one of .+)", re.DOTALL)
+_NOT = re.compile(r"(?P<given>.+) is not (?P<allowed>one of .+|a valid .+|in the range .+)", re.DOTALL)
 _MISSING = re.compile(r"Missing \w+ '(?P<name>[^']+)'")
 _SHOULD = "Input should be "
 
@@ -63,8 +63,9 @@ def _usage(error: TyperException, arguments: Sequence[str]) -> str:
     if found is None:
         return text
     name, why = found["name"], found["why"]
-    if (choice := _NO_CHOICE.fullmatch(why)) is not None:
-        return f"{name} is {choice['given']}; give {choice['allowed']}"
+    if (limited := _NOT.fullmatch(why)) is not None:
+        allowed = re.sub(r"^in the", "a number in the", limited["allowed"]).replace("valid int", "valid integer")
+        return f"{name} is {limited['given']}; give {allowed}"
     allowed = re.sub(r"^(greater|less) than", r"a number \1 than", why.removeprefix(_SHOULD).partition(", unable")[0])
     return f"{name} is {_value_of(name, arguments)!r}; give {allowed}" if why.startswith(_SHOULD) else f"{name}: {why}"
 

@@ -39,6 +39,8 @@ def bake_document(status: BakeStatus, service: BakeService) -> dict[str, Any]:
     return {
         "id": status.id,
         "scene": status.scene,
+        "user": status.client,
+        "created": moment(status.created),
         "state": status.state,
         "progress": status.progress,
         "phase": status.phase,

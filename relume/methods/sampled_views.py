@@ -49,7 +49,7 @@ from relume.trace.geometry import Geometry, merge
 from relume.views.store_io import read_chance
 
 CHUNK_ROWS = 1024
-MAX_PIXELS = 4096 * 4096
+MIN_SIDE, MAX_PIXELS = 16, 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
 _EMISSION_BYTES, _BUMP_BYTES = 12, 4 + 12
 _LAYER_BYTES = 12 + 12 + 1 + 4 + MOST_MIRRORS * (2 + 4 + 12)
@@ -95,8 +95,9 @@ class SampledViews:
             raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(known)}")
         if not recipe.views or len(set(recipe.views)) != len(recipe.views):
             raise PlanError("name each view once, and at least one")
-        if not (width >= 16 and height >= 16 and width * height <= MAX_PIXELS):
-            raise PlanError(f"{width}×{height} pixels were asked for; give at least 16×16, at most {MAX_PIXELS} in all")
+        if not (min(width, height) >= MIN_SIDE and width * height <= MAX_PIXELS):
+            able = f"give at least {MIN_SIDE}×{MIN_SIDE}, at most {MAX_PIXELS} in all"
+            raise PlanError(f"{width}×{height} pixels were asked for; {able}")
         if not MIN_LIGHTS <= recipe.num_lights <= MAX_LIGHTS:
             raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
         samples = bounds.samples_of_view(scene, recipe) * len(recipe.views)

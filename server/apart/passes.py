@@ -22,6 +22,7 @@ from relume import look as looks
 from relume.code_version import truth_code
 from relume.errors import CancelledError
 from relume.imageio.files import write_image
+from relume.methods.sampled_views import MIN_SIDE
 from relume.picture.jobs import Cancelled, Progress
 from relume.picture.transfer import Axis, Eyes, Opened
 from relume.reference.truth import Comparison, Estimate, compare, error_map
@@ -119,7 +120,8 @@ def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: 
 
 
 def _smaller(factor: int, width: int, height: int) -> tuple[int, int]:
-    return max(1, width // factor), max(1, height // factor)
+    factor = max(1, min(factor, width // MIN_SIDE, height // MIN_SIDE))
+    return width // factor, height // factor
 
 
 def _look(request: TruthRequest, transfer: Opened) -> Any:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Annotated
 from urllib.parse import quote
 
-from fastapi import APIRouter, Header, Request, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from pydantic import AwareDatetime
 
 from relume.errors import ParameterError
 from server.files.moments import small_picture
-from server.openapi import LOOK
+from server.openapi import LOOK, files
 from server.records.looks import ListedLook, SavedLook, check_name, parse_document
 from server.routes.paging import Paged, newest
 from server.services import Shared
@@ -65,7 +65,7 @@ async def put_look(
     return Response(status_code=204, headers=_headers(look))
 
 
-@router.put("/{name}/thumbnail", status_code=204)
+@router.put("/{name}/thumbnail", status_code=204, name="put_look_thumbnail")
 def put_thumbnail(name: str, request: ThumbnailRequest, services: Shared, if_match: Etags = None) -> Response:
     """Store a picture of the version that If-Match names; another version has none."""
     services.looks.put_thumbnail(check_name(name), small_picture(request.picture), if_match)
@@ -73,10 +73,11 @@ def put_thumbnail(name: str, request: ThumbnailRequest, services: Shared, if_mat
 
 
 @router.get(
-    "/{name}/thumbnail.webp", response_class=Response, responses={200: {"content": {"image/webp": {}}}}
+    "/{name}/thumbnail.webp", response_class=Response,
+    name="get_look_thumbnail", responses=files("image/webp"),
 )
-def get_thumbnail(name: str, services: Shared) -> Response:
-    """The picture of a look as it is, at most 320 pixels a side."""
+def get_thumbnail(name: str, services: Shared, version: Annotated[str | None, Query(max_length=64)] = None) -> Response:
+    """The picture of a look as it is, at most 320 pixels a side; `version` makes the address change when it does."""
     picture = services.looks.thumbnail(check_name(name))
     return Response(picture, media_type="image/webp", headers={"Cache-Control": "no-cache"})
 

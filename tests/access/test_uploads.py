@@ -190,7 +190,7 @@ class TestUnpacking:
         monkeypatch.setattr(client.app.state.services.intake.importers, "run", unpack)
         refused = client.post("/api/scenes", files=SCENE, headers=bearer("edit", "Ann"))
         assert (refused.status_code, asked) == (429, [2_000])
-        assert "unpacks to more than the 2.0 kB" in refused.json()["detail"]
+        assert "unpacks to more than the 2 kB" in refused.json()["detail"]
         assert access.quotas.used_bytes("Ann") == 3_000
 
 
@@ -227,7 +227,7 @@ class TestDisk:
         settings.max_bytes_each = 2_000
         reservation = Reservation(access.quotas, "Ann")
         reservation.hold(1_500)
-        with pytest.raises(QuotaError, match=r"you have 0 bytes of at most 2.0 kB, and this takes 2.5 kB"):
+        with pytest.raises(QuotaError, match=r"you have 0 bytes of at most 2 kB, and this takes 2.5 kB"):
             reservation.hold(2_500)
         assert (reservation.bytes, access.quotas.used_bytes("Ann")) == (1_500, 1_500)
 

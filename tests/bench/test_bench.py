@@ -33,7 +33,7 @@ LONG = [
     "bench.surface_truth", "bench.canvas_moving", "bench.btf", "bench.btf_true", "bench.btf_shown", "bench.load",
     "bench.btf_held", "bench.many", "bench.refusal", "bench.slider_drag", "bench.resting", "bench.rotation",
     "bench.btf_several", "bench.plan_disk", "bench.surface_live", "bench.surface_points", "bench.real_files",
-    "bench.opening", "bench.flood",
+    "bench.opening", "bench.flood", "bench.slow_readers", "bench.entering",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error
 ESTIMATES = (

@@ -378,7 +378,7 @@ def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Sess
             pass
         np.testing.assert_array_equal(shown(frame), shown(first))
     session.send(type="evaluate", by="nobody")
-    assert "evaluate" in str(session.text("problem"))
+    assert "/by is 'nobody'" in str(session.text("problem"))
 
 
 def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(

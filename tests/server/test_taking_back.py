@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import Control
-from session_client import IOR, SIGMA, TOGETHER, Baked, Session, open_session
+from session_client import IOR, SIGMA, TOGETHER, Baked, Frame, Session, open_session
 
 from server.live.rooms.door import watch_of
 from server.settings import Settings
@@ -49,17 +49,26 @@ class Client:
     def hear(self, kind: str) -> dict[str, Any]:
         """Follow all messages up to the next one of a kind."""
         while True:
-            message = self.session.receive()
-            if not isinstance(message, dict):
-                continue
-            if message["type"] == "problem":
-                self._sent.pop(message["revision"], None)
-            elif message["type"] == "shared":
-                own = [self._sent.pop(each) for each in sorted(self._sent) if each <= message["revision"]]
-                for patch in [*own, message["patch"]]:
-                    jsonpatch.apply_patch(self.look, patch, in_place=True)
-            if message["type"] == kind:
+            message = self._next()
+            if isinstance(message, dict) and message["type"] == kind:
                 return message
+
+    def exact(self, revision: int) -> None:
+        """Follow all messages up to the exact picture of a revision."""
+        while True:
+            message = self._next()
+            if isinstance(message, Frame) and message.header["exact"] and message.header["revision"] == revision:
+                return
+
+    def _next(self) -> dict[str, Any] | Frame:
+        message = self.session.receive()
+        if isinstance(message, dict) and message["type"] == "problem":
+            self._sent.pop(message["revision"], None)
+        elif isinstance(message, dict) and message["type"] == "shared":
+            own = [self._sent.pop(each) for each in sorted(self._sent) if each <= message["revision"]]
+            for patch in [*own, message["patch"]]:
+                jsonpatch.apply_patch(self.look, patch, in_place=True)
+        return message
 
     def asks(self) -> None:
         """Follow what has come until now."""
@@ -127,13 +136,13 @@ def test_an_edit_that_fails_for_the_edits_of_others_takes_none_of_them_back(
         ann = Client(session)
         in_a_view_that_cannot_follow(vera, control)
         ann.edit(IOR, 1.7)
-        session.exact(1)
+        ann.exact(1)
         is_told_once(vera)
         for revision in (1, 2):
             vera.edit(revision, EXPOSURE, float(revision))
             is_told_once(vera)
         ann.edit(SIGMA, 0.31)
-        session.exact(2)
+        ann.exact(2)
         look = rooms_look(client, baked)
         assert (params(look)["ior"], params(look)["sigma"]) == (1.7, 0.31)
         ann.comes_to(look)

@@ -62,7 +62,7 @@ def test_a_dropped_file_lights_the_scene_and_others_are_refused_in_words(editor:
     page = editor.page
     before = editor.pixels()
     page.evaluate(DROP, ["teapot.glb", ""])
-    expect(page.get_by_text("give an environment as .hdr or .exr")).to_be_visible()
+    expect(page.get_by_text("Scenes are imported on the start page")).to_be_visible()
     page.evaluate(DROP, ["broken.hdr", base64.b64encode(b"broken").decode()])
     expect(page.get_by_text("neither Radiance .hdr nor OpenEXR")).to_be_visible()
     expect(page.get_by_role("radio", name="Own")).to_be_checked()

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from editor_page import Editor, changed
 from playwright.sync_api import expect
 
 
-def test_offline_is_said_and_edits_are_kept(editor: Editor) -> None:
+def test_offline_is_said_and_edits_are_kept(editor: Editor, request: pytest.FixtureRequest) -> None:
     """Twice: the network goes, an edit is made, the network is back, and the server has the edit."""
     page, state = editor.page, editor.page.locator(".status .state")
+    request.addfinalizer(lambda: page.context.set_offline(False))  # else those who share the page have no network
     editor.choose("Ball", 1)
     roughness = editor.slider("Roughness σ")
     for key in ("Home", "End"):
