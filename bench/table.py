@@ -102,6 +102,12 @@ TARGETS = {
     "opening.large_edit_ms": "≤ 33 ms",
     "opening.larger_ratio": "≤ 1",
     "memory.server_growth": "≤ 0.1",
+    "flood.latency_ratio": "≤ 2",
+    "slow_readers.mb": "≤ 50 MB",
+    "rooms.enter_s": "≤ 1 s",
+    "btf.several_ratio": "≤ 3.5",
+    "btf.five_vs_two": "≤ 1.1",
+    "plan.disk_ratio": "1 to 3",
     "demo.bake_s": "≤ 30 s",
     "demo.first_picture_s": "≤ 10 s",
 }
