@@ -20,7 +20,7 @@ SETTLE = """() => new Promise((done) => {
   tick();
 })"""
 # Messages lie over the picture's foot for some seconds.
-WITHOUT_MESSAGES = ".toasts { visibility: hidden !important }"
+WITHOUT_MESSAGES = ".toasts, .limits { visibility: hidden !important }"  # nor what a corner says of the picture
 # Controls that a screen reader has no word for.
 NAMELESS = """() => {
   const controls = "button, input, select, canvas:not([aria-hidden]), a, [role=slider], [role=option], [tabindex='0']";
