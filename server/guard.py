@@ -22,11 +22,13 @@ from relume.errors import ParameterError
 from relume.measured.merl import FILE_BYTES
 from server.errors import ForbiddenOriginError, TooLargeError, problem_of, problem_response
 
-# as large as the settings allow
-UPLOADS = ("/api/scenes", "/api/materials/btf-works", "/api/materials/btf-works/geometry")
+# as large as the settings allow: an environment of 4K is 25 MB, one of 8K some 100
+UPLOADS = (
+    "/api/scenes", "/api/environments", "/api/images", "/api/materials/btf-works", "/api/materials/btf-works/geometry",
+)  # fmt: skip
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
-# images, environments, and documents with many looks: as large as the settings allow for those
-LARGER = ("/api/environments", "/api/images", "/api/renders", "/api/renders/looks")
+# documents with many looks
+LARGER = ("/api/renders", "/api/renders/looks")
 MAX_JSON_BYTES = 1024**2
 """Of any other body. JSON is read on the event loop, some 40 MB a second, while nobody else is served."""
 MAX_LOGIN_BYTES = 4 * 1024

@@ -87,8 +87,8 @@ class Settings(BaseSettings):
         default=None, ge=1, description="of them, of one client; unset: a quarter where clients are known by name"
     )
     idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
-    max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest upload of a scene or of a BTF's images")
-    max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of any other request")
+    max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest upload of a file but a measured material")
+    max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of a call for renders")
     least_free_bytes: int = Field(
         default=256 * 1024**2, ge=0, description="room on the disk below which nothing is begun"
     )

@@ -19,17 +19,9 @@ from server.access.reservations import Reservation
 from server.access.roles import KEY
 from server.errors import NearlyFullError, QuotaError, problem_of, problem_response
 from server.files.slots import Slots
+from server.guard import UPLOADS
 
-UPLOADS = frozenset(
-    {
-        "/api/scenes",
-        "/api/environments",
-        "/api/images",
-        "/api/materials/measured",
-        "/api/materials/btf-works",
-        "/api/materials/btf-works/geometry",
-    }
-)
+MEASURED = "/api/materials/measured"
 UPLOADS_AT_ONCE, UPLOADS_EACH = 64, 8
 STEP_BYTES = 16 << 20
 """Held at a time of a body that does not say how large it is."""
@@ -51,7 +43,7 @@ class Door:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Hand on; an upload with what it may take, which is let go when it is answered."""
-        if scope["type"] != "http" or scope["method"] != "POST" or scope["path"] not in UPLOADS:
+        if scope["type"] != "http" or scope["method"] != "POST" or scope["path"] not in (*UPLOADS, MEASURED):
             await self._app(scope, receive, send)
             return
         who = scope[KEY].name

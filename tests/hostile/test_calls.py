@@ -41,6 +41,14 @@ def test_upload_beyond_the_limit_is_413(client: TestClient) -> None:
     assert problem_of(response)["status"] == 413
 
 
+@pytest.mark.parametrize(("path", "field"), [("/api/environments", "environment"), ("/api/images", "image")])
+def test_environments_and_images_may_be_as_large_as_scenes(client: TestClient, path: str, field: str) -> None:
+    """Those of 4K have more bytes than any document."""
+    for num_mib, is_too_large in ((3, False), (4, True)):  # of a document 2 MiB are taken here
+        response = client.post(path, files={field: ("x.exr", b"\x00" * (num_mib * 1024**2))})
+        assert (problem_of(response)["status"] == 413) == is_too_large
+
+
 def test_upload_of_unknown_length_is_cut_at_the_limit(client: TestClient) -> None:
     num_chunks = 0
 
