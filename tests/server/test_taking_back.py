@@ -132,8 +132,9 @@ def test_an_edit_that_fails_for_the_edits_of_others_takes_none_of_them_back(
     client: TestClient, baked: Baked, control: Control, opening: dict[str, str]
 ) -> None:
     control.may_freeze.set()
-    with joined(client, baked) as session, open_session(client, baked.bake, opening=opening) as vera:
-        ann = Client(session)
+    with ExitStack() as stack:
+        ann = Client(stack.enter_context(joined(client, baked)))  # the room is there before anybody may watch it
+        vera = stack.enter_context(open_session(client, baked.bake, opening=opening))
         in_a_view_that_cannot_follow(vera, control)
         ann.edit(IOR, 1.7)
         ann.exact(1)
