@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import pytest
 from anyio.from_thread import start_blocking_portal
@@ -14,6 +15,8 @@ from server.access.access import Access
 from server.access.audit import Entry
 from server.access.roles import Caller, Role
 from server.live.edit_notes import EditNotes
+from server.live.rooms.door import Door
+from server.live.rooms.room import Room
 from server.settings import Settings
 
 SEEN = {"op": "replace", "path": "/display/exposure", "value": 2.0}
@@ -134,6 +137,16 @@ def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked,
         with open_session(client, baked.bake, opening=opening, headers=bearer("view", "Vera")) as vera:
             found = vera.text("hello")["room"]
             assert [(each["name"], each["role"]) for each in found["people"]] == [("Ann", "edit"), ("Vera", "view")]
+
+
+def test_whom_a_proxy_names_comes_back_to_the_own_place_and_to_nobody_elses() -> None:
+    room = Room({}, 8, 60.0, lambda room: None)
+    door = Door(TOGETHER["room"], "watch", None, None)
+    ann = room.sit(door, Caller("proxy:Ann", Role.EDIT, "10.0.0.5", "proxy"))
+    back = replace(door, seat=ann.token)
+    assert room.sit(back, Caller("proxy:Ann", Role.EDIT, "10.0.0.5", "proxy")) is ann
+    assert room.sit(back, Caller("Ann", Role.VIEW, "10.0.0.9", "token")) is not ann
+    assert [(person.name, person.role) for person in room.people()] == [("Ann", "edit"), ("Ann", "view")]
 
 
 def test_viewers_see_shared_and_saved_looks(client: TestClient, baked: Baked, bearer: Bearer) -> None:

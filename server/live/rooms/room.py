@@ -63,7 +63,7 @@ class Room:
     def sit(self, door: Door, caller: Caller) -> Seat:
         """The place that a session comes back to, or a new one. Raises BusyError where there is none."""
         seat = self._seats.get(door.seat or "")
-        if seat is None or (caller.name and seat.name != caller.name):
+        if seat is None or seat.owner != caller.name:
             seat = self._new_seat(door, caller)
         if seat.leaving is not None:
             seat.leaving.cancel()
@@ -80,7 +80,7 @@ class Room:
         taken = {seat.color for seat in self._seats.values()}
         color = next((color for color in COLORS if color not in taken), COLORS[self._num_come % len(COLORS)])
         name = caller.person or door.name or f"Guest {self._num_come}"
-        seat = Seat(secrets.token_urlsafe(24), self._num_come, color, name, caller.role)
+        seat = Seat(secrets.token_urlsafe(24), self._num_come, color, name, caller.role, caller.name)
         self._seats[seat.token] = seat
         return seat
 

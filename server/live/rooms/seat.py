@@ -17,6 +17,7 @@ class Seat:
 
     Attributes:
         number: from 1 on, in the order of coming. num_sessions: that are open now.
+        name: that others read. owner: whose it is, as quotas name them; empty if nobody logs in.
         leaving: takes the place away in a while, where none is.
     """
 
@@ -25,6 +26,7 @@ class Seat:
     color: str
     name: str
     role: Role
+    owner: str
     material: str | None = None
     num_sessions: int = 0
     leaving: asyncio.TimerHandle | None = field(default=None, repr=False)
