@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from alone import run_alone
 from fastapi.testclient import TestClient
 from server_fakes import tiny_scene
 from starlette.types import Message, Receive, Scope, Send
@@ -94,7 +95,7 @@ class TestBodies:
 
     def test_one_that_says_that_it_is_too_large_is_not_read(self, access: Access) -> None:
         body = Body(a_door(access), [b"x"], length=100_001)
-        assert asyncio.run(body()) == 429
+        assert run_alone(body()) == 429
         assert body.num_read == 0
         assert access.quotas.used_bytes("Ann") == 0
 
@@ -103,7 +104,7 @@ class TestBodies:
     ) -> None:
         monkeypatch.setattr(door, "STEP_BYTES", 10_000)
         body = Body(a_door(access), [b"x" * 10_000] * 50)
-        assert asyncio.run(body()) == 429
+        assert run_alone(body()) == 429
         assert body.num_read <= 10
         assert access.quotas.used_bytes("Ann") == 0
 
@@ -125,7 +126,7 @@ class TestBodies:
             reading.set()
             return sorted(await asyncio.gather(*tasks))
 
-        assert asyncio.run(all_at_once()) == [201, 201, 201, 429, 429]
+        assert run_alone(all_at_once()) == [201, 201, 201, 429, 429]
         assert access.quotas.used_bytes("Ann") == 0
 
     def test_of_one_user_so_many_are_read_at_once(self, access: Access) -> None:
@@ -142,7 +143,7 @@ class TestBodies:
             whole = a_door(access, slow, each=2)
             return list(await asyncio.gather(*(Body(whole, [b"x"], length=1)() for _ in range(6))))
 
-        assert asyncio.run(all_at_once()) == [201] * 6
+        assert run_alone(all_at_once()) == [201] * 6
         assert most == [2]
 
     def test_who_goes_away_takes_nothing_any_more(self, access: Access) -> None:
@@ -151,7 +152,7 @@ class TestBodies:
             raise asyncio.CancelledError
 
         with pytest.raises(asyncio.CancelledError):
-            asyncio.run(Body(a_door(access, gone), [b"x"], length=5)())
+            run_alone(Body(a_door(access, gone), [b"x"], length=5)())
         assert access.quotas.used_bytes("Ann") == 0
 
 
@@ -245,7 +246,7 @@ class TestSlots:
         async def all_of_them() -> None:
             await asyncio.gather(*map(take, who))
 
-        asyncio.run(all_of_them())
+        run_alone(all_of_them())
         return "".join(got)
 
     def test_users_take_turns(self) -> None:
@@ -265,4 +266,4 @@ class TestSlots:
             async with slots.held("c"):
                 pass
 
-        asyncio.run(cancelled())
+        run_alone(cancelled())

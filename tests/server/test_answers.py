@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from alone import run_alone
 from fastapi.testclient import TestClient
 from session_client import Baked
 
@@ -24,8 +25,7 @@ T = TypeVar("T")
 
 
 def run(work: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    with ThreadPoolExecutor(1) as thread:  # browser tests of the same process have a loop in this one
-        return thread.submit(lambda: asyncio.run(work())).result()
+    return run_alone(work())
 
 
 async def sent(response: Any) -> bytes:

@@ -3,11 +3,11 @@
 import asyncio
 import gc
 import threading
-from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from alone import run_alone
 from server_fakes import Control, FakeJob
 
 from relume.errors import ProtocolError, StoreError
@@ -54,8 +54,7 @@ def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
             threads.close()
         gc.collect()
 
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(asyncio.run, main()).result(timeout=120)
+    run_alone(main())
     return told.states, complaints
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from alone import run_alone
 
 from relume.errors import ParameterError, ProtocolError, StoreError
 from server.library.transfers import MAX_IDLE, TransferPool
@@ -210,9 +211,7 @@ def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failu
             async with pool.using("broken", Path("broken")):
                 pass
 
-    # in a thread of its own: the browser tests' event loop may still stand in this one
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(asyncio.run, run()).result()
+    run_alone(run())
     assert opened == ["broken", "broken", "b0", "b1", "b2", "b3", "b0"]
 
 
@@ -234,7 +233,7 @@ def test_sessions_on_one_scene_look_into_the_ledger_together() -> None:
         for task in telling:
             task.cancel()
 
-    with ThreadPoolExecutor(1) as thread, ThreadPoolExecutor(1) as asking:  # browser tests have a loop in this one
-        thread.submit(asyncio.run, scenario()).result()
+    with ThreadPoolExecutor(1) as asking:
+        run_alone(scenario())
     assert set(asked) == {"one", "other"}
     assert 2 <= asked.count("one") <= 5

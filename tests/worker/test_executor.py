@@ -10,20 +10,14 @@ import sys
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from alone import run_alone
 
 from relume.errors import PlanError
 from worker.dask_executor import DaskExecutor
 from worker.executor import BAKE_NICE, Executors
-
-
-def run(work: Coroutine[Any, Any, None]) -> None:
-    """Run it in a thread of its own: the browser tests leave a loop running in this one."""
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(asyncio.run, work).result()
 
 
 class FakeTask:
@@ -49,7 +43,7 @@ class FakeClient:
         return FakeTask(fn(*args))
 
     def add_callback(self, follow: Callable[..., Coroutine[Any, Any, None]], *args: object) -> None:
-        run(follow(*args))
+        run_alone(follow(*args))
 
     def close(self, timeout: float) -> None:
         raise TimeoutError
@@ -63,7 +57,7 @@ class FakeCluster:
         self.workers = {0: FakeNanny(self.log), 1: FakeNanny(self.log)}
 
     def sync(self, work: Callable[..., Coroutine[Any, Any, None]], *args: object, callback_timeout: float) -> None:
-        run(work(*args))
+        run_alone(work(*args))
 
     def close(self, timeout: float) -> None:
         self.log.append("close")
