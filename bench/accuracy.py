@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from bench.figure import Figure
-from bench.points import Lit, frame_radiance, lit_points
+from bench.points import LitSamples, frame_radiance, sample_lit_surface
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
-from bench.standard_error import over_points
+from bench.standard_error import estimate_point_error
 from relume.brdf.document import complete_term
-from relume.estimated import Estimated
-from relume.reference import reference_radiance, texels_of
+from relume.estimated import JackknifeEstimate
+from relume.reference import environment_texels, reference_radiance
 from relume.trace.embree import EmbreeScene
 from relume.trace.visibility import trace_visibility
 
@@ -36,41 +36,46 @@ def measure(tiny: bool) -> list[Figure]:
     return compare(_CASES, 20 if tiny else 2000, tiny)
 
 
-def compare(cases: tuple[Case, ...], num_points: int, tiny: bool) -> list[Figure]:
+def compare(cases: tuple[Case, ...], num_positions: int, tiny: bool) -> list[Figure]:
     """A figure for each case; they share shadow rays.
 
     Args:
         cases: of each the figure's name, the term of pot and table, and the curve that is free.
-        num_points: view samples.
+        num_positions: view samples.
         tiny: few lights, one environment, few texels.
     Returns:
         The worst error over the environments, and its standard error over the view samples.
     """
     num_lights = 200 if tiny else 4000
-    errors: dict[str, dict[str, Estimated]] = {name: {} for name, _, _ in cases}
+    errors: dict[str, dict[str, JackknifeEstimate]] = {name: {} for name, _, _ in cases}
     documents = {name: complete_term(("accuracy",), dict(term), None) for name, term, _ in cases}
     for environment in environments()[: 1 if tiny else 3]:
         scene = teapot_on_table(environment, (LAMBERT,), (LAMBERT,))
-        lit = lit_points(scene, (320, 320), num_points, num_lights, None)
-        texels, spp = texels_of(environment), 500 if tiny else 0
-        for label, of in ((environment.name, lit), (f"{environment.name} without shadows", _without_shadows(lit))):
+        lit_samples = sample_lit_surface(scene, (320, 320), num_positions, num_lights, None)
+        texels, spp = environment_texels(environment), 500 if tiny else 0
+        for label, variant in (
+            (environment.name, lit_samples),
+            (f"{environment.name} without shadows", _without_shadows(lit_samples)),
+        ):
             terms = [[documents[name]] for name, _, _ in cases]
-            truth = reference_radiance(of.geometry, texels, of.points, terms, spp)
-            for (name, _, curve), right in zip(cases, truth, strict=True):
-                errors[name][label] = over_points(frame_radiance(of, documents[name], curve), right)
-    context = {"view_samples": num_points, "lights": num_lights}
+            reference = reference_radiance(variant.geometry, texels, variant.surface_points, terms, spp)
+            for (name, _, curve), right in zip(cases, reference, strict=True):
+                errors[name][label] = estimate_point_error(frame_radiance(variant, documents[name], curve), right)
+    context = {"view_samples": num_positions, "lights": num_lights}
     figures = []
-    for name, found in errors.items():
-        worst = max(error for label, error in found.items() if "without" not in label)
-        parts = {label: error.value for label, error in found.items()}
-        figures.append(Figure(name, worst.value, "relative RMSE", {**context, **parts}, worst.standard_error))
+    for name, error_by_label in errors.items():
+        worst = max(error for label, error in error_by_label.items() if "without" not in label)
+        values_by_label = {label: error.value for label, error in error_by_label.items()}
+        figures.append(Figure(name, worst.value, "relative RMSE", {**context, **values_by_label}, worst.standard_error))
     return figures
 
 
-def _without_shadows(lit: Lit) -> Lit:
+def _without_shadows(lit_samples: LitSamples) -> LitSamples:
     """Put the same points where nothing is near them, so that nothing casts a shadow."""
     corners = np.array([[1e6, 1e6, 1e6], [1e6 + 1, 1e6, 1e6], [1e6, 1e6 + 1, 1e6]], np.float32)
-    geometry = replace(lit.geometry, embree=EmbreeScene.build(corners, np.array([[0, 1, 2]], np.uint32)))
-    points = lit.points
-    visible = trace_visibility(geometry.embree, points.position, points.normal, lit.lights.direction).visible
-    return replace(lit, geometry=geometry, receivers=replace(lit.receivers, visible=visible))
+    geometry = replace(lit_samples.geometry, embree=EmbreeScene.build(corners, np.array([[0, 1, 2]], np.uint32)))
+    surface_points = lit_samples.surface_points
+    visible = trace_visibility(
+        geometry.embree, surface_points.position, surface_points.normal, lit_samples.lights.direction
+    ).visible
+    return replace(lit_samples, geometry=geometry, receivers=replace(lit_samples.receivers, visible=visible))

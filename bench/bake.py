@@ -14,13 +14,13 @@ from typing import Any
 
 from bench.figure import Figure
 from bench.timing import seconds
-from relume.bake import Recipe, Written
+from relume.bake import Recipe, TaskOutput
 from relume.methods.direct import DirectMethod
 from relume.methods.store_io import read_rays
 from relume.parallel import num_threads
 from relume.scene.demo import demo_scene
 from relume.scene.model import Scene
-from relume.store import bake_here, open_store
+from relume.store import bake_in_process, open_store
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -41,17 +41,19 @@ def measure(tiny: bool) -> list[Figure]:
 
 def _bake(scene: Scene, size: tuple[int, int], num_lights: int, target: Path) -> tuple[float, dict[str, Any]]:
     """Wall time of a bake, and what is to be known about it."""
-    written: list[Written] = []
+    written: list[TaskOutput] = []
     recipe = Recipe("direct", ("front",), size, num_lights)
-    wall_s = seconds(lambda: bake_here(DirectMethod(), scene, recipe, target, lambda _, one: written.append(one)))
+    wall_s = seconds(
+        lambda: bake_in_process(DirectMethod(), scene, recipe, target, lambda _, record: written.append(record))
+    )
     store = open_store(target)
-    trace_s, rays = sum(one.trace_s for one in written), read_rays(store)
+    trace_s, rays = sum(record.trace_s for record in written), read_rays(store)
     return wall_s, {
         "wall_s": wall_s,
         "tracing_s": trace_s,
-        "rays": rays.traced,
-        "rays_per_s": rays.traced / trace_s,
-        "full_trace": rays.full,
+        "rays": rays.num_traced,
+        "rays_per_s": rays.num_traced / trace_s,
+        "full_trace": rays.num_full,
         "samples": store.shape("views/0/pixel")[0],
         "size": list(size),
         "lights": num_lights,

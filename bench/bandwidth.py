@@ -11,9 +11,9 @@ import numba as nb
 import numpy as np
 
 from bench.figure import Figure
-from bench.timing import in_turn
-from relume.operators.frozen import tiles_of
-from relume.operators.stream import columns_of, stream
+from bench.timing import time_interleaved
+from relume.operators.frozen import tile_layout
+from relume.operators.stream import changed_columns, stream
 from relume.parallel import for_ranges, num_threads
 
 _NUM_BANDS, _NUM_COLUMNS = 256, 30
@@ -22,17 +22,17 @@ _FLOATS_A_RANGE = 1 << 22
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def _sum(values, start, stop):  # type: ignore[no-untyped-def]
-    part = values[start:stop]
+    block = values[start:stop]
     total = np.float32(0)
-    for k in range(part.shape[0]):
-        total += part[k]
+    for k in range(block.shape[0]):
+        total += block[k]
     return total
 
 
 def measure(tiny: bool) -> list[Figure]:
     """Time both sides on the same 805 MB, in turn."""
     side = 64 if tiny else 512
-    tiles, samples = tiles_of(side * side)
+    tiles, samples = tile_layout(side * side)
     transport = np.full((tiles, 3, _NUM_BANDS, samples), 1e-6, np.float32)
     image = np.zeros((tiles, 3, samples), np.float32)
     flat = transport.reshape(-1)
@@ -42,12 +42,12 @@ def measure(tiny: bool) -> list[Figure]:
         change = np.zeros((3, _NUM_BANDS))
         for channel in range(3):
             change[channel, rng.permutation(_NUM_BANDS)[:_NUM_COLUMNS]] = 0.5
-        stream(transport, columns_of(change), image)
+        stream(transport, changed_columns(change), image)
 
     def read() -> None:
         for_ranges(lambda start, stop: _sum(flat, start, stop), flat.size, _FLOATS_A_RANGE)
 
-    updates, reads = in_turn([update, read], 2 if tiny else 40)
+    updates, reads = time_interleaved([update, read], 2 if tiny else 40)
     update_bytes, read_bytes = 4 * 3 * _NUM_COLUMNS * tiles * samples, flat.nbytes
     streamed, bandwidth = update_bytes / min(updates), read_bytes / min(reads)
     context = {

@@ -8,20 +8,20 @@ from typing import Any, Self
 
 import numpy as np
 
-from relume.moving.picture import MovingPicture
+from relume.moving.picture import FreeCameraPicture
 
 
-class Beside:
+class BackgroundJobs:
     """A thread for what a picture waits for; use as a context.
 
     Attributes:
         lags_s: of each frame, how long ago the look was wanted whose light between surfaces it shows.
     """
 
-    def __init__(self, picture: MovingPicture) -> None:
+    def __init__(self, picture: FreeCameraPicture) -> None:
         self._picture, self._thread = picture, ThreadPoolExecutor(1)
         self._running: tuple[Any, Future[Any], float] | None = None
-        self._wanted_s = self._of_shown_s = time.perf_counter()
+        self._requested_s = self._displayed_request_s = time.perf_counter()
         self.lags_s: list[float] = []
 
     def __enter__(self) -> Self:
@@ -30,23 +30,23 @@ class Beside:
     def __exit__(self, *_: object) -> None:
         self._thread.shutdown()
 
-    def want(self) -> None:
+    def request(self) -> None:
         """Another look is wanted; what has been made goes in."""
-        self._wanted_s = time.perf_counter()
+        self._requested_s = time.perf_counter()
         if self._running is not None and self._running[1].done():
-            job, made, self._of_shown_s = self._running
-            self._picture.install(job, made.result())
+            job, future, self._displayed_request_s = self._running
+            self._picture.install(job, future.result())
             self._running = None
 
-    def go_on(self) -> None:
+    def start_next(self) -> None:
         """A frame is there; what it lacks is begun, where nothing else is made."""
-        self.lags_s.append(time.perf_counter() - self._of_shown_s)
+        self.lags_s.append(time.perf_counter() - self._displayed_request_s)
         job = self._picture.next_job() if self._running is None else None
-        if job is not None and not job.refines:
-            made = self._thread.submit(job.make, lambda share: None, lambda: False)
-            self._running = job, made, self._wanted_s
+        if job is not None and not job.is_refinement:
+            future = self._thread.submit(job.run, lambda share: None, lambda: False)
+            self._running = job, future, self._requested_s
         elif self._running is None:
-            self._of_shown_s = self._wanted_s
+            self._displayed_request_s = self._requested_s
 
     @property
     def lag_s(self) -> float:

@@ -13,18 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.btf_made import Made, kept_folder
+from bench.btf_made import SyntheticBtf, open_values_folder
 from bench.figure import Figure
-from bench.moving_scene import rest
+from bench.moving_scene import run_light_jobs
 from relume.bake import Recipe
 from relume.btf.shelf import STORE, BtfRecord
 from relume.look import Look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.scene.built_in import built_in
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 _BOUND, _SCALE = 0.05, 4.0
 
@@ -32,26 +32,32 @@ _BOUND, _SCALE = 0.05, 4.0
 def measure(tiny: bool) -> list[Figure]:
     """Cover a still life, and change how."""
     size, lights, frames = ((40, 30), 100, 3) if tiny else ((640, 480), 1000, 10)
-    with kept_folder(tiny) as kept, tempfile.TemporaryDirectory() as name, STORE.at(Path(name) / "btfs"):
-        record, folder = Made("weave", kept, tiny).kept(Path(name), _BOUND), Path(name)
+    with (
+        open_values_folder(tiny) as values_folder,
+        tempfile.TemporaryDirectory() as name,
+        STORE.with_search_folder(Path(name) / "btfs"),
+    ):
+        record, folder = SyntheticBtf("weave", values_folder, tiny).save(Path(name), _BOUND), Path(name)
         scene, recipe = built_in("interior" if tiny else "still_life"), Recipe("direct", ("front",), size, lights)
-        transfer = open_transfer(bake_here(METHODS["direct"], scene, recipe, folder / "held.zarr"), Memory(4 << 30))
-        picture = Picture(transfer, "front", Memory(4 << 30))
-        shaded_s = _edit_s(picture, _covered(transfer, record, scale=_SCALE))
-        repeats = [_covered(transfer, record, scale=_SCALE + 0.1 * k) for k in range(1, frames)]
-        held_ms = 1e3 * float(np.median([_edit_s(picture, look) for look in repeats]))
+        transfer = open_transfer(
+            bake_in_process(METHODS["direct"], scene, recipe, folder / "held.zarr"), Cache(4 << 30)
+        )
+        picture = Picture(transfer, "front", Cache(4 << 30))
+        shaded_s = _edit_s(picture, _override_with_btf(transfer, record, scale=_SCALE))
+        repeats = [_override_with_btf(transfer, record, scale=_SCALE + 0.1 * k) for k in range(1, frames)]
+        drag_ms = 1e3 * float(np.median([_edit_s(picture, look) for look in repeats]))
     context = {"size": f"{size[0]}×{size[1]}", "lights": lights, "every_surface": "woven"}
-    return [Figure("btf.held_ms", held_ms, "ms", {**context, "shaded": 1e3 * shaded_s})]
+    return [Figure("btf.held_ms", drag_ms, "ms", {**context, "shaded": 1e3 * shaded_s})]
 
 
-def _covered(transfer: Transfer, record: BtfRecord, **params: float) -> Look:
+def _override_with_btf(transfer: FixedViewTransfer, record: BtfRecord, **params: float) -> Look:
     terms = [{**record.terms()[0], "params": params}]
     return validate({"materials": {name: {"terms": terms} for name in transfer.material_names}}, transfer.default_look)
 
 
 def _edit_s(picture: Picture, look: Look) -> float:
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     picture.set_look(look)
     picture.advance(None)
-    rest(picture)
-    return time.perf_counter() - began
+    run_light_jobs(picture)
+    return time.perf_counter() - start_time

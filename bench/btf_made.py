@@ -10,18 +10,18 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from relume.btf.compress import compress
-from relume.btf.eigen import F32, EigenBtf
-from relume.btf.rings import ubo_rings
-from relume.btf.shelf import BtfRecord, keep
-from relume.btf.values import Values
-from relume.code_version import code_hash, sources_of
+from relume.btf.eigen import F32, LocalPcaBtf
+from relume.btf.rings import ubo_grid
+from relume.btf.shelf import BtfRecord, store_btf
+from relume.btf.values import ValueFile
+from relume.code_version import code_hash, collect_sources
 from relume.synthetic.make import GEOMETRIES
-from relume.synthetic.render import SmallGeometry
+from relume.synthetic.render import TileGeometry
 
-KEPT = Path(__file__).with_name(".kept")
+CACHE_FOLDER = Path(__file__).with_name(".kept")
 
 
-class Made:
+class SyntheticBtf:
     """A synthetic BTF before compression.
 
     Args:
@@ -31,34 +31,34 @@ class Made:
     def __init__(self, name: str, folder: Path, tiny: bool) -> None:
         self.name = name
         size, self.grid = (8, 1) if tiny else (128, 3)  # as `relume material make-btf` does
-        small = SmallGeometry(GEOMETRIES[name](), ubo_rings(), (size, size), self.grid, 1)
-        self.values = Values(folder / name, ubo_rings(), (size, size))
-        self.values.fill(small.seen_from, lambda share: None, lambda: False)
+        small = TileGeometry(GEOMETRIES[name](), ubo_grid(), (size, size), self.grid, 1)
+        self.values = ValueFile(folder / name, ubo_grid(), (size, size))
+        self.values.fill(small.get_view, lambda share: None, lambda: False)
         self.height: F32 = small.height()
 
-    def compressed(self, bound: float) -> EigenBtf:
+    def compress(self, bound: float) -> LocalPcaBtf:
         """Kept to an error bound, as `relume material make-btf` does."""
-        kept = compress(self.values, bound, lambda share: None, lambda: False)
-        return replace(kept, height=self.height)
+        compressed = compress(self.values, bound, lambda share: None, lambda: False)
+        return replace(compressed, height=self.height)
 
-    def kept(self, folder: Path, bound: float) -> BtfRecord:
+    def save(self, folder: Path, bound: float) -> BtfRecord:
         """The same in an asset store."""
         folder.mkdir(parents=True, exist_ok=True)
         source = folder / f"{self.name}.json"
         source.write_text(f"{self.name} {bound}")
-        return keep(folder / "btfs", source, self.name, self.name, lambda: self.compressed(bound))
+        return store_btf(folder / "btfs", source, self.name, self.name, lambda: self.compress(bound))
 
 
 @contextmanager
-def kept_folder(tiny: bool) -> Iterator[Path]:
+def open_values_folder(tiny: bool) -> Iterator[Path]:
     """Where values are: named by the code that makes them, those of other code are deleted; trials keep nothing."""
     if tiny:
         with TemporaryDirectory() as trial:
             yield Path(trial)
         return
     makers = ("render", "weave", "pebbles", "corduroy")
-    folder = KEPT / code_hash(sources_of([f"synthetic.{name}" for name in makers]))
-    for other in KEPT.iterdir() if KEPT.is_dir() else ():
-        if other != folder:
-            shutil.rmtree(other)
+    folder = CACHE_FOLDER / code_hash(collect_sources([f"synthetic.{name}" for name in makers]))
+    for stale_folder in CACHE_FOLDER.iterdir() if CACHE_FOLDER.is_dir() else ():
+        if stale_folder != folder:
+            shutil.rmtree(stale_folder)
     yield folder

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from bench.btf_made import Made, kept_folder
+from bench.btf_made import SyntheticBtf, open_values_folder
 from bench.figure import Figure
-from bench.moving_scene import MovingScene, rotated
+from bench.moving_scene import FreeCameraScene, rotated
 from relume.btf.shelf import STORE, BtfRecord
-from relume.moving.picture import MovingPicture
-from relume.moving.shader.tables import Part
-from server.live.sending.painter import jpeg_of
+from relume.moving.picture import FreeCameraPicture
+from relume.moving.shader.tables import ArrayBlock
+from server.live.sending.painter import encode_jpeg
 from server.live.state.pending_requests import PendingRequests
 
 _BOUND = 0.05
@@ -30,54 +30,67 @@ _BOUND = 0.05
 
 def measure(tiny: bool) -> list[Figure]:
     """Cover a still life, and turn it and its light."""
-    with kept_folder(tiny) as kept, tempfile.TemporaryDirectory() as folder, STORE.at(Path(folder) / "btfs"):
-        return _shown(Made("weave", kept, tiny).kept(Path(folder), _BOUND), Path(folder), tiny)
+    with (
+        open_values_folder(tiny) as values_folder,
+        tempfile.TemporaryDirectory() as folder,
+        STORE.with_search_folder(Path(folder) / "btfs"),
+    ):
+        return _measure_free_camera(
+            SyntheticBtf("weave", values_folder, tiny).save(Path(folder), _BOUND), Path(folder), tiny
+        )
 
 
-def _shown(record: BtfRecord, folder: Path, tiny: bool) -> list[Figure]:
-    still = MovingScene("interior" if tiny else "still_life", folder, (40, 40) if tiny else (400, 400), tiny)
+def _measure_free_camera(record: BtfRecord, folder: Path, tiny: bool) -> list[Figure]:
+    still_life = FreeCameraScene("interior" if tiny else "still_life", folder, (40, 40) if tiny else (400, 400), tiny)
 
-    def covered(document: dict[str, Any]) -> None:
+    def override_with_btf(document: dict[str, Any]) -> None:
         for material in document["materials"].values():
             material["terms"] = [{**record.terms()[0], "params": {"scale": 4.0}}]
 
-    def turned(document: dict[str, Any], share: float) -> None:
-        covered(document)
-        rotated(document, share)
+    def rotate_light(document: dict[str, Any], fraction: float) -> None:
+        override_with_btf(document)
+        rotated(document, fraction)
 
     frames = 3 if tiny else 40
-    eye, light = still.eye_s(frames, covered), still.edits(frames, turned, is_watched=True)
-    frame_bytes = _light_bytes(still, covered, turned)
-    context = {"size": "400×400", "points": still.num_points, "every_surface": "woven"}
+    camera_times, light = (
+        still_life.time_camera_moves(frames, override_with_btf),
+        still_life.edits(frames, rotate_light, is_watched=True),
+    )
+    frame_bytes = _light_bytes(still_life, override_with_btf, rotate_light)
+    context = {"size": "400×400", "points": still_life.num_probes, "every_surface": "woven"}
     return [
-        Figure("btf.view_fps", 1 / float(np.median(eye)), "frames/s", context),
-        Figure("btf.light_ms", 1e3 * light.median_s, "ms", {**context, **light.said(), "bounces": "all"}),
+        Figure("btf.view_fps", 1 / float(np.median(camera_times)), "frames/s", context),
+        Figure("btf.light_ms", 1e3 * light.median_s, "ms", {**context, **light.summarize(), "bounces": "all"}),
         Figure("btf.light_bytes", frame_bytes.pop("jpeg") / 1e3, "kB", {**context, **frame_bytes}),
     ]
 
 
 def _light_bytes(
-    still: MovingScene, covered: Callable[[Any], None], turned: Callable[[Any, float], None]
+    still_life: FreeCameraScene, override_with_btf: Callable[[Any], None], rotate_light: Callable[[Any, float], None]
 ) -> dict[str, float]:
     """Bytes that go to a browser when light is turned: "jpeg", "hdr", "by_browser"."""
-    look = still.look(lambda document: turned(document, 0.5))
-    picture = still.picture(look, is_watched=True)
+    look = still_life.look(lambda document: rotate_light(document, 0.5))
+    picture = still_life.picture(look, is_watched=True)
     picture.advance(None)
     drawn = {
-        "jpeg": len(jpeg_of(picture, look.display, still.size, PendingRequests.quality)),
+        "jpeg": len(encode_jpeg(picture, look.display, still_life.size, PendingRequests.quality)),
         "hdr": len(picture.encode(picture.all_tiles(), "rgb9e5")),
     }
-    picture = still.picture(still.look(covered), is_watched=True)
-    picture.draws = False
-    before = _parts(picture)
+    picture = still_life.picture(still_life.look(override_with_btf), is_watched=True)
+    picture.renders_pixels = False
+    before = _get_cached_parts(picture)
     picture.set_look(look)
     picture.advance(None)
-    new = [part for name, part in _parts(picture).items() if name not in before or before[name].key != part.key]
-    return {**drawn, "by_browser": sum(array.nbytes for part in new for array in part.make().values())}
+    new = [
+        entry
+        for name, entry in _get_cached_parts(picture).items()
+        if name not in before or before[name].key != entry.key
+    ]
+    return {**drawn, "by_browser": sum(array.nbytes for entry in new for array in entry.make().values())}
 
 
-def _parts(picture: MovingPicture) -> Mapping[str, Part]:
+def _get_cached_parts(picture: FreeCameraPicture) -> Mapping[str, ArrayBlock]:
     picture.advance(None)
-    found = picture.parts()
-    assert found is not None
-    return found[0]
+    cached_parts = picture.array_blocks()
+    assert cached_parts is not None
+    return cached_parts[0]

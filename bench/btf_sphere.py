@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.btf_pictures import covered, traced_by_peer
+from bench.btf_pictures import bake_with_btf, traced_by_peer
 from bench.figure import Figure, skipped
 from bench.indirect import PASSES
 from bench.mitsuba import missing
-from bench.standard_error import over_passes
+from bench.standard_error import compare_with_passes
 from relume.btf.shelf import BtfRecord
 from relume.environments.model import Environment
 from relume.environments.studio import studio
@@ -27,17 +27,17 @@ from relume.scene.archive import make_scene
 from relume.scene.demo.still_life import look_at
 from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.synthetic.make import GEOMETRIES
-from relume.synthetic.tile import Tile, levelled, repeated
+from relume.synthetic.tile import Tile, centered_height, repeat_tile
 
 F64 = NDArray[np.float64]
 
 _RADIUS = 1.25  # periods
-_COVERED = np.radians(115.0)  # from the middle of the plane, which is turned to the eye but for some
-_TURNED = np.radians(20.0)
+_VISIBLE_ANGLE = np.radians(115.0)  # from the middle of the plane, which is turned to the eye but for some
+_SPHERE_ROTATION = np.radians(20.0)
 _FAR, _ACROSS = 40.0, 2.7  # the eye, and what its picture shows, periods
-_RIM = 0.97  # of the radius
+_MAX_RADIUS = 0.97  # of the radius
 _STEPS = 160  # of the smooth ball's grid, along the plane's sides
-_NEAR = np.cos(np.radians(60.0))
+_NEAR_COSINE = np.cos(np.radians(60.0))
 _BLACK: tuple[dict[str, Any], ...] = ({"model": "lambert", "color": [0.0, 0.0, 0.0]},)
 
 
@@ -51,39 +51,44 @@ def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     if (why := missing()) is not None:
         return skipped((name,), "%", why)[0]
     size, spp = ((16, 16), 2) if tiny else ((128, 128), 64)
-    smooth, real = _scenes()
-    opened, look = covered(smooth, record, size, folder / "sphere.zarr", 60 if tiny else 2000)
-    ours = render_image(opened, "eye", look)[..., :3].astype(np.float64)
-    theirs = traced_by_peer(real, size, spp, [GEOMETRIES["weave"]().materials[0], _BLACK], folder / "sphere")
-    cosine = _cosines(real.cameras[0], size)
-    parts = {"all": cosine > 0, "near": cosine > _NEAR, "rim": (cosine > 0) & (cosine <= _NEAR)}
-    errors = {part: over_passes(ours[rows][None], theirs[:, rows][:, None]) for part, rows in parts.items()}
+    smooth, displaced_scene = _make_scenes()
+    bake, look = bake_with_btf(smooth, record, size, folder / "sphere.zarr", 60 if tiny else 2000)
+    rendered = render_image(bake, "eye", look)[..., :3].astype(np.float64)
+    reference_passes = traced_by_peer(
+        displaced_scene, size, spp, [GEOMETRIES["weave"]().materials[0], _BLACK], folder / "sphere"
+    )
+    cosine = _cosines(displaced_scene.cameras[0], size)
+    row_masks = {"all": cosine > 0, "near": cosine > _NEAR_COSINE, "rim": (cosine > 0) & (cosine <= _NEAR_COSINE)}
+    errors = {
+        label: compare_with_passes(rendered[rows][None], reference_passes[:, rows][:, None])
+        for label, rows in row_masks.items()
+    }
     whole = errors["all"]
     context: dict[str, Any] = {
-        **{part: errors[part].said for part in ("near", "rim")}, "bias": whole.bias.value, "noise": whole.noise,
-        "kept_to": record.error[-1], "periods_across": 2 * _RADIUS, "pixels": int(parts["all"].sum()),
+        **{label: errors[label].summary for label in ("near", "rim")}, "bias": whole.bias.value, "noise": whole.noise,
+        "kept_to": record.error[-1], "periods_across": 2 * _RADIUS, "pixels": int(row_masks["all"].sum()),
         "spp": PASSES * spp, "size": list(size),
     }  # fmt: skip
     return Figure(name, 100 * whole.error.value, "%", context, 100 * whole.error.standard_error)
 
 
-def _scenes() -> tuple[Scene, Scene]:
+def _make_scenes() -> tuple[Scene, Scene]:
     """The smooth ball and the real geometry about a black one, seen from far away."""
-    tile = levelled(GEOMETRIES["weave"]())
-    towards = np.array([np.sin(_TURNED) * 0.8, np.sin(_TURNED) * 0.6, np.cos(_TURNED)])
+    tile = centered_height(GEOMETRIES["weave"]())
+    towards = np.array([np.sin(_SPHERE_ROTATION) * 0.8, np.sin(_SPHERE_ROTATION) * 0.6, np.cos(_SPHERE_ROTATION)])
     camera = look_at("eye", tuple(_FAR * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _ACROSS / _FAR)))
-    sky = Environment("sky", np.array(studio().radiance))
+    environment = Environment("sky", np.array(studio().radiance))
     cloth, black = Material("Cloth", tuple(map(dict, tile.materials[0]))), Material("Black", _BLACK)
     lowest = _RADIUS + float(tile.positions[:, 2].min())
     return (
-        make_scene("smooth", [_ball(_RADIUS, 0)], (cloth,), [camera], sky),
-        make_scene("real", [_wrapped(tile), _ball(0.99 * lowest, 1)], (cloth, black), [camera], sky),
+        make_scene("smooth", [_make_sphere(_RADIUS, 0)], (cloth,), [camera], environment),
+        make_scene("real", [_wrap_tile(tile), _make_sphere(0.99 * lowest, 1)], (cloth, black), [camera], environment),
     )
 
 
-def _about(places: F64) -> tuple[F64, F64, F64]:
+def _project_to_sphere(uvs: F64) -> tuple[F64, F64, F64]:
     """Where places of the plane (n, 2) lie about the unit ball: normal, axis of x, axis of y. (n, 3) each"""
-    p, q = (places / (2 * _RADIUS)).T
+    p, q = (uvs / (2 * _RADIUS)).T
     s = 1 + p**2 + q**2
     return (
         np.stack([2 * p, 2 * q, 2 - s], axis=1) / s[:, None],
@@ -94,42 +99,42 @@ def _about(places: F64) -> tuple[F64, F64, F64]:
 
 def _reach() -> float:
     """How far the plane is covered, periods."""
-    return float(2 * _RADIUS * np.tan(_COVERED / 2))
+    return float(2 * _RADIUS * np.tan(_VISIBLE_ANGLE / 2))
 
 
-def _wrapped(tile: Tile) -> Mesh:
-    around = repeated(tile, int(np.ceil(_reach())))
-    middle = around.positions[around.faces, :2].mean(axis=1)
-    faces = around.faces[np.hypot(*middle.T) < _reach()]
-    used = np.zeros(len(around.positions), bool)
+def _wrap_tile(tile: Tile) -> Mesh:
+    repeated_tile = repeat_tile(tile, int(np.ceil(_reach())))
+    middle = repeated_tile.positions[repeated_tile.faces, :2].mean(axis=1)
+    faces = repeated_tile.faces[np.hypot(*middle.T) < _reach()]
+    used = np.zeros(len(repeated_tile.positions), bool)
     used[faces] = True
     faces = (np.cumsum(used) - 1)[faces]
-    positions, normals = around.positions[used], around.normals[used]
-    n, x, y = _about(positions[:, :2])
+    positions, normals = repeated_tile.positions[used], repeated_tile.normals[used]
+    n, x, y = _project_to_sphere(positions[:, :2])
     shrunk = 0.5 * (1 + n[:, 2:])  # sides of the plane, on the ball
-    turned = normals[:, :1] * x + normals[:, 1:2] * y + normals[:, 2:] * n
-    return _mesh((_RADIUS + shrunk * positions[:, 2:]) * n, turned, faces, x, positions[:, :2], 0)
+    rotated_normals = normals[:, :1] * x + normals[:, 1:2] * y + normals[:, 2:] * n
+    return _mesh((_RADIUS + shrunk * positions[:, 2:]) * n, rotated_normals, faces, x, positions[:, :2], 0)
 
 
-def _ball(radius: float, material: int) -> Mesh:
+def _make_sphere(radius: float, material: int) -> Mesh:
     """What is covered, smooth."""
     along = np.linspace(-_reach(), _reach(), _STEPS + 1)
-    places = np.stack([grid.ravel() for grid in np.meshgrid(along, along)], axis=1)
+    uvs = np.stack([grid.ravel() for grid in np.meshgrid(along, along)], axis=1)
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(_STEPS), np.arange(_STEPS), indexing="ij"))
     a = i * (_STEPS + 1) + j
     faces = np.concatenate([np.stack([a, a + 1, a + _STEPS + 2], 1), np.stack([a, a + _STEPS + 2, a + _STEPS + 1], 1)])
-    n, x, _ = _about(places)
-    return _mesh(radius * n, n, faces, x, places, material)
+    n, x, _ = _project_to_sphere(uvs)
+    return _mesh(radius * n, n, faces, x, uvs, material)
 
 
-def _mesh(positions: F64, normals: F64, faces: NDArray[Any], tangents: F64, places: F64, material: int) -> Mesh:
+def _mesh(positions: F64, normals: F64, faces: NDArray[Any], tangents: F64, uvs: F64, material: int) -> Mesh:
     """A mesh whose texture coordinates are places of the plane, v down."""
     return Mesh(
         "cloth" if material == 0 else "inside",
         np.ascontiguousarray(positions, np.float32),
         np.ascontiguousarray(normals, np.float32),
         np.ascontiguousarray(np.column_stack([tangents, np.ones(len(tangents))]), np.float32),
-        np.ascontiguousarray(places * [1, -1], np.float32),
+        np.ascontiguousarray(uvs * [1, -1], np.float32),
         np.ascontiguousarray(faces, np.uint32),
         material,
     )
@@ -142,7 +147,9 @@ def _cosines(camera: Camera, size: tuple[int, int]) -> F64:
     half = np.tan(camera.yfov / 2)
     d = np.stack([x * half, y * half, -np.ones_like(x)], axis=-1) @ np.asarray(camera.to_world, np.float64)[:3, :3].T
     d /= np.linalg.norm(d, axis=-1, keepdims=True)
-    eye = np.asarray(camera.to_world, np.float64)[:3, 3]
-    along = -d @ eye
-    beside = np.sqrt(np.maximum(eye @ eye - along**2, 0))
-    return np.where(beside < _RIM * _RADIUS, np.sqrt(np.maximum(1 - (beside / _RADIUS) ** 2, 0)), -1.0)
+    camera_position = np.asarray(camera.to_world, np.float64)[:3, 3]
+    along = -d @ camera_position
+    perpendicular = np.sqrt(np.maximum(camera_position @ camera_position - along**2, 0))
+    return np.where(
+        perpendicular < _MAX_RADIUS * _RADIUS, np.sqrt(np.maximum(1 - (perpendicular / _RADIUS) ** 2, 0)), -1.0
+    )

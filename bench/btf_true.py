@@ -11,7 +11,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from bench.btf_made import Made, kept_folder
+from bench.btf_made import SyntheticBtf, open_values_folder
 from bench.btf_pictures import against_geometry, against_table
 from bench.btf_sphere import against_displaced
 from bench.figure import Figure
@@ -22,11 +22,15 @@ _BOUND, _FINE = 0.05, 0.02  # of pictures, and of what is compared with all valu
 
 def measure(tiny: bool) -> list[Figure]:
     """Make a weave, and compare its pictures with the real one's."""
-    with kept_folder(tiny) as kept, tempfile.TemporaryDirectory() as folder, STORE.at(Path(folder) / "btfs"):
-        at, made = Path(folder), Made("weave", kept, tiny)
-        record = made.kept(at, _BOUND)
+    with (
+        open_values_folder(tiny) as values_folder,
+        tempfile.TemporaryDirectory() as folder,
+        STORE.with_search_folder(Path(folder) / "btfs"),
+    ):
+        folder_path, synthetic_btf = Path(folder), SyntheticBtf("weave", values_folder, tiny)
+        record = synthetic_btf.save(folder_path, _BOUND)
         return [
-            against_geometry(record, at, tiny),
-            against_displaced(record, at, tiny),
-            against_table(made.kept(at, _FINE), made.values, at, tiny),
+            against_geometry(record, folder_path, tiny),
+            against_displaced(record, folder_path, tiny),
+            against_table(synthetic_btf.save(folder_path, _FINE), synthetic_btf.values, folder_path, tiny),
         ]

@@ -2,8 +2,8 @@
 
 The editor on the built-in scene at 640×480; the slider of the teapot's highlight width ("Exponent along" of its
 ashikhmin_shirley term) is dragged. Both ends are on
-the browser's clock, taken by the editor itself (`window.relumeStats`): the input event, and the draw of the frame.
-The browser, its software rasteriser and the server share the cores.
+the browser's clock, taken by the editor itself (`max_in_flight.relumeStats`): the input event, and the draw of the
+frame. The browser, its software rasteriser and the server share the cores.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NAMES = ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # Chromium as it is on a machine without a GPU: its own compositor, WebGL by SwiftShader where it is allowed to
 ARGUMENTS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"]
-_READY_S = 90.0
+_READY_TIMEOUT_S = 90.0
 _AT_ONCE_MS, _QUIET_MS = 500, 100
 _QUIET_LOOKS = 20
 _SLIDER, _COUNT = "Exponent along", "window.relumeStats.latencies.length"
@@ -42,7 +42,7 @@ def measure(tiny: bool) -> list[Figure]:
     size, num_lights, num_moves = ((64, 48), 60, 5) if tiny else ((640, 480), 2000, 120)
     recipe = Recipe("direct", ("front",), size, num_lights)
     with baked_house(demo_scene(), recipe) as house, serving(house) as server:
-        latencies = _drag(browser, f"http://127.0.0.1:{server.port}/?{_place(house)}", num_moves)
+        latencies = _drag(browser, f"http://127.0.0.1:{server.port}/?{_make_editor_query(house)}", num_moves)
         at_socket = server.edit_ms()[-num_moves:]
     p50, p95 = percentiles(latencies)
     context = {
@@ -55,7 +55,7 @@ def measure(tiny: bool) -> list[Figure]:
     return [Figure(_NAMES[0], p50, "ms", context), Figure(_NAMES[1], p95, "ms", context)]
 
 
-def _place(house: House) -> str:
+def _make_editor_query(house: House) -> str:
     return urlencode({"scene": house.scene, "bake": house.bake, "view": "front", "material": "Teapot", "term": 1})
 
 
@@ -68,7 +68,7 @@ def _drag(browser: str, url: str, num_moves: int) -> list[float]:
         page = chromium.new_page(viewport={"width": 1280, "height": 800})
         page.goto(url)
         slider = page.get_by_role("slider", name=_SLIDER)
-        slider.wait_for(timeout=1000 * _READY_S)
+        slider.wait_for(timeout=1000 * _READY_TIMEOUT_S)
         box: Any = slider.bounding_box()
         y, middle = box["y"] + box["height"] / 2, box["x"] + box["width"] / 2
         page.mouse.move(middle, y)
@@ -91,7 +91,7 @@ def _wait_until_frozen(page: Any, move: Callable[[int], None]) -> None:
 
     The page's policy forbids it to evaluate strings, so the waiting is done here.
     """
-    deadline, k, in_a_row = time.monotonic() + _READY_S, 0, 0
+    deadline, k, in_a_row = time.monotonic() + _READY_TIMEOUT_S, 0, 0
     while in_a_row < 3:
         if time.monotonic() > deadline:
             raise TimeoutError("the editor draws no frames when the slider is moved")
@@ -105,7 +105,7 @@ def _wait_until_frozen(page: Any, move: Callable[[int], None]) -> None:
 
 def _wait_until_quiet(page: Any) -> None:
     """Wait until the server has shaded and frozen all that it wants: edits are painted beside that, but slower."""
-    deadline, in_a_row = time.monotonic() + _READY_S, 0
+    deadline, in_a_row = time.monotonic() + _READY_TIMEOUT_S, 0
     while in_a_row < _QUIET_LOOKS:
         if time.monotonic() > deadline:
             raise TimeoutError("the server does not come to rest")

@@ -15,45 +15,49 @@ from typing import Any
 import numpy as np
 
 from bench.figure import Figure
-from bench.points import Lit, freeze_along, lit_points, relative_rmse
+from bench.points import LitSamples, freeze_for_curve, relative_rmse, sample_lit_surface
 from bench.scenes import cook_torrance, teapot_on_table
-from bench.timing import in_turn
+from bench.timing import time_interleaved
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
-from relume.light.merged import merge, num_merged
+from relume.light.merged import cluster_lights, num_clusters
 from relume.light.tiles import choose_tiles
 from relume.parallel import num_threads
 
 
-def lit_teapot(term: dict[str, Any], tiny: bool) -> Lit:
+def lit_teapot(term: dict[str, Any], tiny: bool) -> LitSamples:
     """View samples of a teapot, all of one term, with their light triangles and what they see of them."""
-    num_points, num_lights, size = (100, 200, (64, 64)) if tiny else (17_700, 4000, (320, 320))
-    return lit_points(teapot_on_table(studio(), (term,), (term,)), size, num_points, num_lights, material=0)
+    num_positions, num_lights, size = (100, 200, (64, 64)) if tiny else (17_700, 4000, (320, 320))
+    return sample_lit_surface(teapot_on_table(studio(), (term,), (term,)), size, num_positions, num_lights, material=0)
 
 
-def rough(lit: Lit) -> Lit:
+def merge_lights(lit_samples: LitSamples) -> LitSamples:
     """The same with the lights merged that an operator is made of first."""
-    radiance, num = studio().radiance, lit.lights.num_lights
-    return replace(lit, lights=merge(lit.lights, choose_tiles(radiance, num), num_merged(num)))
+    radiance, num = studio().radiance, lit_samples.lights.num_lights
+    return replace(
+        lit_samples, lights=cluster_lights(lit_samples.lights, choose_tiles(radiance, num), num_clusters(num))
+    )
 
 
-def error_of_change(lit: Lit, merged: Lit, before: dict[str, Any], after: dict[str, Any], curve: str) -> float:
+def error_of_change(
+    lit_samples: LitSamples, merged: LitSamples, before: dict[str, Any], after: dict[str, Any], curve: str
+) -> float:
     """How far T Δc of merged lights is from that of all, relative RMSE.
 
     Args:
-        lit, merged: points with lights. before, after: documents whose `curve` differs.
+        lit_samples, merged: points with lights. before, after: documents whose `curve` differs.
     """
     declared = TERMS[before["model"]].curve(curve)
     change = analysis(curve_bands(after, declared)) - analysis(curve_bands(before, declared))
     images = []
-    for some in (merged, lit):
-        frozen = freeze_along(some, before, curve)
-        tiles, _, _, samples = frozen.transport.shape
+    for variant in (merged, lit_samples):
+        operator = freeze_for_curve(variant, before, curve)
+        tiles, _, _, samples = operator.transport.shape
         image = np.zeros((tiles, 3, samples), np.float32)
-        frozen.add(change, image)
+        operator.add(change, image)
         images.append(image)
     return relative_rmse(*images)
 
@@ -62,21 +66,23 @@ def measure(tiny: bool) -> list[Figure]:
     """Freeze along both curves in turn."""
     term = cook_torrance(0.2)
     document = complete_term(("curve_switch",), term, None)
-    lit = lit_teapot(document, tiny)
+    lit_samples = lit_teapot(document, tiny)
     curves = ("theta_h", "theta_d")
-    merged = rough(lit)
-    ways = [partial(freeze_along, some, document, curve) for curve in curves for some in (merged, lit)]
-    names = [f"{curve}{which}_s" for curve in curves for which in ("", "_exact")]
-    taken = in_turn(ways, 2 if tiny else 5)
-    medians = {name: float(np.median(times)) for name, times in zip(names, taken, strict=True)}
-    others = complete_term(("curve_switch",), {**term, "params": {"sigma": 0.3, "ior": 2.5}}, None)
+    merged = merge_lights(lit_samples)
+    freezes = [
+        partial(freeze_for_curve, variant, document, curve) for curve in curves for variant in (merged, lit_samples)
+    ]
+    names = [f"{curve}{suffix}_s" for curve in curves for suffix in ("", "_exact")]
+    durations = time_interleaved(freezes, 2 if tiny else 5)
+    medians = {name: float(np.median(times)) for name, times in zip(names, durations, strict=True)}
+    other_term = complete_term(("curve_switch",), {**term, "params": {"sigma": 0.3, "ior": 2.5}}, None)
     context = {
         **medians,
-        **{f"{curve}_error": error_of_change(lit, merged, document, others, curve) for curve in curves},
+        **{f"{curve}_error": error_of_change(lit_samples, merged, document, other_term, curve) for curve in curves},
         "merged_lights": merged.lights.num_lights,
-        "view_samples": lit.points.num_points,
-        "lights": lit.lights.num_lights,
-        "visible_share": float(np.unpackbits(lit.receivers.visible).mean()),
+        "view_samples": lit_samples.surface_points.num_points,
+        "lights": lit_samples.lights.num_lights,
+        "visible_share": float(np.unpackbits(lit_samples.receivers.visible).mean()),
         "threads": num_threads(),
     }
     return [Figure("freeze.curve_switch_s", max(medians[f"{curve}_s"] for curve in curves), "s", context)]

@@ -53,5 +53,5 @@ def render(
     script = Path(__file__).with_name("peer_cycles_render.py")
     command = [str(_interpreter()), "-I", str(script), str(folder)]
     subprocess.run(command, check=True, timeout=3600, stdout=subprocess.DEVNULL)
-    found: dict[str, Any] = json.loads((folder / "cycles_result.json").read_text())
-    return found
+    result: dict[str, Any] = json.loads((folder / "cycles_result.json").read_text())
+    return result

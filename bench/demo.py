@@ -25,12 +25,12 @@ def measure(tiny: bool) -> list[Figure]:
     with baked_house(scene, preview) as house:
         preview_s = house.bake_s
     with baked_house(scene, recipe) as house:
-        first_s, again_s = _first_picture_s(house), _first_picture_s(house)
-    context, of_preview = _context(recipe), _context(preview)
+        first_s, second_s = _first_picture_s(house), _first_picture_s(house)
+    context, preview_context = _context(recipe), _context(preview)
     return [
-        Figure("demo.preview_s", preview_s, "s", of_preview),
+        Figure("demo.preview_s", preview_s, "s", preview_context),
         Figure("demo.bake_s", house.bake_s, "s", context),
-        Figure("demo.first_picture_s", first_s, "s", {**context, "second_opening_s": again_s}),
+        Figure("demo.first_picture_s", first_s, "s", {**context, "second_opening_s": second_s}),
     ]
 
 

@@ -41,21 +41,21 @@ def measure(tiny: bool) -> list[Figure]:
         for thread in asking:
             thread.start()
         time.sleep(0.1 if tiny else 2.0)  # they all wait now
-        beside_s = max(_enter(server, house) for _ in range(rooms))
+        concurrent_s = max(_enter(server, house) for _ in range(rooms))
         waiting = sum(thread.is_alive() for thread in asking)
     context = {"quiet_s": quiet_s, "rooms": rooms, "thumbnails": _THUMBNAILS, "thumbnails_waiting_at_end": waiting}
-    return [Figure(_NAME, beside_s, "s", context)]
+    return [Figure(_NAME, concurrent_s, "s", context)]
 
 
 def _enter(server: Server, house: House) -> float:
     """Seconds to the first message in a new room."""
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     room = secrets.token_hex(16)
     address = f"{server.session(house.bake)}?room_prefix={room[:8]}"
     with connect(address, subprotocols=[SPEAKS], max_size=None, compression=None, open_timeout=120) as connection:
         connection.send(json.dumps({"type": "open", "room": room, "name": "Ann"}))
         connection.recv(120)
-        return time.perf_counter() - began
+        return time.perf_counter() - start_time
 
 
 def _ask(server: Server, house: House) -> None:

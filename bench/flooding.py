@@ -13,21 +13,21 @@ from websockets import Subprotocol
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-KINDS = ("acknowledgements", "exposure", "refused")
+FLOOD_TYPES = ("acknowledgements", "exposure", "refused")
 SPEAKS = Subprotocol("relume.v1")
 _AT_ONCE, _REST_S = 20_000, 0.5
 _BEFORE_S = 2.0  # until the server has taken what it takes of a burst
 
 
-def flood(address: str, watch: str, kind: str, begun: Event) -> None:
+def flood(address: str, watch: str, kind: str, started: Event) -> None:
     """Send as fast as can be, until killed.
 
     Args:
-        address: of the session. watch: opens its room to a viewer. kind: one of `KINDS`.
-        begun: set when it has been at it for a while.
+        address: of the session. watch: opens its room to a viewer. kind: one of `FLOOD_TYPES`.
+        started: set when it has been at it for a while.
     """
     block = b"".join(_frame(_message(kind, revision)) for revision in range(1, _AT_ONCE))
-    threading.Timer(_BEFORE_S, begun.set).start()
+    threading.Timer(_BEFORE_S, started.set).start()
     while True:
         with (
             suppress(WebSocketException, OSError),

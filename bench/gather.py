@@ -17,17 +17,17 @@ import numpy as np
 
 from bench.figure import Figure
 from bench.timing import percentiles, seconds
-from relume.bake import Recipe, Task, Written
+from relume.bake import Recipe, Task, TaskOutput
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.gather import GatherMethod
 from relume.methods.registry import open_transfer
 from relume.parallel import num_threads
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.scene.cornell import cornell_box
 from relume.scene.model import Scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 _NAMES = ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")
 FLOOR = "/materials/Floor/terms/1"
@@ -50,25 +50,25 @@ def measure(tiny: bool) -> list[Figure]:
     """Bake, open, freeze, drag."""
     scene = cornell_box(is_floor_glossy=True)
     with tempfile.TemporaryDirectory() as folder:
-        bake(scene, recipe_of(tiny=True), Path(folder) / "warm.zarr")
-        baked = bake(scene, recipe_of(tiny), Path(folder) / "gather.zarr")
+        bake(scene, make_recipe(tiny=True), Path(folder) / "warm.zarr")
+        baked = bake(scene, make_recipe(tiny), Path(folder) / "gather.zarr")
         size_mb = store_mb(baked.path)
-        transfer = open_transfer(baked.path, Memory(4 << 30))
-        picture = opened(transfer)
-        freezing = _freezing(transfer, picture)
+        transfer = open_transfer(baked.path, Cache(4 << 30))
+        picture = open_exact_picture(transfer)
+        freeze_times = _time_freezes(transfer, picture)
         frames_s = edit_frames_s(transfer, picture, 5 if tiny else 120)
     p50, p95 = percentiles(frames_s)
-    followed_s = max(taken for name, taken in freezing.items() if not name.endswith("exact_s"))
-    size = {"size": list(recipe_of(tiny).size), "cells": baked.context["cells"]}
+    max_freeze_s = max(taken for name, taken in freeze_times.items() if not name.endswith("exact_s"))
+    size = {"size": list(make_recipe(tiny).size), "cells": baked.context["cells"]}
     return [
         Figure(_NAMES[0], baked.wall_s, "s", {**baked.context, "threads": num_threads()}),
         Figure(_NAMES[1], size_mb, "MB", {**size, "rays_a_sample": transfer.store.shape("views/0/links")[1]}),
-        Figure(_NAMES[2], followed_s, "s", {**size, "floor_samples": _floor_samples(transfer), **freezing}),
+        Figure(_NAMES[2], max_freeze_s, "s", {**size, "floor_samples": _floor_samples(transfer), **freeze_times}),
         Figure(_NAMES[3], 1 / p50, _SPEED, {**size, "ms_p50": 1e3 * p50, "ms_p95": 1e3 * p95}),
     ]
 
 
-def recipe_of(tiny: bool) -> Recipe:
+def make_recipe(tiny: bool) -> Recipe:
     """The recipe that is measured, or, where tiny, one that bakes in a second."""
     return Recipe("gather", ("front",), *(((40, 40), 60) if tiny else ((400, 400), 2000)))
 
@@ -88,17 +88,19 @@ def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
     )
     last = time.perf_counter()
 
-    def note(task: Task, written: Written) -> None:
+    def note(task: Task, written: TaskOutput) -> None:
         nonlocal last
-        stage, now = stages[GatherMethod.stages[task.stage]], time.perf_counter()
-        stage["wall_s"] += now - last
+        stage, current_time = stages[GatherMethod.stages[task.stage]], time.perf_counter()
+        stage["wall_s"] += current_time - last
         stage["tracing_s"] += written.trace_s
         stage["rays"] += written.num_rays
-        last = now
+        last = current_time
 
-    wall_s = seconds(lambda: bake_here(method, scene, recipe, target, note))
-    cells = open_transfer(target, Memory(4 << 30)).store.shape("cells/material")[0]
-    return Baked(target, wall_s, {"cells": cells, "size": list(recipe.size), "lights": recipe.num_lights, **stages})
+    wall_s = seconds(lambda: bake_in_process(method, scene, recipe, target, note))
+    num_patches = open_transfer(target, Cache(4 << 30)).store.shape("cells/material")[0]
+    return Baked(
+        target, wall_s, {"cells": num_patches, "size": list(recipe.size), "lights": recipe.num_lights, **stages}
+    )
 
 
 def store_mb(path: Path) -> float:
@@ -106,39 +108,39 @@ def store_mb(path: Path) -> float:
     return sum(file.stat().st_size for file in path.rglob("*") if file.is_file()) / 1e6
 
 
-def opened(transfer: Transfer) -> Picture:
+def open_exact_picture(transfer: FixedViewTransfer) -> Picture:
     """A picture at rest."""
-    picture = Picture(transfer, "front", Memory(4 << 30))
-    settle(picture)
+    picture = Picture(transfer, "front", Cache(4 << 30))
+    run_until_exact(picture)
     return picture
 
 
-def settle(picture: Picture) -> None:
+def run_until_exact(picture: Picture) -> None:
     """Make all that is lacking."""
     while not picture.advance(None).exact or picture.next_job() is not None:
         if picture.next_job() is not None:
-            picture.freeze(lambda share: None, lambda: False)
+            picture.run_next_job(lambda share: None, lambda: False)
 
 
-def _freezing(transfer: Transfer, picture: Picture) -> dict[str, float]:
+def _time_freezes(transfer: FixedViewTransfer, picture: Picture) -> dict[str, float]:
     """Seconds until the picture follows a hand on the floor's highlight, and until its operators are exact ones.
 
     Both are made once before, which compiles. The last one made stays the one that the picture follows.
     """
-    warm, taken = opened(transfer), dict[str, float]()
+    warm, durations = open_exact_picture(transfer), dict[str, float]()
     for pointer in ("curves/theta_h", "params/exponent"):
-        warm.touch(f"{FLOOR}/{pointer}")
-        settle(warm)
-        picture.touch(f"{FLOOR}/{pointer}")
-        began, name = time.perf_counter(), pointer.rpartition("/")[2]
-        picture.freeze(lambda share: None, lambda: False)
-        taken[f"{name}_s"] = time.perf_counter() - began
-        settle(picture)
-        taken[f"{name}_exact_s"] = time.perf_counter() - began
-    return taken
+        warm.prepare(f"{FLOOR}/{pointer}")
+        run_until_exact(warm)
+        picture.prepare(f"{FLOOR}/{pointer}")
+        start_time, name = time.perf_counter(), pointer.rpartition("/")[2]
+        picture.run_next_job(lambda share: None, lambda: False)
+        durations[f"{name}_s"] = time.perf_counter() - start_time
+        run_until_exact(picture)
+        durations[f"{name}_exact_s"] = time.perf_counter() - start_time
+    return durations
 
 
-def edit_frames_s(transfer: Transfer, picture: Picture, num_frames: int) -> list[float]:
+def edit_frames_s(transfer: FixedViewTransfer, picture: Picture, num_frames: int) -> list[float]:
     """Seconds of each frame but the first, from the look to the encoded bytes, while the floor's exponent is dragged.
 
     Args:
@@ -146,18 +148,18 @@ def edit_frames_s(transfer: Transfer, picture: Picture, num_frames: int) -> list
         picture: of it, at rest, what a hand needs made before.
         num_frames: looks of the drag.
     """
-    taken = []
+    durations = []
     for exponent in np.geomspace(3, 300, num_frames):
         document = copy.deepcopy(transfer.default_look)
         document["materials"]["Floor"]["terms"][1]["params"]["exponent"] = float(exponent)
         look = validate(document, transfer.default_look)
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         picture.set_look(look)
         picture.encode(picture.advance(None).tiles, "rgb9e5")
-        taken.append(time.perf_counter() - began)
-    return taken[1:]
+        durations.append(time.perf_counter() - start_time)
+    return durations[1:]
 
 
-def _floor_samples(transfer: Transfer) -> int:
+def _floor_samples(transfer: FixedViewTransfer) -> int:
     rows = transfer.views["front"].rows(transfer.material_names.index("Floor"))
     return int(rows.stop - rows.start)

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from bench.figure import Figure
-from bench.gather import bake, recipe_of, settle
+from bench.gather import bake, make_recipe, run_until_exact
 from bench.points import relative_rmse
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.scene.cornell import cornell_box
 
 Document = dict[str, Any]
@@ -34,54 +34,56 @@ _NAME = "gather.follow_error"
 
 def measure(tiny: bool) -> list[Figure]:
     """Measure three drags in one bake."""
-    recipe, num_frames = recipe_of(tiny), 3 if tiny else 12
+    recipe, num_frames = make_recipe(tiny), 3 if tiny else 12
     drags: dict[str, tuple[str, Edit]] = {
-        "red wall to blue": ("/materials/Red wall/terms/0/color", _color("Red wall", [0.06, 0.1, 0.7])),
-        "floor to dark grey": ("/materials/Floor/terms/0/color", _color("Floor", [0.1, 0.1, 0.1])),
+        "red wall to blue": ("/materials/Red wall/terms/0/color", _make_color_edit("Red wall", [0.06, 0.1, 0.7])),
+        "floor to dark grey": ("/materials/Floor/terms/0/color", _make_color_edit("Floor", [0.1, 0.1, 0.1])),
         "all bounces to one": ("/transport/bounces", _bounces),
     }
     with tempfile.TemporaryDirectory() as folder:
         path = bake(cornell_box(is_floor_glossy=True), recipe, Path(folder) / "gather.zarr").path
-        transfer = open_transfer(path, Memory(4 << 30))
-        found = {name: _dragged(transfer, pointer, edit, num_frames) for name, (pointer, edit) in drags.items()}
-    worst = max(drag["error"] for drag in found.values())
-    return [Figure(_NAME, worst, "relative RMSE", {**found, "size": list(recipe.size)})]
+        transfer = open_transfer(path, Cache(4 << 30))
+        drag_results = {
+            name: _measure_drag(transfer, pointer, edit, num_frames) for name, (pointer, edit) in drags.items()
+        }
+    worst = max(drag["error"] for drag in drag_results.values())
+    return [Figure(_NAME, worst, "relative RMSE", {**drag_results, "size": list(recipe.size)})]
 
 
-def _color(material: str, target: list[float]) -> Edit:
-    def edit(document: Document, share: float) -> None:
+def _make_color_edit(material: str, target: list[float]) -> Edit:
+    def edit(document: Document, fraction: float) -> None:
         term = document["materials"][material]["terms"][0]
         term["color"] = [
-            (1 - share) * was + share * becomes for was, becomes in zip(term["color"], target, strict=True)
+            (1 - fraction) * was + fraction * becomes for was, becomes in zip(term["color"], target, strict=True)
         ]
 
     return edit
 
 
-def _bounces(document: Document, share: float) -> None:
-    document["transport"]["bounces"] = round(document["transport"]["bounces"] ** (1 - share))
+def _bounces(document: Document, fraction: float) -> None:
+    document["transport"]["bounces"] = round(document["transport"]["bounces"] ** (1 - fraction))
 
 
-def _dragged(transfer: Transfer, pointer: str, edit: Edit, num_frames: int) -> dict[str, float]:
+def _measure_drag(transfer: FixedViewTransfer, pointer: str, edit: Edit, num_frames: int) -> dict[str, float]:
     """Error of the last frame, the change that it shows, both relative, and median milliseconds of a frame."""
-    picture = Picture(transfer, "front", Memory(4 << 30))
-    settle(picture)
+    picture = Picture(transfer, "front", Cache(4 << 30))
+    run_until_exact(picture)
     before = picture.image().astype(np.float64)
-    picture.touch(pointer)
-    settle(picture)
-    taken = []
-    for share in np.linspace(0, 1, num_frames + 1)[1:]:
+    picture.prepare(pointer)
+    run_until_exact(picture)
+    durations = []
+    for fraction in np.linspace(0, 1, num_frames + 1)[1:]:
         document = copy.deepcopy(transfer.default_look)
-        edit(document, float(share))
+        edit(document, float(fraction))
         look = validate(document, transfer.default_look)
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         picture.set_look(look)
         picture.encode(picture.advance(None).tiles, "rgb9e5")
-        taken.append(time.perf_counter() - began)
-    followed = picture.image().astype(np.float64)
-    settle(picture)
+        durations.append(time.perf_counter() - start_time)
+    incremental = picture.image().astype(np.float64)
+    run_until_exact(picture)
     exact = picture.image()
     return {
-        "error": relative_rmse(followed, exact), "changed_by": relative_rmse(before, exact),
-        "ms_p50": 1e3 * float(np.median(taken[1:])),
+        "error": relative_rmse(incremental, exact), "changed_by": relative_rmse(before, exact),
+        "ms_p50": 1e3 * float(np.median(durations[1:])),
     }  # fmt: skip

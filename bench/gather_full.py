@@ -7,13 +7,13 @@ other surfaces there by their own shape, with us by few functions (docs/adr/0047
 from __future__ import annotations
 
 from bench.figure import Figure, skipped
-from bench.gather_scenes import SIZES, rendered
+from bench.gather_scenes import SIZES, render_pair
 from bench.indirect import PASSES
 from bench.mitsuba import missing
-from bench.standard_error import over_passes
+from bench.standard_error import compare_with_passes
 
 _SPP = {"still_life": 128}  # of each pass: errors of some per cent are told from the noise; its highlights have most
-_SPP_OF_OTHERS = 16
+_OTHER_SPP = 16
 _UNIT = "%"
 
 
@@ -25,11 +25,16 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _figures(name: str, tiny: bool) -> list[Figure]:
-    spp = 2 if tiny else _SPP.get(name, _SPP_OF_OTHERS)
-    pair = rendered(name, spp, tiny, is_full=True)
-    found = over_passes(*pair)
-    about = {"size": list(pair.ours.shape[1::-1]), "spp": PASSES * spp, "noise": found.noise, "limit": found.limit}
+    spp = 2 if tiny else _SPP.get(name, _OTHER_SPP)
+    pair = render_pair(name, spp, tiny, is_full=True)
+    comparison = compare_with_passes(*pair)
+    details = {
+        "size": list(pair.rendered.shape[1::-1]),
+        "spp": PASSES * spp,
+        "noise": comparison.noise,
+        "limit": comparison.limit,
+    }
     return [
-        Figure(f"gather.full_{kind}_{name}", 100 * of.value, _UNIT, about, 100 * of.standard_error)
-        for kind, of in (("rmse", found.error), ("bias", found.bias))
+        Figure(f"gather.full_{kind}_{name}", 100 * estimate.value, _UNIT, details, 100 * estimate.standard_error)
+        for kind, estimate in (("rmse", comparison.error), ("bias", comparison.bias))
     ]

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from bench.figure import Figure
-from bench.gather import bake, recipe_of, store_mb
+from bench.gather import bake, make_recipe, store_mb
 from relume.bake import Recipe
 from relume.parallel import num_threads
 from relume.scene.interior import interior
@@ -19,13 +19,13 @@ _NAMES = ("gather.interior_bake_s", "gather.interior_store_mb")
 
 def measure(tiny: bool) -> list[Figure]:
     """Time one bake."""
-    recipe = recipe_of(tiny=True) if tiny else Recipe("gather", ("front",), (800, 800), 2000)
+    recipe = make_recipe(tiny=True) if tiny else Recipe("gather", ("front",), (800, 800), 2000)
     with tempfile.TemporaryDirectory() as folder:
-        bake(interior(), recipe_of(tiny=True), Path(folder) / "warm.zarr")
+        bake(interior(), make_recipe(tiny=True), Path(folder) / "warm.zarr")
         baked = bake(interior(), recipe, Path(folder) / "interior.zarr")
         size_mb = store_mb(baked.path)
-    about = {"cells": baked.context["cells"], "size": list(recipe.size)}
+    details = {"cells": baked.context["cells"], "size": list(recipe.size)}
     return [
         Figure(_NAMES[0], baked.wall_s, "s", {**baked.context, "threads": num_threads()}),
-        Figure(_NAMES[1], size_mb, "MB", about),
+        Figure(_NAMES[1], size_mb, "MB", details),
     ]

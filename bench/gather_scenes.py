@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
 from bench.gather import bake
-from bench.indirect import PASSES, highlights_send_nothing, reflected, reflected_by_mitsuba
+from bench.indirect import PASSES, ignore_glossy_reflection, reflected, reflected_by_mitsuba
 from bench.mitsuba import bsdf, missing
-from bench.standard_error import over_passes
+from bench.standard_error import compare_with_passes
 from relume.bake import Recipe
-from relume.brdf.albedo import is_diffuse
-from relume.memory import Memory
+from relume.brdf.albedo import scatters_diffusely
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from relume.scene.built_in import built_in
 from relume.scene.cornell import cornell_box
@@ -45,10 +45,10 @@ class Pair(NamedTuple):
     """Reflected light of one scene.
 
     Attributes:
-        ours: (height, width, 3). passes: independent ones of Mitsuba's. (passes, height, width, 3)
+        rendered: (height, width, 3). passes: independent ones of Mitsuba's. (passes, height, width, 3)
     """
 
-    ours: F64
+    rendered: F64
     passes: F32
 
 
@@ -59,14 +59,14 @@ def measure(tiny: bool) -> list[Figure]:
         return skipped(names, _UNIT, why)
     figures, spp = [], 2 if tiny else _SPP
     for figure, name in zip(names, SIZES, strict=True):
-        pair = rendered(name, spp, tiny)
-        found = over_passes(*pair)
-        about = {**found.context, "size": list(pair.ours.shape[1::-1]), "spp": PASSES * spp}
-        figures.append(Figure(figure, found.error.value, _UNIT, about, found.error.standard_error))
+        pair = render_pair(name, spp, tiny)
+        comparison = compare_with_passes(*pair)
+        details = {**comparison.context, "size": list(pair.rendered.shape[1::-1]), "spp": PASSES * spp}
+        figures.append(Figure(figure, comparison.error.value, _UNIT, details, comparison.error.standard_error))
     return figures
 
 
-def rendered(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool = False) -> Pair:
+def render_pair(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool = False) -> Pair:
     """Bake and render one of `SIZES` by both renderers.
 
     Args:
@@ -77,27 +77,31 @@ def rendered(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool = 
     size = (40, 30) if tiny else SIZES[name]
     terms: dict[str, Terms] = {material.name: material.terms for material in scene.materials}
     if name == "still_life":
-        terms |= _in_place_of(scene)
-    of_meshes = [terms[scene.materials[mesh.material].name] for mesh in scene.meshes]
-    seen = [bsdf(of_mesh) for of_mesh in of_meshes]
-    beyond = seen if is_full else [bsdf([term for term in of_mesh if is_diffuse(term)]) for of_mesh in of_meshes]
+        terms |= _choose_replacement_terms(scene)
+    mesh_materials = [terms[scene.materials[mesh.material].name] for mesh in scene.meshes]
+    camera_bsdfs = [bsdf(mesh_terms) for mesh_terms in mesh_materials]
+    beyond = (
+        camera_bsdfs
+        if is_full
+        else [bsdf([term for term in mesh_terms if scatters_diffusely(term)]) for mesh_terms in mesh_materials]
+    )
     finer = (_FINER * size[0], _FINER * size[1])
     recipe = Recipe("gather", (scene.cameras[0].name,), finer, 60 if tiny else 2000)
-    with tempfile.TemporaryDirectory() as folder, nullcontext() if is_full else highlights_send_nothing():
-        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path, Memory(4 << 30))
+    with tempfile.TemporaryDirectory() as folder, nullcontext() if is_full else ignore_glossy_reflection():
+        transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path, Cache(4 << 30))
         fine = reflected(transfer, terms).reshape(size[1], _FINER, size[0], _FINER, 3)
-        theirs = reflected_by_mitsuba(scene, size, seen, beyond, spp, Path(folder))
-        return Pair(fine.mean(axis=(1, 3)), theirs)
+        reference_passes = reflected_by_mitsuba(scene, size, camera_bsdfs, beyond, spp, Path(folder))
+        return Pair(fine.mean(axis=(1, 3)), reference_passes)
 
 
-def _in_place_of(scene: Scene) -> dict[str, Terms]:
+def _choose_replacement_terms(scene: Scene) -> dict[str, Terms]:
     """Terms of the still life that both have."""
-    of = {material.name: material for material in scene.materials}
-    wood = of["Tray"].textures["diffuse"].pixels.mean(axis=(0, 1), dtype=np.float64).tolist()
-    teapot, bowl = of["Teapot"].terms[0], of["Bowl"].terms[0]
+    materials_by_name = {material.name: material for material in scene.materials}
+    wood = materials_by_name["Tray"].textures["diffuse"].pixels.mean(axis=(0, 1), dtype=np.float64).tolist()
+    teapot, bowl = materials_by_name["Teapot"].terms[0], materials_by_name["Bowl"].terms[0]
     return {
         "Teapot": (teapot, _facets([1.0, 1.0, 1.0], 0.1, 1.7)),
-        "Tray": ({"model": "lambert", "color": wood, "texture": None}, of["Tray"].terms[1]),
+        "Tray": ({"model": "lambert", "color": wood, "texture": None}, materials_by_name["Tray"].terms[1]),
         "Handles": (_facets([0.91, 0.70, 0.34], 0.2, 5.0),),
         "Bowl": (bowl, _facets([1.0, 1.0, 1.0], 0.12, 1.5)),
     }

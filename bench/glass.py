@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.gather import bake
 from bench.indirect import PASSES
-from bench.mitsuba import averaged, bsdf, missing, passes_of, render
-from bench.standard_error import NoiseFree, over_passes
+from bench.mitsuba import averaged, bsdf, missing, read_passes, render
+from bench.standard_error import NoiseCorrectedError, compare_with_passes
 from relume.bake import Recipe
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
@@ -38,7 +38,7 @@ _NAME, _UNIT = "glass.rmse", "relative RMSE"
 _SIZE, _FINER, _SPP = (400, 300), 2, 128
 _DEPTH = 24
 _ABSORBED = (0.3, 1.5, 4.0)
-_PARTS = {"floor": (0.0, 1.0, 0.8, 1.0), "pane": (0.41, 0.64, 0.3, 0.7), "clear": (0.1, 0.32, 0.35, 0.62),
+_IMAGE_REGIONS = {"floor": (0.0, 1.0, 0.8, 1.0), "pane": (0.41, 0.64, 0.3, 0.7), "clear": (0.1, 0.32, 0.35, 0.62),
           "absorbing": (0.73, 0.9, 0.43, 0.66)}  # fmt: skip
 
 
@@ -49,18 +49,25 @@ def measure(tiny: bool) -> list[Figure]:
     size, spp = ((40, 30), 2) if tiny else (_SIZE, _SPP)
     scene = glass_scene()
     with tempfile.TemporaryDirectory() as folder:
-        ours, theirs = _ours(scene, size, tiny, Path(folder)), _theirs(scene, size, spp, Path(folder))
-    found = over_passes(ours, theirs)
-    parts = {name: _part(ours, theirs, *share).said for name, share in _PARTS.items()}
-    about = {**found.context, "size": list(size), "spp": PASSES * spp, **parts}
-    return [Figure(_NAME, found.error.value, _UNIT, about, found.error.standard_error)]
+        rendered, reference_passes = (
+            _render_relume(scene, size, tiny, Path(folder)),
+            _render_mitsuba(scene, size, spp, Path(folder)),
+        )
+    comparison = compare_with_passes(rendered, reference_passes)
+    region_summaries = {
+        name: _compare_region(rendered, reference_passes, *bounds).summary for name, bounds in _IMAGE_REGIONS.items()
+    }
+    details = {**comparison.context, "size": list(size), "spp": PASSES * spp, **region_summaries}
+    return [Figure(_NAME, comparison.error.value, _UNIT, details, comparison.error.standard_error)]
 
 
-def _part(ours: F64, theirs: F32, left: float, right: float, top: float, bottom: float) -> NoiseFree:
+def _compare_region(
+    rendered: F64, reference_passes: F32, left: float, right: float, top: float, bottom: float
+) -> NoiseCorrectedError:
     """Of a part of the picture, in shares of width and height."""
-    height, width, _ = ours.shape
+    height, width, _ = rendered.shape
     rows, columns = slice(int(top * height), int(bottom * height)), slice(int(left * width), int(right * width))
-    return over_passes(ours[rows, columns], theirs[:, rows, columns])
+    return compare_with_passes(rendered[rows, columns], reference_passes[:, rows, columns])
 
 
 def glass_scene() -> Scene:
@@ -73,31 +80,31 @@ def glass_scene() -> Scene:
         Material("Absorbing", (clear,), glass=Glass(thickness=0.7, absorbed=_ABSORBED)),
         Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
     ]
-    turn = np.eye(3)
+    rotation = np.eye(3)
     meshes = [
         rectangle([-2, 0, 2], [4, 0, 0], [0, 0, -4]).mesh("floor", 0),
-        sphere(0.45, 48).moved(turn, [-0.9, 0.46, 0.2]).mesh("clear", 1),
+        sphere(0.45, 48).transform(rotation, [-0.9, 0.46, 0.2]).mesh("clear", 1),
         rectangle([-0.3, 0.01, 0.5], [0.8, 0, 0], [0, 1, 0]).mesh("pane", 2),
-        sphere(0.35, 48).moved(turn, [1.0, 0.36, 0.2]).mesh("absorbing", 3),
-        sphere(0.35, 48).moved(turn, [0.1, 0.36, -0.3]).mesh("red", 4),
+        sphere(0.35, 48).transform(rotation, [1.0, 0.36, 0.2]).mesh("absorbing", 3),
+        sphere(0.35, 48).transform(rotation, [0.1, 0.36, -0.3]).mesh("red", 4),
     ]
     camera = look_at("front", (0.3, 1.1, 3.4), (0.0, 0.4, 0.0), 0.7)
     return make_scene("glass", meshes, materials, [camera], sunny_sky())
 
 
-def _ours(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:
+def _render_relume(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:
     width, height = size
     recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), 60 if tiny else 2000)
-    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
+    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
     return averaged(render_image(transfer, "front", validate({}, transfer.default_look)), _FINER)
 
 
-def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
+def _render_mitsuba(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
     materials = [scene.materials[mesh.material] for mesh in scene.meshes]
     bsdfs = [bsdf(m.terms) if m.glass is None else _dielectric(m.glass) for m in materials]
     job = {"integrator": {"type": "volpath", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
     render(scene, size, job, folder)
-    return passes_of(folder)
+    return read_passes(folder)
 
 
 def _dielectric(glass: Glass) -> Mapping[str, Any]:
@@ -105,7 +112,7 @@ def _dielectric(glass: Glass) -> Mapping[str, Any]:
     if glass.thickness == 0:
         tint = {"type": "rgb", "value": list(glass.tint)}
         return {"type": "thindielectric", "int_ior": glass.ior, "specular_transmittance": tint}
-    most = max(*glass.absorbed, 1e-9)
-    rate = {"type": "rgb", "value": [absorbed / most for absorbed in glass.absorbed]}
-    inside = {"type": "homogeneous", "albedo": 0.0, "scale": most, "sigma_t": rate}
+    max_absorption = max(*glass.absorbed, 1e-9)
+    rate = {"type": "rgb", "value": [absorbed / max_absorption for absorbed in glass.absorbed]}
+    inside = {"type": "homogeneous", "albedo": 0.0, "scale": max_absorption, "sigma_t": rate}
     return {"type": "dielectric", "int_ior": glass.ior, "interior": inside}

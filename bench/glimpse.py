@@ -19,13 +19,13 @@ from bench.points import relative_rmse
 from bench.timing import seconds
 from relume.bake import Recipe
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.scene.demo import demo_scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -35,13 +35,17 @@ def measure(tiny: bool) -> list[Figure]:
     view = scene.cameras[0].name
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe("direct", (view,), size, num_lights)
-        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Memory(4 << 30))
-        picture = Picture(transfer, view, Memory(4 << 30))
-        _settle(picture)
-        first, *glimpses = [seconds(partial(_turn, picture, transfer, angle)) for angle in range(10, 51, 10)]
-        rough = picture.image()
-        whole = seconds(partial(_settle, picture))
-        error = relative_rmse(rough, picture.image())
+        transfer = open_transfer(
+            bake_in_process(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Cache(4 << 30)
+        )
+        picture = Picture(transfer, view, Cache(4 << 30))
+        _run_until_exact(picture)
+        first, *glimpses = [
+            seconds(partial(_rotate_environment, picture, transfer, angle)) for angle in range(10, 51, 10)
+        ]
+        preview = picture.image()
+        whole = seconds(partial(_run_until_exact, picture))
+        error = relative_rmse(preview, picture.image())
     context = {
         "size": list(size),
         "view_samples": transfer.views[view].num_surface_samples,
@@ -55,16 +59,16 @@ def measure(tiny: bool) -> list[Figure]:
     ]
 
 
-def _turn(picture: Picture, transfer: Transfer, angle: float) -> None:
+def _rotate_environment(picture: Picture, transfer: FixedViewTransfer, angle: float) -> None:
     """One position of the hand: the glimpse alone."""
     document = copy.deepcopy(transfer.default_look)
     document["environment"]["rotation"] = float(angle)
     picture.set_look(validate(document, transfer.default_look))
-    picture.freeze(lambda share: None, lambda: False)
+    picture.run_next_job(lambda share: None, lambda: False)
     picture.advance(None)
 
 
-def _settle(picture: Picture) -> None:
+def _run_until_exact(picture: Picture) -> None:
     while not picture.advance(None).exact or picture.next_job() is not None:
         if picture.next_job() is not None:
-            picture.freeze(lambda share: None, lambda: False)
+            picture.run_next_job(lambda share: None, lambda: False)

@@ -64,21 +64,29 @@ class File:
 
     def accessor(self, number: int) -> NDArray[Any]:
         """Its values, integers that stand for shares as shares. (count, width)"""
-        of = self.json["accessors"][number]
-        dtype, width, count = np.dtype(_TYPES[of["componentType"]]), _WIDTHS[of["type"]], of["count"]
-        view = self.json["bufferViews"][of["bufferView"]]
-        data, start = self.buffer_view(of["bufferView"]), of.get("byteOffset", 0)
+        description = self.json["accessors"][number]
+        dtype, width, count = (
+            np.dtype(_TYPES[description["componentType"]]),
+            _WIDTHS[description["type"]],
+            description["count"],
+        )
+        view = self.json["bufferViews"][description["bufferView"]]
+        data, start = self.buffer_view(description["bufferView"]), description.get("byteOffset", 0)
         stride = view.get("byteStride", dtype.itemsize * width)
         rows = np.lib.stride_tricks.as_strided(
             np.frombuffer(data, np.uint8)[start:], (count, dtype.itemsize * width), (stride, 1), writeable=False
         )
         values = np.ascontiguousarray(rows).view(dtype)
-        return values / np.float32(np.iinfo(dtype).max) if of.get("normalized") else values
+        return values / np.float32(np.iinfo(dtype).max) if description.get("normalized") else values
 
     def image(self, texture: int) -> NDArray[np.uint8]:
         """A texture's bytes, RGBA. (height, width, 4)"""
-        of = self.json["textures"][texture]
-        source = of.get("extensions", {}).get("EXT_texture_webp", of).get("source", of.get("source"))
+        texture_info = self.json["textures"][texture]
+        source = (
+            texture_info.get("extensions", {})
+            .get("EXT_texture_webp", texture_info)
+            .get("source", texture_info.get("source"))
+        )
         image = self.json["images"][source]
         data = self.buffer_view(image["bufferView"]) if "bufferView" in image else self._bytes(image["uri"])
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"))
@@ -103,21 +111,23 @@ def read_plain(path: Path) -> File:
         chunk, data = data[28 + length :], data[20 : 20 + length]
     file = File(json.loads(data), path.parent, chunk=chunk)
     lights = file.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
-    for node, to_world in _nodes(file.json):
+    for node, to_world in _walk_nodes(file.json):
         number = node.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
         if number is not None:
             file.lights.append((lights[number], to_world))
         if "mesh" in node:
             primitives = file.json["meshes"][node["mesh"]]["primitives"]
-            file.shapes.extend(_shape(file, of, to_world) for of in primitives if of.get("mode", 4) == 4)
+            file.shapes.extend(
+                _shape(file, primitive, to_world) for primitive in primitives if primitive.get("mode", 4) == 4
+            )
     return file
 
 
-def _nodes(of: dict[str, Any]) -> Iterator[tuple[dict[str, Any], F64]]:
-    stack = [(root, np.eye(4)) for root in of["scenes"][of.get("scene", 0)]["nodes"]]
+def _walk_nodes(document: dict[str, Any]) -> Iterator[tuple[dict[str, Any], F64]]:
+    stack = [(root, np.eye(4)) for root in document["scenes"][document.get("scene", 0)]["nodes"]]
     while stack:
         number, parent = stack.pop()
-        node = of["nodes"][number]
+        node = document["nodes"][number]
         to_world = parent @ _local(node)
         yield node, to_world
         stack.extend((child, to_world) for child in node.get("children", []))
@@ -135,30 +145,33 @@ def _local(node: dict[str, Any]) -> F64:
 
 
 def _shape(file: File, primitive: dict[str, Any], to_world: F64) -> Shape:
-    found = {name: file.accessor(k).astype(np.float32) for name, k in primitive["attributes"].items()}
-    positions, linear = found["POSITION"], to_world[:3, :3]
+    attributes = {name: file.accessor(k).astype(np.float32) for name, k in primitive["attributes"].items()}
+    positions, linear = attributes["POSITION"], to_world[:3, :3]
     faces = file.accessor(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
     triangles = np.asarray(faces.reshape(-1, 3), np.uint32)
     mirrored = np.linalg.det(linear) < 0
-    found["POSITION"] = (positions @ linear.T + to_world[:3, 3]).astype(np.float32)
+    attributes["POSITION"] = (positions @ linear.T + to_world[:3, 3]).astype(np.float32)
     triangles = triangles[:, ::-1] if mirrored else triangles
-    if "NORMAL" in found:
-        found["NORMAL"] = _unit(found["NORMAL"] @ np.linalg.inv(linear))
+    if "NORMAL" in attributes:
+        attributes["NORMAL"] = _unit(attributes["NORMAL"] @ np.linalg.inv(linear))
     else:
-        found, triangles = _flat(found, triangles)
-    if "TANGENT" in found:
-        along, hand = _unit(found["TANGENT"][:, :3] @ linear.T), found["TANGENT"][:, 3:] * (-1 if mirrored else 1)
-        found["TANGENT"] = np.concatenate([along, hand], axis=1).astype(np.float32)
-    return Shape(found, np.ascontiguousarray(triangles), primitive.get("material"))
+        attributes, triangles = _make_flat(attributes, triangles)
+    if "TANGENT" in attributes:
+        along, handedness = (
+            _unit(attributes["TANGENT"][:, :3] @ linear.T),
+            attributes["TANGENT"][:, 3:] * (-1 if mirrored else 1),
+        )
+        attributes["TANGENT"] = np.concatenate([along, handedness], axis=1).astype(np.float32)
+    return Shape(attributes, np.ascontiguousarray(triangles), primitive.get("material"))
 
 
-def _flat(found: dict[str, F32], faces: NDArray[np.uint32]) -> tuple[dict[str, F32], NDArray[np.uint32]]:
+def _make_flat(attributes: dict[str, F32], faces: NDArray[np.uint32]) -> tuple[dict[str, F32], NDArray[np.uint32]]:
     """Every triangle with corners and a normal of its own."""
     corners = faces.reshape(-1)
-    own = {name: values[corners] for name, values in found.items()}
-    a, b, c = own["POSITION"].reshape(-1, 3, 3).transpose(1, 0, 2)
-    own["NORMAL"] = np.repeat(_unit(np.cross(b - a, c - a)), 3, axis=0)
-    return own, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+    corner_attributes = {name: values[corners] for name, values in attributes.items()}
+    a, b, c = corner_attributes["POSITION"].reshape(-1, 3, 3).transpose(1, 0, 2)
+    corner_attributes["NORMAL"] = np.repeat(_unit(np.cross(b - a, c - a)), 3, axis=0)
+    return corner_attributes, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
 
 
 def _unit(vectors: NDArray[Any]) -> F32:

@@ -91,11 +91,11 @@ def serving(house: House, settings: Mapping[str, str] | None = None) -> Iterator
         port = int(probe.getsockname()[1])
     edits = house.data / "edits.txt"
     environment = {**os.environ, "RELUME_DATA": str(house.data), "RELUME_PORT": str(port), **(settings or {})}
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     process = subprocess.Popen([sys.executable, "-m", "bench.recording_server", str(edits)], env=environment)
     try:
         _wait(process, port)
-        yield Server(port, process.pid, began, edits)
+        yield Server(port, process.pid, start_time, edits)
     finally:
         process.terminate()
         process.wait(30)
@@ -120,7 +120,7 @@ class SessionClient:
         self._connection = connection
         self._last: dict[str, Any] = {"exact": False, "revision": -1}
 
-    def send(self, **message: Any) -> None:
+    def send_message(self, **message: Any) -> None:
         """One JSON message."""
         self._connection.send(json.dumps(message))
 
@@ -137,7 +137,7 @@ class SessionClient:
                 continue
             (length,) = struct.unpack_from("<I", message)
             header: dict[str, Any] = json.loads(message[4 : 4 + length])
-            self.send(type="ack", frame=header["frame"])
+            self.send_message(type="ack", frame=header["frame"])
             self._last = header
             return header, len(message)
 

@@ -30,19 +30,19 @@ def measure(tiny: bool) -> list[Figure]:
     size = 24 if tiny else 160
     phong = [_energies(_phong(s), size) for s in EXPONENTS]
     half = [_energies(_torrance_sparrow(sigma), size) for sigma in SIGMAS]
-    by_exponent = [_count(found, ENERGY) for found in phong]
-    by_sigma = [_count(found, ENERGY) for found in half]
-    about = {"norm": "99 % of the energy, visible hemispheres, no cosine", "angles": size}
+    by_exponent = [_count(energies, ENERGY) for energies in phong]
+    by_sigma = [_count(energies, ENERGY) for energies in half]
+    details = {"norm": "99 % of the energy, visible hemispheres, no cosine", "angles": size}
     return [
         Figure(
             "in_out.phong_terms_per_exponent",
             _slope(EXPONENTS, by_exponent),
             "terms",
             {
-                **about,
+                **details,
                 "exponents": list(EXPONENTS),
                 "terms": by_exponent,
-                "terms_for_2_percent": [_count(found, 1 - 0.02**2) for found in phong],
+                "terms_for_2_percent": [_count(energies, 1 - 0.02**2) for energies in phong],
             },
         ),
         Figure(
@@ -50,10 +50,10 @@ def measure(tiny: bool) -> list[Figure]:
             _slope([1 / sigma**2 for sigma in SIGMAS], by_sigma),
             "terms · σ²",
             {
-                **about,
+                **details,
                 "sigmas": list(SIGMAS),
                 "terms": by_sigma,
-                "terms_for_2_percent": [_count(found, 1 - 0.02**2) for found in half],
+                "terms_for_2_percent": [_count(energies, 1 - 0.02**2) for energies in half],
             },
         ),
     ]
@@ -76,16 +76,16 @@ def _energies(brdf: Brdf, size: int) -> F64:
     across = np.outer(sine, sine)[:, :, None] * np.cos(azimuth)
     cos_half = (cosine[:, None] + cosine)[:, :, None] / np.sqrt(np.maximum(2 * (1 + level + across), 1e-12))
     values = brdf(level - across, cos_half) * np.sqrt(np.outer(weight, weight))[:, :, None]
-    found = []
+    energies_by_frequency = []
     for m in range(size):
-        part = (values @ np.cos(m * azimuth)) / len(azimuth)
-        of_frequency = np.linalg.svd(part, compute_uv=False) ** 2
-        found.append(of_frequency if m == 0 else np.repeat(of_frequency, 2))
-    return np.sort(np.concatenate(found))[::-1]
+        fourier_coefficients = (values @ np.cos(m * azimuth)) / len(azimuth)
+        squared_singular_values = np.linalg.svd(fourier_coefficients, compute_uv=False) ** 2
+        energies_by_frequency.append(squared_singular_values if m == 0 else np.repeat(squared_singular_values, 2))
+    return np.sort(np.concatenate(energies_by_frequency))[::-1]
 
 
-def _count(energies: F64, share: float) -> int:
-    return int(np.searchsorted(np.cumsum(energies), share * energies.sum()) + 1)
+def _count(energies: F64, energy_fraction: float) -> int:
+    return int(np.searchsorted(np.cumsum(energies), energy_fraction * energies.sum()) + 1)
 
 
 def _slope(x: Sequence[float], y: Sequence[int]) -> float:

@@ -24,14 +24,14 @@ from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
 from relume.look import Look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
 from relume.methods.store_io import read_lights
-from relume.operators.frozen import freeze
+from relume.operators.frozen import precompute
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
-from relume.store import bake_here
+from relume.picture.transfer import FixedViewTransfer
+from relume.store import bake_in_process
 
 F64 = NDArray[np.float64]
 
@@ -47,24 +47,26 @@ def measure(tiny: bool) -> list[Figure]:
     glossy = {"model": "ggx", "color": [0.5, 0.5, 0.5], "params": {"roughness": 0.4, "f0": 0.1}}
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT, glossy))
     with tempfile.TemporaryDirectory() as folder:
-        path = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, num_lights), Path(folder) / "s.zarr")
-        transfer = open_transfer(path, Memory(4 << 30))
-        picture = Picture(transfer, "front", Memory(4 << 30))
-        _settle(picture)
+        path = bake_in_process(
+            DirectMethod(), scene, Recipe("direct", ("front",), size, num_lights), Path(folder) / "s.zarr"
+        )
+        transfer = open_transfer(path, Cache(4 << 30))
+        picture = Picture(transfer, "front", Cache(4 << 30))
+        _run_until_exact(picture)
         look, inexact = _edit(picture, transfer, num_edits)
-        _settle(picture)
+        _run_until_exact(picture)
         error = relative_rmse(picture.image(), _full_image(transfer, look))
     context = {"edits": num_edits, "shown_inexactly": inexact, "size": list(size), "coefficients_a_step": _BUDGET}
     return [Figure("frame.incremental_rmse", error, "relative RMSE", context)]
 
 
-def _settle(picture: Picture) -> None:
+def _run_until_exact(picture: Picture) -> None:
     while not picture.advance(_BUDGET).exact or picture.next_job() is not None:
         if picture.next_job() is not None:
-            picture.freeze(lambda share: None, lambda: False)
+            picture.run_next_job(lambda share: None, lambda: False)
 
 
-def _edit(picture: Picture, transfer: Transfer, num_edits: int) -> tuple[Look, int]:
+def _edit(picture: Picture, transfer: FixedViewTransfer, num_edits: int) -> tuple[Look, int]:
     """Random edits; returns the last look and how many of them were not exact when the next one came."""
     rng, inexact = np.random.default_rng(29), 0
     document = copy.deepcopy(transfer.default_look)
@@ -73,13 +75,13 @@ def _edit(picture: Picture, transfer: Transfer, num_edits: int) -> tuple[Look, i
         material, index, curve, parameter = _TARGETS[k // _STRETCH % len(_TARGETS)]
         term = document["materials"][material]["terms"][index]
         if k % _STRETCH == 0:
-            _settle(picture)  # the hand rests before it opens another curve
-            picture.touch(f"/materials/{material}/terms/{index}/curves/{curve}")
+            _run_until_exact(picture)  # the hand rests before it opens another curve
+            picture.prepare(f"/materials/{material}/terms/{index}/curves/{curve}")
         _change(rng, term, curve, parameter)
         look = validate(copy.deepcopy(document), transfer.default_look)
         picture.set_look(look)
-        while (need := picture.next_job()) is not None and not need.refines:
-            picture.freeze(lambda share: None, lambda: False)
+        while (need := picture.next_job()) is not None and not need.is_refinement:
+            picture.run_next_job(lambda share: None, lambda: False)
         inexact += not picture.advance(_BUDGET).exact
     return look, inexact
 
@@ -100,7 +102,7 @@ def _change(rng: np.random.Generator, term: dict[str, Any], curve: str, paramete
         term["params"][parameter] = float(rng.uniform(low, high))
 
 
-def _full_image(transfer: Transfer, look: Look) -> F64:
+def _full_image(transfer: FixedViewTransfer, look: Look) -> F64:
     """Σ terms of colour · texture · outgoing curves · T · c, all in float64 but T. (height, width, 3)"""
     view = transfer.views["front"]
     radiance = np.zeros((view.num_view_samples, 3))
@@ -110,20 +112,22 @@ def _full_image(transfer: Transfer, look: Look) -> F64:
         for document in look.materials[name].terms:
             radiance[rows] += _full_term(transfer, view.receivers(k), dict(document), view.cos_theta_o[rows])
     weighted = np.empty((view.width * view.height, 3))
-    pixel_of = np.repeat(np.arange(view.width * view.height), np.diff(view.first))
+    pixel_index = np.repeat(np.arange(view.width * view.height), np.diff(view.first))
     for c in range(3):
-        weighted[:, c] = np.bincount(pixel_of, view.gains[:, 0] * radiance[view.order, c], len(weighted))
+        weighted[:, c] = np.bincount(pixel_index, view.throughput[:, 0] * radiance[view.order, c], len(weighted))
     return np.array(look.environment.gain) * weighted.reshape(view.height, view.width, 3)
 
 
-def _full_term(transfer: Transfer, receivers: Any, document: dict[str, Any], cos_theta_o: F64) -> F64:
-    term = TERMS[document["model"]].settled(document)
-    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
+def _full_term(transfer: FixedViewTransfer, receivers: Any, document: dict[str, Any], cos_theta_o: F64) -> F64:
+    term = TERMS[document["model"]].normalized(document)
+    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
     active = max(bands, key=lambda name: bands[name].shape[1])
-    frozen = freeze(term, bands, active, read_lights(transfer.store), receivers, lambda share: None, lambda: False)
-    sums = np.einsum("tcjs,cj->tsc", frozen.transport.astype(np.float64), analysis(bands[active]), optimize=True)
+    operator = precompute(
+        term, bands, active, read_lights(transfer.store), receivers, lambda share: None, lambda: False
+    )
+    sums = np.einsum("tcjs,cj->tsc", operator.transport.astype(np.float64), analysis(bands[active]), optimize=True)
     radiance = sums.reshape(-1, 3)[: len(cos_theta_o)] * np.asarray(document["color"])
     for curve in term.curves:
-        if curve.outgoing:
+        if curve.depends_on_view:
             radiance = radiance * curve_values(document, curve, np.arccos(cos_theta_o)).T
     return np.asarray(radiance)

@@ -23,17 +23,17 @@ from bench.scenes import cook_torrance, teapot_on_table
 from relume.bake import Recipe
 from relume.environments.studio import studio
 from relume.look import Look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
-from relume.operators.frozen import frozen_bytes, packed_bytes
-from relume.picture.jobs import Freeze
+from relume.operators.frozen import operator_bytes, quantized_bytes
+from relume.picture.jobs import PrecomputeOperator
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
-from relume.store import bake_here
+from relume.picture.transfer import FixedViewTransfer
+from relume.store import bake_in_process
 
 _ROOMY, _BANDS = 16 << 30, 256
-_HAND = "/materials/Teapot/terms/0/curves/theta_h"
+_ACTIVE_POINTER = "/materials/Teapot/terms/0/curves/theta_h"
 _CLOSE = 0.3  # of the eye's distance; the teapot fills the picture
 
 
@@ -45,23 +45,23 @@ def measure(tiny: bool) -> list[Figure]:
     def dragged(size: tuple[int, int], forms: tuple[str, ...]) -> dict[str, Any]:
         with tempfile.TemporaryDirectory() as folder:
             recipe = Recipe("direct", ("front",), size, num_lights)
-            path = bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr")
-            return _ways(open_transfer(path, Memory(_ROOMY)), forms, num_edits)
+            path = bake_in_process(DirectMethod(), scene, recipe, Path(folder) / "s.zarr")
+            return _measure_forms(open_transfer(path, Cache(_ROOMY)), forms, num_edits)
 
     large = dragged((width, height), ("packed", "thin"))
     quarter = dragged((width // 2, height // 2), ("packed", "float32"))
-    about = {"size": [width, height], "bands": _BANDS, "lights": num_lights, "edits": num_edits}
-    sizes = {form: of["bytes"] / (width * height) for form, of in large.items()}
-    whole = frozen_bytes(width * height, _BANDS)  # a sample a pixel, as where a material fills the picture
+    details = {"size": [width, height], "bands": _BANDS, "lights": num_lights, "edits": num_edits}
+    sizes = {form: form_result["bytes"] / (width * height) for form, form_result in large.items()}
+    whole = operator_bytes(width * height, _BANDS)  # a sample a pixel, as where a material fills the picture
     sizes["float32"] = whole / (width * height)
     return [
-        Figure("large.frame_ms", large["packed"]["ms"], "ms", {**about, **large}),
+        Figure("large.frame_ms", large["packed"]["ms"], "ms", {**details, **large}),
         Figure("large.frame_ratio", quarter["packed"]["ms"] / quarter["float32"]["ms"], "ratio", quarter),
         Figure("large.bytes_ratio", large["packed"]["bytes"] / whole, "ratio", {"bytes_a_pixel": sizes}),
     ]
 
 
-def _looks(transfer: Transfer, num: int) -> list[Look]:
+def _looks(transfer: FixedViewTransfer, num: int) -> list[Look]:
     """The highlight's curve, drawn higher and narrower from look to look."""
     looks = []
     for k in range(num):
@@ -73,45 +73,45 @@ def _looks(transfer: Transfer, num: int) -> list[Look]:
     return looks
 
 
-def _ways(transfer: Transfer, forms: tuple[str, ...], num_edits: int) -> dict[str, Any]:
+def _measure_forms(transfer: FixedViewTransfer, forms: tuple[str, ...], num_edits: int) -> dict[str, Any]:
     """The drag with operators of several forms, each in a memory that has room for no better one."""
     rows = transfer.views["front"].rows(0)
     num = rows.stop - rows.start
-    budgets = {"float32": _ROOMY, "packed": frozen_bytes(num, _BANDS) - 1, "thin": packed_bytes(num, _BANDS) - 1}
+    budgets = {"float32": _ROOMY, "packed": operator_bytes(num, _BANDS) - 1, "thin": quantized_bytes(num, _BANDS) - 1}
     looks = _looks(transfer, num_edits)
-    last = _settled(transfer, looks[-1], Memory(_ROOMY)).image()
-    return {form: _follow(transfer, looks, budgets[form], last) for form in forms}
+    last = _open_exact(transfer, looks[-1], Cache(_ROOMY)).image()
+    return {form: _measure_edits(transfer, looks, budgets[form], last) for form in forms}
 
 
-def _follow(transfer: Transfer, looks: list[Look], budget_bytes: int, last: Any) -> dict[str, Any]:
+def _measure_edits(transfer: FixedViewTransfer, looks: list[Look], budget_bytes: int, last: Any) -> dict[str, Any]:
     """Drag with what is touched frozen beforehand; last: what the last look is when it is shaded."""
-    memory = Memory(budget_bytes)
-    picture = _settled(transfer, looks[0], memory)
-    picture.touch(_HAND)
+    cache = Cache(budget_bytes)
+    picture = _open_exact(transfer, looks[0], cache)
+    picture.prepare(_ACTIVE_POINTER)
     job = picture.next_job()
-    assert isinstance(job, Freeze)
-    began = time.perf_counter()
-    made = job.make(lambda share: None, lambda: False)
-    freeze_s = time.perf_counter() - began
-    picture.install(job, made)
-    taken = []
+    assert isinstance(job, PrecomputeOperator)
+    start_time = time.perf_counter()
+    result = job.run(lambda share: None, lambda: False)
+    freeze_s = time.perf_counter() - start_time
+    picture.install(job, result)
+    durations = []
     for look in looks[1:]:
-        began = time.perf_counter()
-        picture.set_look(look, hand=_HAND)
+        start_time = time.perf_counter()
+        picture.set_look(look, active_pointer=_ACTIVE_POINTER)
         picture.advance(None)
-        taken.append(time.perf_counter() - began)
+        durations.append(time.perf_counter() - start_time)
     return {
-        "ms": 1e3 * float(np.median(taken)),
+        "ms": 1e3 * float(np.median(durations)),
         "freeze_s": freeze_s,
         "error": relative_rmse(picture.image(), last),
         "step": job.form.step,
-        "bytes": made.num_bytes,
+        "bytes": result.num_bytes,
     }
 
 
-def _settled(transfer: Transfer, look: Look, memory: Memory) -> Picture:
-    picture = Picture(transfer, "front", memory)
+def _open_exact(transfer: FixedViewTransfer, look: Look, cache: Cache) -> Picture:
+    picture = Picture(transfer, "front", cache)
     picture.set_look(look)
     while not picture.advance(None).exact or picture.next_job() is not None:
-        picture.freeze(lambda share: None, lambda: False)
+        picture.run_next_job(lambda share: None, lambda: False)
     return picture

@@ -19,21 +19,21 @@ from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
 from bench.indirect import PASSES
-from bench.mitsuba import bsdf, missing, passes_of, render
-from bench.standard_error import over_passes
+from bench.mitsuba import bsdf, missing, read_passes, render
+from bench.standard_error import compare_with_passes
 from relume.bake import Recipe
 from relume.environments.model import Environment
 from relume.light.local import rectangle
 from relume.look import Look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
 from relume.scene.cornell import cornell_box
 from relume.scene.model import Scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 F64 = NDArray[np.float64]
 
@@ -68,53 +68,56 @@ def _errors(folder: Path, tiny: bool) -> list[Figure]:
     night = Environment("night", np.full((4, 8, 3), 1e-7, np.float32))
     scene = make_scene("night", room.meshes, room.materials, room.cameras, night)
     recipe = Recipe("direct", ("front",), size, 20)
-    transfer = open_transfer(bake_here(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Memory(4 << 30))
+    transfer = open_transfer(bake_in_process(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Cache(4 << 30))
     bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     figures = []
     for name, (kind, light) in zip(_NAMES, _LIGHTS.items(), strict=True):
-        ours = render_image(transfer, "front", _look(transfer, {"A": light})).astype(np.float64)
+        rendered = render_image(transfer, "front", _make_look(transfer, {"A": light})).astype(np.float64)
         job = {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs, "emitters": [_emitter(light, transfer)]}
         render(scene, size, job, folder)
-        theirs = passes_of(folder)
-        found = over_passes(_blocks(ours), np.array([_blocks(one) for one in theirs], np.float32))
-        context = {**found.context, "size": list(size), "spp": PASSES * spp, "kind": kind}
-        figures.append(Figure(name, found.error.value, "relative RMSE", context, found.error.standard_error))
+        reference_passes = read_passes(folder)
+        comparison = compare_with_passes(
+            _average_blocks(rendered),
+            np.array([_average_blocks(block_pass) for block_pass in reference_passes], np.float32),
+        )
+        context = {**comparison.context, "size": list(size), "spp": PASSES * spp, "kind": kind}
+        figures.append(Figure(name, comparison.error.value, "relative RMSE", context, comparison.error.standard_error))
     return figures
 
 
-def _look(transfer: Transfer, lights: dict[str, Any]) -> Look:
+def _make_look(transfer: FixedViewTransfer, lights: dict[str, Any]) -> Look:
     return validate({"environment": {"scale": 0.0}, "lights": lights}, transfer.default_look)
 
 
-def _blocks(picture: NDArray[np.floating]) -> F64:
+def _average_blocks(picture: NDArray[np.floating]) -> F64:
     height, width, _ = picture.shape
     blocks = picture.reshape(height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK, 3)
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
 
 
-def _emitter(light: dict[str, Any], transfer: Transfer) -> dict[str, Any]:
+def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, Any]:
     """A light of a look as Mitsuba describes it; `to_world` by rows."""
-    made = _look(transfer, {"A": light}).lights["A"].geometry
-    shine = {"type": "rgb", "value": light["emission"]}
+    geometry = _make_look(transfer, {"A": light}).lights["A"].geometry
+    emission = {"type": "rgb", "value": light["emission"]}
     if light["kind"] == "point":
-        return {"type": "point", "position": light["position"], "intensity": shine}
+        return {"type": "point", "position": light["position"], "intensity": emission}
     if light["kind"] == "directional":
-        return {"type": "directional", "direction": light["direction"], "irradiance": shine}
+        return {"type": "directional", "direction": light["direction"], "irradiance": emission}
     to_world = np.eye(4)
     if light["kind"] == "spot":
-        forward = np.array(made.direction) / np.linalg.norm(made.direction)
+        forward = np.array(geometry.direction) / np.linalg.norm(geometry.direction)
         right = np.cross([1.0, 0.0, 0.0], forward)
         right /= np.linalg.norm(right)
         to_world[:3, :3] = np.stack([np.cross(forward, right), right, forward], axis=1)
-        to_world[:3, 3] = made.position
-        inner, outer = made.cone
+        to_world[:3, 3] = geometry.position
+        inner, outer = geometry.cone
         angles = {"beam_width": inner, "cutoff_angle": outer}
-        return {"type": "spot", "intensity": shine, "to_world": to_world.ravel().tolist(), **angles}
-    corner, edges = rectangle(made)  # Mitsuba's covers [-1, 1]²
+        return {"type": "spot", "intensity": emission, "to_world": to_world.ravel().tolist(), **angles}
+    corner, edges = rectangle(geometry)  # Mitsuba's covers [-1, 1]²
     to_world[:3, :2] = edges.T / 2
-    to_world[:3, 2] = np.array(made.direction) / np.linalg.norm(made.direction)
+    to_world[:3, 2] = np.array(geometry.direction) / np.linalg.norm(geometry.direction)
     to_world[:3, 3] = corner + edges.sum(axis=0) / 2
-    area = {"type": "area", "radiance": shine}
+    area = {"type": "area", "radiance": emission}
     return {"type": "rectangle", "emitter": area, "to_world": to_world.ravel().tolist()}
 
 
@@ -122,19 +125,19 @@ def _gain_fps(folder: Path, tiny: bool) -> Figure:
     """Time frames of a picture with reflected light, 400×400, while one of two lights is dimmed."""
     scene: Scene = cornell_box()
     size, method = ((32, 32), "direct") if tiny else ((400, 400), "gather")
-    store = bake_here(
+    store = bake_in_process(
         METHODS[method], scene, Recipe(method, ("front",), size, 20 if tiny else 1000), folder / "gather.zarr"
     )
-    transfer = open_transfer(store, Memory(4 << 30))
-    picture = Picture(transfer, "front", Memory(1 << 30))
-    taken = []
+    transfer = open_transfer(store, Cache(4 << 30))
+    picture = Picture(transfer, "front", Cache(1 << 30))
+    durations = []
     for k in range(5 if tiny else 60):
         panel = _LIGHTS["rectangle"] | {"scale": 1 + k / 60}
         picture.set_look(validate({"lights": {"A": _LIGHTS["point"], "B": panel}}, transfer.default_look))
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         if k > 1:  # the first shades all, the second one light alone
             picture.encode(picture.advance(None).tiles, "rgb9e5")
-            taken.append(time.perf_counter() - began)
+            durations.append(time.perf_counter() - start_time)
         while not picture.advance(None).exact or picture.next_job() is not None:
-            picture.freeze(lambda share: None, lambda: False)
-    return Figure(_FPS, 1 / float(np.median(taken)), "fps", {"size": list(size), "method": method})
+            picture.run_next_job(lambda share: None, lambda: False)
+    return Figure(_FPS, 1 / float(np.median(durations)), "fps", {"size": list(size), "method": method})

@@ -35,26 +35,26 @@ def measure(tiny: bool) -> list[Figure]:
         serving(house) as server,
         session(server, house.bake) as client,
     ):
-        client.send(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
+        client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
-        hand = _Hand(client)
-        hand.drag(seconds)  # what is made once is made
-        alone: list[float] = []
-        beside: list[float] = []
+        slider_client = _SliderClient(client)
+        slider_client.drag(seconds)  # what is made once is made
+        unloaded_ms: list[float] = []
+        loaded_ms: list[float] = []
         painted = 0
         for _ in range(rounds):
-            alone.append(hand.drag(seconds))
+            unloaded_ms.append(slider_client.drag(seconds))
             queued = _fill(server, house)
-            beside.append(hand.drag(seconds))
-            found = [_call(server, "GET", address) for address in queued]
-            painted += sum(int(body["done"] if "done" in body else body["passes"]) for body in found)
+            loaded_ms.append(slider_client.drag(seconds))
+            responses = [_call(server, "GET", address) for address in queued]
+            painted += sum(int(body["done"] if "done" in body else body["passes"]) for body in responses)
             for address in queued:
                 _call(server, "DELETE", f"{address}?forget=true" if "truths" in address else address)
             time.sleep(0.5)
     context = {
-        "alone_fps": float(np.median(alone)),
-        "beside_fps": float(np.median(beside)),
-        "each_ratio": [b / a for a, b in zip(alone, beside, strict=True)],
+        "alone_fps": float(np.median(unloaded_ms)),
+        "beside_fps": float(np.median(loaded_ms)),
+        "each_ratio": [b / a for a, b in zip(unloaded_ms, loaded_ms, strict=True)],
         "steps_done_beside": painted,
         "rounds": rounds,
         "seconds": seconds,
@@ -63,7 +63,7 @@ def measure(tiny: bool) -> list[Figure]:
     return [Figure(_NAME, context["beside_fps"] / context["alone_fps"], "ratio", context)]  # type: ignore[operator]
 
 
-class _Hand:
+class _SliderClient:
     """Drags σ to and fro."""
 
     def __init__(self, client: SessionClient) -> None:
@@ -71,29 +71,29 @@ class _Hand:
 
     def drag(self, seconds: float) -> float:
         """Frames a second."""
-        began, frames = time.perf_counter(), 0
-        while (taken := time.perf_counter() - began) < seconds:
+        start_time, frames = time.perf_counter(), 0
+        while (durations := time.perf_counter() - start_time) < seconds:
             self._revision += 1
             sigma = 0.2 + 0.15 * np.sin(2 * np.pi * self._revision / 90)
             patch = [{"op": "replace", "path": _SIGMA, "value": round(float(sigma), 5)}]
-            self._client.send(type="edit", revision=self._revision, patch=patch)
-            while (found := self._client.frame()) is None or found[0]["revision"] < self._revision:
+            self._client.send_message(type="edit", revision=self._revision, patch=patch)
+            while (received := self._client.frame()) is None or received[0]["revision"] < self._revision:
                 pass
             frames += 1
         self._client.exact(self._revision)
-        return frames / taken
+        return frames / durations
 
 
 def _fill(server: Server, house: House) -> list[str]:
     """Queue batches and a comparison, and wait until both run; returns their addresses."""
     common = {"bake": house.bake, "view": "front"}
     looks = [{"materials": {"Teapot": {"terms": [LAMBERT, cook_torrance(0.15 + 0.002 * k)]}}} for k in range(200)]
-    found = [
+    job_addresses = [
         str(_call(server, "POST", "/api/renders", {**common, "looks": looks, "format": "png"})["id"])
         for _ in range(_NUM_BATCHES)
     ]
-    truth = str(_call(server, "POST", "/api/truths", {**common, "passes": 1024})["id"])
-    addresses = [*(f"/api/renders/{identity}" for identity in found), f"/api/truths/{truth}"]
+    comparison_id = str(_call(server, "POST", "/api/truths", {**common, "passes": 1024})["id"])
+    addresses = [*(f"/api/renders/{identity}" for identity in job_addresses), f"/api/truths/{comparison_id}"]
     deadline = time.monotonic() + _WAIT_S
     while not all(_call(server, "GET", addresses[k])["progress"] > 0 for k in (0, -1)):
         if time.monotonic() > deadline:
@@ -109,5 +109,5 @@ def _call(server: Server, method: str, path: str, body: Any = None) -> dict[str,
         request.add_header("Content-Type", "application/json")
     with urllib.request.urlopen(request, timeout=_WAIT_S) as answer:
         text = answer.read()
-    found: dict[str, Any] = json.loads(text) if text else {}
-    return found
+    content: dict[str, Any] = json.loads(text) if text else {}
+    return content

@@ -18,7 +18,7 @@ def processor_ticks() -> tuple[int, int] | None:
     return stolen + sum(ticks[k] for k in (_USER, _NICE, _SYSTEM, _IRQ, _SOFT_IRQ)), stolen
 
 
-def stolen_share(before: tuple[int, int] | None, after: tuple[int, int] | None) -> float | None:
+def measure_stolen_fraction(before: tuple[int, int] | None, after: tuple[int, int] | None) -> float | None:
     """Share of the wanted processor time between two readings that went to other guests; None where it is not known.
 
     A wall time measured while it is 0.5 is about twice what the machine needs by itself.

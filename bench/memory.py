@@ -43,15 +43,15 @@ def measure(tiny: bool) -> list[Figure]:
     """Let one server bake and show scene after scene, then leave it alone."""
     size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
     num_scenes, num_more = (2, 1) if tiny else (_NUM_SCENES, _NUM_MORE)
-    scenes = list(_scenes(num_scenes + num_more))
+    scenes = list(_make_scenes(num_scenes + num_more))
     with baked_house(scenes[0], Recipe("direct", (scenes[0].cameras[0].name,), (64, 48), 60)) as house:
         _register(house, scenes[1:])
         with serving(house) as server:
             before = _resident(server.pid)
-            _visit_all(server, scenes[:num_scenes], size, num_lights)
+            _use_all(server, scenes[:num_scenes], size, num_lights)
             after = _resident(server.pid)
-            rest = _rested(server, tiny)
-            _visit_all(server, scenes[num_scenes:], (size[0] // 2, size[1] // 2), num_lights // 2)
+            idle = _rested(server, tiny)
+            _use_all(server, scenes[num_scenes:], (size[0] // 2, size[1] // 2), num_lights // 2)
             more = _rested(server, tiny)
     context = {
         "scenes": num_scenes,
@@ -60,29 +60,29 @@ def measure(tiny: bool) -> list[Figure]:
         "rest_s": _REST_S + _MORE_S,
         "server_at_start": before.server / 1e6,
     }
-    found = {"after": after, "rest": rest}
-    of_growth = {**context, "more_scenes": num_more, "floor_mb": rest.server / 1e6, "rest_mb": more.server / 1e6}
+    readings = {"after": after, "rest": idle}
+    growth_context = {**context, "more_scenes": num_more, "floor_mb": idle.server / 1e6, "rest_mb": more.server / 1e6}
     return [
         *(
-            Figure(f"memory.{of}_{when}_mb", getattr(resident, of) / 1e6, "MB", context)
-            for when, resident in found.items()
-            for of in ("server", "workers")
+            Figure(f"memory.{process_group}_{when}_mb", getattr(resident, process_group) / 1e6, "MB", context)
+            for when, resident in readings.items()
+            for process_group in ("server", "workers")
         ),
-        Figure("memory.server_growth", max(0.0, more.server / rest.server - 1), "share", of_growth),
+        Figure("memory.server_growth", max(0.0, more.server / idle.server - 1), "share", growth_context),
     ]
 
 
-def _scenes(count: int) -> Iterator[Scene]:
+def _make_scenes(count: int) -> Iterator[Scene]:
     """Scenes of several sizes made by code, each another."""
     yield from [each.make() for each in BUILT_IN.values()][:count]
     for number in range(count - len(BUILT_IN)):
         yield teapot_on_table(studio(), (LAMBERT, cook_torrance(0.1 + 0.01 * number)), (LAMBERT,))
 
 
-def _visit_all(server: Server, scenes: list[Scene], size: tuple[int, int], num_lights: int) -> None:
+def _use_all(server: Server, scenes: list[Scene], size: tuple[int, int], num_lights: int) -> None:
     """One after another, every second with light between surfaces."""
     for number, scene in enumerate(scenes):
-        _visit(server, scene, size, num_lights, "gather" if number % 2 else "direct")
+        _use_scene(server, scene, size, num_lights, "gather" if number % 2 else "direct")
 
 
 def _rested(server: Server, tiny: bool) -> Resident:
@@ -98,7 +98,7 @@ def _register(house: House, scenes: list[Scene]) -> None:
     ledger.close()
 
 
-def _visit(server: Server, scene: Scene, size: tuple[int, int], num_lights: int, method: str) -> None:
+def _use_scene(server: Server, scene: Scene, size: tuple[int, int], num_lights: int, method: str) -> None:
     """Bake a scene, look at it, edit it, and leave."""
     views = [scene.cameras[0].name]
     bake = _call(server, "POST", "/api/bakes", scene=scene.id, views=views, size=size, lights=num_lights, method=method)
@@ -112,9 +112,9 @@ def _visit(server: Server, scene: Scene, size: tuple[int, int], num_lights: int,
     light = [("/environment/rotation", 40.0), ("/environment/map", "sunset")]
     with session(server, bake["id"]) as client:
         client.exact(0)
-        client.send(type="touch", curve=f"/materials/{material.name}/terms/0/curves/{curve}")
+        client.send_message(type="touch", curve=f"/materials/{material.name}/terms/0/curves/{curve}")
         for revision, (path, value) in enumerate(light, start=1):
-            client.send(type="edit", revision=revision, patch=[{"op": "replace", "path": path, "value": value}])
+            client.send_message(type="edit", revision=revision, patch=[{"op": "replace", "path": path, "value": value}])
             client.exact(revision)
 
 
@@ -130,9 +130,9 @@ def _call(server: Server, verb: str, path: str, **body: Any) -> Any:
 def _resident(server: int) -> Resident:
     """Of a process, and of all that it and they have started."""
     parents = dict(_processes())
-    below, found = {server}, 0
-    while len(below) > found:
-        found = len(below)
+    below, num_bytes = {server}, 0
+    while len(below) > num_bytes:
+        num_bytes = len(below)
         below |= {pid for pid, parent in parents.items() if parent in below}
     return Resident(_resident_bytes(server), sum(_resident_bytes(pid) for pid in below - {server}))
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from bench.timing import in_turn
+from bench.timing import time_interleaved
 from relume.scene.mesh_files.obj import read_obj
 from relume.scene.mesh_files.ply import read_ply
 
@@ -35,12 +35,17 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _figure(
-    name: str, num_triangles: int, data: bytes, ours: Callable[[], object], library: str, theirs: Callable[[bytes], int]
+    name: str,
+    num_triangles: int,
+    data: bytes,
+    relume_reader: Callable[[], object],
+    library: str,
+    library_reader: Callable[[bytes], int],
 ) -> Figure:
-    calls = [ours]
+    calls = [relume_reader]
     if importlib.util.find_spec(library) is not None:
-        calls.append(lambda: theirs(data))
-    fastest = [min(times) for times in in_turn(calls, _ROUNDS)]
+        calls.append(lambda: library_reader(data))
+    fastest = [min(times) for times in time_interleaved(calls, _ROUNDS)]
     context: dict[str, Any] = {"triangles": num_triangles, "bytes": len(data), "rounds": _ROUNDS}
     context |= {f"{library}_s": seconds for seconds in fastest[1:]}
     return Figure(name, fastest[0], "s", context)
@@ -92,5 +97,5 @@ def _by_tinyobjloader(data: bytes) -> int:
 def _by_plyfile(data: bytes) -> int:
     import plyfile
 
-    found = plyfile.PlyData.read(io.BytesIO(data))
-    return len(np.vstack(found["face"]["vertex_indices"]))
+    ply = plyfile.PlyData.read(io.BytesIO(data))
+    return len(np.vstack(ply["face"]["vertex_indices"]))

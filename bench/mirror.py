@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.gather import bake
 from bench.indirect import PASSES
-from bench.mitsuba import averaged, missing, passes_of, render
-from bench.standard_error import NoiseFree, over_passes
+from bench.mitsuba import averaged, missing, read_passes, render
+from bench.standard_error import NoiseCorrectedError, compare_with_passes
 from relume.bake import Recipe
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
@@ -45,32 +45,42 @@ def measure(tiny: bool) -> list[Figure]:
     size, spp, lights = ((40, 30), 2, 60) if tiny else (_SIZE, _SPP, _LIGHTS)
     scene = mirror_room()
     with tempfile.TemporaryDirectory() as folder:
-        ours, is_ball = _ours(scene, size, lights, Path(folder))
-        theirs = _theirs(scene, size, spp, Path(folder))
-    whole, balls, others = (_over(ours, theirs, chosen) for chosen in (is_ball | True, is_ball, ~is_ball))
-    about = {"size": list(size), "spp": PASSES * spp, "lights": lights}
+        rendered, is_ball = _render_relume(scene, size, lights, Path(folder))
+        reference_passes = _render_mitsuba(scene, size, spp, Path(folder))
+    whole, balls, background = (
+        _compare_pixels(rendered, reference_passes, mask) for mask in (is_ball | True, is_ball, ~is_ball)
+    )
+    details = {"size": list(size), "spp": PASSES * spp, "lights": lights}
     return [
-        Figure(name, found.error.value, _UNIT, {**found.context, **about, **more}, found.error.standard_error)
-        for name, found, more in zip(_NAMES, (whole, balls), ({"beside_the_balls": others.said}, {}), strict=True)
+        Figure(
+            name,
+            comparison.error.value,
+            _UNIT,
+            {**comparison.context, **details, **more},
+            comparison.error.standard_error,
+        )
+        for name, comparison, more in zip(
+            _NAMES, (whole, balls), ({"beside_the_balls": background.summary}, {}), strict=True
+        )
     ]
 
 
-def _over(ours: F64, theirs: F32, chosen: NDArray[np.bool_]) -> NoiseFree:
+def _compare_pixels(rendered: F64, reference_passes: F32, mask: NDArray[np.bool_]) -> NoiseCorrectedError:
     """Of some pixels, as if they were a row."""
-    return over_passes(ours[chosen][None], theirs[:, chosen][:, None])
+    return compare_with_passes(rendered[mask][None], reference_passes[:, mask][:, None])
 
 
 def mirror_room() -> Scene:
     """The scene of this benchmark."""
     names = ("Table", "Left", "Back", "Clay", "Chrome", "Brass")
-    turn = np.eye(3)
+    rotation = np.eye(3)
     meshes = [
         rectangle([-2, 0, 2], [4, 0, 0], [0, 0, -4]).mesh("table", 0),
         rectangle([-2, 0, 2], [0, 0, -4], [0, 2.5, 0]).mesh("left", 1),
         rectangle([-2, 0, -2], [4, 0, 0], [0, 2.5, 0]).mesh("back", 2),
-        sphere(0.25, 64).moved(turn, [-0.1, 0.25, 0.8]).mesh("clay", 3),
-        sphere(0.6, 96).moved(turn, [-0.8, 0.6, 0.0]).mesh("chrome", 4),
-        sphere(0.45, 96).moved(turn, [0.7, 0.45, 0.2]).mesh("brass", 5),
+        sphere(0.25, 64).transform(rotation, [-0.1, 0.25, 0.8]).mesh("clay", 3),
+        sphere(0.6, 96).transform(rotation, [-0.8, 0.6, 0.0]).mesh("chrome", 4),
+        sphere(0.45, 96).transform(rotation, [0.7, 0.45, 0.2]).mesh("brass", 5),
     ]
     camera = look_at("front", (0.6, 1.3, 4.0), (-0.1, 0.5, 0.0), 0.7)
     return make_scene("mirrors", meshes, [_material(name) for name in names], [camera], sunny_sky())
@@ -83,11 +93,11 @@ def _material(name: str) -> Material:
     return Material(name, (*diffuse, *mirror))
 
 
-def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
+def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
     """The picture, and which pixels the metal balls fill."""
     width, height = size
     recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), lights)
-    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
+    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
     fine = render_image(transfer, "front", validate({}, transfer.default_look))
     is_ball = np.isin(transfer.views["front"].material_ids(), (4, 5))
     return (
@@ -96,11 +106,11 @@ def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tup
     )
 
 
-def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
+def _render_mitsuba(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
     bsdfs = [_bsdf(material.name) for material in scene.materials]
     job = {"integrator": {"type": "path", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
     render(scene, size, job, folder)
-    return passes_of(folder)
+    return read_passes(folder)
 
 
 def _bsdf(name: str) -> dict[str, object]:

@@ -22,7 +22,7 @@ from relume.scene.model import Scene
 F32 = NDArray[np.float32]
 
 _FINE_ROWS = 2048  # of a map that is handed over, where n times its rows may be as many
-_MOST_SPP = 32  # at once; more would not fit in memory
+_MAX_SPP_PER_PASS = 32  # at once; more would not fit in memory
 
 
 def missing() -> str | None:
@@ -41,8 +41,8 @@ def _interpreter() -> Path | None:
 
 
 def _llvm() -> str | None:
-    found = sorted(map(str, Path("/usr/lib").glob("*/libLLVM*19*")))
-    return os.environ.get("DRJIT_LIBLLVM_PATH") or (found[0] if found else None)
+    libraries = sorted(map(str, Path("/usr/lib").glob("*/libLLVM*19*")))
+    return os.environ.get("DRJIT_LIBLLVM_PATH") or (libraries[0] if libraries else None)
 
 
 def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -61,9 +61,12 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             "sigma": params["sigma"], "ior": params["ior"],
         }  # fmt: skip
     glossy, exponent = (lobes[0]["color"], lobes[0]["params"]["exponent"]) if lobes else ([0.0] * 3, 1.0)
-    share = sum(diffuse) / max(1e-9, sum(diffuse) + 4 * sum(glossy))  # a highlight reflects up to four times its colour
+    diffuse_fraction = sum(diffuse) / max(
+        1e-9, sum(diffuse) + 4 * sum(glossy)
+    )  # a highlight reflects up to four times its colour
     return {
-        "type": "lambert_blinn_phong", "albedo": diffuse, "gain": glossy, "exponent": exponent, "diffuse_share": share,
+        "type": "lambert_blinn_phong", "albedo": diffuse, "gain": glossy, "exponent": exponent,
+        "diffuse_share": diffuse_fraction,
     }  # fmt: skip
 
 
@@ -84,13 +87,13 @@ def map_for_mitsuba(radiance: F32) -> F32:
     return np.asarray(0.5 * (radiance[above] + radiance[below]), np.float32).repeat(finer, axis=1)
 
 
-def passes_of(folder: Path) -> F32:
+def read_passes(folder: Path) -> F32:
     """Read the independent pictures that `render` was asked for. (passes, height, width, 3)"""
     return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
 
 
 def averaged(fine: NDArray[Any], finer: int) -> NDArray[np.float64]:
-    """Average a picture that has `finer` times as many pixels both ways as the peer's. (h, w, 3) float64"""
+    """Average a picture that has `with_detail` times as many pixels both ways as the peer's. (h, w, 3) float64"""
     height, width, _ = fine.shape
     blocks = fine.reshape(height // finer, finer, width // finer, finer, 3)
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
@@ -131,13 +134,16 @@ def render_arrays(
         size, job, folder: as of `render`.
     """
     camera, llvm = scene.cameras[0], _llvm()
-    seen: dict[str, Any] = {"camera": camera.to_world, "environment": map_for_mitsuba(scene.environment.radiance)}
-    np.savez(folder / "scene.npz", allow_pickle=False, **{**seen, **arrays})
-    whole = {"yfov": camera.yfov, "size": list(size), "most": _MOST_SPP, **job}
+    arrays_by_name: dict[str, Any] = {
+        "camera": camera.to_world,
+        "environment": map_for_mitsuba(scene.environment.radiance),
+    }
+    np.savez(folder / "scene.npz", allow_pickle=False, **{**arrays_by_name, **arrays})
+    whole = {"yfov": camera.yfov, "size": list(size), "most": _MAX_SPP_PER_PASS, **job}
     (folder / "job.json").write_text(json.dumps(whole))
     script = Path(__file__).with_name("peer_mitsuba_render.py")
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(llvm)}
     command = [str(_interpreter()), "-I", str(script), str(folder)]
     subprocess.run(command, env=environment, check=True, timeout=3600)
-    found: dict[str, Any] = json.loads((folder / "result.json").read_text())
-    return found
+    result: dict[str, Any] = json.loads((folder / "result.json").read_text())
+    return result

@@ -28,20 +28,20 @@ from bench.figure import Figure
 from bench.timing import seconds
 from relume.bake import BakeMethod, Recipe
 from relume.look import Look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
 from relume.methods.registry import open_transfer
 from relume.parallel import num_threads
 from relume.picture.picture import Picture
-from relume.picture.routes.preview import Preview
-from relume.picture.transfer import Transfer
+from relume.picture.routes.preview import SparsePreview
+from relume.picture.transfer import FixedViewTransfer
 from relume.render.image import render_image
 from relume.scene.demo import demo_scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
-_MEMORY = 6 << 30  # the most that a server takes unless it is told
-_HAND = "/materials/Teapot/terms/1/params/nu"
+_CACHE_BYTES = 6 << 30  # the most that a server takes unless it is told
+_ACTIVE_POINTER = "/materials/Teapot/terms/1/params/nu"
 _EDITS = 30
 _TURNED, _EXCHANGED = {"rotation": 50.0}, {"map": "clear_sky"}
 
@@ -70,25 +70,25 @@ def measure(tiny: bool) -> list[Figure]:
     num_lights = 60 if tiny else 1000
     direct, gather = DirectMethod(), GatherMethod()
     for method in (direct, gather):
-        _waits(method, (48, 36), 60)
-    one, all_light = (_waits(method, small, num_lights) for method in (direct, gather))
-    hd, uhd = (_waits(direct, size, num_lights) for size in (large, larger))
+        _measure_waits(method, (48, 36), 60)
+    direct_waits, gather_waits = (_measure_waits(method, small, num_lights) for method in (direct, gather))
+    hd, uhd = (_measure_waits(direct, size, num_lights) for size in (large, larger))
     common = {"lights": num_lights, "threads": num_threads()}
-    of_small = {"size": list(small), **common, "direct": one._asdict(), "gather": all_light._asdict()}
-    of_large = {**common, _name(large): hd._asdict(), _name(larger): uhd._asdict()}
+    small_context = {"size": list(small), **common, "direct": direct_waits._asdict(), "gather": gather_waits._asdict()}
+    large_context = {**common, _name(large): hd._asdict(), _name(larger): uhd._asdict()}
     pixels = larger[0] * larger[1] / (large[0] * large[1])
     return [
-        Figure("opening.first_s", max(one.first_s, all_light.first_s), "s", of_small),
-        Figure("opening.exact_s", one.exact_s, "s", of_small),
-        Figure("opening.exact_gather_s", all_light.exact_s, "s", of_small),
-        Figure("opening.ahead_s", one.ahead_s, "s", of_small),
-        Figure("opening.ahead_gather_s", all_light.ahead_s, "s", of_small),
-        Figure("opening.relit_s", one.relit_s, "s", of_small),
-        Figure("opening.relit_gather_s", all_light.relit_s, "s", of_small),
-        Figure("opening.large_first_s", hd.first_s, "s", of_large),
-        Figure("opening.large_exact_s", hd.exact_s, "s", of_large),
-        Figure("opening.large_edit_ms", hd.edit_ms, "ms", of_large),
-        Figure("opening.larger_ratio", float(np.max(np.divide(uhd, hd)) / pixels), "ratio", of_large),
+        Figure("opening.first_s", max(direct_waits.first_s, gather_waits.first_s), "s", small_context),
+        Figure("opening.exact_s", direct_waits.exact_s, "s", small_context),
+        Figure("opening.exact_gather_s", gather_waits.exact_s, "s", small_context),
+        Figure("opening.ahead_s", direct_waits.ahead_s, "s", small_context),
+        Figure("opening.ahead_gather_s", gather_waits.ahead_s, "s", small_context),
+        Figure("opening.relit_s", direct_waits.relit_s, "s", small_context),
+        Figure("opening.relit_gather_s", gather_waits.relit_s, "s", small_context),
+        Figure("opening.large_first_s", hd.first_s, "s", large_context),
+        Figure("opening.large_exact_s", hd.exact_s, "s", large_context),
+        Figure("opening.large_edit_ms", hd.edit_ms, "ms", large_context),
+        Figure("opening.larger_ratio", float(np.max(np.divide(uhd, hd)) / pixels), "ratio", large_context),
     ]
 
 
@@ -96,79 +96,79 @@ def _name(size: tuple[int, int]) -> str:
     return f"{size[0]}×{size[1]}"
 
 
-def _waits(method: BakeMethod, size: tuple[int, int], num_lights: int) -> _Waits:
+def _measure_waits(method: BakeMethod, size: tuple[int, int], num_lights: int) -> _Waits:
     scene = demo_scene()
     view = scene.cameras[0].name
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe(method.name, (view,), size, num_lights)
-        path = bake_here(method, scene, recipe, Path(folder) / "opened.zarr")
-        began = time.perf_counter()
-        transfer, picture = _opened(path, view)
+        path = bake_in_process(method, scene, recipe, Path(folder) / "opened.zarr")
+        start_time = time.perf_counter()
+        transfer, picture = _open_picture(path, view)
         while not picture.advance(None).complete:
-            _make(picture)
+            _run_next_job(picture)
         picture.encode(picture.all_tiles(), "rgb9e5")
-        first_s = time.perf_counter() - began
-        while isinstance(picture.next_job(), Preview):
-            _make(picture)
+        first_s = time.perf_counter() - start_time
+        while isinstance(picture.next_job(), SparsePreview):
+            _run_next_job(picture)
             picture.advance(None)
         picture.encode(picture.all_tiles(), "rgb9e5")
-        lit_s = time.perf_counter() - began
-        _settle(picture)
-        exact_s = time.perf_counter() - began
+        lit_s = time.perf_counter() - start_time
+        _run_until_exact(picture)
+        exact_s = time.perf_counter() - start_time
         shutil.rmtree(path / "derived")
-        _shade_ahead(path, view)
-        ahead_s = seconds(lambda: _settle(_opened(path, view)[1]))
-        turned_s, exchanged_s = (_relit_s(transfer, picture, light) for light in (_TURNED, _EXCHANGED))
+        _prewarm(path, view)
+        prewarmed_s = seconds(lambda: _run_until_exact(_open_picture(path, view)[1]))
+        rotated_s, exchanged_s = (_relit_s(transfer, picture, light) for light in (_TURNED, _EXCHANGED))
         _relit_s(transfer, picture, {})
-        return _Waits(first_s, lit_s, exact_s, ahead_s, turned_s, exchanged_s, _edit_ms(transfer, picture))
+        return _Waits(first_s, lit_s, exact_s, prewarmed_s, rotated_s, exchanged_s, _edit_ms(transfer, picture))
 
 
-def _opened(path: Path, view: str) -> tuple[Transfer, Picture]:
+def _open_picture(path: Path, view: str) -> tuple[FixedViewTransfer, Picture]:
     """A bake of which nothing is in memory, and its picture."""
-    transfer = open_transfer(path, Memory(_MEMORY))
-    return transfer, Picture(transfer, view, Memory(_MEMORY), is_watched=True)
+    transfer = open_transfer(path, Cache(_CACHE_BYTES))
+    return transfer, Picture(transfer, view, Cache(_CACHE_BYTES), is_watched=True)
 
 
-def _shade_ahead(path: Path, view: str) -> None:
+def _prewarm(path: Path, view: str) -> None:
     """What is made of a bake before anybody opens it."""
-    transfer = open_transfer(path, Memory(_MEMORY))
+    transfer = open_transfer(path, Cache(_CACHE_BYTES))
     render_image(transfer, view, validate(transfer.default_look, transfer.default_look))
 
 
-def _make(picture: Picture) -> None:
-    picture.freeze(lambda share: None, lambda: False)
+def _run_next_job(picture: Picture) -> None:
+    picture.run_next_job(lambda share: None, lambda: False)
 
 
-def _settle(picture: Picture) -> None:
+def _run_until_exact(picture: Picture) -> None:
     """Make all that is lacking, and the bytes of the exact picture."""
     while not picture.advance(None).exact or picture.next_job() is not None:
-        _make(picture)
+        _run_next_job(picture)
     picture.encode(picture.all_tiles(), "rgb9e5")
 
 
-def _relit_s(transfer: Transfer, picture: Picture, light: dict[str, Any]) -> float:
+def _relit_s(transfer: FixedViewTransfer, picture: Picture, light: dict[str, Any]) -> float:
     """Seconds until the picture shows the scene's own look in another light exactly."""
     document = copy.deepcopy(transfer.default_look)
     document["environment"] |= light
     picture.set_look(validate(document, transfer.default_look))
-    return seconds(lambda: _settle(picture))
+    return seconds(lambda: _run_until_exact(picture))
 
 
-def _edit_ms(transfer: Transfer, picture: Picture) -> float:
+def _edit_ms(transfer: FixedViewTransfer, picture: Picture) -> float:
     """The median frame of a drag, what the hand needs made before."""
-    picture.touch(_HAND)
-    _settle(picture)
-    taken = []
+    picture.prepare(_ACTIVE_POINTER)
+    _run_until_exact(picture)
+    durations = []
     for exponent in np.geomspace(20, 200, _EDITS):
         look = _sharpened(transfer, float(exponent))
-        began = time.perf_counter()
-        picture.set_look(look, hand=_HAND)
+        start_time = time.perf_counter()
+        picture.set_look(look, active_pointer=_ACTIVE_POINTER)
         picture.encode(picture.advance(None).tiles, "rgb9e5")
-        taken.append(time.perf_counter() - began)
-    return 1e3 * float(np.median(taken))
+        durations.append(time.perf_counter() - start_time)
+    return 1e3 * float(np.median(durations))
 
 
-def _sharpened(transfer: Transfer, exponent: float) -> Look:
+def _sharpened(transfer: FixedViewTransfer, exponent: float) -> Look:
     document = copy.deepcopy(transfer.default_look)
     document["materials"]["Teapot"]["terms"][1]["params"]["nu"] = exponent
     return validate(document, transfer.default_look)

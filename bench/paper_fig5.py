@@ -15,20 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from bench.points import Lit, freeze_along, lit_points
+from bench.points import LitSamples, freeze_for_curve, sample_lit_surface
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
-from bench.standard_error import over_points
+from bench.standard_error import estimate_point_error
 from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
-from relume.look import BAKED_ENVIRONMENT, Paths
+from relume.look import BAKED_ENVIRONMENT, LightPaths
 from relume.operators.edit_basis import CurveBasis
-from relume.operators.frozen import Frozen
-from relume.picture.light import Light
+from relume.operators.frozen import LinearOperator
+from relume.picture.light import Illumination
 from relume.picture.routes.operator import advance
-from relume.picture.shown import Shown
+from relume.picture.shown import DisplayedImage
 
 F64 = NDArray[np.float64]
 
@@ -39,16 +39,20 @@ _PEAK_DEG, _RISE = (20.0, 40.0, 62.0, 80.0), (0.6, 0.15, 0.05)  # where the rise
 
 def measure(tiny: bool) -> list[Figure]:
     """Measure both errors on the same last frame."""
-    num_points, num_lights = (30, 200) if tiny else (4000, 2000)
+    num_positions, num_lights = (30, 200) if tiny else (4000, 2000)
     start = complete_term(("fig5",), cook_torrance(0.1), None)
     scene = teapot_on_table(studio(), (LAMBERT, start), (LAMBERT,))
-    lit = lit_points(scene, (320, 320), num_points, num_lights, 0)
-    frozen = freeze_along(lit, start, _CURVE)
-    frames = [_drawn(start, (k + 1) / _DRAG) for k in range(_DRAG)]
+    lit_samples = sample_lit_surface(scene, (320, 320), num_positions, num_lights, 0)
+    operator = freeze_for_curve(lit_samples, start, _CURVE)
+    frames = [_draw_curve(start, (k + 1) / _DRAG) for k in range(_DRAG)]
     bands = curve_bands(frames[-1], TERMS["cook_torrance"].curve(_CURVE))
-    truth = _rows(_image(frozen, analysis(bands)), num_points)
-    incremental = over_points(_rows(_dragged(lit, frozen, start, frames), num_points), truth)
-    non_linear = over_points(_rows(_image(frozen, _largest(analysis(bands))), num_points), truth)
+    reference = _select_rows(_image(operator, analysis(bands)), num_positions)
+    incremental = estimate_point_error(
+        _select_rows(_render_drag(lit_samples, operator, start, frames), num_positions), reference
+    )
+    non_linear = estimate_point_error(
+        _select_rows(_image(operator, _largest(analysis(bands))), num_positions), reference
+    )
     context = {"terms": _BUDGET, "of": bands.shape[1], "drag_frames": _DRAG, "resting_frames": _REST}
     return [
         Figure("paper.fig5_incremental", incremental.value, "relative RMSE", context, incremental.standard_error),
@@ -56,40 +60,42 @@ def measure(tiny: bool) -> list[Figure]:
     ]
 
 
-def _drawn(start: dict[str, Any], share: float) -> dict[str, Any]:
+def _draw_curve(start: dict[str, Any], fraction: float) -> dict[str, Any]:
     """The generated curve with a part of the rise on it, as bands of each channel."""
     bands = curve_bands(start, TERMS["cook_torrance"].curve(_CURVE))
     degrees = (np.arange(bands.shape[1]) + 0.5) * 90 / bands.shape[1]
     rise = np.interp(degrees, _PEAK_DEG, [0, 1, 0.4, 0])
     document = copy.deepcopy(start)
-    document["curves"] = {_CURVE: {"bands": (bands + share * np.outer(_RISE, rise)).tolist()}}
+    document["curves"] = {_CURVE: {"bands": (bands + fraction * np.outer(_RISE, rise)).tolist()}}
     return document
 
 
-def _dragged(lit: Lit, frozen: Frozen, start: dict[str, Any], frames: list[dict[str, Any]]) -> F64:
+def _render_drag(
+    lit_samples: LitSamples, operator: LinearOperator, start: dict[str, Any], frames: list[dict[str, Any]]
+) -> F64:
     """The term's image after the drag and the rest."""
     curve = TERMS["cook_torrance"].curve(_CURVE)
-    basis, light = CurveBasis.of(curve), Light(BAKED_ENVIRONMENT, (), Paths(True, 1, 0))
-    empty = Shown(np.zeros_like(frozen.transport[:, :, 0]))
-    shown = empty.summed(frozen, basis, {_CURVE: curve_bands(start, curve)}, light)
+    basis, light = CurveBasis.from_curve(curve), Illumination(BAKED_ENVIRONMENT, (), LightPaths(True, 1, 0))
+    empty = DisplayedImage(np.zeros_like(operator.transport[:, :, 0]))
+    summed_image = empty.evaluate_operator(operator, basis, {_CURVE: curve_bands(start, curve)}, light)
     for document in [*frames, *[frames[-1]] * _REST]:
-        shown = advance(shown, {_CURVE: curve_bands(document, curve)}, frozen, _BUDGET)
-    return shown.image.astype(np.float64)
+        summed_image = advance(summed_image, {_CURVE: curve_bands(document, curve)}, operator, _BUDGET)
+    return summed_image.image.astype(np.float64)
 
 
-def _image(frozen: Frozen, coefficients: F64) -> F64:
+def _image(operator: LinearOperator, coefficients: F64) -> F64:
     """T · c in float64. (tiles, 3, samples)"""
-    return np.asarray(np.einsum("tcjs,cj->tcs", frozen.transport.astype(np.float64), coefficients, optimize=True))
+    return np.asarray(np.einsum("tcjs,cj->tcs", operator.transport.astype(np.float64), coefficients, optimize=True))
 
 
-def _rows(image: F64, num_points: int) -> F64:
+def _select_rows(image: F64, num_positions: int) -> F64:
     """Samples of an image in tiles, (tiles, 3, samples), one a row. (n, 3)"""
-    return image.transpose(0, 2, 1).reshape(-1, 3)[:num_points]
+    return image.transpose(0, 2, 1).reshape(-1, 3)[:num_positions]
 
 
 def _largest(coefficients: F64) -> F64:
     """The coefficients, all but the largest of each channel made zero."""
-    kept = np.zeros_like(coefficients)
+    truncated = np.zeros_like(coefficients)
     index = np.argsort(-np.abs(coefficients), axis=1)[:, :_BUDGET]
-    np.put_along_axis(kept, index, np.take_along_axis(coefficients, index, axis=1), axis=1)
-    return kept
+    np.put_along_axis(truncated, index, np.take_along_axis(coefficients, index, axis=1), axis=1)
+    return truncated

@@ -16,9 +16,9 @@ import numpy as np
 from bench.figure import Figure
 from relume.basis.pca import decompose, joint, relative_rms, worst_relative_rms
 from relume.brdf.registry import TERMS
-from relume.brdf.sweep import bands_at, moved_curves, slider_values
+from relume.brdf.sweep import curve_at_value, curves_of_parameter, slider_values
 from relume.brdf.term import F64, Parameter, Term
-from relume.operators.nodes import linearise
+from relume.operators.nodes import linearize
 
 _NUM_VECTORS = (2, 4, 6, 8, 10, 12, 16)
 _BOUND = 1e-3
@@ -32,47 +32,49 @@ def measure(tiny: bool) -> list[Figure]:
     needed, context = 0, {}
     for term in TERMS.values():
         for parameter in term.parameters:
-            if not moved_curves(term, parameter.name):
+            if not curves_of_parameter(term, parameter.name):
                 continue
             errors = _errors(term, parameter, num)
             enough = [k for k, (overall, _) in errors.items() if overall <= _BOUND]
             needed = max(needed, min(enough, default=_NUM_VECTORS[-1] + 1))
-            context[f"{term.model}.{parameter.name}"] = _said(errors)
+            context[f"{term.model}.{parameter.name}"] = _describe(errors)
     return [
-        Figure("pca.blinn_phong_6", paper[6][0], "relative RMS", {"errors": _said(paper)}),
+        Figure("pca.blinn_phong_6", paper[6][0], "relative RMS", {"errors": _describe(paper)}),
         Figure("pca.vectors", needed, "vectors", context),
-        _nodes([TERMS["lambert"], TERMS["cook_torrance"]] if tiny else list(TERMS.values())),
+        _count_nodes([TERMS["lambert"], TERMS["cook_torrance"]] if tiny else list(TERMS.values())),
     ]
 
 
-def _nodes(terms: list[Term]) -> Figure:
+def _count_nodes(terms: list[Term]) -> Figure:
     """Nodes of every slider; "bands" where too many would be needed."""
-    found: dict[str, int | str] = {}
+    num_nodes: dict[str, int | str] = {}
     for term in terms:
         for parameter in term.parameters:
-            if moved_curves(term, parameter.name):
-                linearised = linearise({"model": term.model, "params": {}}, parameter.name)
-                found[f"{term.model}.{parameter.name}"] = "bands" if linearised is None else linearised.num_columns
-    return Figure("pca.slider_nodes", max(n for n in found.values() if isinstance(n, int)), "nodes", found)
+            if curves_of_parameter(term, parameter.name):
+                linearised = linearize({"model": term.model, "params": {}}, parameter.name)
+                num_nodes[f"{term.model}.{parameter.name}"] = "bands" if linearised is None else linearised.num_columns
+    return Figure("pca.slider_nodes", max(n for n in num_nodes.values() if isinstance(n, int)), "nodes", num_nodes)
 
 
 def _errors(term: Term, parameter: Parameter, num: int) -> dict[int, tuple[float, float]]:
     """Error over all values, and at the worst, by number of vectors."""
     components = decompose(_curves(term, parameter, slider_values(parameter, num)))
-    exact = _curves(term, parameter, slider_values(parameter, num - 1, between=True))
+    exact = _curves(term, parameter, slider_values(parameter, num - 1, at_midpoints=True))
     errors = {}
     for k in _NUM_VECTORS:
-        few = components.first(k)
-        found = few.synthesis(few.analysis(exact))
-        errors[k] = relative_rms(found, exact), worst_relative_rms(found, exact)
+        truncated = components.first(k)
+        approximation = truncated.synthesis(truncated.analysis(exact))
+        errors[k] = relative_rms(approximation, exact), worst_relative_rms(approximation, exact)
     return errors
 
 
 def _curves(term: Term, parameter: Parameter, values: F64) -> F64:
     """What a parameter moves, all its curves multiplied. (values, J)"""
-    curves = moved_curves(term, parameter.name)
-    return np.array([joint([bands_at(term, curve, {parameter.name: value}) for curve in curves]) for value in values])
+    curves = curves_of_parameter(term, parameter.name)
+    return np.array(
+        [joint([curve_at_value(term, curve, {parameter.name: value}) for curve in curves]) for value in values]
+    )
 
 
-def _said(errors: dict[int, tuple[float, float]]) -> str:
+def _describe(errors: dict[int, tuple[float, float]]) -> str:
     return ", ".join(f"{k}: {overall:.1e} ({worst:.1e})" for k, (overall, worst) in errors.items())

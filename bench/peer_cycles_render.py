@@ -20,24 +20,24 @@ Matrix: Any = __import__("mathutils").Matrix
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from our Y up
 
 
-def material(index: int, colours: dict[str, Any]) -> Any:
+def material(index: int, colors: dict[str, Any]) -> Any:
     """Diffuse and glossy together."""
-    made = bpy.data.materials.new(f"material {index}")
-    tree = made.node_tree
+    node_material = bpy.data.materials.new(f"material {index}")
+    tree = node_material.node_tree
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*colours["diffuse"], 1)
+    diffuse.inputs["Color"].default_value = (*colors["diffuse"], 1)
     surface = diffuse.outputs[0]
-    if any(colours["glossy"]):
+    if any(colors["glossy"]):
         glossy, total = (tree.nodes.new(f"ShaderNode{name}") for name in ("BsdfAnisotropic", "AddShader"))
         glossy.distribution = "BECKMANN"
-        glossy.inputs["Color"].default_value = (*colours["glossy"], 1)
-        glossy.inputs["Roughness"].default_value = colours["roughness"]
-        tree.links.new(surface, total.inputs[0])
-        tree.links.new(glossy.outputs[0], total.inputs[1])
+        glossy.inputs["Color"].default_value = (*colors["glossy"], 1)
+        glossy.inputs["Roughness"].default_value = colors["roughness"]
+        tree.gather_hits.new(surface, total.inputs[0])
+        tree.gather_hits.new(glossy.outputs[0], total.inputs[1])
         surface = total.outputs[0]
-    tree.links.new(surface, output.inputs["Surface"])
-    return made
+    tree.gather_hits.new(surface, output.inputs["Surface"])
+    return node_material
 
 
 def environment(radiance: Any) -> None:
@@ -50,7 +50,7 @@ def environment(radiance: Any) -> None:
     tree = world.node_tree
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
-    tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    tree.gather_hits.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
     bpy.context.scene.world = world
 
 
@@ -58,10 +58,10 @@ def load(folder: Path, job: dict[str, Any]) -> None:
     """The scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     arrays, scene = np.load(folder / "cycles.npz", allow_pickle=False), bpy.context.scene
-    for k, colours in enumerate(job["materials"]):
+    for k, colors in enumerate(job["materials"]):
         mesh = bpy.data.meshes.new(f"mesh {k}")
         mesh.from_pydata((arrays[f"positions_{k}"] @ Z_UP[:3, :3].T).tolist(), [], arrays[f"faces_{k}"].tolist())
-        mesh.materials.append(material(k, colours))
+        mesh.materials.append(material(k, colors))
         scene.collection.objects.link(bpy.data.objects.new(f"object {k}", mesh))
     environment(arrays["environment"])
     lens = bpy.data.cameras.new("camera")
@@ -92,9 +92,9 @@ def render(folder: Path, spp: int, seed: int) -> tuple[Any, float]:
     scene = bpy.context.scene
     scene.cycles.samples, scene.cycles.seed = spp, seed
     scene.render.filepath = str(folder / "cycles.exr")
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     bpy.ops.render.render(write_still=True)
-    taken_s = time.perf_counter() - began
+    taken_s = time.perf_counter() - start_time
     image = bpy.data.images.load(scene.render.filepath)
     pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     image.pixels.foreach_get(pixels)
@@ -107,14 +107,14 @@ def main(folder: Path) -> None:
     """Render what cycles.json asks for, and write cycles_result.json and picture.npy."""
     job = json.loads((folder / "cycles.json").read_text())
     load(folder, job)
-    found = []
+    step_results = []
     render(folder, 1, 99)  # loads kernels
     for spp in job["spp"]:
-        (one, first_s), (other, second_s) = (render(folder, spp, seed) for seed in (1, 2))
-        noise = float(np.sqrt(np.mean((one - other) ** 2) / 2))
-        found.append({"spp": spp, "seconds": (first_s + second_s) / 2, "noise": noise})
-    np.save(folder / "picture.npy", ((one + other) / 2).astype(np.float32))
-    (folder / "cycles_result.json").write_text(json.dumps({"steps": found, "version": bpy.app.version_string}))
+        (first_image, first_s), (second_image, second_s) = (render(folder, spp, seed) for seed in (1, 2))
+        noise = float(np.sqrt(np.mean((first_image - second_image) ** 2) / 2))
+        step_results.append({"spp": spp, "seconds": (first_s + second_s) / 2, "noise": noise})
+    np.save(folder / "picture.npy", ((first_image + second_image) / 2).astype(np.float32))
+    (folder / "cycles_result.json").write_text(json.dumps({"steps": step_results, "version": bpy.app.version_string}))
 
 
 if __name__ == "__main__":

@@ -21,24 +21,24 @@ import numpy as np
 
 from bench import cycles, mitsuba
 from bench.figure import Figure, skipped
-from bench.gather import FLOOR, bake, edit_frames_s, opened, recipe_of, settle
+from bench.gather import FLOOR, bake, edit_frames_s, make_recipe, open_exact_picture, run_until_exact
 from bench.indirect import mitsuba_job, reflected, reflected_by_mitsuba
-from bench.standard_error import over_passes
-from relume.estimated import Estimated
+from bench.standard_error import compare_with_passes
+from relume.estimated import JackknifeEstimate
 from relume.look.document import MAX_BOUNCES
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.scene.cornell import GLOSSY_FLOOR, cornell_box
 from relume.scene.model import Scene
 
 _NAMES = ("peer.mitsuba_gather_time_ratio", "peer.cycles_time_ratio")
 
 
-class _Ours(NamedTuple):
+class _RelumeResult(NamedTuple):
     """Error of reflected light, absolute; seconds of an edit's frame."""
 
-    error: Estimated
+    error: JackknifeEstimate
     edit_s: float
 
 
@@ -46,46 +46,47 @@ def measure(tiny: bool) -> list[Figure]:
     """Measure our edit and its error, then how long the others render to it."""
     if (why := mitsuba.missing()) is not None:
         return skipped(_NAMES, "ratio", f"our error is not known: {why}")
-    scene, recipe = cornell_box(is_floor_glossy=True), recipe_of(tiny)
+    scene, recipe = cornell_box(is_floor_glossy=True), make_recipe(tiny)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
+        transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
         edit_s = _edit_s(transfer, 5 if tiny else 60)
         light = reflected(transfer, {})
         bsdfs = [mitsuba.bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
-        theirs = reflected_by_mitsuba(scene, recipe.size, bsdfs, bsdfs, 2 if tiny else 128, folder)
+        reference_passes = reflected_by_mitsuba(scene, recipe.size, bsdfs, bsdfs, 2 if tiny else 128, folder)
         scale = float(np.sqrt(np.mean(light**2)))
-        found = over_passes(light, theirs)
-        error = found.error.value if found.is_told else found.limit
-        ours = _Ours(Estimated(error * scale, found.error.standard_error * scale), edit_s)
+        comparison = compare_with_passes(light, reference_passes)
+        error = comparison.error.value if comparison.is_significant else comparison.limit
+        relume = _RelumeResult(JackknifeEstimate(error * scale, comparison.error.standard_error * scale), edit_s)
         job = {"spp": [1, 2] if tiny else [8, 64], **mitsuba_job(bsdfs, bsdfs)}
         steps = mitsuba.render(scene, recipe.size, job, folder)
-        of_mitsuba = [{**step, "noise": step["error"] * scale} for step in steps["steps"]]
-        about = {"mitsuba": steps["version"], "error": found.error.value, **found.context}
-        figures = [_ratio(_NAMES[0], of_mitsuba, ours, about)]
+        mitsuba_steps = [{**step, "noise": step["error"] * scale} for step in steps["steps"]]
+        details = {"mitsuba": steps["version"], "error": comparison.error.value, **comparison.context}
+        figures = [_ratio(_NAMES[0], mitsuba_steps, relume, details)]
         if (why := cycles.missing()) is not None:
             return figures + skipped(_NAMES[1:], "ratio", why)
         spp = [1, 2] if tiny else [4, 32]
         rendered = cycles.render(scene, recipe.size, _materials(scene), spp, MAX_BOUNCES, folder)
-    return [*figures, _ratio(_NAMES[1], rendered["steps"], ours, {"blender": rendered["version"]})]
+    return [*figures, _ratio(_NAMES[1], rendered["steps"], relume, {"blender": rendered["version"]})]
 
 
-def _ratio(name: str, steps: list[dict[str, Any]], ours: _Ours, about: dict[str, Any]) -> Figure:
+def _ratio(name: str, steps: list[dict[str, Any]], relume: _RelumeResult, details: dict[str, Any]) -> Figure:
     last = steps[-1]
-    theirs_s = last["seconds"] * max(1 / last["spp"], (last["noise"] / ours.error.value) ** 2)
-    ratio = theirs_s / ours.edit_s  # ∝ 1/error²
+    mitsuba_s = last["seconds"] * max(1 / last["spp"], (last["noise"] / relume.error.value) ** 2)
+    ratio = mitsuba_s / relume.edit_s  # ∝ 1/error²
     context = {
-        "our_error": ours.error.value, "our_edit_ms": 1e3 * ours.edit_s, "their_seconds": theirs_s,
-        "extrapolated_from_spp": last["spp"] if last["noise"] > ours.error.value else 0, "their_steps": steps, **about,
+        "our_error": relume.error.value, "our_edit_ms": 1e3 * relume.edit_s, "their_seconds": mitsuba_s,
+        "extrapolated_from_spp": last["spp"] if last["noise"] > relume.error.value else 0, "their_steps": steps,
+        **details,
     }  # fmt: skip
-    return Figure(name, ratio, "ratio", context, 2 * ratio * ours.error.standard_error / ours.error.value)
+    return Figure(name, ratio, "ratio", context, 2 * ratio * relume.error.standard_error / relume.error.value)
 
 
-def _edit_s(transfer: Transfer, num_frames: int) -> float:
+def _edit_s(transfer: FixedViewTransfer, num_frames: int) -> float:
     """Median seconds of the frames of a drag."""
-    picture = opened(transfer)
-    picture.touch(f"{FLOOR}/params/exponent")
-    settle(picture)
+    picture = open_exact_picture(transfer)
+    picture.prepare(f"{FLOOR}/params/exponent")
+    run_until_exact(picture)
     return float(np.median(edit_frames_s(transfer, picture, num_frames)))
 
 
@@ -94,6 +95,6 @@ def _materials(scene: Scene) -> list[dict[str, Any]]:
     floor = GLOSSY_FLOOR[1]
     alpha = (2 / (floor["params"]["exponent"] + 2)) ** 0.5
     black = {"glossy": [0.0, 0.0, 0.0], "roughness": 0.0}
-    made = [{"diffuse": scene.materials[mesh.material].terms[0]["color"], **black} for mesh in scene.meshes]
-    made[0] |= {"glossy": [4 * channel for channel in floor["color"]], "roughness": alpha**0.5}
-    return made
+    bsdfs = [{"diffuse": scene.materials[mesh.material].terms[0]["color"], **black} for mesh in scene.meshes]
+    bsdfs[0] |= {"glossy": [4 * channel for channel in floor["color"]], "roughness": alpha**0.5}
+    return bsdfs

@@ -23,20 +23,20 @@ import numpy as np
 
 from bench.figure import Figure, skipped
 from bench.mitsuba import bsdf, missing, render
-from bench.points import frame_radiance, lit_points
+from bench.points import frame_radiance, sample_lit_surface
 from bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
-from bench.standard_error import over_points
+from bench.standard_error import estimate_point_error
 from relume.bake import Recipe
 from relume.brdf.document import complete_term
-from relume.estimated import Estimated
+from relume.estimated import JackknifeEstimate
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
 from relume.picture.picture import Picture
-from relume.reference import reference_radiance, texels_of
+from relume.reference import environment_texels, reference_radiance
 from relume.scene.model import Scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 _NAMES = ("peer.mitsuba_time_ratio",)
 _SIGMA, _CURVES = 0.2, ("theta_i", "theta_h")
@@ -49,59 +49,63 @@ def measure(tiny: bool) -> list[Figure]:
         return skipped(_NAMES, "ratio", why)
     size = (32, 32) if tiny else (512, 512)
     scene = teapot_on_table(environments()[0], _TERMS, _TERMS)
-    error = _our_error(scene, tiny)
-    edit_s, frame = _our_edit(scene, size, tiny)
+    error = _measure_relume_error(scene, tiny)
+    edit_s, frame = _time_relume_edit(scene, size, tiny)
     with tempfile.TemporaryDirectory() as folder:
         job = {"spp": [1, 4] if tiny else [8, 32, 128, 512], "bsdfs": [bsdf(_TERMS)] * len(scene.meshes)}
-        found = render(scene, size, job, Path(folder))
+        result = render(scene, size, job, Path(folder))
         picture = np.load(Path(folder) / "picture.npy", allow_pickle=False)
-    last = found["steps"][-1]
-    theirs_s = last["seconds"] * max(1.0, (last["error"] / error.value) ** 2)
+    last = result["steps"][-1]
+    mitsuba_s = last["seconds"] * max(1.0, (last["error"] / error.value) ** 2)
     context = {
         "our_error": error.value,
         "our_error_standard_error": error.standard_error,
         "our_edit_ms": 1e3 * edit_s,
-        "their_seconds": theirs_s,
+        "their_seconds": mitsuba_s,
         "extrapolated_from_spp": last["spp"] if last["error"] > error.value else 0,
-        "their_steps": found["steps"],
+        "their_steps": result["steps"],
         "pictures_differ_median": float(np.median(np.abs(picture - frame) / np.maximum(frame, 1e-6))),
-        "mitsuba": found["version"],
+        "mitsuba": result["version"],
         "size": list(size),
     }
-    ratio = theirs_s / edit_s  # ∝ 1/error²
+    ratio = mitsuba_s / edit_s  # ∝ 1/error²
     return [Figure(_NAMES[0], ratio, "ratio", context, 2 * ratio * error.standard_error / error.value)]
 
 
-def _our_error(scene: Scene, tiny: bool) -> Estimated:
-    lit = lit_points(scene, (320, 320), 20 if tiny else 2000, 200 if tiny else 4000, None)
-    texels = texels_of(scene.environment)
-    truth = reference_radiance(lit.geometry, texels, lit.points, [_TERMS], 500 if tiny else 0)[0]
-    frame = sum(frame_radiance(lit, term, curve) for term, curve in zip(_TERMS, _CURVES, strict=True))
-    return over_points(np.asarray(frame), truth)
+def _measure_relume_error(scene: Scene, tiny: bool) -> JackknifeEstimate:
+    lit_samples = sample_lit_surface(scene, (320, 320), 20 if tiny else 2000, 200 if tiny else 4000, None)
+    texels = environment_texels(scene.environment)
+    reference = reference_radiance(
+        lit_samples.geometry, texels, lit_samples.surface_points, [_TERMS], 500 if tiny else 0
+    )[0]
+    frame = sum(frame_radiance(lit_samples, term, curve) for term, curve in zip(_TERMS, _CURVES, strict=True))
+    return estimate_point_error(np.asarray(frame), reference)
 
 
-def _our_edit(scene: Scene, size: tuple[int, int], tiny: bool) -> tuple[float, Any]:
+def _time_relume_edit(scene: Scene, size: tuple[int, int], tiny: bool) -> tuple[float, Any]:
     """Median seconds of an edit, and the picture of the default look."""
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe("direct", ("front",), size, 60 if tiny else 1000)
-        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Memory(4 << 30))
-        picture = Picture(transfer, "front", Memory(4 << 30))
-        picture.touch("/materials/Teapot/terms/1/curves/theta_h")
-        _settle(picture)
-        shown = picture.image()
-        taken = []
+        transfer = open_transfer(
+            bake_in_process(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Cache(4 << 30)
+        )
+        picture = Picture(transfer, "front", Cache(4 << 30))
+        picture.prepare("/materials/Teapot/terms/1/curves/theta_h")
+        _run_until_exact(picture)
+        edited_image = picture.image()
+        durations = []
         for k in range(5 if tiny else 60):
             document = copy.deepcopy(transfer.default_look)
             document["materials"]["Teapot"]["terms"][1]["params"]["sigma"] = 0.1 + 0.2 * (k % 7) / 7
             look = validate(document, transfer.default_look)
-            began = time.perf_counter()
+            start_time = time.perf_counter()
             picture.set_look(look)
             picture.encode(picture.advance(None).tiles, "rgb9e5")
-            taken.append(time.perf_counter() - began)
-    return float(np.median(taken[1:])), shown
+            durations.append(time.perf_counter() - start_time)
+    return float(np.median(durations[1:])), edited_image
 
 
-def _settle(picture: Picture) -> None:
+def _run_until_exact(picture: Picture) -> None:
     while not picture.advance(None).exact or picture.next_job() is not None:
         if picture.next_job() is not None:
-            picture.freeze(lambda share: None, lambda: False)
+            picture.run_next_job(lambda share: None, lambda: False)

@@ -32,8 +32,8 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
 
     def __init__(self, props: Any) -> None:
         mi.BSDF.__init__(self, props)
-        own = [name for name in props.keys() if name != "id"]  # noqa: SIM118  (not a mapping)
-        given = {name: props[name] for name in own}
+        property_names = [name for name in props.keys() if name != "id"]  # noqa: SIM118  (not a mapping)
+        given = {name: props[name] for name in property_names}
         self.textures = {name: value for name, value in given.items() if isinstance(value, mi.Texture)}
         self.numbers = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
         flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.SpatiallyVarying
@@ -43,48 +43,48 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
             self.sheen_table = mi.Float(_sheen_albedo(self.numbers["sheen_alpha"]))
 
     def _texture(self, name: str, si: Any, active: Any, width: int) -> Any:
-        of = self.textures[name]
+        texture = self.textures[name]
         placed = mi.SurfaceInteraction3f(si)
         if f"{name}_00" in self.numbers:
             m = [[self.numbers[f"{name}_{row}{column}"] for column in range(3)] for row in range(2)]
             u, v = si.uv.x, si.uv.y
             placed.uv = mi.Point2f(*(row[0] * u + row[1] * v + row[2] for row in m))
-        return of.eval_1(placed, active) if width == 1 else mi.Color3f(of.eval_3(placed, active))
+        return texture.eval_1(placed, active) if width == 1 else mi.Color3f(texture.eval_3(placed, active))
 
     def _at(self, si: Any, active: Any) -> Texel:
-        found = Texel()
+        texel = Texel()
         for name, width in {"base": 3, "rough": 1, "metal": 1, "weight": 1, "tint": 3}.items():
-            found[name] = self._texture(name, si, active, width)
+            texel[name] = self._texture(name, si, active, width)
         if "colors" in self.textures:
-            found["base"] *= mi.Color3f(self.textures["colors"].eval_3(si, active))
+            texel["base"] *= mi.Color3f(self.textures["colors"].eval_3(si, active))
         for name, width in {"coat": 1, "coat_rough": 1, "sheen": 3}.items():
             if name in self.textures:
-                found[name] = self._texture(name, si, active, width)
-        found["frame"] = self._frame(si, active)
-        alpha = found.rough * found.rough
+                texel[name] = self._texture(name, si, active, width)
+        texel["frame"] = self._frame(si, active)
+        alpha = texel.rough * texel.rough
         strength = self.numbers.get("anisotropy", 0.0)
-        found["across"] = dr.maximum(alpha, _LEAST_ALPHA)
-        found["along"] = dr.maximum(dr.lerp(alpha, 1.0, strength**2), _LEAST_ALPHA)
-        return found
+        texel["across"] = dr.maximum(alpha, _LEAST_ALPHA)
+        texel["along"] = dr.maximum(dr.lerp(alpha, 1.0, strength**2), _LEAST_ALPHA)
+        return texel
 
     def _frame(self, si: Any, active: Any) -> Any:
         """Tangent, bitangent and normal, as a normal map bends them, in coordinates of the shading frame."""
         if "tangent" in self.textures:
             along = mi.Vector3f(self.textures["tangent"].eval_3(si, active)) * 2 - 1
-            hand = self.textures["hand"].eval_1(si, active) * 2 - 1
+            handedness = self.textures["hand"].eval_1(si, active) * 2 - 1
         else:
             along, down = self._towards_texels(si)
-            hand = dr.sign(dr.dot(dr.cross(si.sh_frame.n, along), -down))
+            handedness = dr.sign(dr.dot(dr.cross(si.sh_frame.n, along), -down))
         along = si.to_local(along)
         up = mi.Vector3f(0, 0, 1)
         along = dr.normalize(mi.Vector3f(along.x, along.y, 0) + mi.Vector3f(1e-9, 0, 0))
-        beside = dr.cross(up, along) * hand
+        bitangent = dr.cross(up, along) * handedness
         normal = up
         if "normal" in self.textures:
             bump = mi.Vector3f(self._texture("normal", si, active, 3)) * 2 - 1
-            normal = dr.normalize(bump.x * along + bump.y * beside + bump.z * up)
-        turn = self.numbers.get("turn", 0.0)
-        s = along * dr.cos(turn) + beside * dr.sin(turn)
+            normal = dr.normalize(bump.x * along + bump.y * bitangent + bump.z * up)
+        rotation = self.numbers.get("turn", 0.0)
+        s = along * dr.cos(rotation) + bitangent * dr.sin(rotation)
         s = dr.normalize(s - normal * dr.dot(normal, s))
         return mi.Frame3f(s, dr.cross(normal, s), normal)
 
@@ -93,8 +93,8 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         if "normal_00" not in self.numbers:
             return si.dp_du, si.dp_dv
         (a, b), (c, d) = ([self.numbers[f"normal_{row}{column}"] for column in range(2)] for row in range(2))
-        of_area = a * d - b * c
-        return (d * si.dp_du - c * si.dp_dv) / of_area, (a * si.dp_dv - b * si.dp_du) / of_area
+        determinant = a * d - b * c
+        return (d * si.dp_du - c * si.dp_dv) / determinant, (a * si.dp_dv - b * si.dp_du) / determinant
 
     def _value(self, t: Texel, wi: Any, wo: Any) -> Any:
         """BRDF times the cosine; directions in the bent frame."""
@@ -122,19 +122,19 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         alpha = self.numbers["sheen_alpha"]
         fibres = (2 + 1 / alpha) * dr.power(dr.maximum(1 - cos_h * cos_h, 1e-8), 0.5 / alpha) / (2 * dr.pi)
         masking = 1 / ((1 + _sheen_lambda(cos_i, alpha) + _sheen_lambda(cos_o, alpha)) * (4 * cos_i * cos_o))
-        most = dr.max(t.sheen)
-        keep = dr.minimum(1 - most * self._albedo(cos_i), 1 - most * self._albedo(cos_o))
-        return t.sheen * fibres * masking + below * keep
+        max_sheen = dr.max(t.sheen)
+        base_scale = dr.minimum(1 - max_sheen * self._albedo(cos_i), 1 - max_sheen * self._albedo(cos_o))
+        return t.sheen * fibres * masking + below * base_scale
 
     def _albedo(self, cosine: Any) -> Any:
         last = dr.width(self.sheen_table) - 1
-        place = dr.clip(cosine, 0, 1) * last
-        low = dr.minimum(mi.UInt32(place), last - 1)
-        share = place - mi.Float(low)
+        coordinate = dr.clip(cosine, 0, 1) * last
+        low = dr.minimum(mi.UInt32(coordinate), last - 1)
+        fraction = coordinate - mi.Float(low)
         low_value = dr.gather(mi.Float, self.sheen_table, low)
-        return dr.lerp(low_value, dr.gather(mi.Float, self.sheen_table, low + 1), share)
+        return dr.lerp(low_value, dr.gather(mi.Float, self.sheen_table, low + 1), fraction)
 
-    def _shares(self, t: Texel) -> tuple[Any, Any, Any]:
+    def _get_lobe_probabilities(self, t: Texel) -> tuple[Any, Any, Any]:
         """Of rays by the cosine, by the facets, by the coat."""
         diffuse = 0.1 + 0.4 * (1 - t.metal)
         coat = 0.3 * t.coat if "coat" in t else mi.Float(0)
@@ -143,7 +143,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
     def _density(self, t: Texel, wi: Any, wo: Any) -> Any:
         h = dr.normalize(wi + wo)
         jacobian = 1 / (4 * dr.maximum(dr.abs(dr.dot(wo, h)), 1e-6))
-        diffuse, glossy, coat = self._shares(t)
+        diffuse, glossy, coat = self._get_lobe_probabilities(t)
         facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, t.along, t.across, True)
         density = diffuse * mi.warp.square_to_cosine_hemisphere_pdf(wo) + glossy * facets.pdf(wi, h) * jacobian
         if "coat" in t:
@@ -156,45 +156,45 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         """Mitsuba's interface."""
         t = self._at(si, active)
         wi = t.frame.to_local(si.wi)
-        diffuse, glossy, _ = self._shares(t)
+        diffuse, glossy, _ = self._get_lobe_probabilities(t)
         facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, t.along, t.across, True)
         h, _ = facets.sample(wi, sample2)
         if "coat" in t:
             alpha = dr.maximum(t.coat_rough * t.coat_rough, _LEAST_ALPHA)
             film, _ = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, alpha, True).sample(wi, sample2)
             h = dr.select(sample1 < diffuse + glossy, h, film)
-        wo = dr.select(sample1 < diffuse, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(wi, h))
+        wo = dr.select(sample1 < diffuse, mi.warp.square_to_cosine_hemisphere(sample2), mi.has_indirect(wi, h))
         bs = mi.BSDFSample3f()
         bs.wo = t.frame.to_world(wo)
-        bs.pdf = dr.select(self._seen(si.wi, wi, bs.wo, wo, active), self._density(t, wi, wo), 0)
+        bs.pdf = dr.select(self._is_same_side(si.wi, wi, bs.wo, wo, active), self._density(t, wi, wo), 0)
         bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
         bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
         usable = bs.pdf > 1e-9
         value = dr.select(usable, self._value(t, wi, wo) / dr.maximum(bs.pdf, 1e-9), 0)
         return bs, mi.Color3f(value) & active
 
-    def _both(self, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+    def _eval_and_pdf(self, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         t = self._at(si, active)
         bent_i, bent_o = t.frame.to_local(si.wi), t.frame.to_local(wo)
-        seen = self._seen(si.wi, bent_i, wo, bent_o, active)
-        value = dr.select(seen, mi.Color3f(self._value(t, bent_i, bent_o)), 0)
-        return value, dr.select(seen, self._density(t, bent_i, bent_o), 0)
+        is_visible = self._is_same_side(si.wi, bent_i, wo, bent_o, active)
+        value = dr.select(is_visible, mi.Color3f(self._value(t, bent_i, bent_o)), 0)
+        return value, dr.select(is_visible, self._density(t, bent_i, bent_o), 0)
 
     @staticmethod
-    def _seen(wi: Any, bent_i: Any, wo: Any, bent_o: Any, active: Any) -> Any:
+    def _is_same_side(wi: Any, bent_i: Any, wo: Any, bent_o: Any, active: Any) -> Any:
         return active & (wi.z > 0) & (bent_i.z > 0) & (wo.z > 0) & (bent_o.z > 0)
 
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""
-        return self._both(si, wo, active)[0]
+        return self._eval_and_pdf(si, wo, active)[0]
 
     def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""
-        return self._both(si, wo, active)[1]
+        return self._eval_and_pdf(si, wo, active)[1]
 
     def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""
-        return self._both(si, wo, active)
+        return self._eval_and_pdf(si, wo, active)
 
     def to_string(self) -> str:
         """Mitsuba's interface."""
@@ -208,7 +208,7 @@ def _sheen_l(x: Any, alpha: float) -> Any:
     """Estevez and Kulla 2017, equation 3."""
     t = (1 - alpha) ** 2
     ends = ((25.3245, 3.32435, 0.16801, -1.27393, -4.85967), (21.5473, 3.82987, 0.19823, -1.97760, -4.32054))
-    a, b, c, d, e = (t * one + (1 - t) * other for one, other in zip(*ends, strict=True))
+    a, b, c, d, e = (t * smooth_value + (1 - t) * rough_value for smooth_value, rough_value in zip(*ends, strict=True))
     return a / (1 + b * dr.power(x, c)) + d * x + e
 
 
@@ -220,7 +220,7 @@ def _sheen_lambda(cosine: Any, alpha: float) -> Any:
 
 def _sheen_albedo(alpha: float, num: int = 65) -> list[float]:
     """Share of light from each cosine that a white sheen reflects, at even cosines."""
-    found = []
+    albedos = []
     for k in range(num):
         cos_o = max(k / (num - 1), 1e-3)
         i, j = dr.meshgrid(dr.arange(mi.Float, 256), dr.arange(mi.Float, 256))
@@ -230,5 +230,5 @@ def _sheen_albedo(alpha: float, num: int = 65) -> list[float]:
         cos_h2 = z * z / (x * x + y * y + z * z)
         fibres = (2 + 1 / alpha) * dr.power(dr.maximum(1 - cos_h2, 1e-8), 0.5 / alpha) / (2 * dr.pi)
         shadowed = 1 + _sheen_lambda(cos_i, alpha) + _sheen_lambda(mi.Float(cos_o), alpha)
-        found.append(2 * dr.pi * dr.mean(fibres / (shadowed * 4 * cos_o))[0])
-    return found
+        albedos.append(2 * dr.pi * dr.mean(fibres / (shadowed * 4 * cos_o))[0])
+    return albedos

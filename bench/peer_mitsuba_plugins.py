@@ -88,9 +88,11 @@ class LambertCookTorrance(_TwoLobes):
         facets = self._facets().pdf(wi, h) / (4 * dr.maximum(dr.dot(wo, h), 1e-6))
         return 0.5 * (mi.warp.square_to_cosine_hemisphere_pdf(wo) + facets)
 
-    def _drawn(self, wi: Any, which: Any, place: Any) -> Any:
-        h, _ = self._facets().sample(wi, place)
-        return dr.select(which < 0.5, mi.warp.square_to_cosine_hemisphere(place), mi.reflect(wi, h))
+    def _sample_direction(self, wi: Any, lobe_sample: Any, direction_sample: Any) -> Any:
+        h, _ = self._facets().sample(wi, direction_sample)
+        return dr.select(
+            lobe_sample < 0.5, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.has_indirect(wi, h)
+        )
 
 
 mi.register_bsdf("lambert_cook_torrance", lambda props: LambertCookTorrance(props))
@@ -112,21 +114,23 @@ class LambertBlinnPhong(_TwoLobes):
     def _density(self, wi: Any, wo: Any) -> Any:
         h = dr.normalize(wi + wo)
         lobe = (self.exponent + 1) / (2 * dr.pi) * dr.power(dr.maximum(mi.Frame3f.cos_theta(h), 0), self.exponent)
-        about_mirror = lobe / (4 * dr.maximum(dr.dot(wo, h), 1e-6))
-        return dr.lerp(about_mirror, mi.warp.square_to_cosine_hemisphere_pdf(wo), self.diffuse)
+        half_vector_pdf = lobe / (4 * dr.maximum(dr.dot(wo, h), 1e-6))
+        return dr.lerp(half_vector_pdf, mi.warp.square_to_cosine_hemisphere_pdf(wo), self.diffuse)
 
-    def _drawn(self, wi: Any, which: Any, place: Any) -> Any:
-        cos_h = dr.power(place.x, 1 / (self.exponent + 1))
-        sin_h, phi = dr.safe_sqrt(1 - cos_h * cos_h), 2 * dr.pi * place.y
+    def _sample_direction(self, wi: Any, lobe_sample: Any, direction_sample: Any) -> Any:
+        cos_h = dr.power(direction_sample.x, 1 / (self.exponent + 1))
+        sin_h, phi = dr.safe_sqrt(1 - cos_h * cos_h), 2 * dr.pi * direction_sample.y
         h = mi.Vector3f(sin_h * dr.cos(phi), sin_h * dr.sin(phi), cos_h)
-        return dr.select(which < self.diffuse, mi.warp.square_to_cosine_hemisphere(place), mi.reflect(wi, h))
+        return dr.select(
+            lobe_sample < self.diffuse, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.has_indirect(wi, h)
+        )
 
 
 mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
 
 
 class _MirrorOverDiffuse(_Sided):
-    """`share` of a smooth mirror beside albedo/π.
+    """`diffuse_probability` of a smooth mirror beside albedo/π.
 
     Mitsuba's own `blendbsdf` of the two loses light: under a constant sky of 1, a tenth of a mirror over an albedo of
     0.3 sends 0.363 (3.9.1), as densities of what it samples lack the weights.
@@ -134,17 +138,17 @@ class _MirrorOverDiffuse(_Sided):
 
     def __init__(self, props: Any) -> None:
         super().__init__(props, mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection)
-        self.albedo, self.share = mi.Color3f(props["albedo"]), float(props["share"])
+        self.albedo, self.diffuse_probability = mi.Color3f(props["albedo"]), float(props["share"])
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """Mitsuba's interface."""
-        bs, is_mirror = mi.BSDFSample3f(), sample1 < self.share
-        bs.wo = dr.select(is_mirror, mi.reflect(si.wi), mi.warp.square_to_cosine_hemisphere(sample2))
-        bs.pdf = dr.select(is_mirror, self.share, self.pdf(ctx, si, bs.wo, active))
+        bs, is_mirror = mi.BSDFSample3f(), sample1 < self.diffuse_probability
+        bs.wo = dr.select(is_mirror, mi.has_indirect(si.wi), mi.warp.square_to_cosine_hemisphere(sample2))
+        bs.pdf = dr.select(is_mirror, self.diffuse_probability, self.pdf(ctx, si, bs.wo, active))
         bs.eta, bs.sampled_component = 1.0, dr.select(is_mirror, mi.UInt32(1), mi.UInt32(0))
         types = (mi.UInt32(+mi.BSDFFlags.DeltaReflection), mi.UInt32(+mi.BSDFFlags.DiffuseReflection))
         bs.sampled_type = dr.select(is_mirror, *types)
-        weight = dr.select(is_mirror, mi.Color3f(1), self.albedo / (1 - self.share))
+        weight = dr.select(is_mirror, mi.Color3f(1), self.albedo / (1 - self.diffuse_probability))
         return bs, dr.select(_above(si.wi, bs.wo, active), weight, 0)
 
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
@@ -153,7 +157,7 @@ class _MirrorOverDiffuse(_Sided):
 
     def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""
-        density = (1 - self.share) * mi.warp.square_to_cosine_hemisphere_pdf(wo)
+        density = (1 - self.diffuse_probability) * mi.warp.square_to_cosine_hemisphere_pdf(wo)
         return dr.select(_above(si.wi, wo, active), density, 0)
 
 
@@ -163,13 +167,14 @@ mi.register_bsdf("mirror_over_diffuse", lambda props: _MirrorOverDiffuse(props))
 class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]
     """Light that surfaces have reflected onto what the camera sees: one step, then Mitsuba's own path tracer.
 
-    `seen` is the scene as the camera sees it; beyond the first surface paths go on in the scene that is rendered, which
-    may reflect otherwise. That paths leave the scene right after the first surface is direct light: it is left out.
+    `camera_bsdfs` is the scene as the camera sees it; beyond the first surface paths go on in the scene that is
+    rendered, which may reflect otherwise. That paths leave the scene right after the first surface is direct light: it
+    is left out.
     """
 
-    def __init__(self, seen: Any, bounces: int) -> None:
+    def __init__(self, camera_bsdfs: Any, bounces: int) -> None:
         mi.SamplingIntegrator.__init__(self, mi.Properties())
-        self.seen = seen
+        self.camera_bsdfs = camera_bsdfs
         path = {"type": "path", "max_depth": bounces + 1, "rr_depth": 6, "hide_emitters": True}
         self.path = mi.load_dict(path)
 
@@ -185,12 +190,12 @@ class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]
         Returns:
             Radiance, which lanes hit anything, and no further values.
         """
-        si = self.seen.ray_intersect(ray, active)
+        si = self.camera_bsdfs.ray_intersect(ray, active)
         active = active & si.is_valid()
         bs, weight = si.bsdf(ray).sample(mi.BSDFContext(), si, sampler.next_1d(active), sampler.next_2d(active), active)
         active = active & (bs.pdf > 0)
-        found, _, _ = self.path.sample(scene, sampler, si.spawn_ray(si.to_world(bs.wo)), None, active)
-        return dr.select(active, weight * found, 0), active, []
+        radiance, _, _ = self.path.sample(scene, sampler, si.spawn_ray(si.to_world(bs.wo)), None, active)
+        return dr.select(active, weight * radiance, 0), active, []
 
     def to_string(self) -> str:
         """Mitsuba's interface."""

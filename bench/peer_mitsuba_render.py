@@ -22,7 +22,7 @@ plugins: Any = __import__("peer_mitsuba_plugins")
 __import__("peer_mitsuba_gltf")
 
 
-def described(arrays: Any, value: Any) -> Any:
+def resolve_description(arrays: Any, value: Any) -> Any:
     """A description with its images.
 
     Args:
@@ -31,10 +31,10 @@ def described(arrays: Any, value: Any) -> Any:
             "wrap_mode" and "filter_type" may stand beside it.
     """
     if isinstance(value, dict) and "array" in value:
-        others = {key: of for key, of in value.items() if key != "array"}
-        return {"type": "bitmap", "bitmap": mi.Bitmap(arrays[value["array"]]), "raw": True, **others}
+        plain_entries = {key: entry for key, entry in value.items() if key != "array"}
+        return {"type": "bitmap", "bitmap": mi.Bitmap(arrays[value["array"]]), "raw": True, **plain_entries}
     if isinstance(value, dict) and value.get("type") != "rgb":
-        return {key: described(arrays, of) for key, of in value.items()}
+        return {key: resolve_description(arrays, entry) for key, entry in value.items()}
     return mi.ScalarVector3f(value) if isinstance(value, list) else value
 
 
@@ -47,15 +47,21 @@ def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
             shines. One that is neither a dielectric nor has "sides" is the same from both.
     """
     props = mi.Properties()
-    beside = {key: mi.load_dict(described(arrays, bsdf[key])) for key in ("interior", "emitter") if key in bsdf}
-    own = {key: described(arrays, value) for key, value in bsdf.items() if key not in ("interior", "emitter", "sides")}
-    has_sides = "dielectric" in own["type"] or "sides" in bsdf
-    props["mesh_bsdf"] = mi.load_dict(own if has_sides else {"type": "twosided", "front": own})
-    for key, value in beside.items():
+    attached = {
+        key: mi.load_dict(resolve_description(arrays, bsdf[key])) for key in ("interior", "emitter") if key in bsdf
+    }
+    bsdf_entries = {
+        key: resolve_description(arrays, value)
+        for key, value in bsdf.items()
+        if key not in ("interior", "emitter", "sides")
+    }
+    has_sides = "dielectric" in bsdf_entries["type"] or "sides" in bsdf
+    props["mesh_bsdf"] = mi.load_dict(bsdf_entries if has_sides else {"type": "twosided", "front": bsdf_entries})
+    for key, value in attached.items():
         props[key] = value
     positions, faces = arrays[f"positions_{k}"], arrays[f"faces_{k}"]
-    vertices = {"has_vertex_normals": True, "has_vertex_texcoords": True}
-    shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), **vertices, props=props)
+    vertex_flags = {"has_vertex_normals": True, "has_vertex_texcoords": True}
+    shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), **vertex_flags, props=props)
     for name in (name for name in arrays if name.endswith(f"_of_{k}")):
         values = arrays[name]
         shape.add_attribute(f"vertex_{name.removesuffix(f'_of_{k}')}", values.shape[1], values.ravel())
@@ -110,15 +116,15 @@ def renderer(folder: Path, job: dict[str, Any]) -> Callable[[int, int], Any]:
     Direct light; or, where the job says "bounces", the light alone that surfaces have reflected so many times at most
     onto what the camera sees. "bsdfs" are of the surfaces on the way, "seen" of what the camera sees.
     """
-    scene, most = load(folder, job, job["bsdfs"]), job["most"]
+    scene, max_spp = load(folder, job, job["bsdfs"]), job["most"]
     is_direct = "bounces" not in job
     integrator = None if is_direct else plugins.Indirect(load(folder, job, job["seen"]), job["bounces"])
 
     def render(spp: int, seed: int) -> Any:
         total: Any = 0.0
-        passes = max(1, spp // most)
+        passes = max(1, spp // max_spp)
         for k in range(passes):
-            picture = mi.render(scene, integrator=integrator, spp=min(spp, most), seed=seed * 10_000 + k)
+            picture = mi.render(scene, integrator=integrator, spp=min(spp, max_spp), seed=seed * 10_000 + k)
             total = total + np.array(picture)
         return total / passes
 
@@ -134,19 +140,19 @@ def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) 
         folder: where picture.npy, of the last count, and result.json are written.
     """
     render(job["spp"][0], 99)  # compiles
-    found = []
+    step_results = []
     for spp in job["spp"]:
         if spp >= job["most"]:
             render(job["most"], 98)  # each wavefront size warms up by itself
-        began = time.perf_counter()
-        one, other = (render(spp, seed) for seed in (1, 2))
-        taken_s = (time.perf_counter() - began) / 2
-        picture = (one + other) / 2
+        start_time = time.perf_counter()
+        first_image, second_image = (render(spp, seed) for seed in (1, 2))
+        taken_s = (time.perf_counter() - start_time) / 2
+        picture = (first_image + second_image) / 2
         scale = np.sqrt(np.mean(picture[..., :3] ** 2))
-        error = np.sqrt(np.mean((one - other) ** 2) / 2) / scale
-        found.append({"spp": spp, "seconds": taken_s, "error": float(error)})
+        error = np.sqrt(np.mean((first_image - second_image) ** 2) / 2) / scale
+        step_results.append({"spp": spp, "seconds": taken_s, "error": float(error)})
     np.save(folder / "picture.npy", np.ascontiguousarray(picture[..., :3], np.float32))
-    (folder / "result.json").write_text(json.dumps({"steps": found, "version": mi.__version__}))
+    (folder / "result.json").write_text(json.dumps({"steps": step_results, "version": mi.__version__}))
 
 
 def passes(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:

@@ -23,7 +23,7 @@ from relume.scene.archive import save_scene
 from relume.scene.built_in import BUILT_IN
 from relume.scene.importer import import_scene
 from relume.scene.model import Scene
-from worker.executor import ONE_THREAD
+from worker.executor import SINGLE_THREAD_ENV
 from worker.status import recipe_json
 
 _NAMES = ("plan.memory_share", "plan.samples_share", "plan.store_share", "plan.rays_share")
@@ -37,34 +37,36 @@ def measure(tiny: bool) -> list[Figure]:
     if not Path("/proc/self/status").exists():
         return skipped(_NAMES, "", "only Linux counts the most memory that a process has held")
     size, num_lights = ((32, 24), 60) if tiny else ((640, 480), 500)
-    shares: dict[str, list[float]] = {}
-    for scene in _scenes(tiny):
+    ratios: dict[str, list[float]] = {}
+    for scene in _make_scenes(tiny):
         for method in sorted(METHODS):
             recipe = Recipe(method, (scene.cameras[0].name,), size, num_lights)
-            plan, took = METHODS[method].plan(scene, recipe), taken(scene, recipe)
-            shares[f"{scene.name}, {method}"] = [
-                took[of] / getattr(plan, planned) for of, planned in zip(_TAKEN, _PLANNED, strict=True)
+            plan, measured = METHODS[method].plan(scene, recipe), measure_use(scene, recipe)
+            ratios[f"{scene.name}, {method}"] = [
+                measured[quantity] / getattr(plan, planned) for quantity, planned in zip(_TAKEN, _PLANNED, strict=True)
             ]
-    context = {"scenes": len(shares), "size": list(size), "lights": num_lights}
-    found = []
+    context = {"scenes": len(ratios), "size": list(size), "lights": num_lights}
+    figures = []
     for k, name in enumerate(_NAMES):
-        most = max(shares, key=lambda which: shares[which][k])
-        of_each = {which: round(values[k], 3) for which, values in shares.items()}
-        found.append(Figure(name, shares[most][k], "of the plan", {**context, "most": most, "shares": of_each}))
-    return found
+        largest = max(ratios, key=lambda label: ratios[label][k])
+        ratio_by_label = {label: round(values[k], 3) for label, values in ratios.items()}
+        figures.append(
+            Figure(name, ratios[largest][k], "of the plan", {**context, "most": largest, "shares": ratio_by_label})
+        )
+    return figures
 
 
-def taken(scene: Scene, recipe: Recipe) -> dict[str, Any]:
+def measure_use(scene: Scene, recipe: Recipe) -> dict[str, Any]:
     """What a bake takes in a process of its own; see `bench.plan_process`."""
     with tempfile.TemporaryDirectory() as folder:
         save_scene(scene, folder)
         command = [sys.executable, "-m", "bench.plan_process", folder, recipe_json(recipe)]
-        done = subprocess.run(command, env=os.environ | ONE_THREAD, stdout=subprocess.PIPE, check=True)
-    answer: dict[str, Any] = json.loads(done.stdout)
+        records = subprocess.run(command, env=os.environ | SINGLE_THREAD_ENV, stdout=subprocess.PIPE, check=True)
+    answer: dict[str, Any] = json.loads(records.stdout)
     return answer
 
 
-def _scenes(tiny: bool) -> Iterator[Scene]:
+def _make_scenes(tiny: bool) -> Iterator[Scene]:
     for built_in in list(BUILT_IN.values())[: 1 if tiny else None]:
         yield built_in.make()
     for pattern in () if tiny else _FILES:

@@ -15,41 +15,41 @@ from bench.scenes import shared_data
 from relume.bake import Recipe
 from relume.errors import RelumeError
 from relume.folders import folder_bytes
-from relume.methods.disk import disk_of
+from relume.methods.disk import estimate_disk
 from relume.methods.registry import METHODS
 from relume.scene.built_in import BUILT_IN
 from relume.scene.importer import import_scene
 from relume.scene.model import Scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 NAME = "plan.disk_ratio"
 _FILES = ("scenes/*.glb", "scenes/*/*.glb", "scenes/*/*.gltf", "scenes/meshes/*.ply", "scenes/meshes/*.obj")
-_OF_GLASS = "conformance/**/*.glb"  # of those, the ones that have glass: plans of these were worst
+_GLASS_FILES = "conformance/**/*.glb"  # of those, the ones that have glass: plans of these were worst
 
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake all scenes by all methods; the largest ratio, and whose it is."""
     if not tiny and not shared_data().is_dir():
         return skipped((NAME,), "", "the folder of shared scenes is not here: set RELUME_SHARED_DATA")
-    size, lights, points = ((64, 48), 60, 2000) if tiny else ((320, 240), 300, 50_000)
+    size, lights, num_probes = ((64, 48), 60, 2000) if tiny else ((320, 240), 300, 50_000)
     ratios: dict[str, float] = {}
-    for scene in _scenes(tiny):
+    for scene in _list_scenes(tiny):
         for name, method in sorted(METHODS.items()):
-            recipe = Recipe(name, (scene.cameras[0].name,), size, lights, num_points=points)
-            planned = disk_of(method, scene, recipe, method.plan(scene, recipe)).store
+            recipe = Recipe(name, (scene.cameras[0].name,), size, lights, num_points=num_probes)
+            planned = estimate_disk(method, scene, recipe, method.plan(scene, recipe)).store
             with tempfile.TemporaryDirectory() as folder:
-                taken = folder_bytes(bake_here(method, scene, recipe, Path(folder) / "s.zarr"))
-            ratios[f"{scene.name}, {name}"] = planned / taken
-    most, least = max(ratios, key=ratios.__getitem__), min(ratios, key=ratios.__getitem__)
-    if ratios[least] < 1:
-        raise AssertionError(f"{least} takes {1 / ratios[least]:.2f} times what was planned")
-    context = {"size": list(size), "lights": lights, "points": points, "bakes": len(ratios), "most": most}
-    least_of = {"least": least, "least_ratio": round(ratios[least], 2)}
-    each = {"ratios": {which: round(ratio, 2) for which, ratio in ratios.items()}}
-    return [Figure(NAME, ratios[most], "of what is taken", {**context, **least_of, **each})]
+                measured_bytes = folder_bytes(bake_in_process(method, scene, recipe, Path(folder) / "s.zarr"))
+            ratios[f"{scene.name}, {name}"] = planned / measured_bytes
+    largest, smallest = max(ratios, key=ratios.__getitem__), min(ratios, key=ratios.__getitem__)
+    if ratios[smallest] < 1:
+        raise AssertionError(f"{smallest} takes {1 / ratios[smallest]:.2f} times what was planned")
+    context = {"size": list(size), "lights": lights, "points": num_probes, "bakes": len(ratios), "most": largest}
+    smallest_details = {"least": smallest, "least_ratio": round(ratios[smallest], 2)}
+    each = {"ratios": {label: round(ratio, 2) for label, ratio in ratios.items()}}
+    return [Figure(NAME, ratios[largest], "of what is taken", {**context, **smallest_details, **each})]
 
 
-def _scenes(tiny: bool) -> Iterator[Scene]:
+def _list_scenes(tiny: bool) -> Iterator[Scene]:
     for built_in in list(BUILT_IN.values())[: 1 if tiny else None]:
         yield built_in.make()
     if tiny:
@@ -57,7 +57,7 @@ def _scenes(tiny: bool) -> Iterator[Scene]:
     for pattern in _FILES:
         for path in sorted(shared_data().glob(pattern)):
             yield from _imported(path)
-    for path in sorted(shared_data().glob(_OF_GLASS)):
+    for path in sorted(shared_data().glob(_GLASS_FILES)):
         yield from (scene for scene in _imported(path) if any(material.glass for material in scene.materials))
 
 

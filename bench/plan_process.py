@@ -13,30 +13,30 @@ from pathlib import Path
 
 import distributed.worker  # noqa: F401  a worker process holds it too
 
-from relume.bake import Task, Written
+from relume.bake import Task, TaskOutput
 from relume.methods.registry import METHODS
 from relume.scene.archive import load_scene
-from relume.store import bake_here, open_store
+from relume.store import bake_in_process, open_store
 from relume.store.publish import array_paths
-from worker.status import MOVING, recipe_from_json
+from worker.status import FREE_CAMERA_METHODS, recipe_from_json
 
 
 def main(folder: str, recipe: str) -> None:
     """Bake, look at the store, print."""
-    wanted, rays = recipe_from_json(recipe), 0
+    planned_recipe, rays = recipe_from_json(recipe), 0
 
-    def count(_: Task, written: Written) -> None:
+    def count(_: Task, written: TaskOutput) -> None:
         nonlocal rays
         rays += written.num_rays
 
     with tempfile.TemporaryDirectory() as target:
         scene = load_scene(folder)
-        store = bake_here(METHODS[wanted.method], scene, wanted, Path(target) / "s.zarr", count)
+        store = bake_in_process(METHODS[planned_recipe.method], scene, planned_recipe, Path(target) / "s.zarr", count)
         peak_bytes = _peak_bytes()
         reader = open_store(store)
-        of_views = [f"views/{k}/pixel" for k in range(len(wanted.views))]
-        of_method = ["points/material"] if wanted.method in MOVING else of_views
-        samples = sum(reader.shape(path)[0] for path in of_method)
+        view_arrays = [f"views/{k}/pixel" for k in range(len(planned_recipe.views))]
+        sample_arrays = ["points/material"] if planned_recipe.method in FREE_CAMERA_METHODS else view_arrays
+        samples = sum(reader.shape(path)[0] for path in sample_arrays)
         store_bytes = sum(reader.read(path).nbytes for path in array_paths(store))
     print(json.dumps({"peak_bytes": peak_bytes, "view_samples": samples, "rays": rays, "store_bytes": store_bytes}))
 

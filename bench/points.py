@@ -13,84 +13,95 @@ from relume.basis.daubechies import analysis
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.triangles import TriangleLights, subdivide
-from relume.operators.frozen import Frozen, freeze
-from relume.operators.stream import columns_of, stream
-from relume.project.receivers import Receivers
-from relume.reference import Points
-from relume.reference.image import points_of
+from relume.light.triangles import TriangleLights, tessellate_environment
+from relume.operators.frozen import LinearOperator, precompute
+from relume.operators.stream import changed_columns, stream
+from relume.project.receivers import ShadingPoints
+from relume.reference import ReferencePoints
+from relume.reference.image import points_of_samples
 from relume.scene.model import Scene
-from relume.trace.geometry import Geometry, merge
+from relume.trace.geometry import SceneBuffers, build_scene_buffers
 from relume.trace.visibility import trace_visibility
 
 
 @dataclass(frozen=True)
-class Lit:
+class LitSamples:
     """Points with the light triangles that they see."""
 
-    geometry: Geometry
-    points: Points
+    geometry: SceneBuffers
+    surface_points: ReferencePoints
     lights: TriangleLights
-    receivers: Receivers
+    receivers: ShadingPoints
 
 
-def lit_points(scene: Scene, size: tuple[int, int], num_points: int, num_lights: int, material: int | None) -> Lit:
+def sample_lit_surface(
+    scene: Scene, size: tuple[int, int], num_positions: int, num_lights: int, material: int | None
+) -> LitSamples:
     """A random subset (fixed seed, order kept) of a view's samples, with the light triangles that they see.
 
     Args:
         scene: its first view is taken. size: width and height, pixels.
-        num_points: of the subset; all where there are fewer.
+        num_positions: of the subset; all where there are fewer.
         num_lights: triangles that the environment is divided into, at least.
         material: whose samples are taken; None for those on any surface.
     """
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     camera = scene.cameras[0]
     samples = sample_view(scene, geometry, camera.name, size)
-    wanted = samples.material != BACKGROUND if material is None else samples.material == material
-    rows = np.nonzero(wanted)[0]
+    is_selected = samples.material != BACKGROUND if material is None else samples.material == material
+    rows = np.nonzero(is_selected)[0]
     rng = np.random.default_rng(5)
-    chosen = np.sort(rng.permutation(rows)[:num_points])
-    of_surface = samples.surface
-    textures = {"diffuse": of_surface.diffuse, "specular": of_surface.specular}
-    points = points_of(samples, textures, of_surface.roughness).rows(chosen)
-    lights = subdivide(scene.environment.radiance, num_lights)
-    visible = trace_visibility(geometry.embree, points.position, points.normal, lights.direction).visible
-    return Lit(geometry, points, lights, Receivers(samples.surface.points.rows(chosen), points.wo, visible))
+    sample_rows = np.sort(rng.permutation(rows)[:num_positions])
+    surface_attributes = samples.surface
+    textures = {"diffuse": surface_attributes.diffuse, "specular": surface_attributes.specular}
+    surface_points = points_of_samples(samples, textures, surface_attributes.roughness).samples_of(sample_rows)
+    lights = tessellate_environment(scene.environment.radiance, num_lights)
+    visible = trace_visibility(
+        geometry.embree, surface_points.position, surface_points.normal, lights.direction
+    ).visible
+    return LitSamples(
+        geometry,
+        surface_points,
+        lights,
+        ShadingPoints(samples.surface.points.rows(sample_rows), surface_points.wo, visible),
+    )
 
 
-def freeze_along(lit: Lit, document: Mapping[str, Any], active: str) -> Frozen:
+def freeze_for_curve(lit_samples: LitSamples, document: Mapping[str, Any], active: str) -> LinearOperator:
     """The operator of one term along one curve.
 
     Args:
-        lit: points and lights. document: the complete term.
+        lit_samples: points and lights. document: the complete term.
         active: name of the curve that stays free.
     """
-    term = TERMS[document["model"]].settled(document)
-    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
-    frozen = freeze(term, bands, active, lit.lights, lit.receivers, lambda share: None, lambda: False)
-    assert isinstance(frozen, Frozen)
-    return frozen
+    term = TERMS[document["model"]].normalized(document)
+    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
+    operator = precompute(
+        term, bands, active, lit_samples.lights, lit_samples.receivers, lambda share: None, lambda: False
+    )
+    assert isinstance(operator, LinearOperator)
+    return operator
 
 
-def frame_radiance(lit: Lit, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:
+def frame_radiance(lit_samples: LitSamples, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:
     """R = T · c of one term, as a frame computes it, times its colour and curves of the outgoing angle.
 
     Args:
-        lit: points and lights. document: the complete term.
+        lit_samples: points and lights. document: the complete term.
         active: name of the curve that T is frozen along.
     Returns:
         (n, 3) float64
     """
-    frozen = freeze_along(lit, document, active)
-    tiles, _, _, samples = frozen.transport.shape
+    operator = freeze_for_curve(lit_samples, document, active)
+    tiles, _, _, samples = operator.transport.shape
     image = np.zeros((tiles, 3, samples), np.float32)
     bands = curve_bands(document, TERMS[document["model"]].curve(active))
-    stream(frozen.transport, columns_of(analysis(bands)), image)
-    radiance = image.transpose(0, 2, 1).reshape(-1, 3)[: lit.points.num_points]
+    stream(operator.transport, changed_columns(analysis(bands)), image)
+    radiance = image.transpose(0, 2, 1).reshape(-1, 3)[: lit_samples.surface_points.num_points]
     factor = np.asarray(document["color"], np.float64)
-    cos_theta_o = np.einsum("nc,nc->n", lit.points.normal, lit.points.wo)
+    cos_theta_o = np.einsum("nc,nc->n", lit_samples.surface_points.normal, lit_samples.surface_points.wo)
     for curve in TERMS[document["model"]].curves:
-        if curve.outgoing:
+        if curve.depends_on_view:
             factor = factor * curve_values(document, curve, np.arccos(np.clip(cos_theta_o, 0, 1))).T
     return np.asarray(radiance.astype(np.float64) * factor)
 

@@ -17,9 +17,9 @@ from bench.figure import Figure
 from bench.points import relative_rmse
 from bench.scenes import LAMBERT
 from bench.timing import seconds
-from relume.bake import BakeMethod, Recipe, StoreReader, Task, Written
+from relume.bake import BakeMethod, Recipe, StoreReader, Task, TaskOutput
 from relume.look import complete, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
 from relume.methods.sampled_views import SampledViews
@@ -27,7 +27,7 @@ from relume.methods.store_io import read_lights, read_rays
 from relume.render.image import render_image
 from relume.scene.demo import demo_scene
 from relume.scene.model import Scene
-from relume.store import bake_here, open_store
+from relume.store import bake_in_process, open_store
 from relume.trace.visibility import trace_visibility
 
 
@@ -36,12 +36,12 @@ class _EveryRay(SampledViews):
 
     name = "direct"
 
-    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
+    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> TaskOutput:
         position = store.read(f"views/{k}/position", task.start, task.stop)
         normal = store.read(f"views/{k}/normal", task.start, task.stop)
         embree = self.geometry_of(scene).embree
         traced = trace_visibility(embree, position, normal, read_lights(store).direction)
-        return Written({f"views/{k}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
+        return TaskOutput({f"views/{k}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
 
 
 _BAKES: tuple[BakeMethod, ...] = (DirectMethod(), _EveryRay())
@@ -49,9 +49,9 @@ _BAKES: tuple[BakeMethod, ...] = (DirectMethod(), _EveryRay())
 
 def _times(method: BakeMethod, scene: Scene, recipe: Recipe, path: Path) -> tuple[float, float]:
     """Seconds of a whole bake, and those in which it traced and predicted."""
-    written: list[Written] = []
-    wall_s = seconds(lambda: bake_here(method, scene, recipe, path, lambda _, one: written.append(one)))
-    return wall_s, sum(one.trace_s for one in written)
+    written: list[TaskOutput] = []
+    wall_s = seconds(lambda: bake_in_process(method, scene, recipe, path, lambda _, record: written.append(record)))
+    return wall_s, sum(record.trace_s for record in written)
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -64,10 +64,10 @@ def measure(tiny: bool) -> list[Figure]:
         rays = read_rays(open_store(paths[0]))
         bits = [np.unpackbits(open_store(path).read("views/0/visibility")) for path in paths]
         context = {
-            "rays": rays.traced,
-            "full_trace": rays.full,
-            "wrong_bits": float(np.count_nonzero(bits[0] != bits[1]) / rays.full),
-            "estimated_by_the_bake": rays.wrong_share,
+            "rays": rays.num_traced,
+            "full_trace": rays.num_full,
+            "wrong_bits": float(np.count_nonzero(bits[0] != bits[1]) / rays.num_full),
+            "estimated_by_the_bake": rays.error_rate,
             **_changes(scene, paths),
             "wall_s": saving[0],
             "wall_s_of_every_ray": full[0],
@@ -76,7 +76,7 @@ def measure(tiny: bool) -> list[Figure]:
             "size": list(recipe.size),
             "lights": recipe.num_lights,
         }
-    return [Figure("bake.ray_saving", rays.full / rays.traced, "ratio", context)]
+    return [Figure("bake.ray_saving", rays.num_full / rays.num_traced, "ratio", context)]
 
 
 def _changes(scene: Scene, paths: list[Path]) -> dict[str, float]:
@@ -89,7 +89,7 @@ def _changes(scene: Scene, paths: list[Path]) -> dict[str, float]:
     for name, partial in looks.items():
         pictures = []
         for path in paths:
-            transfer = open_transfer(path, Memory(4 << 30))
+            transfer = open_transfer(path, Cache(4 << 30))
             look = validate(complete(partial, transfer.default_look), transfer.default_look)
             pictures.append(render_image(transfer, "front", look))
         changes[name] = relative_rmse(*pictures)

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from bench.timing import in_turn
+from bench.timing import time_interleaved
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.parallel import for_ranges, num_threads
 from relume.scene.demo import demo_scene
-from relume.trace.geometry import Geometry, merge
+from relume.trace.geometry import SceneBuffers, build_scene_buffers
 from relume.trace.visibility import trace_visibility
 
 F32 = NDArray[np.float32]
@@ -27,52 +27,59 @@ _PIECE = 65_536
 
 def measure(tiny: bool) -> list[Figure]:
     """Both sides in turn, the best of each; and how many rays they answer differently."""
-    size, num_points, num_lights = ((32, 24), 160, 50) if tiny else ((640, 480), 16_384, 300)
+    size, num_positions, num_lights = ((32, 24), 160, 50) if tiny else ((640, 480), 16_384, 300)
     scene = demo_scene()
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "front", size)
     surfaces = int((samples.material != BACKGROUND).sum())
-    start = max(0, surfaces // 2 - num_points // 2) // 16 * 16  # neighbours, as in a bake
-    origins = samples.surface.points.position[start : start + num_points]
-    normals = samples.surface.points.normal[start : start + num_points]
-    directions = subdivide(scene.environment.radiance, num_lights).direction
-    point, light = _active_rays(normals, directions)
-    ray_origins, ray_directions = np.ascontiguousarray(origins[point]), np.ascontiguousarray(directions[light])
-    peer, hits = embreex_scene(geometry), np.empty(len(point), np.int32)
+    start = max(0, surfaces // 2 - num_positions // 2) // 16 * 16  # neighbours, as in a bake
+    origins = samples.surface.points.position[start : start + num_positions]
+    normals = samples.surface.points.normal[start : start + num_positions]
+    directions = tessellate_environment(scene.environment.radiance, num_lights).direction
+    point_index, light = _active_rays(normals, directions)
+    ray_origins, ray_directions = np.ascontiguousarray(origins[point_index]), np.ascontiguousarray(directions[light])
+    peer, hits = embreex_scene(geometry), np.empty(len(point_index), np.int32)
 
     def piece(a: int, b: int) -> None:
         hits[a:b] = peer.run(ray_origins[a:b], ray_directions[a:b], query="OCCLUDED")
 
     def embreex() -> None:
-        for_ranges(piece, len(point), _PIECE)
+        for_ranges(piece, len(point_index), _PIECE)
 
-    ours, theirs = in_turn(
+    relume_times, embree_times = time_interleaved(
         [lambda: trace_visibility(geometry.embree, origins, normals, directions), embreex], 2 if tiny else 7
     )
     traced = trace_visibility(geometry.embree, origins, normals, directions)
-    seen = (traced.visible[point, light >> 3] >> (light & 7)) & 1 == 1
+    is_visible = (traced.visible[point_index, light >> 3] >> (light & 7)) & 1 == 1
     context = {
-        "packets_rays_per_s": traced.num_rays / min(ours),
-        "embreex_rays_per_s": len(point) / min(theirs),
-        "rays": len(point),
-        "answers_that_differ": float(np.mean(seen != (hits < 0))),
+        "packets_rays_per_s": traced.num_rays / min(relume_times),
+        "embreex_rays_per_s": len(point_index) / min(embree_times),
+        "rays": len(point_index),
+        "answers_that_differ": float(np.mean(is_visible != (hits < 0))),
         "threads": num_threads(),
     }
-    return [Figure("bake.rays_vs_embreex", traced.num_rays / min(ours) / (len(point) / min(theirs)), "ratio", context)]
+    return [
+        Figure(
+            "bake.rays_vs_embreex",
+            traced.num_rays / min(relume_times) / (len(point_index) / min(embree_times)),
+            "ratio",
+            context,
+        )
+    ]
 
 
 def _active_rays(normals: F32, directions: F32) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Point and light of each ray above the horizon: sixteen points, then light by light."""
     above = normals @ directions.T > 0
-    points, lights = [], []
+    point_indices, lights = [], []
     for first in range(0, len(normals), 16):
-        light, point = np.nonzero(above[first : first + 16].T)
-        points.append(point + first)
+        light, point_index = np.nonzero(above[first : first + 16].T)
+        point_indices.append(point_index + first)
         lights.append(light)
-    return np.concatenate(points), np.concatenate(lights)
+    return np.concatenate(point_indices), np.concatenate(lights)
 
 
-def embreex_scene(geometry: Geometry) -> Any:
+def embreex_scene(geometry: SceneBuffers) -> Any:
     """The same triangles for embreex."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene

@@ -19,15 +19,15 @@ from bench.figure import Figure, skipped
 from bench.gather import bake
 from bench.gltf_plain import File, read_plain
 from bench.indirect import PASSES
-from bench.mitsuba import averaged, missing, passes_of, render_arrays
+from bench.mitsuba import averaged, missing, read_passes, render_arrays
 from bench.plain_materials import Materials
 from bench.scenes import environments, shared_data
-from bench.standard_error import NoiseFree, over_passes
+from bench.standard_error import NoiseCorrectedError, compare_with_passes
 from relume.bake import Recipe
 from relume.environments.reading import read_environment
 from relume.eye.view_samples import BACKGROUND
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from relume.render.image import render_image
 from relume.scene.importer import import_scene
@@ -64,20 +64,27 @@ def measure(tiny: bool) -> list[Figure]:
         return skipped((_NAME,), _UNIT, why)
     if not all((shared_data() / path).is_file() for path in FILES.values()):
         return skipped((_NAME,), _UNIT, "the real files are not there; bench/scenes.py says where they are looked for")
-    chosen = list(FILES)[-1:] if tiny else list(FILES)
-    found = {name: over_passes(*compared(name, tiny)) for name in chosen}
+    file_names = list(FILES)[-1:] if tiny else list(FILES)
+    comparisons = {name: compare_with_passes(*compared(name, tiny)) for name in file_names}
     # where an error cannot be told from the peer's noise, what it is very likely below counts in its place
-    errors = {name: of.error.value if of.is_told else of.limit for name, of in found.items()}
+    errors = {
+        name: comparison.error.value if comparison.is_significant else comparison.limit
+        for name, comparison in comparisons.items()
+    }
     middle = sorted(errors, key=lambda name: errors[name])[len(errors) // 2]
-    context = {**{name: _said(of) for name, of in found.items()}, "size": list(_SIZE), "spp": PASSES * _SPP}
+    context = {
+        **{name: _describe(comparison) for name, comparison in comparisons.items()},
+        "size": list(_SIZE),
+        "spp": PASSES * _SPP,
+    }
     median = float(np.median(list(errors.values())))
-    return [Figure(_NAME, median, _UNIT, {**context, "lights": _LIGHTS}, found[middle].error.standard_error)]
+    return [Figure(_NAME, median, _UNIT, {**context, "lights": _LIGHTS}, comparisons[middle].error.standard_error)]
 
 
-def _said(of: NoiseFree) -> str:
-    if not of.is_told:
-        return f"below {100 * of.limit:.0f} % (bias {100 * of.bias.value:.1f} %)"
-    return f"{of.said} ± {100 * of.error.standard_error:.2g} %"
+def _describe(comparison: NoiseCorrectedError) -> str:
+    if not comparison.is_significant:
+        return f"below {100 * comparison.limit:.0f} % (bias {100 * comparison.bias.value:.1f} %)"
+    return f"{comparison.summary} ± {100 * comparison.error.standard_error:.2g} %"
 
 
 def compared(name: str, tiny: bool, folder: Path | None = None) -> tuple[F64, F32]:
@@ -91,11 +98,11 @@ def compared(name: str, tiny: bool, folder: Path | None = None) -> tuple[F64, F3
     path = shared_data() / FILES[name]
     scene = import_scene(path, name, _light())
     with tempfile.TemporaryDirectory() as scratch:
-        ours, is_surface = _ours(scene, size, lights, Path(scratch))
-        theirs = _theirs(read_plain(path), scene, size, spp, Path(scratch))
+        rendered, is_surface = _render_relume(scene, size, lights, Path(scratch))
+        reference_passes = _render_mitsuba(read_plain(path), scene, size, spp, Path(scratch))
     if folder is not None:
-        np.savez(folder / f"{name}.npz", ours=ours, theirs=theirs, is_surface=is_surface)
-    return ours[is_surface][None], theirs[:, is_surface][:, None]
+        np.savez(folder / f"{name}.npz", ours=rendered, theirs=reference_passes, is_surface=is_surface)
+    return rendered[is_surface][None], reference_passes[:, is_surface][:, None]
 
 
 def _light() -> Any:
@@ -103,45 +110,49 @@ def _light() -> Any:
     return read_environment(path, path.stem) if path.is_file() else environments()[0]
 
 
-def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
+def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
     """The picture, and which pixels show any surface."""
     width, height = size
     recipe = Recipe("gather", (scene.cameras[0].name,), (_FINER * width, _FINER * height), lights)
-    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Memory(4 << 30))
+    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
     view = scene.cameras[0].name
     fine = render_image(transfer, view, validate({}, transfer.default_look))
     is_surface = transfer.views[view].material_ids() != BACKGROUND
     return averaged(fine, _FINER), is_surface.reshape(height, _FINER, width, _FINER).any(axis=(1, 3))
 
 
-def _theirs(file: File, scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
+def _render_mitsuba(file: File, scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
     materials, arrays, bsdfs = Materials(file), dict[str, Any](), []
     for k, shape in enumerate(file.shapes):
-        of, num = shape.attributes, len(shape.attributes["POSITION"])
-        arrays |= {f"positions_{k}": of["POSITION"], f"normals_{k}": of["NORMAL"], f"faces_{k}": shape.faces}
-        arrays[f"uvs_{k}"] = of.get("TEXCOORD_0", np.zeros((num, 2), np.float32))
-        if "TANGENT" in of:
+        attributes, num = shape.attributes, len(shape.attributes["POSITION"])
+        arrays |= {
+            f"positions_{k}": attributes["POSITION"],
+            f"normals_{k}": attributes["NORMAL"],
+            f"faces_{k}": shape.faces,
+        }
+        arrays[f"uvs_{k}"] = attributes.get("TEXCOORD_0", np.zeros((num, 2), np.float32))
+        if "TANGENT" in attributes:
             arrays |= {
-                f"tangent_of_{k}": of["TANGENT"][:, :3] * 0.5 + 0.5,
-                f"hand_of_{k}": of["TANGENT"][:, 3:] * 0.5 + 0.5,
+                f"tangent_of_{k}": attributes["TANGENT"][:, :3] * 0.5 + 0.5,
+                f"hand_of_{k}": attributes["TANGENT"][:, 3:] * 0.5 + 0.5,
             }
-        if "COLOR_0" in of:
-            arrays[f"colors_of_{k}"] = np.ascontiguousarray(of["COLOR_0"][:, :3])
-        bsdfs.append(materials.bsdf(shape.material, of))
+        if "COLOR_0" in attributes:
+            arrays[f"colors_of_{k}"] = np.ascontiguousarray(attributes["COLOR_0"][:, :3])
+        bsdfs.append(materials.bsdf(shape.material, attributes))
     job = {
         "integrator": {"type": "volpath", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs,
-        "emitters": [emitter for of, to_world in file.lights for emitter in _emitter(of, to_world)],
+        "emitters": [emitter for attributes, to_world in file.lights for emitter in _emitter(attributes, to_world)],
     }  # fmt: skip
     render_arrays({**arrays, **materials.arrays}, scene, size, job, folder)
-    return passes_of(folder)
+    return read_passes(folder)
 
 
-def _emitter(of: dict[str, Any], to_world: F64) -> list[dict[str, Any]]:
+def _emitter(light: dict[str, Any], to_world: F64) -> list[dict[str, Any]]:
     """A light of KHR_lights_punctual."""
-    gain = [_CANDELA * of.get("intensity", 1.0) * c for c in of.get("color", [1, 1, 1])]
+    gain = [_CANDELA * light.get("intensity", 1.0) * c for c in light.get("color", [1, 1, 1])]
     spectrum = {"type": "rgb", "value": gain}
-    if of["type"] == "point":
+    if light["type"] == "point":
         return [{"type": "point", "position": to_world[:3, 3].tolist(), "intensity": spectrum}]
-    if of["type"] == "directional":
+    if light["type"] == "directional":
         return [{"type": "directional", "direction": (-to_world[:3, 2]).tolist(), "irradiance": spectrum}]
-    raise ValueError(f"{of['type']} is not among the lights of these files")
+    raise ValueError(f"{light['type']} is not among the lights of these files")

@@ -33,9 +33,9 @@ def measure(tiny: bool) -> list[Figure]:
         for _ in range(1 if tiny else 5):
             with closing(Importers()) as importers:
                 for times in (cold, warm, warm, warm):
-                    began = time.perf_counter()
+                    start_time = time.perf_counter()
                     with suppress(SceneError):
                         importers.run(request)
-                    times.append(1e3 * (time.perf_counter() - began))
+                    times.append(1e3 * (time.perf_counter() - start_time))
     cold_ms, warm_ms = float(np.median(cold)), float(np.median(warm))
     return [Figure("import.refusal_ms", warm_ms, "ms", {"cold_ms": cold_ms, "ratio": warm_ms / cold_ms})]

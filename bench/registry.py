@@ -13,7 +13,7 @@ from datetime import date
 from typing import Any
 
 from bench.figure import Figure
-from bench.machine import processor_ticks, stolen_share
+from bench.machine import measure_stolen_fraction, processor_ticks
 from relume.store.schema import SCHEMA_VERSION
 
 
@@ -30,18 +30,18 @@ class Group:
 
     def measure(self, tiny: bool) -> list[Figure]:
         """Run it; a failure is a figure without a value."""
-        began, ticks = time.perf_counter(), processor_ticks()
+        start_time, ticks = time.perf_counter(), processor_ticks()
         try:
             figures: list[Figure] = importlib.import_module(self.module).measure(tiny)
         except Exception as error:  # the other groups shall be measured
             traceback.print_exc()
             return [Figure(name, None, "", {"failed": f"{type(error).__name__}: {error}"[:500]}) for name in self.names]
-        about = {
-            "measured_in_s": round(time.perf_counter() - began, 1),
-            "stolen_share": stolen_share(ticks, processor_ticks()),
+        details = {
+            "measured_in_s": round(time.perf_counter() - start_time, 1),
+            "stolen_share": measure_stolen_fraction(ticks, processor_ticks()),
             "measured_on": f"{date.today().isoformat()}, schema {SCHEMA_VERSION}",
         }
-        return [replace(figure, context={**figure.context, **about}) for figure in figures]
+        return [replace(figure, context={**figure.context, **details}) for figure in figures]
 
 
 GROUPS = (
@@ -207,9 +207,9 @@ def names() -> list[str]:
 def measure(prefix: str, tiny: bool = False) -> Iterator[Figure]:
     """Measure the groups that have a figure whose name starts with `prefix`; yields those figures."""
     for group in GROUPS:
-        wanted = [name for name in group.names if name.startswith(prefix)]
-        if wanted:
-            yield from (figure for figure in group.measure(tiny) if figure.name in wanted)
+        names = [name for name in group.names if name.startswith(prefix)]
+        if names:
+            yield from (figure for figure in group.measure(tiny) if figure.name in names)
 
 
 def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
@@ -236,9 +236,9 @@ def _line(figure: Figure) -> str:
     if figure.value is None:
         return f"{figure.name:<32} -  {figure.context.get('skipped') or figure.context.get('failed')}"
     stolen = figure.context.get("stolen_share") or 0
-    beside = f"   (the host gave {stolen:.0%} of the processor time to others)" if stolen >= _NOTEWORTHY else ""
+    stolen_note = f"   (the host gave {stolen:.0%} of the processor time to others)" if stolen >= _NOTEWORTHY else ""
     error = "" if figure.standard_error is None else f" ± {figure.standard_error:.2g}"
-    return f"{figure.name:<32} {figure.value:.4g}{error} {figure.unit}{beside}"
+    return f"{figure.name:<32} {figure.value:.4g}{error} {figure.unit}{stolen_note}"
 
 
 def _plain(value: Any) -> Any:

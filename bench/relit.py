@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from bench.points import Lit
+from bench.points import LitSamples
 from bench.scenes import LAMBERT, cook_torrance
-from bench.standard_error import over_points
+from bench.standard_error import estimate_point_error
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
-from relume.estimated import Estimated
+from relume.estimated import JackknifeEstimate
 from relume.light.tiles import Tiles, choose_tiles
-from relume.light.triangles import TriangleLights, Unturned, weigh
+from relume.light.triangles import RotatedEnvironment, TriangleLights, integrate_environment
 from relume.operators.shade import shade
-from relume.reference import reference_radiance, texels_of
+from relume.reference import environment_texels, reference_radiance
 from relume.trace.visibility import trace_visibility
 
 F64 = NDArray[np.float64]
@@ -50,16 +50,25 @@ def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
     """
     tiles = choose_tiles(environment.radiance, num_lights, relightable)
     centroids = tiles.centroids.astype(np.float32)
-    return Bake(tiles, centroids if relightable else weigh(tiles, Unturned.of(environment.radiance)).direction)
+    return Bake(
+        tiles,
+        centroids
+        if relightable
+        else integrate_environment(tiles, RotatedEnvironment.from_radiance(environment.radiance)).direction,
+    )
 
 
 def compare(
-    lit: Lit, bakes: Mapping[str, Bake], light: Environment, terms: Mapping[str, Mapping[str, Any]], spp: int
-) -> dict[tuple[str, str], Estimated]:
+    lit_samples: LitSamples,
+    bakes: Mapping[str, Bake],
+    light: Environment,
+    terms: Mapping[str, Mapping[str, Any]],
+    spp: int,
+) -> dict[tuple[str, str], JackknifeEstimate]:
     """Relative RMSE of each term in each bake, of the same points under one light.
 
     Args:
-        lit: the points; what they see is traced anew for each bake.
+        lit_samples: the points; what they see is traced anew for each bake.
         bakes: by a name for each.
         light: the map that is shown.
         terms: complete ones, by the names of their figures.
@@ -68,36 +77,42 @@ def compare(
         By the names of term and bake.
     """
     documents = [[dict(document)] for document in terms.values()]
-    truth = reference_radiance(lit.geometry, texels_of(light), lit.points, documents, spp)
+    reference = reference_radiance(
+        lit_samples.geometry, environment_texels(light), lit_samples.surface_points, documents, spp
+    )
     errors = {}
     for kind, baked in bakes.items():
-        lights = weigh(baked.tiles, Unturned.of(light.radiance))
-        for (name, document), right in zip(terms.items(), truth, strict=True):
-            errors[name, kind] = over_points(_radiance(lit, baked, lights, document), right)
+        lights = integrate_environment(baked.tiles, RotatedEnvironment.from_radiance(light.radiance))
+        for (name, document), right in zip(terms.items(), reference, strict=True):
+            errors[name, kind] = estimate_point_error(_radiance(lit_samples, baked, lights, document), right)
     return errors
 
 
-def _radiance(lit: Lit, baked: Bake, lights: TriangleLights, document: Mapping[str, Any]) -> F64:
+def _radiance(lit_samples: LitSamples, baked: Bake, lights: TriangleLights, document: Mapping[str, Any]) -> F64:
     """Of the points under the lights in a bake's tiles. (n, 3)"""
-    points, term = lit.points, TERMS[document["model"]]
-    visible = trace_visibility(lit.geometry.embree, points.position, points.normal, baked.towards).visible
-    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
-    receivers = replace(lit.receivers, visible=visible)
+    surface_points, term = lit_samples.surface_points, TERMS[document["model"]]
+    visible = trace_visibility(
+        lit_samples.geometry.embree, surface_points.position, surface_points.normal, baked.towards
+    ).visible
+    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
+    receivers = replace(lit_samples.receivers, visible=visible)
     image = shade(term, bands, lights, receivers, lambda share: None, lambda: False).image
-    found = image.transpose(0, 2, 1).reshape(-1, 3)[: points.num_points]
-    return np.asarray(found.astype(np.float64) * np.asarray(document["color"]))
+    radiance = image.transpose(0, 2, 1).reshape(-1, 3)[: surface_points.num_points]
+    return np.asarray(radiance.astype(np.float64) * np.asarray(document["color"]))
 
 
-def figures(found: Mapping[str, Mapping[str, Estimated]], context: Mapping[str, Any]) -> list[Figure]:
+def figures(errors_by_name: Mapping[str, Mapping[str, JackknifeEstimate]], context: Mapping[str, Any]) -> list[Figure]:
     """Each figure's worst error of a relightable bake; all errors, labelled "kind, …", beside it."""
-    made = []
-    for name, errors in found.items():
+    results = []
+    for name, errors in errors_by_name.items():
         worst, plain = _worst(errors, "relightable"), _worst(errors, "plain")
-        about = {"plain": plain.value, "plain_standard_error": plain.standard_error}
-        parts = {label: error.value for label, error in errors.items()}
-        made.append(Figure(name, worst.value, "relative RMSE", {**context, **about, **parts}, worst.standard_error))
-    return made
+        details = {"plain": plain.value, "plain_standard_error": plain.standard_error}
+        values_by_label = {label: error.value for label, error in errors.items()}
+        results.append(
+            Figure(name, worst.value, "relative RMSE", {**context, **details, **values_by_label}, worst.standard_error)
+        )
+    return results
 
 
-def _worst(errors: Mapping[str, Estimated], kind: str) -> Estimated:
+def _worst(errors: Mapping[str, JackknifeEstimate], kind: str) -> JackknifeEstimate:
     return max(error for label, error in errors.items() if label.startswith(kind))

@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from bench.figure import Figure, skipped
 from bench.gather import bake
 from bench.indirect import PASSES
-from bench.mitsuba import averaged, missing, passes_of, render
-from bench.standard_error import over_passes
+from bench.mitsuba import averaged, missing, read_passes, render
+from bench.standard_error import compare_with_passes
 from relume.bake import Recipe
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
 from relume.scene.cornell import rectangle, sunny_sky
 from relume.scene.demo.still_life import look_at
 from relume.scene.demo.surfaces import sphere
-from relume.scene.model import Coding, Material, Scene, Texture
+from relume.scene.model import Material, Scene, Texture, TextureEncoding
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -42,28 +42,31 @@ def measure(tiny: bool) -> list[Figure]:
     if (why := missing()) is not None:
         return skipped((_NAME,), _UNIT, why)
     size, spp = ((40, 30), 2) if tiny else (_SIZE, _SPP)
-    scene = rough_scene()
+    scene = make_roughness_map_scene()
     with tempfile.TemporaryDirectory() as folder:
-        ours, mean = _ours(scene, size, 60 if tiny else _LIGHTS, Path(folder))
-        theirs = _theirs(scene, size, spp, Path(folder))
-    found, without = over_passes(ours, theirs), over_passes(mean, theirs)
-    about = {
-        **found.context,
+        rendered, mean = _render_relume(scene, size, 60 if tiny else _LIGHTS, Path(folder))
+        reference_passes = _render_mitsuba(scene, size, spp, Path(folder))
+    comparison, mean_comparison = (
+        compare_with_passes(rendered, reference_passes),
+        compare_with_passes(mean, reference_passes),
+    )
+    details = {
+        **comparison.context,
         "size": list(size),
         "spp": PASSES * spp,
         "lights": _LIGHTS,
-        "mean_roughness": without.said,
+        "mean_roughness": mean_comparison.summary,
     }
-    return [Figure(_NAME, found.error.value, _UNIT, about, found.error.standard_error)]
+    return [Figure(_NAME, comparison.error.value, _UNIT, details, comparison.error.standard_error)]
 
 
-def rough_scene() -> Scene:
+def make_roughness_map_scene() -> Scene:
     """The scene of this benchmark."""
     maps = {"Floor": _tiles(), "Ball": _spots()}
     materials = [Material(name, (_mirror(name, texels),), {"roughness": _map(texels)}) for name, texels in maps.items()]
     meshes = [
         rectangle([-2, 0, 2], [4, 0, 0], [0, 0, -4]).mesh("floor", 0),
-        sphere(0.6, 64).moved(np.eye(3), [0, 0.6, 0]).mesh("ball", 1),
+        sphere(0.6, 64).transform(np.eye(3), [0, 0.6, 0]).mesh("ball", 1),
     ]
     camera = look_at("front", (0.3, 1.2, 3.4), (0.0, 0.45, 0.0), 0.7)
     return make_scene("rough", meshes, materials, [camera], sunny_sky())
@@ -83,7 +86,7 @@ def _spots(side: int = 256) -> F32:
 def _map(texels: F32) -> Texture:
     mean = float(texels.mean())
     pixels = np.round(255 * texels).astype(np.uint8)[..., None]
-    return Texture(pixels, coding=Coding("share", (1 / mean, 1 / mean, 1 / mean)))
+    return Texture(pixels, encoding=TextureEncoding("share", (1 / mean, 1 / mean, 1 / mean)))
 
 
 def _mirror(name: str, texels: F32) -> dict[str, object]:
@@ -91,13 +94,15 @@ def _mirror(name: str, texels: F32) -> dict[str, object]:
     return {"model": "ggx", "color": list(_COLORS[name]), "params": params, "texture": None, "roughness_map": True}
 
 
-def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, F64]:
+def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, F64]:
     """The picture with the maps, and with their means."""
     width, height = size
     recipe = Recipe("direct", ("front",), (_FINER * width, _FINER * height), lights)
-    transfer = open_transfer(bake(scene, recipe, folder / "rough.zarr").path, Memory(4 << 30))
+    transfer = open_transfer(bake(scene, recipe, folder / "rough.zarr").path, Cache(4 << 30))
     materials = transfer.default_look["materials"]
-    plain = {name: {"terms": [{**of["terms"][0], "roughness_map": False}]} for name, of in materials.items()}
+    plain = {
+        name: {"terms": [{**material["terms"][0], "roughness_map": False}]} for name, material in materials.items()
+    }
 
     def picture(changes: dict[str, object]) -> F64:
         return averaged(render_image(transfer, "front", validate(changes, transfer.default_look)), _FINER)
@@ -105,7 +110,7 @@ def _ours(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tup
     return picture({}), picture({"materials": plain})
 
 
-def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
+def _render_mitsuba(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
     images = {"alpha_0": np.square(_tiles())[..., None], "alpha_1": np.square(_spots())[..., None]}
     bsdfs = [
         {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": {"array": f"alpha_{k}"},
@@ -113,4 +118,4 @@ def _theirs(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
         for k, material in enumerate(scene.materials)
     ]  # fmt: skip
     render(scene, size, {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs}, folder, images)
-    return passes_of(folder)
+    return read_passes(folder)

@@ -18,13 +18,13 @@ from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from bench.timing import percentiles
 from relume.bake import Recipe
 from relume.environments.studio import studio
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from worker.paths import bake_path
 
 _SIGMA = "/materials/Teapot/terms/1/params/sigma"
 _EDITS_A_SECOND = 60.0
-_PARTS = ("wait", "update", "encode")
+_FRAME_STAGES = ("wait", "update", "encode")
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -32,11 +32,11 @@ def measure(tiny: bool) -> list[Figure]:
     size, num_lights, num_edits = ((64, 64), 60, 10) if tiny else ((512, 512), 1000, 600)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     with baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house:
-        ids = open_transfer(bake_path(house.data, house.bake), Memory(4 << 30)).views["front"].material_ids()
+        ids = open_transfer(bake_path(house.data, house.bake), Cache(4 << 30)).views["front"].material_ids()
         with serving(house) as server, session(server, house.bake) as client:
-            client.send(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
+            client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
             client.exact(0)
-            client.send(type="edit", revision=1, patch=[{"op": "replace", "path": _SIGMA, "value": 0.19}])
+            client.send_message(type="edit", revision=1, patch=[{"op": "replace", "path": _SIGMA, "value": 0.19}])
             client.exact(1)
             before = len(server.edit_ms())
             frames = _drag(client, num_edits)
@@ -48,7 +48,10 @@ def measure(tiny: bool) -> list[Figure]:
         "size": list(size),
         "share_of_picture": float(np.mean(ids == 0)),
         "frame_bytes_median": float(np.median([num_bytes for _, num_bytes in frames])),
-        **{f"{part}_ms_median": float(np.median([header["ms"][part] for header, _ in frames])) for part in _PARTS},
+        **{
+            f"{stage}_ms_median": float(np.median([header["ms"][stage] for header, _ in frames]))
+            for stage in _FRAME_STAGES
+        },
         "max_ms": max(times),
     }
     return [
@@ -59,13 +62,13 @@ def measure(tiny: bool) -> list[Figure]:
 
 def _drag(client: SessionClient, num_edits: int) -> list[tuple[dict[str, Any], int]]:
     """Move σ on a steady clock, reading frames in between; returns their headers and sizes."""
-    began, frames = time.perf_counter(), []
+    start_time, frames = time.perf_counter(), []
     for k in range(num_edits):
         sigma = 0.2 + 0.15 * np.sin(2 * np.pi * k / 90)
         patch = [{"op": "replace", "path": _SIGMA, "value": round(float(sigma), 5)}]
-        client.send(type="edit", revision=2 + k, patch=patch)
-        while (left_s := began + (k + 1) / _EDITS_A_SECOND - time.perf_counter()) > 0:
-            if (found := client.frame(left_s)) is not None:
-                frames.append(found)
+        client.send_message(type="edit", revision=2 + k, patch=patch)
+        while (remaining_s := start_time + (k + 1) / _EDITS_A_SECOND - time.perf_counter()) > 0:
+            if (received := client.frame(remaining_s)) is not None:
+                frames.append(received)
     client.exact(1 + num_edits)
     return frames

@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 
 from bench.figure import Figure
-from bench.points import Lit, lit_points
+from bench.points import LitSamples, sample_lit_surface
 from bench.scenes import LAMBERT, environments, teapot_on_table
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
-from relume.brdf.sweep import moved_curves, slider_values, solid_angles
+from relume.brdf.sweep import curves_of_parameter, slider_values, solid_angles
 from relume.brdf.term import F64
 from relume.imageio.tonemap import tone_map
-from relume.operators.nodes import Linearised, linearise
+from relume.operators.nodes import ParameterOperator, linearize
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 
@@ -31,51 +31,53 @@ _SLIDERS = (("ggx", "roughness"), ("cook_torrance", "sigma"), ("blinn_phong", "e
 
 def measure(tiny: bool) -> list[Figure]:
     """Measure every slider under every light."""
-    num_points, num_lights, size = (60, 80, (32, 32)) if tiny else (4000, 2000, (160, 160))
-    found = {}
+    num_positions, num_lights, size = (60, 80, (32, 32)) if tiny else (4000, 2000, (160, 160))
+    errors_by_name = {}
     for environment in environments()[: 1 if tiny else 3]:
         scene = teapot_on_table(environment, (LAMBERT,), (LAMBERT,))
-        lit = lit_points(scene, size, num_points, num_lights, material=0)
+        lit_samples = sample_lit_surface(scene, size, num_positions, num_lights, material=0)
         for model, parameter in _SLIDERS:
-            found[f"{environment.name}, {model}.{parameter}"] = _errors(lit, model, parameter, 2 if tiny else 12)
-    worst = {name: max(errors[name] for errors in found.values()) for name in ("largest", "levels")}
+            errors_by_name[f"{environment.name}, {model}.{parameter}"] = _errors(
+                lit_samples, model, parameter, 2 if tiny else 12
+            )
+    worst = {name: max(errors[name] for errors in errors_by_name.values()) for name in ("largest", "levels")}
     return [
-        Figure("slider.sharp_error", worst["largest"], "share", {"view_samples": num_points, **found}),
-        Figure("slider.sharp_levels", worst["levels"], "of 255", {"view_samples": num_points}),
+        Figure("slider.sharp_error", worst["largest"], "share", {"view_samples": num_positions, **errors_by_name}),
+        Figure("slider.sharp_levels", worst["levels"], "of 255", {"view_samples": num_positions}),
     ]
 
 
-def _errors(lit: Lit, model: str, parameter: str, num: int) -> dict[str, float]:
+def _errors(lit_samples: LitSamples, model: str, parameter: str, num: int) -> dict[str, float]:
     """Over values in the sharpest tenth, of which exponents have theirs at the upper end."""
     declared = TERMS[model].parameter(parameter)
-    values = slider_values(declared, 10 * num, between=True)
+    values = slider_values(declared, 10 * num, at_midpoints=True)
     tenth = values[-num:] if parameter == "exponent" else values[:num]
     first = complete_term(("slider",), {"model": model, "params": {parameter: float(values[0])}}, None)
-    along = linearise(first, parameter)
+    along = linearize(first, parameter)
     if along is None:
         raise ValueError(f"{parameter} of {model} has no nodes")
     term = TERMS[model]
-    progress, cancelled = (lambda share: None), (lambda: False)
-    frozen = along.freeze(term, _bands(first), lit.lights, lit.receivers, progress, cancelled)
-    shares, levels, negative = [], [], []
+    progress, is_canceled = (lambda share: None), (lambda: False)
+    operator = along.precompute(term, _bands(first), lit_samples.lights, lit_samples.receivers, progress, is_canceled)
+    energy_fractions, noise_levels, negative = [], [], []
     for value in tenth:
         document = {**first, "params": {**first["params"], parameter: float(value)}}
-        exact = _shaded(lit, document, _bands(document))
-        even = _shaded(lit, document, _spread(along, _bands(document)))
-        tiles, _, _, samples = frozen.transport.shape
+        exact = _shade(lit_samples, document, _bands(document))
+        uniform = _shade(lit_samples, document, _spread(along, _bands(document)))
+        tiles, _, _, samples = operator.transport.shape
         image = np.zeros((tiles, 3, samples), np.float32)
-        frozen.add(along.coefficients(_bands(document)), image)
-        shown = image.transpose(0, 2, 1).reshape(-1, 3)[: lit.points.num_points].astype(np.float64)
-        shares.append(np.abs(shown - exact) / (exact + 0.01 * even + 1e-12))
-        negative.append(float((shown < -0.01 * even).any(axis=1).mean()))
+        operator.add(along.coefficients(_bands(document)), image)
+        radiance = image.transpose(0, 2, 1).reshape(-1, 3)[: lit_samples.surface_points.num_points].astype(np.float64)
+        energy_fractions.append(np.abs(radiance - exact) / (exact + 0.01 * uniform + 1e-12))
+        negative.append(float((radiance < -0.01 * uniform).any(axis=1).mean()))
         exposure = -float(np.log2(max(np.percentile(exact, 95), 1e-9)))
-        display = [tone_map(rows[None].astype(np.float32), exposure, "agx")[0] for rows in (shown, exact)]
-        levels.append(255 * np.abs(display[0].astype(np.float64) - display[1]))
+        display = [tone_map(rows[None].astype(np.float32), exposure, "agx")[0] for rows in (radiance, exact)]
+        noise_levels.append(255 * np.abs(display[0].astype(np.float64) - display[1]))
     return {
-        "largest": float(np.max(shares)),
-        "percentile_99": float(np.percentile(shares, 99)),
-        "levels": float(np.max(levels)),
-        "levels_99": float(np.percentile(levels, 99)),
+        "largest": float(np.max(energy_fractions)),
+        "percentile_99": float(np.percentile(energy_fractions, 99)),
+        "levels": float(np.max(noise_levels)),
+        "levels_99": float(np.percentile(noise_levels, 99)),
         "negative_share": max(negative),
         "nodes": along.num_columns,
     }
@@ -83,20 +85,20 @@ def _errors(lit: Lit, model: str, parameter: str, num: int) -> dict[str, float]:
 
 def _bands(document: dict[str, Any]) -> dict[str, F64]:
     curves = TERMS[document["model"]].curves
-    return {curve.name: curve_bands(document, curve) for curve in curves if not curve.outgoing}
+    return {curve.name: curve_bands(document, curve) for curve in curves if not curve.depends_on_view}
 
 
-def _spread(along: Linearised, bands: dict[str, F64]) -> dict[str, F64]:
+def _spread(along: ParameterOperator, bands: dict[str, F64]) -> dict[str, F64]:
     """The curves that a slider moves, each spread evenly over all directions."""
     spread = dict(bands)
-    for curve in moved_curves(TERMS[along.model], along.parameter):
-        share = solid_angles(curve) / solid_angles(curve).sum()
-        spread[curve.name] = np.repeat((bands[curve.name] @ share)[:, None], curve.num_bands, axis=1)
+    for curve in curves_of_parameter(TERMS[along.model], along.parameter):
+        weights = solid_angles(curve) / solid_angles(curve).sum()
+        spread[curve.name] = np.repeat((bands[curve.name] @ weights)[:, None], curve.num_bands, axis=1)
     return spread
 
 
-def _shaded(lit: Lit, document: dict[str, Any], bands: dict[str, F64]) -> F64:
+def _shade(lit_samples: LitSamples, document: dict[str, Any], bands: dict[str, F64]) -> F64:
     """All curves contracted. (n, 3)"""
-    term = TERMS[document["model"]].settled(document)
-    projector = Projector(term, contract(term, bands, None), lit.lights, lit.receivers)
-    return projector.project(0, lit.points.num_points)[:, 0].astype(np.float64)
+    term = TERMS[document["model"]].normalized(document)
+    projector = Projector(term, contract(term, bands, None), lit_samples.lights, lit_samples.receivers)
+    return projector.project(0, lit_samples.surface_points.num_points)[:, 0].astype(np.float64)

@@ -23,22 +23,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure
-from bench.points import freeze_along, lit_points, relative_rmse
+from bench.points import freeze_for_curve, relative_rmse, sample_lit_surface
 from bench.scenes import LAMBERT, cook_torrance, teapot_on_table
-from bench.timing import in_turn
+from bench.timing import time_interleaved
 from relume.bake import Recipe
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
 from relume.environments.studio import studio
 from relume.look import Look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
-from relume.operators.nodes import linearise
+from relume.operators.nodes import linearize
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
-from relume.store import bake_here
+from relume.picture.transfer import FixedViewTransfer
+from relume.store import bake_in_process
 
 _NAMES = ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")
 _TERM = "/materials/Teapot/terms/1"
@@ -57,7 +57,7 @@ class _Drag:
     def document(self) -> dict[str, Any]:
         return {"model": self.model, "color": [0.9, 0.9, 0.9], "params": {self.parameter: float(self.values[0])}}
 
-    def looks(self, transfer: Transfer) -> list[Look]:
+    def looks(self, transfer: FixedViewTransfer) -> list[Look]:
         """The highlight alone, so that errors are of what moves."""
         looks = []
         for value in self.values:
@@ -72,85 +72,97 @@ class _Drag:
 def measure(tiny: bool) -> list[Figure]:
     """Measure both drags, and both freezes."""
     size, num_lights, num_frames = ((32, 32), 60, 4) if tiny else ((320, 320), 500, 12)
-    several = _Drag("ggx", "roughness", np.linspace(0.15, 0.75, num_frames))
-    alone = _Drag("cook_torrance", "sigma", np.geomspace(0.05, 0.5, num_frames))
+    multi_curve_drag = _Drag("ggx", "roughness", np.linspace(0.15, 0.75, num_frames))
+    single_curve_drag = _Drag("cook_torrance", "sigma", np.geomspace(0.05, 0.5, num_frames))
     terms = (LAMBERT, cook_torrance(0.2))
     scene = teapot_on_table(studio(), terms, terms)
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe("direct", ("front",), size, num_lights)
-        transfer = open_transfer(bake_here(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Memory(4 << 30))
-        found = {f"{drag.model}.{drag.parameter}": _ways(transfer, drag) for drag in (several, alone)}
-    ours, before = found["ggx.roughness"]["nodes"], found["ggx.roughness"]["θh alone, 64"]
-    ratio, freezes = _freezes(tiny, several, alone)
+        transfer = open_transfer(
+            bake_in_process(DirectMethod(), scene, recipe, Path(folder) / "s.zarr"), Cache(4 << 30)
+        )
+        results = {
+            f"{drag.model}.{drag.parameter}": _measure_strategies(transfer, drag)
+            for drag in (multi_curve_drag, single_curve_drag)
+        }
+    node_result, before = results["ggx.roughness"]["nodes"], results["ggx.roughness"]["θh alone, 64"]
+    ratio, freezes = _freezes(tiny, multi_curve_drag, single_curve_drag)
     return [
-        Figure(_NAMES[0], ours["error"], "relative RMSE", {"one_curve": before["error"], "size": list(size), **found}),
-        Figure(_NAMES[1], ours["ms"], "ms", {"one_curve": before["ms"], "size": list(size)}),
+        Figure(
+            _NAMES[0],
+            node_result["error"],
+            "relative RMSE",
+            {"one_curve": before["error"], "size": list(size), **results},
+        ),
+        Figure(_NAMES[1], node_result["ms"], "ms", {"one_curve": before["ms"], "size": list(size)}),
         Figure(_NAMES[2], ratio, "ratio", freezes),
     ]
 
 
-def _ways(transfer: Transfer, drag: _Drag) -> dict[str, dict[str, float]]:
+def _measure_strategies(transfer: FixedViewTransfer, drag: _Drag) -> dict[str, dict[str, float]]:
     """The drag with nodes, and with the wavelets of θh, so many of them a frame."""
     exact = _exact(transfer, drag)
-    found = {"nodes": _follow(transfer, drag, "params/" + drag.parameter, None, exact)}
+    results = {"nodes": _measure_drag(transfer, drag, "params/" + drag.parameter, None, exact)}
     for budget in _BUDGETS:
         name = f"θh alone, {'all' if budget is None else budget}"
-        found[name] = _follow(transfer, drag, "curves/theta_h", budget, exact)
-    return found
+        results[name] = _measure_drag(transfer, drag, "curves/theta_h", budget, exact)
+    return results
 
 
-def _exact(transfer: Transfer, drag: _Drag) -> list[NDArray[np.float32]]:
+def _exact(transfer: FixedViewTransfer, drag: _Drag) -> list[NDArray[np.float32]]:
     """The pictures of the drag, each of them shaded."""
     pictures = []
     for look in drag.looks(transfer):
-        picture = Picture(transfer, "front", Memory(4 << 30))
+        picture = Picture(transfer, "front", Cache(4 << 30))
         picture.set_look(look)
-        _settle(picture)
+        _run_until_exact(picture)
         pictures.append(picture.image())
     return pictures
 
 
-def _follow(
-    transfer: Transfer, drag: _Drag, touched: str, budget: int | None, exact: list[NDArray[np.float32]]
+def _measure_drag(
+    transfer: FixedViewTransfer, drag: _Drag, touched: str, budget: int | None, exact: list[NDArray[np.float32]]
 ) -> dict[str, float]:
     """Drag with what is touched frozen beforehand, and nothing else made."""
-    looks, seen = drag.looks(transfer), transfer.views["front"].material_ids() == 0
-    picture = Picture(transfer, "front", Memory(4 << 30))
+    looks, is_edited = drag.looks(transfer), transfer.views["front"].material_ids() == 0
+    picture = Picture(transfer, "front", Cache(4 << 30))
     picture.set_look(looks[0])
-    _settle(picture)
-    picture.touch(f"{_TERM}/{touched}")
+    _run_until_exact(picture)
+    picture.prepare(f"{_TERM}/{touched}")
     while picture.next_job() is not None:  # a rough operator may come first
-        picture.freeze(lambda share: None, lambda: False)
-    errors, taken = [], []
+        picture.run_next_job(lambda share: None, lambda: False)
+    errors, durations = [], []
     for look, right in zip(looks[1:], exact[1:], strict=True):
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         picture.set_look(look)
         picture.advance(budget)
-        taken.append(time.perf_counter() - began)
-        errors.append(relative_rmse(picture.image()[seen], right[seen]))
-    return {"error": max(errors), "error_median": float(np.median(errors)), "ms": 1e3 * float(np.median(taken))}
+        durations.append(time.perf_counter() - start_time)
+        errors.append(relative_rmse(picture.image()[is_edited], right[is_edited]))
+    return {"error": max(errors), "error_median": float(np.median(errors)), "ms": 1e3 * float(np.median(durations))}
 
 
-def _settle(picture: Picture) -> None:
+def _run_until_exact(picture: Picture) -> None:
     while not picture.advance(None).exact or picture.next_job() is not None:
         if picture.next_job() is not None:
-            picture.freeze(lambda share: None, lambda: False)
+            picture.run_next_job(lambda share: None, lambda: False)
 
 
 def _freezes(tiny: bool, *drags: _Drag) -> tuple[float, dict[str, Any]]:
     """Seconds along each parameter and along θh; the ratio is of the first."""
-    num_points, num_lights, size = (60, 80, (32, 32)) if tiny else (6000, 2000, (320, 320))
+    num_positions, num_lights, size = (60, 80, (32, 32)) if tiny else (6000, 2000, (320, 320))
     documents = [complete_term(("slider",), drag.document, None) for drag in drags]
     scene = teapot_on_table(studio(), (documents[0],), (documents[0],))
-    lit = lit_points(scene, size, num_points, num_lights, material=0)
+    lit_samples = sample_lit_surface(scene, size, num_positions, num_lights, material=0)
     calls: dict[str, Callable[[], object]] = {}
     for drag, document in zip(drags, documents, strict=True):
-        term, along = TERMS[drag.model], linearise(document, drag.parameter)
+        term, along = TERMS[drag.model], linearize(document, drag.parameter)
         if along is None:
             raise ValueError(f"{drag.parameter} of {drag.model} has no nodes")
-        bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
-        rest = (lit.lights, lit.receivers, lambda share: None, lambda: False)
-        calls[f"{drag.model}.{drag.parameter}, {along.num_columns} nodes"] = partial(along.freeze, term, bands, *rest)
-        calls[f"{drag.model}, θh"] = partial(freeze_along, lit, document, "theta_h")
-    taken = [float(np.median(times)) for times in in_turn(list(calls.values()), 2 if tiny else 5)]
-    return taken[0] / taken[1], {**dict(zip(calls, taken, strict=True)), "view_samples": num_points}
+        bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
+        freeze_arguments = (lit_samples.lights, lit_samples.receivers, lambda share: None, lambda: False)
+        calls[f"{drag.model}.{drag.parameter}, {along.num_columns} nodes"] = partial(
+            along.precompute, term, bands, *freeze_arguments
+        )
+        calls[f"{drag.model}, θh"] = partial(freeze_for_curve, lit_samples, document, "theta_h")
+    durations = [float(np.median(times)) for times in time_interleaved(list(calls.values()), 2 if tiny else 5)]
+    return durations[0] / durations[1], {**dict(zip(calls, durations, strict=True)), "view_samples": num_positions}

@@ -21,26 +21,26 @@ from relume.resident import resident_bytes
 from relume.scene.built_in import built_in
 
 _NAME = "slow_readers.mb"
-_SETTLED = 5
+_NUM_STABLE_READINGS = 5
 """Looks at the memory, one after another, in which it no longer grows."""
 
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, ask."""
-    readers, points = (3, 2_000) if tiny else (60, 200_000)
+    readers, num_probes = (3, 2_000) if tiny else (60, 200_000)
     scene = built_in("cornell_box")
-    recipe = Recipe("surface", (scene.cameras[0].name,), (64, 64), 60, num_points=points)
+    recipe = Recipe("surface", (scene.cameras[0].name,), (64, 64), 60, num_points=num_probes)
     with baked_house(scene, recipe) as house, serving(house, {"RELUME_AHEAD": "false"}) as server:
         array, answer_bytes = _largest(server, house)
         with ThreadPoolExecutor(readers) as threads:
             list(threads.map(lambda _: _read(server, array), range(readers)))
-        before = _settled(server)
+        before = _measure_settled_bytes(server)
         with ExitStack() as connections:
             for _ in range(readers):
                 _ask(connections, server, array)
-            beside = _settled(server)
+            idle_bytes = _measure_settled_bytes(server)
     context = {"readers": readers, "answer_mb": answer_bytes / 1e6, "before_mb": before / 1e6, "array": array}
-    return [Figure(_NAME, (beside - before) / 1e6, "MB", context)]
+    return [Figure(_NAME, (idle_bytes - before) / 1e6, "MB", context)]
 
 
 def _largest(server: Server, house: House) -> tuple[str, int]:
@@ -67,11 +67,11 @@ def _ask(connections: ExitStack, server: Server, path: str) -> None:
     connection.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
 
 
-def _settled(server: Server) -> int:
+def _measure_settled_bytes(server: Server) -> int:
     """The server's memory when it no longer grows."""
-    most, same = 0, 0
-    while same < _SETTLED:
+    max_bytes, num_stable = 0, 0
+    while num_stable < _NUM_STABLE_READINGS:
         time.sleep(0.5)
-        now = resident_bytes(server.pid)
-        same, most = (same + 1, most) if now <= most else (0, now)
-    return most
+        current_bytes = resident_bytes(server.pid)
+        num_stable, max_bytes = (num_stable + 1, max_bytes) if current_bytes <= max_bytes else (0, current_bytes)
+    return max_bytes

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from bench.figure import Figure
 from relume.bake import Recipe
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
 from relume.scene.demo import demo_scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 _BLOCK = 4096
 
@@ -20,8 +20,8 @@ def measure(tiny: bool) -> list[Figure]:
     """Bake the built-in scene and add up its files, each rounded up to whole blocks of 4 KiB."""
     recipe = Recipe("direct", ("front",), (64, 48) if tiny else (480, 360), 100 if tiny else 4000)
     with tempfile.TemporaryDirectory() as folder:
-        path = bake_here(DirectMethod(), demo_scene(), recipe, Path(folder) / "s.zarr")
-        view = open_transfer(path, Memory(4 << 30)).views["front"]
+        path = bake_in_process(DirectMethod(), demo_scene(), recipe, Path(folder) / "s.zarr")
+        view = open_transfer(path, Cache(4 << 30)).views["front"]
         sizes = [file.stat().st_size for file in path.rglob("*") if file.is_file()]
     on_disk = sum(-(-size // _BLOCK) * _BLOCK for size in sizes)
     context = {

@@ -6,31 +6,33 @@ As `bench.rotation`. A fresh bake of each map stands beside those that were made
 from __future__ import annotations
 
 from bench.figure import Figure
-from bench.points import lit_points
+from bench.points import sample_lit_surface
 from bench.relit import bake, compare, documents, figures
 from bench.scenes import LAMBERT, environments, teapot_on_table
-from relume.estimated import Estimated
+from relume.estimated import JackknifeEstimate
 from relume.light.tiles import MIN_LIGHTS
 
 
 def measure(tiny: bool) -> list[Figure]:
     """Compare all bakes that are shown in a map, by one truth."""
-    num_points, num_lights = (20, 100) if tiny else (400, 4000)
+    num_positions, num_lights = (20, 100) if tiny else (400, 4000)
     terms = documents("swap")
-    found: dict[str, dict[str, Estimated]] = {name: {} for name in terms}
+    errors: dict[str, dict[str, JackknifeEstimate]] = {name: {} for name in terms}
     maps = environments()[: 2 if tiny else 3]
-    lit = lit_points(teapot_on_table(maps[0], (LAMBERT,), (LAMBERT,)), (320, 320), num_points, MIN_LIGHTS, None)
+    lit_samples = sample_lit_surface(
+        teapot_on_table(maps[0], (LAMBERT,), (LAMBERT,)), (320, 320), num_positions, MIN_LIGHTS, None
+    )
     bakes = {
         (kind, light.name): bake(light, num_lights, kind == "relightable")
         for kind in ("relightable", "plain")
         for light in maps
     }
     for light in maps:
-        kinds = {
-            ("fresh" if made_for == light.name else f"{kind}, {made_for}"): baked
-            for (kind, made_for), baked in bakes.items()
-            if kind == "plain" or made_for != light.name
+        bakes_by_type = {
+            ("fresh" if bake_environment == light.name else f"{kind}, {bake_environment}"): baked
+            for (kind, bake_environment), baked in bakes.items()
+            if kind == "plain" or bake_environment != light.name
         }
-        for (name, kind), error in compare(lit, kinds, light, terms, 500 if tiny else 0).items():
-            found[name][f"{kind} → {light.name}"] = error
-    return figures(found, {"view_samples": num_points, "lights": num_lights})
+        for (name, kind), error in compare(lit_samples, bakes_by_type, light, terms, 500 if tiny else 0).items():
+            errors[name][f"{kind} → {light.name}"] = error
+    return figures(errors, {"view_samples": num_positions, "lights": num_lights})

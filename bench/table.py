@@ -113,7 +113,7 @@ TARGETS = {
 }
 
 
-def document_of(name: str) -> str:
+def find_document(name: str) -> str:
     """Which document a figure belongs to."""
     return (
         "accuracy.md"
@@ -151,8 +151,8 @@ def row(figure: dict[str, Any]) -> str:
         value = f"{100 * figure['value']:.2f}{_spread(figure, 100)} %"
     else:
         value = f"{figure['value']:.3g}{_spread(figure)} {figure['unit'].replace('ratio', '×')}"
-    said = "; ".join(f"{key} {_short(item)}" for key, item in context.items() if key not in ("their_steps",))
-    return f"| `{figure['name']}` | {value} | {TARGETS.get(figure['name'], '')} | {said.replace('|', '/')} |"
+    context_text = "; ".join(f"{key} {_short(item)}" for key, item in context.items() if key not in ("their_steps",))
+    return f"| `{figure['name']}` | {value} | {TARGETS.get(figure['name'], '')} | {context_text.replace('|', '/')} |"
 
 
 def _spread(figure: dict[str, Any], scale: float = 1.0) -> str:
@@ -171,8 +171,8 @@ def _short(value: Any) -> str:
 
 def filled(text: str, figures: list[dict[str, Any]]) -> str:
     """A document with new rows in its table. Raises ValueError where it has no marks."""
-    before, _, rest = text.partition(BEGIN)
-    table, mark, after = rest.partition(END)
+    before, _, suffix = text.partition(BEGIN)
+    table, mark, after = suffix.partition(END)
     if not mark:
         raise ValueError("the document has no table of figures; put the two marks of bench/table.py into it")
     rows = {line.split("`")[1]: line for line in table.splitlines() if line.startswith("| `")}
@@ -185,8 +185,8 @@ def main() -> int:
     figures = json.load(sys.stdin)
     for name in ("performance.md", "accuracy.md"):
         path = DOCS / name
-        mine = [figure for figure in figures if document_of(figure["name"]) == name]
-        path.write_text(filled(path.read_text(), mine))
+        document_figures = [figure for figure in figures if find_document(figure["name"]) == name]
+        path.write_text(filled(path.read_text(), document_figures))
     return 0
 
 

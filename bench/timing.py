@@ -10,20 +10,20 @@ import numpy as np
 
 def seconds(call: Callable[[], object]) -> float:
     """Wall time of one call."""
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     call()
-    return time.perf_counter() - began
+    return time.perf_counter() - start_time
 
 
-def in_turn(calls: Sequence[Callable[[], object]], rounds: int) -> list[list[float]]:
+def time_interleaved(calls: Sequence[Callable[[], object]], rounds: int) -> list[list[float]]:
     """Seconds of each call in each round; the first round, which compiles and warms caches, is not counted."""
     for call in calls:
         call()
-    taken: list[list[float]] = [[] for _ in calls]
+    durations: list[list[float]] = [[] for _ in calls]
     for _ in range(rounds):
-        for call, times in zip(calls, taken, strict=True):
+        for call, times in zip(calls, durations, strict=True):
             times.append(seconds(call))
-    return taken
+    return durations
 
 
 def percentiles(values: Sequence[float]) -> tuple[float, float]:

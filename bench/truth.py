@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figure import Figure, skipped
-from bench.mitsuba import averaged, bsdf, missing, passes_of, render
-from bench.scenes import cook_torrance, sky, teapot_on_table
-from bench.standard_error import over_passes
+from bench.mitsuba import averaged, bsdf, missing, read_passes, render
+from bench.scenes import cook_torrance, make_sky, teapot_on_table
+from bench.standard_error import compare_with_passes
 from relume.brdf.document import complete_term
 from relume.environments.model import Environment
-from relume.estimated import Estimated
+from relume.estimated import JackknifeEstimate
 from relume.look import default_look, validate
 from relume.reference import reference_image
 from relume.reference.truth import Estimate, compare
@@ -40,27 +40,34 @@ def measure(tiny: bool) -> list[Figure]:
     if (why := missing()) is not None:
         return skipped(_NAMES, "relative RMSE", why)
     size, spp, passes = ((16, 12), 4, 2) if tiny else ((96, 72), 64, 8)
-    found = {name: _disagreement(scene, size, spp, passes) for name, scene in _scenes(64 if tiny else 1024).items()}
-    context = {"size": list(size), "spp": spp, "passes": passes, **{name: about for name, (_, about) in found.items()}}
-    worst = max(error for error, _ in found.values())
+    disagreements = {
+        name: _disagreement(scene, size, spp, passes) for name, scene in _make_scenes(64 if tiny else 1024).items()
+    }
+    context = {
+        "size": list(size),
+        "spp": spp,
+        "passes": passes,
+        **{name: details for name, (_, details) in disagreements.items()},
+    }
+    worst = max(error for error, _ in disagreements.values())
     return [Figure(_NAMES[0], worst.value, "relative RMSE", context, worst.standard_error)]
 
 
-def _scenes(num_rows: int) -> dict[str, Scene]:
+def _make_scenes(num_rows: int) -> dict[str, Scene]:
     """The teapot under a high sun, the still life under a low one, and from the left under a hazy one."""
     terms = _terms(0.5, 0.2)
     demo = demo_scene()
-    grey = [
+    gray = [
         Material(material.name, _terms(0.15 + 0.1 * k, 0.1 + 0.05 * k)) for k, material in enumerate(demo.materials)
     ]
 
-    def still_life(view: int, light: Environment) -> Scene:
-        return make_scene("Still life", demo.meshes, grey, demo.cameras[view : view + 1], light)
+    def make_still_life(view: int, light: Environment) -> Scene:
+        return make_scene("Still life", demo.meshes, gray, demo.cameras[view : view + 1], light)
 
     return {
-        "teapot, high sun": teapot_on_table(sky("high", 0.8, num_rows), terms, terms),
-        "still life, low sun": still_life(0, sky("low", 0.3, num_rows)),
-        "still life from the left, haze": still_life(1, sky("haze", 0.5, num_rows, spread=0.02)),
+        "teapot, high sun": teapot_on_table(make_sky("high", 0.8, num_rows), terms, terms),
+        "still life, low sun": make_still_life(0, make_sky("low", 0.3, num_rows)),
+        "still life from the left, haze": make_still_life(1, make_sky("haze", 0.5, num_rows, spread=0.02)),
     }
 
 
@@ -69,7 +76,9 @@ def _terms(albedo: float, sigma: float) -> tuple[dict[str, Any], ...]:
     return tuple(complete_term(("truth",), term, None) for term in (lambert, cook_torrance(sigma)))
 
 
-def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) -> tuple[Estimated, dict[str, Any]]:
+def _disagreement(
+    scene: Scene, size: tuple[int, int], spp: int, passes: int
+) -> tuple[JackknifeEstimate, dict[str, Any]]:
     """How far the two means are apart, and what else `relume.reference.truth.Comparison` says of them.
 
     Args:
@@ -81,20 +90,20 @@ def _disagreement(scene: Scene, size: tuple[int, int], spp: int, passes: int) ->
     bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     with tempfile.TemporaryDirectory() as folder:
         render(scene, size, {"spp": [spp], "bsdfs": bsdfs, "passes": passes}, Path(folder))
-        theirs = passes_of(Path(folder))
-    ours = np.array([_our_pass(scene, size, spp, k) for k in range(passes)])
-    mean = ours.mean(axis=0)
-    estimate = Estimate.nothing(size[1], size[0])
-    both = theirs - (ours - mean)
-    for one in both:
-        estimate = estimate.add(one)
-    found, _ = compare(mean, estimate)
-    error, *_ = over_passes(mean.astype(np.float64), both)
-    about = {**asdict(found), "error": error.value, "standard_error": error.standard_error}
-    return error, {**about, "mean_ratio": float(mean.mean() / theirs.mean())}
+        mitsuba_passes = read_passes(Path(folder))
+    relume_passes = np.array([_render_relume_pass(scene, size, spp, k) for k in range(passes)])
+    mean = relume_passes.mean(axis=0)
+    estimate = Estimate.empty(size[1], size[0])
+    combined = mitsuba_passes - (relume_passes - mean)
+    for estimate_pass in combined:
+        estimate = estimate.add(estimate_pass)
+    comparison, _ = compare(mean, estimate)
+    error, *_ = compare_with_passes(mean.astype(np.float64), combined)
+    details = {**asdict(comparison), "error": error.value, "standard_error": error.standard_error}
+    return error, {**details, "mean_ratio": float(mean.mean() / mitsuba_passes.mean())}
 
 
-def _our_pass(scene: Scene, size: tuple[int, int], spp: int, index: int) -> F32:
+def _render_relume_pass(scene: Scene, size: tuple[int, int], spp: int, index: int) -> F32:
     width, height = size
     finer = (_FINER * width, _FINER * height)
     look = validate({}, default_look(scene.materials))

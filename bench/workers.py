@@ -27,13 +27,13 @@ def bake_s(service: BakeService, scene: str, recipe: Recipe) -> float:
     Raises:
         PlanError: the bake has failed.
     """
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     identity = service.submit(scene, recipe)
     with service.subscribe(identity) as changes:
         last = list(changes)[-1]
     if last.state != "ready":
         raise PlanError(f"the bake {last.state}: {last.problem}; see the log")
-    return time.perf_counter() - began
+    return time.perf_counter() - start_time
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -42,19 +42,19 @@ def measure(tiny: bool) -> list[Figure]:
     views = tuple(camera.name for camera in scene.cameras)
     warm = Recipe("direct", views, (320, 240), 500 if not tiny else 8)
     recipe = Recipe("direct", views, (64, 48) if tiny else (640, 480), 60 if tiny else 2000)
-    taken = {}
+    durations = {}
     for processes in (1, 2):
         with tempfile.TemporaryDirectory() as folder, BakeService(Path(folder), num_workers=processes) as service:
             register_scene(service.data_dir, service.ledger, scene)
             bake_s(service, scene.id, warm)
-            taken[processes] = bake_s(service, scene.id, recipe)
+            durations[processes] = bake_s(service, scene.id, recipe)
     context = {
-        "one_s": taken[1],
-        "two_s": taken[2],
+        "one_s": durations[1],
+        "two_s": durations[2],
         "size": list(recipe.size),
         "views": len(views),
         "lights": recipe.num_lights,
         "cores": num_cores(),
         "runs_in": "the service's own process, too small for a cluster" if tiny else "worker processes",
     }
-    return [Figure("bake.two_workers_speedup", taken[1] / taken[2], "ratio", context)]
+    return [Figure("bake.two_workers_speedup", durations[1] / durations[2], "ratio", context)]

@@ -19,7 +19,7 @@ def audit(
     as_json: Json = False,
 ) -> None:
     """Show what was changed, and by whom; the newest last."""
-    for entry in reversed(open_access(data, is_used=True).audit.list(last, who=who)):
+    for entry in reversed(open_access(data, is_used=True).audit.list(last, actor=who)):
         at = datetime.fromtimestamp(entry.at, UTC).strftime("%Y-%m-%d %H:%M:%S")
         line = f"{at}  {entry.who:20}  {entry.what}  {entry.object}  {entry.status}  {entry.request}"
         print_result(vars(entry), line, as_json=as_json)

@@ -70,16 +70,16 @@ def bake(
     in the background or to cancel.
     """
     from cli.data_folder import find_scene, open_bakes, open_settings
-    from cli.naming import spelled
+    from cli.naming import match_name
     from cli.terminal.documents import bake_document
-    from worker.cameras import chosen_views
+    from worker.cameras import resolve_views
 
     settings = open_settings(data, scheduler=scheduler)
     service = open_bakes(settings)
     try:
         record = find_scene(service.ledger, scene)
-        named = [spelled(name, _view_names(service, record)) for name in view or ()]
-        views = chosen_views(service.ledger, record, [*named, *(read_camera(path) for path in camera or ())])
+        view_names = [match_name(name, _view_names(service, record)) for name in view or ()]
+        views = resolve_views(service.ledger, record, [*view_names, *(read_camera(path) for path in camera or ())])
         recipe = _recipe(method, preset, views, size, lights, points, relightable)
         recipe = replace(recipe, gather_samples=gather_samples, gather_rays=gather_rays)
         if dry_run:
@@ -96,9 +96,9 @@ def bake(
 
 def _view_names(service: BakeService, record: SceneRecord) -> list[str]:
     """Names of views that a bake of a scene may show: its own, and those of cameras that people placed."""
-    from worker.cameras import kept_cameras
+    from worker.cameras import list_cameras
 
-    return [*record.views, *(camera.name for camera in kept_cameras(service.ledger, record.id))]
+    return [*record.views, *(camera.name for camera in list_cameras(service.ledger, record.id))]
 
 
 def _print_plan(service: BakeService, record: SceneRecord, recipe: Recipe, *, as_json: bool) -> None:
@@ -118,54 +118,54 @@ def _recipe(
     views: Views,
     size: str | None,
     lights: int | None,
-    points: int | None,
+    requested_points: int | None,
     relightable: bool,
 ) -> Recipe:
     from relume.bake import Recipe
     from relume.errors import ParameterError
-    from worker.presets import PRESETS, points_of
+    from worker.presets import PRESETS, resolve_num_points
 
     if lights is not None and lights < 1:
         raise ParameterError("--lights", lights, "a number of at least 1")
-    if points is not None and points < 1:
-        raise ParameterError("--points", points, "a number of at least 1")
+    if requested_points is not None and requested_points < 1:
+        raise ParameterError("--points", requested_points, "a number of at least 1")
     fineness, (names, cameras) = PRESETS[preset], views
     pixels = parse_size(size) if size else fineness.size
-    num_lights, num_points = lights or fineness.num_lights, points_of(method, points)
+    num_lights, num_points = lights or fineness.num_lights, resolve_num_points(method, requested_points)
     return Recipe(method, names, pixels, num_lights, relightable, cameras, num_points)
 
 
 def _watch(service: BakeService, settings: Settings, identity: str, label: str, *, as_json: bool) -> int:
     from cli.follow import follow
-    from cli.interrupts import noted_interrupts
+    from cli.interrupts import capture_interrupts
     from cli.terminal.documents import bake_document
 
-    began = time.monotonic()
+    start_s = time.monotonic()
     try:
-        with noted_interrupts() as asked:
+        with capture_interrupts() as interrupted:
             service.start()
             with service.subscribe(identity) as changes:
-                status = follow(changes, label, asked.is_set)
+                status = follow(changes, label, interrupted.is_set)
     except KeyboardInterrupt:
         return _interrupted(service, settings, identity)
     if status.state != "ready":
         typer.echo(f"relume: the bake {status.state}: {status.problem or 'somebody stopped it'}", err=True)
         return 1
     print_result(bake_document(status, service), status.id, as_json=as_json)
-    _report(status, settings, time.monotonic() - began)
+    _report(status, settings, time.monotonic() - start_s)
     return 0
 
 
 def _report(status: BakeStatus, settings: Settings, seconds: float) -> None:
     """Say how well it went."""
     from worker.paths import bake_path
-    from worker.storage import fetched
+    from worker.storage import fetch_if_missing
 
     note(f"{size_text(status.bytes)} in {seconds:.1f} s")
     if status.recipe.method == "direct":
-        _report_rays(fetched(bake_path(settings.data, status.id)))
+        _report_rays(fetch_if_missing(bake_path(settings.data, status.id)))
     if status.recipe.method == "surface":
-        _report_moving_error(fetched(bake_path(settings.data, status.id)))
+        _report_free_camera_error(fetch_if_missing(bake_path(settings.data, status.id)))
 
 
 def _report_rays(store: Path) -> None:
@@ -174,25 +174,27 @@ def _report_rays(store: Path) -> None:
 
     rays = read_rays(open_store(store))
     note(
-        f"{rays.traced / 1e6:,.1f} of {rays.full / 1e6:,.1f} M shadow rays traced, the others predicted; "
-        f"wrong by the bake's own check: {100 * rays.wrong_share:.2g} %"
+        f"{rays.num_traced / 1e6:,.1f} of {rays.num_full / 1e6:,.1f} M shadow rays traced, the others predicted; "
+        f"wrong by the bake's own check: {100 * rays.error_rate:.2g} %"
     )
 
 
-def _report_moving_error(store: Path) -> None:
-    from relume.methods.store_io import read_moving_error
+def _report_free_camera_error(store: Path) -> None:
+    from relume.methods.store_io import read_free_camera_error
     from relume.store import open_store
 
-    found = read_moving_error(open_store(store))
-    if found is not None:
-        off, deviation = 100 * found.value, 100 * found.standard_error
-        note(f"while the eye moves: {off:.1f} ± {deviation:.1f} % off (RMS of surfaces); at rest exact")
+    free_camera_error = read_free_camera_error(open_store(store))
+    if free_camera_error is not None:
+        error_percent, deviation = 100 * free_camera_error.value, 100 * free_camera_error.standard_error
+        note(f"while the eye moves: {error_percent:.1f} ± {deviation:.1f} % off (RMS of surfaces); at rest exact")
 
 
 def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:
     """Ask what Ctrl-C was meant to do."""
-    keep = sys.stdin.isatty() and typer.confirm("\nKeep baking in the background? (no cancels the bake)", default=True)
-    if not keep:
+    keeps_baking = sys.stdin.isatty() and typer.confirm(
+        "\nKeep baking in the background? (no cancels the bake)", default=True
+    )
+    if not keeps_baking:
         service.cancel(identity)
         typer.echo("cancelled; finished parts are kept, the same command goes on with them", err=True)
         return 130

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.naming import spelled
+from cli.naming import match_name
 from relume.errors import NotFoundError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from worker.status import BakeStatus
 
 
-def open_settings(data: Path | None, **others: Any) -> Settings:
+def open_settings(data: Path | None, **overrides: Any) -> Settings:
     """Settings from the environment, with what the command line says in their place; what was imported can be named.
 
     Raises:
@@ -33,13 +33,13 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
     from pydantic_settings import SettingsError
 
     from relume.errors import ParameterError
-    from relume.imageio.ocio.current import use
-    from server.library.shelves import shelves
+    from relume.imageio.ocio.current import use_config
+    from server.library.shelves import list_asset_stores
     from server.settings import Settings
 
-    given = {key: value for key, value in {"data": data, **others}.items() if value is not None}
+    values = {key: value for key, value in {"data": data, **overrides}.items() if value is not None}
     try:
-        settings = Settings(**given)
+        settings = Settings(**values)
     except ValidationError as error:
         first = error.errors()[0]
         field, *within = map(str, first["loc"])
@@ -50,9 +50,9 @@ def open_settings(data: Path | None, **others: Any) -> Settings:
         allowed = """JSON, as '["10.0.0.5"]' or '{"Ann": "edit"}', in quotes of the shell"""
         raise ParameterError(variable, os.environ.get(variable), allowed) from None
     settings.data.mkdir(mode=0o700, parents=True, exist_ok=True)
-    for store, folder in shelves(settings.data):
-        store.use(folder)
-    use(settings.ocio, settings.ocio_space)
+    for store, folder in list_asset_stores(settings.data):
+        store.add_search_folder(folder)
+    use_config(settings.ocio, settings.ocio_space)
     return settings
 
 
@@ -66,17 +66,17 @@ def _refuse_url() -> None:
 @contextmanager
 def private_files() -> Iterator[None]:
     """What is written inside, by processes that are started as well, is for this user alone."""
-    before = os.umask(0o077)
+    previous_mask = os.umask(0o077)
     try:
         yield
     finally:
-        os.umask(before)
+        os.umask(previous_mask)
 
 
 def _allowed(message: str) -> str:
     """What pydantic says of a value, to stand behind "give"."""
-    said = message.removeprefix("Input should be ").removeprefix("Value error, ")
-    return said[:1].lower() + said[1:]
+    text = message.removeprefix("Input should be ").removeprefix("Value error, ")
+    return text[:1].lower() + text[1:]
 
 
 def open_bakes(settings: Settings) -> BakeService:
@@ -89,10 +89,10 @@ def open_bakes(settings: Settings) -> BakeService:
 def check_used(settings: Settings) -> None:
     """Raise ParameterError where a data folder has neither a ledger nor anything that was imported."""
     from relume.errors import ParameterError
-    from server.library.shelves import shelves
+    from server.library.shelves import list_asset_stores
 
-    used = settings.data / "relume.db", *(folder for _, folder in shelves(settings.data))
-    if not settings.database and not any(path.exists() for path in used):
+    paths = settings.data / "relume.db", *(folder for _, folder in list_asset_stores(settings.data))
+    if not settings.database and not any(path.exists() for path in paths):
         raise ParameterError("--data", str(settings.data), "a folder that relume has used; this one is empty")
 
 
@@ -102,64 +102,65 @@ def find_scene(ledger: Ledger, name: str) -> SceneRecord:
     from worker.scenes import list_scenes
 
     scenes = {scene.id: scene for scene in list_scenes(ledger)}
-    known = [(scene.id, scene.name) for scene in scenes.values()]
-    return scenes[pick("scene", name, known, "relume import adds one")]
+    candidates = [(scene.id, scene.name) for scene in scenes.values()]
+    return scenes[pick("scene", name, candidates, "relume import adds one")]
 
 
-def find_shown(
-    service: BakeService, name: str, view: str | None, *, moves: bool = False
+def find_bake_and_view(
+    service: BakeService, name: str, view: str | None, *, is_free_camera: bool = False
 ) -> tuple[SceneRecord, BakeStatus, str]:
     """What a bake's id, the start of one, or a scene's name stands for: the scene, a finished bake of it, and the view.
 
     Args:
-        service: where to look. name: of the bake, or of a scene: then the finest one. view, moves: as of `find_bake`.
+        service: where to look. name: of the bake, or of a scene: then the finest one. view, is_free_camera: as of
+            `find_bake`.
     Raises:
         NotFoundError: there is none, it is not finished, or it does not have the view.
     """
-    called = [bake for bake in service.bakes() if len(name) >= 8 and bake.id.startswith(name)]
-    if len(called) != 1:
+    matches = [bake for bake in service.bakes() if len(name) >= 8 and bake.id.startswith(name)]
+    if len(matches) != 1:
         scene = find_scene(service.ledger, name)
-        return scene, *find_bake(service, scene, view, moves=moves)
-    bake = called[0]
-    view = None if view is None else spelled(view, bake.recipe.views)
-    _check_shown(bake, view, moves)
+        return scene, *find_bake(service, scene, view, is_free_camera=is_free_camera)
+    bake = matches[0]
+    view = None if view is None else match_name(view, bake.recipe.views)
+    _check_bake_and_view(bake, view, is_free_camera)
     return find_scene(service.ledger, bake.scene), bake, view or bake.recipe.views[0]
 
 
-def _check_shown(bake: BakeStatus, view: str | None, moves: bool) -> None:
+def _check_bake_and_view(bake: BakeStatus, view: str | None, is_free_camera: bool) -> None:
     """Raise NotFoundError where a bake that was asked for by its id is not finished, or lacks what is to be shown."""
-    from worker.status import MOVING
+    from worker.status import FREE_CAMERA_METHODS
 
     if bake.state != "ready":
         raise NotFoundError(f"bake {bake.id} is {bake.state}, not ready; go on with it: relume bake {bake.scene}")
     if view is not None and view not in bake.recipe.views:
         raise NotFoundError(f"bake {bake.id} has no view {view[:80]!r}; its views are {', '.join(bake.recipe.views)}")
-    if moves and bake.recipe.method not in MOVING:
+    if is_free_camera and bake.recipe.method not in FREE_CAMERA_METHODS:
         raise NotFoundError(f"bake {bake.id} is of fixed views; run: relume bake {bake.scene} --method surface")
 
 
 def find_bake(
-    service: BakeService, scene: SceneRecord, view: str | None, *, moves: bool = False
+    service: BakeService, scene: SceneRecord, view: str | None, *, is_free_camera: bool = False
 ) -> tuple[BakeStatus, str]:
     """The finest finished bake of a scene that has the view, and the view. Raises NotFoundError.
 
     Args:
-        service, scene: where to look, and what for. view: its name; None: any. moves: its eye must.
+        service, scene: where to look, and what for. view: its name; None: any. is_free_camera: its eye must.
     """
-    from worker.status import MOVING
+    from worker.status import FREE_CAMERA_METHODS
 
     ready = [bake for bake in service.bakes(scene.id) if bake.state == "ready"]
-    if moves:
-        ready = [bake for bake in ready if bake.recipe.method in MOVING]
-    known = dict.fromkeys((*scene.views, *(baked for bake in ready for baked in bake.recipe.views)))
-    view = None if view is None else spelled(view, known)
-    if view is not None and view not in known:
-        raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(known)[:400]}")
-    fitting = [bake for bake in ready if view is None or view in bake.recipe.views]
-    if not fitting:
-        option = " --method surface" if moves else ""
+    if is_free_camera:
+        ready = [bake for bake in ready if bake.recipe.method in FREE_CAMERA_METHODS]
+    view_names = dict.fromkeys((*scene.views, *(baked_view for bake in ready for baked_view in bake.recipe.views)))
+    view = None if view is None else match_name(view, view_names)
+    if view is not None and view not in view_names:
+        raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(view_names)[:400]}")
+    candidates = [bake for bake in ready if view is None or view in bake.recipe.views]
+    if not candidates:
+        option = " --method surface" if is_free_camera else ""
         raise NotFoundError(f"there is no finished bake of {scene.name!r} yet; run: relume bake {scene.id}{option}")
-    finest = max(fitting, key=lambda bake: bake.rank)
+    finest = max(candidates, key=lambda bake: bake.rank)
     return finest, view or finest.recipe.views[0]
 
 

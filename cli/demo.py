@@ -30,14 +30,14 @@ def demo(
 ) -> None:
     """Bake the built-in scene if it is not there, serve it, and open the editor."""
     from cli.data_folder import open_settings, private_files
-    from relume.imageio.ocio.current import current
+    from relume.imageio.ocio.current import get_config
     from server.access.openness import check_openness
     from server.app import serve
 
     settings = open_settings(data, port=port)
     check_openness(settings)
     check_port(settings.host, settings.port)
-    current()  # what is wrong with a config is said before anything runs
+    get_config()  # what is wrong with a config is said before anything runs
     threading.Thread(target=_bake, args=(settings, browser), name="relume-demo", daemon=True).start()
     with private_files():
         serve(settings)
@@ -45,13 +45,13 @@ def demo(
 
 def _bake(settings: Settings, browser: bool) -> None:
     """Queue the demo's bake for the server that is starting, and show here what the browser shows too."""
-    from cli.sentence import sentence
+    from cli.sentence import error_message
 
     try:
         identity, editor = _queue_and_follow(settings, browser)
         typer.echo(f"bake {identity} is ready: {editor}   Ctrl-C ends", err=True)
     except Exception as error:  # the server lives on, so this must be said here
-        typer.echo(f"relume: {sentence(error)}", err=True)
+        typer.echo(f"relume: {error_message(error)}", err=True)
 
 
 def _queue_and_follow(settings: Settings, browser: bool) -> tuple[str, str]:

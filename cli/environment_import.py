@@ -23,11 +23,11 @@ def environment_import(
     """
     from cli.data_folder import open_settings
     from relume.asset_store import check_name
-    from relume.environments.asset_store import keep
+    from relume.environments.asset_store import store_environment
     from worker.paths import environments_path
 
     check_readable("FILE", file)
-    record = keep(environments_path(open_settings(data).data), file, check_name(name or file.stem))
+    record = store_environment(environments_path(open_settings(data).data), file, check_name(name or file.stem))
     document = {"id": record.id, "map": record.map, "name": record.name, "warnings": list(record.warnings)}
     print_result(document, record.map, as_json=as_json)
     for warning in record.warnings:

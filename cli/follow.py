@@ -8,7 +8,7 @@ from collections.abc import Callable
 from cli.terminal.progress import progress
 from relume.errors import NotFoundError
 from worker.board import Subscription
-from worker.status import PHASE_WORDS, BakeStatus
+from worker.status import PHASE_LABELS, BakeStatus
 
 
 def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = lambda: False) -> BakeStatus:
@@ -19,9 +19,9 @@ def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = 
     Raises:
         KeyboardInterrupt: `interrupted` said so. NotFoundError: somebody has deleted the bake.
     """
-    with progress(label) as tell:
+    with progress(label) as report:
         while not (status := changes.latest).final:
-            tell(status.progress, detail(status))
+            report(status.progress, detail(status))
             changes.get(timeout=0.5)
             if changes.is_closed:
                 raise NotFoundError(f"bake {status.id} was deleted; import the scene again where it is gone, too")
@@ -38,9 +38,9 @@ def detail(status: BakeStatus) -> str:
         return "starting"
     since_s = time.time() - (status.phase_since or time.time())
     if status.phase not in ("sampling", "tracing"):
-        return f"{PHASE_WORDS[status.phase]}, {since_s:.0f} s"
-    parts = [PHASE_WORDS[status.phase]]
+        return f"{PHASE_LABELS[status.phase]}, {since_s:.0f} s"
+    texts = [PHASE_LABELS[status.phase]]
     if status.rays_per_second:
-        parts.append(f"{status.rays_per_second / 1e6:.1f} M rays/s")
-    left = "estimating the time left" if status.seconds_left is None else f"{status.seconds_left:.0f} s left"
-    return ", ".join([*parts, left])
+        texts.append(f"{status.rays_per_second / 1e6:.1f} M rays/s")
+    remaining = "estimating the time left" if status.seconds_left is None else f"{status.seconds_left:.0f} s left"
+    return ", ".join([*texts, remaining])

@@ -44,7 +44,7 @@ def import_scene(
     from relume.scene.ground import with_ground
     from worker.scenes import get_scene, register_scene
 
-    scene = _find(file, environment, name, built_in)
+    scene = _read_scene(file, environment, name, built_in)
     scene = with_ground(scene) if ground else scene
     service = open_bakes(open_settings(data))
     try:
@@ -52,12 +52,12 @@ def import_scene(
         bakes = service.bakes(record.id)
     finally:
         service.close()
-    print_result(scene_document(record, bakes), record.id, as_json=as_json, details=_read(scene))
+    print_result(scene_document(record, bakes), record.id, as_json=as_json, details=_summary_lines(scene))
     for warning in sorted(record.warnings, key=lambda remark: EFFECTS.index(remark.effect)):
         typer.echo(f"warning, {warning.effect}: {warning}", err=True)
 
 
-def _read(scene: Scene) -> Iterator[str]:
+def _summary_lines(scene: Scene) -> Iterator[str]:
     """What was read of a file, a line each."""
     height, width, _ = scene.environment.radiance.shape
     low = [min(float(mesh.positions[:, axis].min()) for mesh in scene.meshes) for axis in range(3)]
@@ -66,7 +66,7 @@ def _read(scene: Scene) -> Iterator[str]:
     yield f"  {scene.name}: {sum(len(mesh.faces) for mesh in scene.meshes):,} triangles in {len(scene.meshes):,} meshes"
     yield f"  {sides} m, +Y is up"
     for material in scene.materials:
-        yield f"  material {material.name}: {', '.join(_parts(material))}"
+        yield f"  material {material.name}: {', '.join(_describe_material(material))}"
     yield f"  views: {', '.join(camera.name for camera in scene.cameras)}"
     if scene.lights:
         yield f"  lights: {', '.join(light.name for light in scene.lights)}"
@@ -75,7 +75,7 @@ def _read(scene: Scene) -> Iterator[str]:
     yield f"  environment: {scene.environment.name}, {width} × {height}"
 
 
-def _parts(material: Material) -> Iterator[str]:
+def _describe_material(material: Material) -> Iterator[str]:
     """What a material is made of."""
     yield " + ".join(str(term["model"]) for term in material.terms) or "no terms"
     if material.textures:
@@ -88,17 +88,17 @@ def _parts(material: Material) -> Iterator[str]:
         yield "glass"
 
 
-def _find(file: Path | None, environment: Path | None, name: str | None, made_by_code: str | None) -> Scene:
-    from cli.naming import spelled
+def _read_scene(file: Path | None, environment: Path | None, name: str | None, built_in_name: str | None) -> Scene:
+    from cli.naming import match_name
     from relume.environments.reading import read_environment
     from relume.errors import ParameterError, PlanError
     from relume.scene.built_in import BUILT_IN, built_in
     from relume.scene.importer import import_scene as read_scene
 
-    if made_by_code is not None:
-        if any(given is not None for given in (file, environment, name)):
-            raise ParameterError("--built-in", made_by_code, "alone: such a scene has its own light and name")
-        return built_in(spelled(made_by_code, BUILT_IN))
+    if built_in_name is not None:
+        if any(argument is not None for argument in (file, environment, name)):
+            raise ParameterError("--built-in", built_in_name, "alone: such a scene has its own light and name")
+        return built_in(match_name(built_in_name, BUILT_IN))
     if file is None:
         raise PlanError("nothing to import; give a scene file, or --built-in NAME")
     if environment is not None:

@@ -12,33 +12,33 @@ Made = TypeVar("Made")
 
 
 @contextlib.contextmanager
-def noted_interrupts() -> Iterator[threading.Event]:
+def capture_interrupts() -> Iterator[threading.Event]:
     """The event is set where Python would raise KeyboardInterrupt; for the main thread alone.
 
     Raised between two lines of an import it may leave the interpreter's import lock held for ever, and then the threads
     that bake wait for it and this one waits for them.
     """
-    asked = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda *_: asked.set())
+    interrupted = threading.Event()
+    previous_handler = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
     try:
-        yield asked
+        yield interrupted
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, previous_handler)
 
 
-def until_interrupted(what: str, work: Callable[[Callable[[float], object], Callable[[], bool]], Made]) -> Made:
+def until_interrupted(label: str, work: Callable[[Callable[[float], object], Callable[[], bool]], Made]) -> Made:
     """Do long work and show how far it is.
 
     Args:
-        what: it is, in words. work: told whom to tell the share that is done, and whom to ask whether to stop.
+        label: it is, in words. work: told whom to tell the share that is done, and whom to ask whether to stop.
     Raises:
         KeyboardInterrupt: it was interrupted, and has stopped.
     """
     from cli.terminal.progress import progress
     from relume.errors import CancelledError
 
-    with noted_interrupts() as asked, progress(what) as tell:
+    with capture_interrupts() as interrupted, progress(label) as report:
         try:
-            return work(tell, asked.is_set)
+            return work(report, interrupted.is_set)
         except CancelledError:
             raise KeyboardInterrupt from None

@@ -27,7 +27,7 @@ from cli import (
 from cli.keeping import backup, restore
 from cli.ledger import cancel, delete, draft, listing, status, upgrade
 from cli.material import exporting, importing, making
-from cli.sentence import sentence
+from cli.sentence import error_message
 from cli.terminal.printing import is_quiet
 from cli.truth import reference
 
@@ -50,7 +50,7 @@ app = typer.Typer(
 )
 app.command("demo", short_help="Bake, serve and open the built-in scene.")(demo.demo)
 app.command("import")(import_scene.import_scene)
-app.command("list")(listing.list_things)
+app.command("list")(listing.list_items)
 app.command("bake")(bake.bake)
 app.command("status")(status.status)
 app.command("cancel")(cancel.cancel)
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str]) -> int:
     except Exception as error:
         if verbose:
             traceback.print_exc()
-        typer.echo(f"relume: {sentence(error, arguments)}", err=True)
+        typer.echo(f"relume: {error_message(error, arguments)}", err=True)
         return error.exit_code if isinstance(error, TyperException) else 1
     return result if isinstance(result, int) else 0
 

@@ -8,49 +8,49 @@ from collections.abc import Iterable, Sequence
 
 from relume.errors import NotFoundError
 
-LEAST_OF_ID = 4  # characters that an id may be cut to
-_SHOWN = 10
+MIN_ID_LENGTH = 4  # characters that an id may be cut to
+_MAX_LISTED = 10
 
 
-def plain(name: str) -> str:
+def fold_name(name: str) -> str:
     """What two spellings of a name have in common: neither case, nor underscores, hyphens and spaces, count."""
     folded = unicodedata.normalize("NFKC", name).casefold()
     return re.sub(r"[\s_\u2010-\u2015-]+", " ", folded).strip()
 
 
-def pick(what: str, given: str, known: Sequence[tuple[str, str]], remedy: str) -> str:
+def pick(kind: str, query: str, candidates: Sequence[tuple[str, str]], remedy: str) -> str:
     """The id of what is meant: by its id, its name, the start of its id, or a name that is spelled alike.
 
     Args:
-        what: it is, in a message. given: what was typed. known: id and name of each that there is.
+        kind: it is, in a message. query: what was typed. candidates: id and name of each that there is.
         remedy: what to do where there is none, in a message.
     Raises:
         NotFoundError: there is none, or more than one.
     """
-    ways = (
-        [identity for identity, _ in known if identity == given],
-        [identity for identity, name in known if name == given],
-        [identity for identity, _ in known if len(given) >= LEAST_OF_ID and identity.startswith(given)],
-        [identity for identity, name in known if plain(name) == plain(given)],
+    match_lists = (
+        [identity for identity, _ in candidates if identity == query],
+        [identity for identity, name in candidates if name == query],
+        [identity for identity, _ in candidates if len(query) >= MIN_ID_LENGTH and identity.startswith(query)],
+        [identity for identity, name in candidates if fold_name(name) == fold_name(query)],
     )
-    found = next((way for way in ways if way), [])
-    if len(found) == 1:
-        return found[0]
-    if found:
-        names = dict(known)
-        listed = ", ".join(_shown(identity, names[identity]) for identity in found)
-        raise NotFoundError(f"{given[:80]!r} names {len(found)} {what}s; give one of {listed}")
-    listed = ", ".join(_shown(identity, name) for identity, name in known[:_SHOWN]) or "none yet"
-    more = f" and {len(known) - _SHOWN} more" if len(known) > _SHOWN else ""
-    raise NotFoundError(f"there is no {what} {given[:80]!r}; known are: {listed}{more}; {remedy}")
+    matches = next((ids for ids in match_lists if ids), [])
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        names = dict(candidates)
+        labels = ", ".join(_label(identity, names[identity]) for identity in matches)
+        raise NotFoundError(f"{query[:80]!r} names {len(matches)} {kind}s; give one of {labels}")
+    labels = ", ".join(_label(identity, name) for identity, name in candidates[:_MAX_LISTED]) or "none yet"
+    suffix = f" and {len(candidates) - _MAX_LISTED} more" if len(candidates) > _MAX_LISTED else ""
+    raise NotFoundError(f"there is no {kind} {query[:80]!r}; known are: {labels}{suffix}; {remedy}")
 
 
-def spelled(given: str, known: Iterable[str]) -> str:
+def match_name(query: str, candidates: Iterable[str]) -> str:
     """The name that is meant, of those that there are; the given one where none is, or more than one might be."""
-    names = list(dict.fromkeys(known))
-    alike = [name for name in names if plain(name) == plain(given)]
-    return alike[0] if given not in names and len(alike) == 1 else given
+    names = list(dict.fromkeys(candidates))
+    matches = [name for name in names if fold_name(name) == fold_name(query)]
+    return matches[0] if query not in names and len(matches) == 1 else query
 
 
-def _shown(identity: str, name: str) -> str:
+def _label(identity: str, name: str) -> str:
     return identity if identity == name else f"{identity} ({name[:80]})"

@@ -13,7 +13,7 @@ import typer
 from relume.errors import ParameterError
 
 if TYPE_CHECKING:
-    from relume.scene.placed_camera import PlacedCamera
+    from relume.scene.placed_camera import CustomCamera
 
 Data = Annotated[
     Path | None, typer.Option("--data", metavar="DIR", help="Data folder. [default: RELUME_DATA or user data]")
@@ -64,11 +64,11 @@ def read_look(path: Path | None) -> dict[str, object]:
     return document
 
 
-def read_camera(path: Path) -> PlacedCamera:
+def read_camera(path: Path) -> CustomCamera:
     """A camera from a file. Raises ParameterError."""
-    from relume.scene.placed_camera import read_placed
+    from relume.scene.placed_camera import read_custom_camera
 
-    return read_placed(read_json("--camera", path))
+    return read_custom_camera(read_json("--camera", path))
 
 
 def read_json(option: str, path: Path | None) -> object:
@@ -78,11 +78,11 @@ def read_json(option: str, path: Path | None) -> object:
     else:
         with check_readable(option, path).open("rb") as file:
             text = file.read(MAX_DOCUMENT_BYTES + 1)
-    where = "-" if path is None else str(path)
+    source = "-" if path is None else str(path)
     if len(text) > MAX_DOCUMENT_BYTES:
-        raise ParameterError(option, where, f"at most {MAX_DOCUMENT_BYTES >> 20} MB of JSON")
+        raise ParameterError(option, source, f"at most {MAX_DOCUMENT_BYTES >> 20} MB of JSON")
     try:
         document: object = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ParameterError(option, where, f"a JSON document; {error}") from None
+        raise ParameterError(option, source, f"a JSON document; {error}") from None
     return document

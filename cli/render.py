@@ -10,13 +10,13 @@ import typer
 
 from cli.options import BakeName, Data, DryRun, View
 from cli.pictures.looks import Looks
-from cli.pictures.plans import Turns
+from cli.pictures.plans import TurntableSubject
 from cli.terminal.printing import Json, note, print_result
 
 if TYPE_CHECKING:
     from cli.pictures.files import ExrOptions
-    from cli.pictures.painting import Shown
-    from cli.pictures.plans import Planned, Turn
+    from cli.pictures.painting import RenderSource
+    from cli.pictures.plans import PlannedFile, TurntablePlan
     from worker.service import BakeService
 
 
@@ -46,7 +46,7 @@ def render(
         typer.Option(metavar="N", help="N frames once around: PNG files in a folder, or a video."),
     ] = None,
     turns: Annotated[
-        Turns | None,
+        TurntableSubject | None,
         typer.Option(help="Turntable: what turns; the eye, or before it the object, or the light. [default: eye]"),
     ] = None,
     fps: Annotated[int | None, typer.Option(min=1, max=120, help="Video: frames a second. [default: 25]")] = None,
@@ -63,76 +63,96 @@ def render(
     from cli.data_folder import open_bakes, open_settings
     from cli.pictures.files import exr_options
     from cli.pictures.looks import read_looks
-    from cli.pictures.plans import check_target, plan_files, turn_of
+    from cli.pictures.plans import check_target, make_turntable_plan, plan_files
     from server.records.looks import LookStore
 
-    turn = turn_of(turntable, turns, fps)
-    check_target(output, turn, resumes=resume)
+    turntable_plan = make_turntable_plan(turntable, turns, fps)
+    check_target(output, turntable_plan, resumes=resume)
     exr = exr_options(output, layers=layers, light_groups=light_groups, full_float=full_float, color_space=color_space)
     service = open_bakes(open_settings(data))
     try:
-        planned = plan_files(read_looks(look or (), LookStore(service.ledger.sessions)), output, turn)
-        of = _open(service, bake, view, moves=turn is not None and turn.turns != "environment", quick=quick)
-        documents = _check(of, planned, turn)
+        planned_files = plan_files(read_looks(look or (), LookStore(service.ledger.sessions)), output, turntable_plan)
+        source = _open(
+            service,
+            bake,
+            view,
+            is_free_camera=turntable_plan is not None and turntable_plan.subject != "environment",
+            quick=quick,
+        )
+        documents = _check(source, planned_files, turntable_plan)
         if not dry_run:
-            _write(of, planned, turn, exr, resumes=resume)
+            _write(source, planned_files, turntable_plan, exr, resumes=resume)
     finally:
         service.close()
-    for one, document in zip(planned, documents, strict=True):
-        print_result(document | {"dry_run": dry_run}, str(one.path), as_json=as_json)
+    for planned_file, document in zip(planned_files, documents, strict=True):
+        print_result(document | {"dry_run": dry_run}, str(planned_file.path), as_json=as_json)
 
 
-def _check(of: Shown, planned: Sequence[Planned], turn: Turn | None) -> list[dict[str, Any]]:
+def _check(
+    source: RenderSource, planned_files: Sequence[PlannedFile], turntable_plan: TurntablePlan | None
+) -> list[dict[str, Any]]:
     """What is written, as JSON. Raises ParameterError before anything is where a look, or the turntable, cannot be."""
     from cli.pictures.painting import check_turntable
     from cli.pictures.plans import complete_plan
 
-    view = of.transfer.views[of.view]
-    looks = [complete_plan(one, of.transfer.default_look) for one in planned]
+    view = source.transfer.views[source.view]
+    looks = [complete_plan(planned_file, source.transfer.default_look) for planned_file in planned_files]
     if any(look.environment.map is not None for look in looks):
         note("note: shadows were baked before this light was known: small lamps' are less exact")
-    if turn is not None:
-        check_turntable(of, planned[0], turn)
-    about = {"scene": of.scene.id, "bake": of.bake.id, "view": of.view, "size": [view.width, view.height]}
-    frames = 1 if turn is None else turn.frames
-    return [{"path": str(one.path), "look": one.look, **about, "frames": frames} for one in planned]
+    if turntable_plan is not None:
+        check_turntable(source, planned_files[0], turntable_plan)
+    common = {"scene": source.scene.id, "bake": source.bake.id, "view": source.view, "size": [view.width, view.height]}
+    frames = 1 if turntable_plan is None else turntable_plan.frames
+    return [
+        {"path": str(planned_file.path), "look": planned_file.look, **common, "frames": frames}
+        for planned_file in planned_files
+    ]
 
 
-def _write(of: Shown, planned: Sequence[Planned], turn: Turn | None, exr: ExrOptions, *, resumes: bool) -> None:
+def _write(
+    source: RenderSource,
+    planned_files: Sequence[PlannedFile],
+    turntable_plan: TurntablePlan | None,
+    exr: ExrOptions,
+    *,
+    resumes: bool,
+) -> None:
     """Paint all that is planned, and say how far it is."""
-    from cli.pictures.painting import paint, paint_turntable
+    from cli.pictures.painting import write_picture, write_turntable
     from cli.pictures.plans import complete_plan
-    from cli.terminal.progress import part_of, progress
+    from cli.terminal.progress import progress, report_part
 
-    with progress("render") as tell:
-        if turn is not None:
-            paint_turntable(of, planned[0], turn, tell)
+    with progress("render") as report:
+        if turntable_plan is not None:
+            write_turntable(source, planned_files[0], turntable_plan, report)
             return
-        for number, one in enumerate(planned):
-            words = f"{one.look}, {number + 1} of {len(planned)}" if len(planned) > 1 else ""
-            if not (resumes and one.path.exists()):
-                look = complete_plan(one, of.transfer.default_look)
-                paint(of, look, one.path, exr, part_of(tell, number, len(planned), words))
+        for number, planned_file in enumerate(planned_files):
+            detail = f"{planned_file.look}, {number + 1} of {len(planned_files)}" if len(planned_files) > 1 else ""
+            if not (resumes and planned_file.path.exists()):
+                look = complete_plan(planned_file, source.transfer.default_look)
+                write_picture(
+                    source, look, planned_file.path, exr, report_part(report, number, len(planned_files), detail)
+                )
 
 
-def _open(service: BakeService, bake: str, view: str | None, *, moves: bool, quick: bool) -> Shown:
+def _open(service: BakeService, bake: str, view: str | None, *, is_free_camera: bool, quick: bool) -> RenderSource:
     """Open what was asked for, and say what its pictures are not."""
-    from cli.data_folder import find_shown
-    from cli.pictures.painting import Shown
-    from relume.memory import Memory
-    from relume.methods.moving_views import MovingViews
+    from cli.data_folder import find_bake_and_view
+    from cli.pictures.painting import RenderSource
+    from relume.memory import Cache
+    from relume.methods.moving_views import BakedFreeCamera
     from relume.methods.registry import open_bake
-    from relume.methods.stills import Stills
-    from worker.storage import open_kept
-    from worker.tasks import scene_of
+    from relume.methods.stills import StaticViewBuilder
+    from worker.storage import open_cached
+    from worker.tasks import load_registered_scene
 
-    scene, shown, view_name = find_shown(service, bake, view, moves=moves)
-    transfer = open_kept(service.store_path(shown.id), lambda store: open_bake(store, Memory(4 << 30)))
-    if not shown.is_current:
+    scene, bake_status, view_name = find_bake_and_view(service, bake, view, is_free_camera=is_free_camera)
+    transfer = open_cached(service.store_path(bake_status.id), lambda store: open_bake(store, Cache(4 << 30)))
+    if not bake_status.is_current:
         note(f"note: another version of relume made this bake; anew: relume bake {scene.id}")
-    stills = None
-    if isinstance(transfer, MovingViews) and quick:
+    static_views = None
+    if isinstance(transfer, BakedFreeCamera) and quick:
         note("note: the picture is approximate, as while the eye moves; exact: without --quick")
-    elif isinstance(transfer, MovingViews):
-        stills = Stills(transfer.lit, scene_of(service.data_dir, scene.id))
-    return Shown(scene, shown, view_name, transfer, stills)
+    elif isinstance(transfer, BakedFreeCamera):
+        static_views = StaticViewBuilder(transfer.light_transport, load_registered_scene(service.data_dir, scene.id))
+    return RenderSource(scene, bake_status, view_name, transfer, static_views)

@@ -16,7 +16,7 @@ _MISSING = re.compile(r"Missing \w+ '(?P<name>[^']+)'")
 _SHOULD = "Input should be "
 
 
-def sentence(error: Exception, arguments: Sequence[str] = ()) -> str:
+def error_message(error: Exception, arguments: Sequence[str] = ()) -> str:
     """What went wrong, in one line.
 
     Args:
@@ -25,18 +25,19 @@ def sentence(error: Exception, arguments: Sequence[str] = ()) -> str:
     from sqlalchemy.exc import DBAPIError
 
     from relume.errors import RelumeError
-    from worker.database.faults import told
+    from worker.database.faults import describe_error
 
     if isinstance(error, TyperException):
         text = _usage(error, arguments)
     elif isinstance(error, ParameterError):
-        text = str(_as_typed(error, arguments))
+        text = str(_rename_to_option(error, arguments))
     elif isinstance(error, RelumeError):
         text = str(error)
     elif isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     elif isinstance(error, DBAPIError):
-        text = f"the database cannot be used ({told(error)}); see that it runs, and that RELUME_DATABASE names it"
+        reason = describe_error(error)
+        text = f"the database cannot be used ({reason}); see that it runs, and that RELUME_DATABASE names it"
     elif isinstance(error, MemoryError):
         text = "out of memory; take a smaller size or fewer lights"
     else:
@@ -44,12 +45,12 @@ def sentence(error: Exception, arguments: Sequence[str] = ()) -> str:
     return " ".join(text.split())
 
 
-def _as_typed(error: ParameterError, arguments: Sequence[str]) -> ParameterError:
+def _rename_to_option(error: ParameterError, arguments: Sequence[str]) -> ParameterError:
     """The same, of a parameter that an option was given for, by the name of the option."""
-    typed = {argument.partition("=")[0] for argument in arguments}
+    typed_options = {argument.partition("=")[0] for argument in arguments}
     option = "--" + error.name.replace("_", "-")
     for spelling in (option, option.removesuffix("s")):  # of several views each is given by an option of its own
-        if spelling in typed:
+        if spelling in typed_options:
             return ParameterError(spelling, error.value, error.allowed)
     return error
 
@@ -57,17 +58,23 @@ def _as_typed(error: ParameterError, arguments: Sequence[str]) -> ParameterError
 def _usage(error: TyperException, arguments: Sequence[str]) -> str:
     """What the parser of the command line says, in the words of all other failures."""
     text = error.format_message() or "nothing to do; see relume --help"
-    if (missing := _MISSING.match(text)) is not None:
-        return f"{missing['name']} is missing; give it, as {_command(arguments)} --help says"
-    found = _INVALID.fullmatch(text)
-    if found is None:
+    if (missing_match := _MISSING.match(text)) is not None:
+        return f"{missing_match['name']} is missing; give it, as {_command(arguments)} --help says"
+    invalid = _INVALID.fullmatch(text)
+    if invalid is None:
         return text
-    name, why = found["name"], found["why"]
-    if (limited := _NOT.fullmatch(why)) is not None:
+    name, reason = invalid["name"], invalid["why"]
+    if (limited := _NOT.fullmatch(reason)) is not None:
         allowed = re.sub(r"^in the", "a number in the", limited["allowed"]).replace("valid int", "valid integer")
         return f"{name} is {limited['given']}; give {allowed}"
-    allowed = re.sub(r"^(greater|less) than", r"a number \1 than", why.removeprefix(_SHOULD).partition(", unable")[0])
-    return f"{name} is {_value_of(name, arguments)!r}; give {allowed}" if why.startswith(_SHOULD) else f"{name}: {why}"
+    allowed = re.sub(
+        r"^(greater|less) than", r"a number \1 than", reason.removeprefix(_SHOULD).partition(", unable")[0]
+    )
+    return (
+        f"{name} is {_find_argument_value(name, arguments)!r}; give {allowed}"
+        if reason.startswith(_SHOULD)
+        else f"{name}: {reason}"
+    )
 
 
 def _command(arguments: Sequence[str]) -> str:
@@ -75,11 +82,11 @@ def _command(arguments: Sequence[str]) -> str:
     return " ".join(["relume", *takewhile(lambda word: not word.startswith("-"), arguments[:1])])
 
 
-def _value_of(option: str, arguments: Sequence[str]) -> str:
+def _find_argument_value(option: str, arguments: Sequence[str]) -> str:
     """What was given for an option; the last one counts."""
-    given = ""
-    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+    last_value = ""
+    for argument, next_argument in zip(arguments, [*arguments[1:], ""], strict=True):
         name, is_joined, value = argument.partition("=")
         if name == option:
-            given = value if is_joined else following
-    return given
+            last_value = value if is_joined else next_argument
+    return last_value

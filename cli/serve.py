@@ -18,24 +18,24 @@ Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Port to listen
 def serve(data: Data = None, host: Host = None, port: Port = None, scheduler: Scheduler = None) -> None:
     """Serve the editor and the API, with an embedded worker unless --scheduler names a cluster."""
     from cli.data_folder import open_settings, private_files
-    from relume.imageio.ocio.current import current
+    from relume.imageio.ocio.current import get_config
     from server.access.openness import check_openness
     from server.app import serve as run_server
     from worker.database import open_database
-    from worker.storage.remote import configured
+    from worker.storage.remote import get_storage
 
     settings = open_settings(data, host=host, port=port, scheduler=scheduler)
     check_openness(settings)
     check_port(settings.host, settings.port)
     with private_files():
         open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
-        current()  # likewise
-        configured()  # likewise
-        where = address(settings.host, settings.port)
-        run_server(settings, tell_started=lambda: tell(f"relume listens on {where}", settings.log_format))
+        get_config()  # likewise
+        get_storage()  # likewise
+        url = address(settings.host, settings.port)
+        run_server(settings, on_started=lambda: announce(f"relume listens on {url}", settings.log_format))
 
 
-def tell(line: str, log_format: str) -> None:
+def announce(line: str, log_format: str) -> None:
     """Say something that is to be seen whatever is logged; where machines read the log, as a line of it."""
     if log_format == "json":
         log.warning(line)
@@ -56,5 +56,5 @@ def check_port(host: str, port: int) -> None:
 
 def address(host: str, port: int) -> str:
     """What to type into a browser on this machine."""
-    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # noqa: S104
-    return f"http://{shown}:{port}/"
+    browser_host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # noqa: S104
+    return f"http://{browser_host}:{port}/"

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.options import Data
-from cli.terminal.printing import Json, moment, note, print_result
+from cli.terminal.printing import Json, iso_time, note, print_result
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from server.access.access import Access
+    from server.access.access import AuthServices
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Who it is for; the audit and quotas know them by it.")]
 RoleOption = Annotated[str, typer.Option("--role", metavar="ROLE", help="view, edit or admin.")]
@@ -27,7 +27,7 @@ def token_add(
     """Hand out a token; it is shown this once."""
     access = open_access(data)
     text = access.tokens.add(name, role, days)
-    write_down(access, f"token add --role {role}", name)
+    audit_change(access, f"token add --role {role}", name)
     print_result({"name": name, "role": role, "token": text}, text, as_json=as_json)
     if not as_json:
         note("Keep it: it is shown this once. RELUME_LOGIN=true makes the server ask for tokens.")
@@ -42,12 +42,12 @@ def token_list(as_json: Json = False, data: Data = None) -> None:
         document = {
             "id": token.id,
             "name": token.name,
-            "role": token.role.word,
+            "role": token.role.label,
             "state": state,
-            "created": moment(token.created),
-            "expires": None if token.expires is None else moment(token.expires),
+            "created": iso_time(token.created),
+            "expires": None if token.expires is None else iso_time(token.expires),
         }
-        line = f"{token.id}  {token.role.word:5}  {state:7}  {_day(token.created)}  {token.name}{until}"
+        line = f"{token.id}  {token.role.label:5}  {state:7}  {_day(token.created)}  {token.name}{until}"
         print_result(document, line, as_json=as_json)
 
 
@@ -60,27 +60,27 @@ def token_revoke(
     """
     access = open_access(data)
     access.tokens.revoke(name)
-    write_down(access, "token revoke", name)
+    audit_change(access, "token revoke", name)
 
 
-def open_access(data: Path | None, *, is_used: bool = False) -> Access:
+def open_access(data: Path | None, *, is_used: bool = False) -> AuthServices:
     """Tokens and audit of a data folder. Raises ParameterError where `is_used` is to be and nothing is there yet."""
     from cli.data_folder import check_used, open_settings
-    from server.access.access import Access
+    from server.access.access import AuthServices
     from worker.database import open_database
     from worker.ledger import Ledger
 
     settings = open_settings(data)
     if is_used:
         check_used(settings)
-    return Access(Ledger(open_database(settings.database_url)).sessions, settings)
+    return AuthServices(Ledger(open_database(settings.database_url)).sessions, settings)
 
 
-def write_down(access: Access, what: str, thing: str) -> None:
+def audit_change(access: AuthServices, action: str, target: str) -> None:
     """Note in the audit what somebody at this machine's shell has changed."""
     from server.access.audit import Change
 
-    access.audit.add(Change(f"{getpass.getuser()} (shell)", "admin", "", what, thing, 0, ""))
+    access.audit.add(Change(f"{getpass.getuser()} (shell)", "admin", "", action, target, 0, ""))
 
 
 def _day(posix_s: float) -> str:

@@ -32,14 +32,14 @@ def worker(
     from server.logs.setting_up import set_up
     from worker.service import BakeService
 
-    settings, asked = open_settings(data), threading.Event()
+    settings, stop_requested = open_settings(data), threading.Event()
     set_up(settings.log_format, settings.log_level)
     for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, lambda *_: asked.set())
+        signal.signal(name, lambda *_: stop_requested.set())
     with (
         private_files(),
-        BakeService(settings.data, settings.database_url, num_workers=processes, shares=settings.turns),
+        BakeService(settings.data, settings.database_url, num_workers=processes, client_weights=settings.turns),
     ):
         typer.echo("waiting for bakes", err=True)
-        asked.wait()
+        stop_requested.wait()
     return 0

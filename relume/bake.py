@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.scene.model import Scene
-from relume.scene.placed_camera import PlacedCamera, with_cameras
+from relume.scene.placed_camera import CustomCamera, with_cameras
 
 
-class Rows(Protocol):
+class RowSource(Protocol):
     """Rows that need not be in memory together: an array, or what reads them when they are asked for."""
 
     @property
@@ -35,7 +35,7 @@ class Rows(Protocol):
         ...
 
 
-Arrays = Mapping[str, Rows]
+Arrays = Mapping[str, RowSource]
 
 
 @dataclass(frozen=True)
@@ -59,14 +59,14 @@ class Recipe:
     size: tuple[int, int]
     num_lights: int
     relightable: bool = False
-    cameras: tuple[PlacedCamera, ...] = ()
+    cameras: tuple[CustomCamera, ...] = ()
     num_points: int = 50_000
     gather_samples: int | None = None
     gather_rays: int | None = None
 
-    def seen(self, scene: Scene) -> Scene:
+    def add_cameras(self, scene: Scene) -> Scene:
         """The scene with the cameras that this recipe brings: what its method plans and bakes."""
-        return with_cameras(scene, [placed.camera for placed in self.cameras]) if self.cameras else scene
+        return with_cameras(scene, [placed_camera.camera for placed_camera in self.cameras]) if self.cameras else scene
 
 
 @dataclass(frozen=True)
@@ -92,13 +92,13 @@ class Task:
     Attributes:
         stage: index into `BakeMethod.stages`; a stage starts when the one before is complete.
         index: position within the stage; (stage, index) names the task.
-        view: the view it belongs to, "" for none.
+        group: the view it belongs to, "" for none.
         start, stop: the rows of the stage's arrays that it owns, shard-aligned.
     """
 
     stage: int
     index: int
-    view: str
+    group: str
     start: int
     stop: int
 
@@ -133,7 +133,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Written:
+class TaskOutput:
     """What a task computed: rows [start, stop) of each array, and what it cost.
 
     Attributes:
@@ -214,7 +214,7 @@ class BakeMethod(Protocol):
         """
         ...
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
         """Compute a task's rows; pure, seeded by (scene id, task).
 
         Args:

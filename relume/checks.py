@@ -16,7 +16,7 @@ def pointer_text(pointer: Pointer) -> str:
     return "".join("/" + str(token)[:80].replace("~", "~0").replace("/", "~1") for token in pointer) or "the look"
 
 
-def fail(pointer: Pointer, value: object, allowed: str) -> ParameterError:
+def invalid_value(pointer: Pointer, value: object, allowed: str) -> ParameterError:
     """The error to raise for a value that a document must not have.
 
     Args:
@@ -32,9 +32,9 @@ def fail(pointer: Pointer, value: object, allowed: str) -> ParameterError:
 
 def names_text(names: Iterable[str]) -> str:
     """A list of names for a message, cut where it would be long."""
-    listed = sorted(names)
-    shown = ", ".join(repr(name[:40]) for name in listed[:12])
-    return shown + (f" and {len(listed) - 12} more" if len(listed) > 12 else "") if listed else "nothing"
+    ordered = sorted(names)
+    text = ", ".join(repr(name[:40]) for name in ordered[:12])
+    return text + (f" and {len(ordered) - 12} more" if len(ordered) > 12 else "") if ordered else "nothing"
 
 
 def is_number(value: object) -> bool:
@@ -52,7 +52,7 @@ def check_number(pointer: Pointer, value: Any, minimum: float, maximum: float) -
         ParameterError: it is none.
     """
     if not is_number(value) or not minimum <= value <= maximum:
-        raise fail(pointer, value, f"a number in [{minimum:g}, {maximum:g}]")
+        raise invalid_value(pointer, value, f"a number in [{minimum:g}, {maximum:g}]")
 
 
 def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: float) -> None:
@@ -70,18 +70,18 @@ def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: f
         check_triple(pointer, value, minimum, maximum, "a number or three numbers")
 
 
-def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, what: str = "three numbers") -> None:
+def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, label: str = "three numbers") -> None:
     """Refuse what is not three numbers in [minimum, maximum].
 
     Args:
         pointer: where in the document the value stands. value: of any type.
         minimum, maximum: of each number, both allowed.
-        what: how the message calls what is allowed.
+        label: how the message calls what is allowed.
     Raises:
         ParameterError: it is not.
     """
     if not isinstance(value, list | tuple) or len(value) != 3:
-        raise fail(pointer, value, f"{what} in [{minimum:g}, {maximum:g}]")
+        raise invalid_value(pointer, value, f"{label} in [{minimum:g}, {maximum:g}]")
     for k, channel in enumerate(value):
         check_number((*pointer, k), channel, minimum, maximum)
 
@@ -96,8 +96,8 @@ def check_object(pointer: Pointer, value: Any, allowed: Iterable[str]) -> None:
         ParameterError: it is none, or has others.
     """
     if not isinstance(value, Mapping):
-        raise fail(pointer, value, "an object")
+        raise invalid_value(pointer, value, "an object")
     unknown = value.keys() - set(allowed)
     if unknown:
         name = min(unknown, key=str)
-        raise fail((*pointer, name), "unknown", f"one of {names_text(allowed)}, or leave it out")
+        raise invalid_value((*pointer, name), "unknown", f"one of {names_text(allowed)}, or leave it out")

@@ -16,7 +16,7 @@ _PACKAGE = Path(__file__).parent
 _IMPORT = re.compile(r"^\s*(?:from (\w[\w.]*) import (\([^)]*\)|[^\n#]*)|import (\w[\w.]*))", re.MULTILINE)
 
 _IMAGES = ("methods", "operators", "picture")
-_TRUTHS = (*_IMAGES, "reference")
+_COMPARISONS = (*_IMAGES, "reference")
 _BAKES = ("methods.registry", "scene.archive", "store.fill")
 _AFTER_BAKES = (  # methods import these to open what was baked, and to look at it
     "operators", "picture", "project",
@@ -28,19 +28,19 @@ _AFTER_BAKES = (  # methods import these to open what was baked, and to look at 
 @cache
 def image_code() -> str:
     """Names the code that makes images of terms from a bake. 16 hexadecimal digits"""
-    return code_hash(sources_of(_IMAGES))
+    return code_hash(collect_sources(_IMAGES))
 
 
 @cache
-def truth_code() -> str:
+def comparison_code() -> str:
     """Names the code that compares images with brute force. 16 hexadecimal digits"""
-    return code_hash(sources_of(_TRUTHS))
+    return code_hash(collect_sources(_COMPARISONS))
 
 
 @cache
 def bake_code() -> str:
     """Names the code that makes bakes from scenes. 16 hexadecimal digits"""
-    return code_hash(sources_of(_BAKES, but_for=_AFTER_BAKES))
+    return code_hash(collect_sources(_BAKES, exclude=_AFTER_BAKES))
 
 
 def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
@@ -51,36 +51,36 @@ def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
     return digest.hexdigest()[:16]
 
 
-def sources_of(names: Iterable[str], but_for: Collection[str] = (), package: Path = _PACKAGE) -> set[Path]:
+def collect_sources(names: Iterable[str], exclude: Collection[str] = (), package: Path = _PACKAGE) -> set[Path]:
     """Sources of modules of a package, and of all those of its modules that they import, directly or through others.
 
     Args:
         names: without the package's own, "store.fill"; of a package inside it, all of its modules.
-        but_for: packages and modules inside it that are left out, with what only they import.
+        exclude: packages and modules inside it that are left out, with what only they import.
         package: folder of the package.
     Raises:
-        ModuleNotFoundError: one of `names` or `but_for` is not there.
+        ModuleNotFoundError: one of `names` or `exclude` is not there.
     """
-    left_out = {source.with_suffix("") for name in but_for for source in _roots(package, name)}
-    found: set[Path] = set()
+    excluded = {source.with_suffix("") for name in exclude for source in _roots(package, name)}
+    sources: set[Path] = set()
     todo = [source for name in names for source in _roots(package, name)]
     while todo:
         path = todo.pop()
-        if path not in found and path.with_suffix("") not in left_out:
-            found.add(path)
-            todo.extend(imported(package, path))
-    return found
+        if path not in sources and path.with_suffix("") not in excluded:
+            sources.add(path)
+            todo.extend(imported_modules(package, path))
+    return sources
 
 
 def _roots(package: Path, name: str) -> list[Path]:
     folder = package.joinpath(*name.split("."))
-    found = sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]
-    if not found or not all(path.is_file() for path in found):
+    sources = sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]
+    if not sources or not all(path.is_file() for path in sources):
         raise ModuleNotFoundError(f"{package.name}.{name} has no sources; what is kept on disk cannot be named")
-    return found
+    return sources
 
 
-def imported(package: Path, path: Path) -> Iterator[Path]:
+def imported_modules(package: Path, path: Path) -> Iterator[Path]:
     """Modules of a package that a source imports: `from a.b import c` may mean module a.b, or a.b.c."""
     for origin, names, module in _IMPORT.findall(path.read_text("utf-8")):
         top, _, inside = (origin or module).partition(".")

@@ -11,7 +11,7 @@ U32 = NDArray[np.uint32]
 _MANTISSA_BITS = 9
 _BIAS = 15
 _MAX_EXPONENT = 31
-RGB9E5_LARGEST = (2**_MANTISSA_BITS - 1) / 2**_MANTISSA_BITS * 2.0 ** (_MAX_EXPONENT - _BIAS)
+RGB9E5_MAX = (2**_MANTISSA_BITS - 1) / 2**_MANTISSA_BITS * 2.0 ** (_MAX_EXPONENT - _BIAS)
 
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -42,7 +42,7 @@ def rgb9e5_pack(rgb: F32) -> U32:
     Returns:
         Red in the lowest bits, the exponent in the highest. (...) uint32
     """
-    clamped = np.fmin(np.fmax(np.asarray(rgb, np.float64), 0.0), RGB9E5_LARGEST)  # fmax takes the number, not the NaN
+    clamped = np.fmin(np.fmax(np.asarray(rgb, np.float64), 0.0), RGB9E5_MAX)  # fmax takes the number, not the NaN
     largest = clamped.max(axis=-1)
     _, exponent = np.frexp(largest)
     shared = np.where(largest > 0, np.maximum(exponent + _BIAS, 0), 0)

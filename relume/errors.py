@@ -45,10 +45,10 @@ class ParameterError(RelumeError, ValueError):
     """
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
-        shown = "nothing" if value is None else repr(value)
-        if len(shown) > 80:
-            shown = shown[:77] + "..."
-        super().__init__(f"{name} is {shown}; give {allowed}")
+        text = "nothing" if value is None else repr(value)
+        if len(text) > 80:
+            text = text[:77] + "..."
+        super().__init__(f"{name} is {text}; give {allowed}")
         self.name, self.value, self.allowed = name, value, allowed
 
 
@@ -63,9 +63,9 @@ class PlanError(RelumeError):
 class BudgetError(PlanError):
     """A plan needs more than the budget allows; refused before anything is computed."""
 
-    def __init__(self, what: str, needed_bytes: int, allowed_bytes: int, remedy: str) -> None:
+    def __init__(self, label: str, needed_bytes: int, allowed_bytes: int, remedy: str) -> None:
         needed, allowed = bytes_text(needed_bytes), bytes_text(allowed_bytes)
-        super().__init__(f"{what} needs {needed}, and may take at most {allowed}; {remedy}")
+        super().__init__(f"{label} needs {needed}, and may take at most {allowed}; {remedy}")
         self.needed_bytes, self.allowed_bytes = needed_bytes, allowed_bytes
 
 
@@ -77,7 +77,7 @@ class DiskBudgetError(BudgetError):
     """It is room on the disk that it needs more of."""
 
 
-class NotMadeError(RelumeError):
+class ResultUnavailableError(RelumeError):
     """Something could not be made that a picture can do without: what is shown stays."""
 
 
@@ -105,7 +105,7 @@ class StaleStoreError(StoreError):
         self.stored, self.current = stored, current
 
 
-class StoreGoneError(StoreNotFoundError):
+class StoreDeletedError(StoreNotFoundError):
     """A store was deleted while it was open."""
 
     def __init__(self) -> None:
@@ -125,11 +125,11 @@ class ChunkDamagedError(StoreError):
 class DiskFullError(RelumeError):
     """Something cannot be written for want of room."""
 
-    def __init__(self, what: str) -> None:
-        super().__init__(f"{what} cannot be written, the disk is full; free some space, then try again")
+    def __init__(self, label: str) -> None:
+        super().__init__(f"{label} cannot be written, the disk is full; free some space, then try again")
 
 
-def is_no_room(error: OSError) -> bool:
+def is_disk_full(error: OSError) -> bool:
     """Whether a disk or a quota of it is full."""
     return error.errno in (errno.ENOSPC, errno.EDQUOT)
 
@@ -162,7 +162,7 @@ class EditError(RelumeError):
     """An edit cannot be applied; the look stays as it was."""
 
 
-class NotFrozenError(NotMadeError):
+class NotPrecomputedError(ResultUnavailableError):
     """Something was asked of a curve that is not frozen yet."""
 
 

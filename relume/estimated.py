@@ -10,21 +10,22 @@ from numpy.typing import NDArray
 F64 = NDArray[np.float64]
 
 
-class Estimated(NamedTuple):
+class JackknifeEstimate(NamedTuple):
     """A value and its standard error, both of the same unit."""
 
     value: float
     standard_error: float
 
 
-def root_of_shares(squares: F64, of: F64) -> Estimated:
+def rms_of_parts(numerators: F64, denominators: F64) -> JackknifeEstimate:
     """√(Σ squares / Σ of) over parts that were drawn at random, as a relative RMSE is.
 
     Args:
-        squares, of: of each part, what is summed above and below; no part holds all of `of`. (n,), n at least 2
+        numerators, denominators: of each part, what is summed above and below; no part holds all of `denominators`.
+        (n,), n at least 2
     """
-    without = np.sqrt(np.maximum(squares.sum() - squares, 0.0) / (of.sum() - of))
-    return Estimated(float(np.sqrt(squares.sum() / of.sum())), jackknife(without))
+    without = np.sqrt(np.maximum(numerators.sum() - numerators, 0.0) / (denominators.sum() - denominators))
+    return JackknifeEstimate(float(np.sqrt(numerators.sum() / denominators.sum())), jackknife(without))
 
 
 def jackknife(without: F64) -> float:

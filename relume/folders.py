@@ -13,13 +13,13 @@ def folder_bytes(folder: Path) -> int:
     What somebody deletes while it is counted takes nothing either.
     """
     total = 0
-    for parent, _, names in os.walk(folder, onerror=_unless_gone):
+    for parent, _, names in os.walk(folder, onerror=_raise_unless_missing):
         for name in names:
             with suppress(FileNotFoundError):
                 total += os.stat(os.path.join(parent, name)).st_size
     return total
 
 
-def _unless_gone(error: OSError) -> None:
+def _raise_unless_missing(error: OSError) -> None:
     if not isinstance(error, FileNotFoundError):
         raise error

@@ -26,11 +26,13 @@ from typing import Self
 
 import platformdirs
 
-from relume.code_version import code_hash, imported
+from relume.code_version import code_hash, imported_modules
 
 _PACKAGE = Path(__file__).parent
 UNUSED_S = 30 * 86_400.0
-_OTHERS = "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator"  # of kernels that are not the package's
+_FALLBACK_LOCATORS = (
+    "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator"  # of kernels that are not the package's
+)
 
 
 def kernel_sources(path: Path, package: Path = _PACKAGE) -> set[Path]:
@@ -38,14 +40,14 @@ def kernel_sources(path: Path, package: Path = _PACKAGE) -> set[Path]:
 
     Plain modules give kernels their constants and are not followed further, but for `__init__`, which hands on names.
     """
-    found, todo = {path}, [path]
+    sources, todo = {path}, [path]
     while todo:
         source = todo.pop()
         if source.name == "__init__.py" or _is_kernel(source):
-            new = set(imported(package, source)) - found
-            found |= new
+            new = set(imported_modules(package, source)) - sources
+            sources |= new
             todo.extend(new)
-    return found
+    return sources
 
 
 def _is_kernel(path: Path) -> bool:
@@ -131,26 +133,26 @@ def cache_folder() -> Path:
 
 def remove_unused(folder: Path, older_than_s: float = UNUSED_S) -> None:
     """Delete what no process has used for so long beside a module's folder; errors leave it there."""
-    for sibling in _named_by_hash(folder.parent):
+    for sibling in _module_folders(folder.parent):
         with suppress(OSError):  # another process may be removing it too
             if sibling != folder and _is_private(sibling) and time.time() - sibling.stat().st_mtime > older_than_s:
                 shutil.rmtree(sibling)
 
 
-def _named_by_hash(folder: Path) -> Iterator[Path]:
+def _module_folders(folder: Path) -> Iterator[Path]:
     return (path for path in folder.iterdir() if re.fullmatch(r"[\w.]+-[0-9a-f]{16}", path.name))
 
 
 def use_kernel_cache() -> None:
     """Have Numba ask `KernelLocator`, in this process and in those it starts."""
-    locators = f"{__name__}.{KernelLocator.__name__},{_OTHERS}"
+    locators = f"{__name__}.{KernelLocator.__name__},{_FALLBACK_LOCATORS}"
     os.environ["NUMBA_CACHE_LOCATOR_CLASSES"] = locators  # read when Numba is imported
     numba = sys.modules.get("numba")
     if numba is not None:
         numba.config.CACHE_LOCATOR_CLASSES = locators
 
 
-def keep_no_kernels() -> None:
+def disable_kernel_saving() -> None:
     """Have Numba store nothing that this process compiles from now on: other processes would run it."""
     from numba.core.caching import Cache
 

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
 from weakref import WeakValueDictionary
 
 from relume.errors import MemoryBudgetError
-from relume.resident import held_bytes
+from relume.resident import live_bytes
 
 _ASSETS_BYTES = 1 << 30  # of a memory for assets alone
-PASSING_SHARE = 8  # what is made in passing pushes out what lasts up to the budget over this
+TRANSIENT_BUDGET_DIVISOR = 8  # what is made in passing pushes out what lasts up to the budget over this
 
 ASSETS = "assets"  # owner of what is made of files that looks of any bake name: see `stored`
 
@@ -41,7 +41,7 @@ Value = TypeVar("Value")
 Arguments = ParamSpec("Arguments")
 
 
-class Holder(NamedTuple):
+class CacheOwner(NamedTuple):
     """Who holds memory.
 
     Attributes:
@@ -53,7 +53,7 @@ class Holder(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Kept:
+class _CachedValue:
     """Something that does not tell its size itself."""
 
     value: Any
@@ -61,19 +61,19 @@ class _Kept:
     num_bytes: int
 
 
-class _Making:
+class _Computation:
     """Of one key, as long as somebody makes it or waits for that.
 
     Attributes:
-        too_large: what was made and is not kept, for those who wait: each would make it again.
+        uncached: what was made and is not kept, for those who wait: each would make it again.
     """
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self.too_large: _Kept | None = None
+        self.uncached: _CachedValue | None = None
 
 
-class _Part(OrderedDict[Hashable, Sized]):
+class _LruPool(OrderedDict[Hashable, Sized]):
     """Entries, the one that was used longest ago first."""
 
     used_bytes = 0
@@ -91,38 +91,38 @@ class _Part(OrderedDict[Hashable, Sized]):
         return num_bytes
 
 
-class _Room:
+class _CacheState:
     """What all handles on a memory share; only to be used under its lock."""
 
     def __init__(self, budget_bytes: int) -> None:
         self.budget_bytes = budget_bytes
         self.lock = threading.Lock()
         # one lives as long as somebody makes or waits: all who want a key share it
-        self.making: WeakValueDictionary[Hashable, _Making] = WeakValueDictionary()
-        self.lasting, self.passing = _Part(), _Part()
+        self.computations: WeakValueDictionary[Hashable, _Computation] = WeakValueDictionary()
+        self.persistent, self.transient = _LruPool(), _LruPool()
         self.reserved_bytes = 0
 
     @property
     def used_bytes(self) -> int:
-        return self.lasting.used_bytes + self.passing.used_bytes + self.reserved_bytes
+        return self.persistent.used_bytes + self.transient.used_bytes + self.reserved_bytes
 
-    def make(self, num_bytes: int, *, is_passing: bool) -> bool:
+    def make_space(self, num_bytes: int, *, is_transient: bool) -> bool:
         """Drop what was used longest ago until there are so many bytes; False where nothing more may be dropped.
 
         What was made in passing goes first; for such it is all that goes, once it would hold more than its share.
         """
-        share = self.budget_bytes // PASSING_SHARE
+        transient_limit = self.budget_bytes // TRANSIENT_BUDGET_DIVISOR
         while self.used_bytes + num_bytes > self.budget_bytes:
-            takes_more = self.passing.used_bytes + num_bytes > share
-            from_lasting = not takes_more if is_passing else not self.passing
-            part = self.lasting if from_lasting else self.passing
-            if not part:
+            takes_more = self.transient.used_bytes + num_bytes > transient_limit
+            from_persistent = not takes_more if is_transient else not self.transient
+            pool = self.persistent if from_persistent else self.transient
+            if not pool:
                 return False
-            part.drop(next(iter(part)))
+            pool.drop(next(iter(pool)))
         return True
 
 
-class Memory:
+class Cache:
     """Named entries, all of them together within a budget.
 
     Safe to use from several threads; two never make the same thing at once. Keys of what belongs to a bake begin with
@@ -130,60 +130,60 @@ class Memory:
     """
 
     def __init__(self, budget_bytes: int) -> None:
-        self._room = _Room(budget_bytes)
-        self._is_passing = False
+        self._state = _CacheState(budget_bytes)
+        self._is_transient = False
 
     @property
-    def passing(self) -> Memory:
+    def transient(self) -> Cache:
         """The same memory, for who makes things in passing; what others find there lasts from then on."""
-        found = copy.copy(self)
-        found._is_passing = True
-        return found
+        handle = copy.copy(self)
+        handle._is_transient = True
+        return handle
 
     @property
     def budget_bytes(self) -> int:
         """What the entries hold at most."""
-        return self._room.budget_bytes
+        return self._state.budget_bytes
 
     @property
     def used_bytes(self) -> int:
         """What the entries hold now, and those that are being made."""
-        return self._room.used_bytes
+        return self._state.used_bytes
 
-    def held(self) -> Mapping[Holder, int]:
+    def bytes_by_owner(self) -> Mapping[CacheOwner, int]:
         """Bytes by who holds them."""
-        found: Counter[Holder] = Counter()
-        with self._room.lock:
-            for part in (self._room.lasting, self._room.passing):
-                for key, entry in part.items():
-                    found[_holder(key, entry)] += entry.num_bytes
-        return found
+        totals: Counter[CacheOwner] = Counter()
+        with self._state.lock:
+            for pool in (self._state.persistent, self._state.transient):
+                for key, entry in pool.items():
+                    totals[_cache_owner(key, entry)] += entry.num_bytes
+        return totals
 
-    def find(self, key: Hashable, kind: type[Entry]) -> Entry | None:
+    def get_cached(self, key: Hashable, kind: type[Entry]) -> Entry | None:
         """The entry, now the most recently used, or None where there is none of that kind."""
-        room = self._room
-        with room.lock:
-            if key in room.passing and not self._is_passing:
-                entry = room.passing[key]
-                room.passing.drop(key)
-                room.lasting.add(key, entry)
-            part = room.passing if key in room.passing else room.lasting
-            if key in part:
-                part.move_to_end(key)
-            found = part.get(key)
-            return found if isinstance(found, kind) else None
+        state = self._state
+        with state.lock:
+            if key in state.transient and not self._is_transient:
+                moved_entry = state.transient[key]
+                state.transient.drop(key)
+                state.persistent.add(key, moved_entry)
+            pool = state.transient if key in state.transient else state.persistent
+            if key in pool:
+                pool.move_to_end(key)
+            entry = pool.get(key)
+            return entry if isinstance(entry, kind) else None
 
-    def holds(self, key: Hashable) -> bool:
+    def contains(self, key: Hashable) -> bool:
         """Whether there is an entry of that name; it is used no more recently for that."""
-        with self._room.lock:
-            return key in self._room.passing or key in self._room.lasting
+        with self._state.lock:
+            return key in self._state.transient or key in self._state.persistent
 
-    def forget(self, key: Hashable) -> None:
+    def evict(self, key: Hashable) -> None:
         """Drop an entry that is of no use any more, where there is one."""
-        with self._room.lock:
-            for part in (self._room.passing, self._room.lasting):
-                if key in part:
-                    part.drop(key)
+        with self._state.lock:
+            for pool in (self._state.transient, self._state.persistent):
+                if key in pool:
+                    pool.drop(key)
 
     def check(self, num_bytes: int) -> None:
         """Raises MemoryBudgetError where an entry of so many bytes is larger than the budget."""
@@ -192,8 +192,8 @@ class Memory:
                 "making this", num_bytes, self.budget_bytes, "bake a smaller picture or raise the cache budget"
             )
 
-    def get(self, key: Hashable, kind: type[Entry], num_bytes: int, make: Callable[[], Entry]) -> Entry:
-        """The entry; made by `make` where there is none, room for its `num_bytes` being made first.
+    def get(self, key: Hashable, kind: type[Entry], num_bytes: int, compute: Callable[[], Entry]) -> Entry:
+        """The entry; made by `compute` where there is none, room for its `num_bytes` being made first.
 
         What is made in passing is not kept where all room is taken by what lasts.
 
@@ -203,13 +203,13 @@ class Memory:
             MemoryBudgetError: it alone is larger than the budget.
         """
         self.check(num_bytes)
-        making = self._making(key)
-        with making.lock:
-            found = self.find(key, kind)
-            return found if found is not None else self._insert(key, num_bytes, make)
+        computation = self._get_computation(key)
+        with computation.lock:
+            cached = self.get_cached(key, kind)
+            return cached if cached is not None else self._insert(key, num_bytes, compute)
 
-    def keep(self, key: Key, make: Callable[[], Value]) -> Value:
-        """What `make` makes, made once while there is room for it; larger than the budget, it is not kept, and those
+    def get_value(self, key: Key, compute: Callable[[], Value]) -> Value:
+        """What `compute` makes, made once while there is room for it; larger than the budget, it is not kept, and those
         who wait for it at the same time get the same.
 
         For what a picture cannot do without, however small the budget. Nobody may write to what is kept.
@@ -217,43 +217,43 @@ class Memory:
         Args:
             key: the path of a store or a word for what is no bake's; in words what it is; what tells it from others.
         """
-        making = self._making(key)
-        with making.lock:
-            found = self.find(key, _Kept) or making.too_large
-            if found is not None:
-                known: Value = found.value
-                return known
-            made = make()
-            kept = _Kept(made, str(key[1]), held_bytes(made))
-            if kept.num_bytes <= self.budget_bytes:
-                self._insert(key, kept.num_bytes, lambda: kept)
+        computation = self._get_computation(key)
+        with computation.lock:
+            cached = self.get_cached(key, _CachedValue) or computation.uncached
+            if cached is not None:
+                cached_value: Value = cached.value
+                return cached_value
+            value = compute()
+            entry = _CachedValue(value, str(key[1]), live_bytes(value))
+            if entry.num_bytes <= self.budget_bytes:
+                self._insert(key, entry.num_bytes, lambda: entry)
             else:
-                making.too_large = kept
-            return made
+                computation.uncached = entry
+            return value
 
-    def _making(self, key: Hashable) -> _Making:
-        with self._room.lock:
-            return self._room.making.setdefault(key, _Making())
+    def _get_computation(self, key: Hashable) -> _Computation:
+        with self._state.lock:
+            return self._state.computations.setdefault(key, _Computation())
 
-    def _insert(self, key: Hashable, num_bytes: int, make: Callable[[], Entry]) -> Entry:
-        room, is_kept = self._room, True
-        with room.lock:
-            if not room.make(num_bytes, is_passing=self._is_passing) and self._is_passing:
-                num_bytes, is_kept = 0, False
-            room.reserved_bytes += num_bytes  # so that two freezes at once stay under the budget together
+    def _insert(self, key: Hashable, num_bytes: int, compute: Callable[[], Entry]) -> Entry:
+        state, is_cached = self._state, True
+        with state.lock:
+            if not state.make_space(num_bytes, is_transient=self._is_transient) and self._is_transient:
+                num_bytes, is_cached = 0, False
+            state.reserved_bytes += num_bytes  # so that two freezes at once stay under the budget together
         try:
-            made = make()
+            entry = compute()
         except BaseException:
-            with room.lock:
-                room.reserved_bytes -= num_bytes
+            with state.lock:
+                state.reserved_bytes -= num_bytes
             raise
-        with room.lock:
-            room.reserved_bytes -= num_bytes
-            if is_kept:
-                (room.passing if self._is_passing else room.lasting).add(key, made)
-        return made
+        with state.lock:
+            state.reserved_bytes -= num_bytes
+            if is_cached:
+                (state.transient if self._is_transient else state.persistent).add(key, entry)
+        return entry
 
-    def shrink(self, floor_bytes: int, bakes: Collection[str]) -> None:
+    def trim(self, floor_bytes: int, bakes: Collection[str]) -> None:
         """Drop entries of all but some bakes, least recently used first, until those left hold at most a floor.
 
         Under it are operators and images, which open a bake at once; lights and the like go with the bake. Assets stay
@@ -262,45 +262,45 @@ class Memory:
         Args:
             bakes: paths of stores whose entries stay.
         """
-        room, used = self._room, {*bakes, ASSETS} if bakes else set()
-        with room.lock:
-            parts = room.passing, room.lasting
-            unused = [(part, key) for part in parts for key in part if _owner(key) not in used]
-            for part, key in unused:
-                if isinstance(part[key], _Kept) and _owner(key) != ASSETS:
-                    part.drop(key)
-            others = [(part, key) for part, key in unused if key in part]
-            held = sum(part[key].num_bytes for part, key in others)
-            for part, key in others:
-                if held <= floor_bytes:
+        state, used = self._state, {*bakes, ASSETS} if bakes else set()
+        with state.lock:
+            pools = state.transient, state.persistent
+            unused = [(pool, key) for pool in pools for key in pool if _key_owner(key) not in used]
+            for pool, key in unused:
+                if isinstance(pool[key], _CachedValue) and _key_owner(key) != ASSETS:
+                    pool.drop(key)
+            remaining = [(pool, key) for pool, key in unused if key in pool]
+            remaining_bytes = sum(pool[key].num_bytes for pool, key in remaining)
+            for pool, key in remaining:
+                if remaining_bytes <= floor_bytes:
                     return
-                held -= part.drop(key)
+                remaining_bytes -= pool.drop(key)
 
 
-def _owner(key: Hashable) -> Hashable:
+def _key_owner(key: Hashable) -> Hashable:
     return key[0] if isinstance(key, tuple) and key else None
 
 
-def _holder(key: Hashable, entry: Sized) -> Holder:
-    owner = _owner(key)
-    kind = entry.kind if isinstance(entry, _Kept) else type(entry).__name__.lower()
+def _cache_owner(key: Hashable, entry: Sized) -> CacheOwner:
+    owner = _key_owner(key)
+    kind = entry.kind if isinstance(entry, _CachedValue) else type(entry).__name__.lower()
     path = Path(owner) if isinstance(owner, str) else Path()
     stores = (folder.stem for folder in (path, *path.parents) if folder.suffix == ".zarr")
-    return Holder(kind, next(stores, ""))
+    return CacheOwner(kind, next(stores, ""))
 
 
-class _Assets:
+class _AssetCache:
     """The memory of what is made of files that looks name: its own, until a process opens bakes with one."""
 
-    memory = Memory(_ASSETS_BYTES)
+    cache = Cache(_ASSETS_BYTES)
 
 
-def use_for_assets(memory: Memory) -> None:
+def use_for_assets(cache: Cache) -> None:
     """Store in this memory from now on what is made of files that looks name: BTFs, images, measured materials."""
-    _Assets.memory = memory
+    _AssetCache.cache = cache
 
 
-def stored(kind: str) -> Callable[[Callable[Arguments, Value]], Callable[Arguments, Value]]:
+def asset_cached(kind: str) -> Callable[[Callable[Arguments, Value]], Callable[Arguments, Value]]:
     """Have what a function makes of such files stored by its arguments, as long as there is room for it.
 
     People have as many and as large ones as they like, so that no fixed number of them fits.
@@ -309,25 +309,25 @@ def stored(kind: str) -> Callable[[Callable[Arguments, Value]], Callable[Argumen
         kind: names it among all that is stored, e.g. "BTF file"; one for each function.
     """
 
-    def decorate(make: Callable[Arguments, Value]) -> Callable[Arguments, Value]:
-        @wraps(make)
-        def found(*args: Arguments.args, **named: Arguments.kwargs) -> Value:
-            return stored_as(kind, args, lambda: make(*args, **named))
+    def decorate(compute: Callable[Arguments, Value]) -> Callable[Arguments, Value]:
+        @wraps(compute)
+        def wrapper(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Value:
+            return get_asset(kind, args, lambda: compute(*args, **kwargs))
 
-        return found
+        return wrapper
 
     return decorate
 
 
-def stored_as(kind: str, key: tuple[Any, ...], make: Callable[[], Value]) -> Value:
-    """What `make` makes, stored under a key as `stored` does by arguments.
+def get_asset(kind: str, key: tuple[Any, ...], compute: Callable[[], Value]) -> Value:
+    """What `compute` makes, stored under a key as `asset_cached` does by arguments.
 
     Args:
-        kind: as of `stored`. key: tells it from others of its kind. make: called where it is not there.
+        kind: as of `asset_cached`. key: tells it from others of its kind. compute: called where it is not there.
     """
-    return _Assets.memory.keep((ASSETS, kind, *key), make)
+    return _AssetCache.cache.get_value((ASSETS, kind, *key), compute)
 
 
-def is_stored(kind: str, *args: Hashable) -> bool:
+def is_asset_cached(kind: str, *args: Hashable) -> bool:
     """Whether what a function of that kind makes of these arguments is there now."""
-    return _Assets.memory.holds((ASSETS, kind, *args))
+    return _AssetCache.cache.contains((ASSETS, kind, *args))

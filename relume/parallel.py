@@ -26,60 +26,60 @@ Kernel = Callable[[int, int], object]
 """Works on a range: its start and its stop."""
 
 # two shares even out a core that is busy with something else; more cost more to hand out than they win
-_SHARES_A_THREAD = 2
+_CHUNKS_PER_THREAD = 2
 
 # asked once: of an edit's frame of three milliseconds, asking at every kernel took a third of one
 _AVAILABLE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
-_FRAME, _BESIDE, _LONG = "frame", "beside", "long"
+_FRAME, _LOW_PRIORITY, _LONG = "frame", "beside", "long"
 # where both want a core, frames get three quarters of it from long work, and nearly all from what follows them, which
 # takes no more than every other core: with both cores of two an edit's frame of 4 ms took 5
-_NICE = {_FRAME: 0, _BESIDE: 19, _LONG: 5}
+_NICE = {_FRAME: 0, _LOW_PRIORITY: 19, _LONG: 5}
 
 _lock = threading.Lock()
-_here = threading.local()  # pool: that this thread's kernels go to. is_of_pool: it is one of those that work
+_thread_state = threading.local()  # pool: that this thread's kernels go to. is_of_pool: it is one of those that work
 _pools: dict[str, ThreadPoolExecutor] = {}
-_frames_under_way: list[int] = []  # threads that make them
+_frame_threads: list[int] = []  # threads that make them
 
 
 def num_threads() -> int:
     """How many ranges run at once: `RELUME_THREADS`, or the cores this process may use."""
-    asked = os.environ.get("RELUME_THREADS", "")
-    return max(1, min(int(asked), 256)) if asked.isdigit() else _AVAILABLE
+    requested = os.environ.get("RELUME_THREADS", "")
+    return max(1, min(int(requested), 256)) if requested.isdigit() else _AVAILABLE
 
 
 def _pool(name: str) -> ThreadPoolExecutor:
     with _lock:
         if name not in _pools:
-            num = max(1, num_threads() // 2) if name == _BESIDE else num_threads()
-            _pools[name] = ThreadPoolExecutor(num, f"kernels-{name}", _begin, (name,))
+            num = max(1, num_threads() // 2) if name == _LOW_PRIORITY else num_threads()
+            _pools[name] = ThreadPoolExecutor(num, f"kernels-{name}", _init_worker, (name,))
         return _pools[name]
 
 
-def _begin(name: str) -> None:
-    _here.is_of_pool = True
+def _init_worker(name: str) -> None:
+    _thread_state.is_of_pool = True
     if _NICE[name] and sys.platform == "linux":  # elsewhere it would be of the whole process
         with suppress(OSError):  # not allowed to
             os.setpriority(os.PRIO_PROCESS, 0, os.getpriority(os.PRIO_PROCESS, 0) + _NICE[name])
 
 
-def do_long_work() -> None:
+def mark_background_thread() -> None:
     """From now on kernels that this thread calls let those of frames go first; nobody waits for them."""
-    _here.pool = _LONG
+    _thread_state.pool = _LONG
 
 
 @contextmanager
-def beside_frames() -> Iterator[None]:
+def low_priority() -> Iterator[None]:
     """Inside, kernels that this thread calls let those of frames go first, and do not queue behind long work."""
-    before = getattr(_here, "pool", _FRAME)
-    _here.pool = _BESIDE
+    before = getattr(_thread_state, "pool", _FRAME)
+    _thread_state.pool = _LOW_PRIORITY
     try:
         yield
     finally:
-        _here.pool = before
+        _thread_state.pool = before
 
 
-def make_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+def run_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """Call what makes a frame in this thread; while many do, each keeps to its own core.
 
     Args:
@@ -87,28 +87,28 @@ def make_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     Returns:
         What it returns.
     """
-    _frames_under_way.append(threading.get_ident())
+    _frame_threads.append(threading.get_ident())
     try:
         return work(*args, **kwargs)
     finally:
-        _frames_under_way.remove(threading.get_ident())
+        _frame_threads.remove(threading.get_ident())
 
 
 def _is_crowded(pool: str) -> bool:
     """Whether all cores have frames of their own to make."""
-    return pool == _FRAME and len(_frames_under_way) >= max(2, num_threads())
+    return pool == _FRAME and len(_frame_threads) >= max(2, num_threads())
 
 
 def _run(kernel: Kernel, count: int, grain: int) -> None:
     ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
     # a thread of a pool that waited for its own pool would wait for itself
-    name = getattr(_here, "pool", _FRAME)
-    if num_threads() == 1 or len(ranges) == 1 or getattr(_here, "is_of_pool", False) or _is_crowded(name):
+    name = getattr(_thread_state, "pool", _FRAME)
+    if num_threads() == 1 or len(ranges) == 1 or getattr(_thread_state, "is_of_pool", False) or _is_crowded(name):
         for start, stop in ranges:
             kernel(start, stop)
         return
     if name == _FRAME:
-        _work_together(kernel, ranges)
+        _run_cooperatively(kernel, ranges)
         return
     futures = [_pool(name).submit(kernel, start, stop) for start, stop in ranges]
     errors = [error for future in futures if (error := future.exception()) is not None]
@@ -116,26 +116,26 @@ def _run(kernel: Kernel, count: int, grain: int) -> None:
         raise errors[0]
 
 
-def _work_together(kernel: Kernel, ranges: Sequence[tuple[int, int]]) -> None:
+def _run_cooperatively(kernel: Kernel, ranges: Sequence[tuple[int, int]]) -> None:
     """Work through ranges with threads of the pool, whoever is free taking the next.
 
     The caller works, too: threads that wait are woken late, which took a quarter of a frame of three milliseconds.
     """
-    left = iter(ranges)  # whose next is one thread's, by the interpreter's lock
+    remaining = iter(ranges)  # whose next is one thread's, by the interpreter's lock
 
     def work() -> list[BaseException]:
-        return [error for start, stop in left if (error := _error_of(kernel, start, stop)) is not None]
+        return [error for start, stop in remaining if (error := _capture_error(kernel, start, stop)) is not None]
 
-    others = [_pool(_FRAME).submit(work) for _ in range(min(num_threads(), len(ranges)) - 1)]
+    futures = [_pool(_FRAME).submit(work) for _ in range(min(num_threads(), len(ranges)) - 1)]
     errors = work()
-    for other in others:
-        if not other.cancel():  # else it would find nothing left
-            errors += other.result()
+    for future in futures:
+        if not future.cancel():  # else it would find nothing left
+            errors += future.result()
     if errors:
         raise errors[0]
 
 
-def _error_of(kernel: Kernel, start: int, stop: int) -> BaseException | None:
+def _capture_error(kernel: Kernel, start: int, stop: int) -> BaseException | None:
     try:
         kernel(start, stop)
     except BaseException as error:  # raised when all ranges have ended
@@ -151,29 +151,29 @@ def for_ranges(kernel: Kernel, count: int, grain: int) -> None:
     _run(kernel, count, grain)
 
 
-def for_steps(
+def parallel_for_cancellable(
     kernel: Kernel,
     count: int,
     grain: int,
     progress: Callable[[float], object],
-    cancelled: Callable[[], bool],
-    what: str,
+    is_canceled: Callable[[], bool],
+    label: str,
 ) -> None:
     """`for_ranges` for long work that is watched and may be stopped.
 
     Args:
         kernel: called with the ends of ranges of at most `grain` out of `count`, from several threads.
-        progress: called with the share done after each range. cancelled: asked before each.
-        what: the work is called, in the error.
+        progress: called with the share done after each range. is_canceled: asked before each.
+        label: the work is called, in the error.
     Raises:
-        CancelledError: `cancelled` said so.
+        CancelledError: `is_canceled` said so.
     """
     lock, done = threading.Lock(), 0
 
     def step(start: int, stop: int) -> None:
         nonlocal done
-        if cancelled():
-            raise CancelledError(f"{what} was cancelled")
+        if is_canceled():
+            raise CancelledError(f"{label} was cancelled")
         kernel(start, stop)
         with lock:
             done += stop - start
@@ -182,32 +182,32 @@ def for_steps(
     for_ranges(step, count, grain)
 
 
-def each_in_order(work: Callable[[Item], T], items: Sequence[Item], at_once: int) -> Iterator[T]:
+def map_ordered(work: Callable[[Item], T], items: Sequence[Item], max_concurrent: int) -> Iterator[T]:
     """Call `work` with each item, several at once, and give what it returns in the order of the items.
 
     Args:
         work: called from several threads. items: independent of each other.
-        at_once: what of the results is in memory together, at most.
+        max_concurrent: what of the results is in memory together, at most.
     """
-    step = min(at_once, num_threads())
+    step = min(max_concurrent, num_threads())
     for first in range(0, len(items), step):
-        some = items[first : first + step]
-        found = dict[int, T]()
+        batch = items[first : first + step]
+        results = dict[int, T]()
 
-        def one(start: int, stop: int, some: Sequence[Item] = some, found: dict[int, T] = found) -> None:
-            found.update({k: work(some[k]) for k in range(start, stop)})
+        def run_range(start: int, stop: int, batch: Sequence[Item] = batch, results: dict[int, T] = results) -> None:
+            results.update({k: work(batch[k]) for k in range(start, stop)})
 
-        for_ranges(one, len(some), 1)
-        yield from (found[k] for k in range(len(some)))
+        for_ranges(run_range, len(batch), 1)
+        yield from (results[k] for k in range(len(batch)))
 
 
-def for_shares(kernel: Kernel, count: int, shares_a_thread: int = _SHARES_A_THREAD) -> None:
+def parallel_for_chunks(kernel: Kernel, count: int, chunks_per_thread: int = _CHUNKS_PER_THREAD) -> None:
     """Call `kernel(start, stop)` over [0, count) in a few even shares for each thread.
 
     For work of a few milliseconds, where handing out a range costs as much as doing it.
 
     Args:
-        kernel: works on a range. count: of all. shares_a_thread: more where one may cost much more than another.
+        kernel: works on a range. count: of all. chunks_per_thread: more where one may cost much more than another.
     """
-    grain = max(1, -(-count // (shares_a_thread * num_threads())))
+    grain = max(1, -(-count // (chunks_per_thread * num_threads())))
     _run(kernel, count, grain)

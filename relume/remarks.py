@@ -8,7 +8,7 @@ Effect = Literal["wrong", "simplified", "unused"]
 EFFECTS: tuple[Effect, ...] = get_args(Effect)
 
 
-class Remark(str):
+class ImportRemark(str):
     """A sentence, and what the thing it tells of does to the picture; without that, a plain string.
 
     Attributes:
@@ -18,7 +18,7 @@ class Remark(str):
 
     effect: Effect
 
-    def __new__(cls, sentence: str, effect: Effect) -> Remark:
+    def __new__(cls, sentence: str, effect: Effect) -> ImportRemark:
         remark = super().__new__(cls, sentence)
         remark.effect = effect
         return remark
@@ -31,23 +31,23 @@ class Remark(str):
         return {"text": str(self), "effect": self.effect}
 
 
-def wrong(sentence: str) -> Remark:
+def unsupported(sentence: str) -> ImportRemark:
     """Something is missing in the picture, or looks other than the file says."""
-    return Remark(sentence, "wrong")
+    return ImportRemark(sentence, "wrong")
 
 
-def simplified(sentence: str) -> Remark:
+def approximated(sentence: str) -> ImportRemark:
     """Something looks much the same as the file says, but not quite."""
-    return Remark(sentence, "simplified")
+    return ImportRemark(sentence, "simplified")
 
 
-def unused(sentence: str) -> Remark:
+def ignored(sentence: str) -> ImportRemark:
     """Something is not used, and the picture is the same without it."""
-    return Remark(sentence, "unused")
+    return ImportRemark(sentence, "unused")
 
 
-def remark_of(document: object) -> Remark:
-    """What `Remark.document` wrote; plain sentences, of scenes kept before there were effects, may be anything."""
+def warning_of(document: object) -> ImportRemark:
+    """Read what `ImportRemark.document` wrote; plain sentences, of older scenes, may be anything."""
     if isinstance(document, dict) and document.get("effect") in EFFECTS:
-        return Remark(str(document["text"]), document["effect"])
-    return wrong(str(document))
+        return ImportRemark(str(document["text"]), document["effect"])
+    return unsupported(str(document))

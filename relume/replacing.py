@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from relume.errors import DiskFullError, RelumeError, is_no_room
+from relume.errors import DiskFullError, RelumeError, is_disk_full
 
 UNFINISHED = ".unfinished-*"
 """Names of files and folders that a killed process left."""
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Write a file that takes its name only when it is complete and on the disk; a failure leaves the old one.
 
     Args:
@@ -29,14 +29,14 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         DiskFullError: there is no room for it. RelumeError: it cannot be written. Other errors than OSError pass.
     """
-    unfinished = _unfinished(path)
+    unfinished = _temporary_path(path)
     try:
         yield unfinished
         with unfinished.open("rb") as file:
             os.fsync(file.fileno())
         os.replace(unfinished, path)
     except OSError as error:
-        if is_no_room(error):
+        if is_disk_full(error):
             raise DiskFullError(path.name) from error
         reason = error.strerror or str(error)
         raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
@@ -52,10 +52,10 @@ def remove_folder(path: Path) -> None:
     Raises:
         OSError: it is not there, or may not be moved. What can be moved but not deleted is left under another name.
     """
-    unfinished = _unfinished(path)
+    unfinished = _temporary_path(path)
     path.rename(unfinished)
     shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def _unfinished(path: Path) -> Path:
+def _temporary_path(path: Path) -> Path:
     return path.with_name(UNFINISHED.replace("*", uuid.uuid4().hex + path.suffix.lower()))

@@ -15,22 +15,22 @@ from numpy.typing import NDArray
 
 _OPEN_MODULES = ("builtins", "collections", "functools")
 _OPEN_PACKAGES = ("relume", "scipy")
-_COUNTS_ITSELF = "relume.memory"
+_SELF_COUNTING_MODULE = "relume.memory"
 
 
-def held_bytes(*roots: object) -> int:
+def live_bytes(*roots: object) -> int:
     """Bytes of all NumPy arrays that can be reached from objects of relume's own, each counted once.
 
     Other libraries' objects are not looked into but for SciPy's matrices, nor is the budgeted memory, which tells by
     itself what it holds; files mapped into memory are the system's and count nothing.
     """
-    seen: dict[int, object] = {}  # keeps what it has met: an id is one's own only while one lives
+    visited: dict[int, object] = {}  # keeps what it has met: an id is one's own only while one lives
     todo, total = list(roots), 0
     while todo:
         item = todo.pop()
-        if id(item) in seen or isinstance(item, type):
+        if id(item) in visited or isinstance(item, type):
             continue
-        seen[id(item)] = item
+        visited[id(item)] = item
         if isinstance(item, np.ndarray):
             if isinstance(item.base, np.ndarray):
                 todo.append(item.base)
@@ -44,7 +44,7 @@ def held_bytes(*roots: object) -> int:
 
 
 def _is_open(module: str) -> bool:
-    return module in _OPEN_MODULES or (module.partition(".")[0] in _OPEN_PACKAGES and module != _COUNTS_ITSELF)
+    return module in _OPEN_MODULES or (module.partition(".")[0] in _OPEN_PACKAGES and module != _SELF_COUNTING_MODULE)
 
 
 def _own_bytes(array: NDArray[Any]) -> int:
@@ -60,14 +60,14 @@ def resident_bytes(pid: int) -> int:
     return num_pages * os.sysconf("SC_PAGE_SIZE")
 
 
-def give_back() -> None:
+def trim_heap() -> None:
     """Free what only reference cycles hold, and return free memory to the system; some tenths of a second."""
     gc.collect()
     if _malloc_trim is not None:
         _malloc_trim(0)
 
 
-def share_arenas() -> None:
+def limit_malloc_arenas() -> None:
     """Have all threads of this process allocate from two of glibc's arenas, unless `MALLOC_ARENA_MAX` says how many.
 
     Of itself each thread gets one of its own, up to eight for each core. What one arena has free no other can use, nor

@@ -11,45 +11,47 @@ from scipy.sparse import csr_array
 from relume.brdf.term import Term
 
 
-class Weights(NamedTuple):
+class FilterWeights(NamedTuple):
     """Weights of n points for each other.
 
     Attributes:
         matrix: rows sum to one. (n, n) sparse, float32
-        times: how often what each point has is replaced by the weighted mean.
+        num_passes: how often what each point has is replaced by the weighted mean.
     """
 
     matrix: Any
-    times: int
+    num_passes: int
 
-    def rings(self, start: int, stop: int) -> tuple[list[Any], NDArray[np.intp]]:
+    def find_dependencies(self, start: int, stop: int) -> tuple[list[Any], NDArray[np.intp]]:
         """Find what points [start, stop) need of others.
 
         Returns:
             Matrices that are to be multiplied with what the points have, the last one first; and those points.
         """
-        wanted, found = np.arange(start, stop), list[Any]()
-        place, is_among = np.empty(self.matrix.shape[1], np.int32), np.zeros(self.matrix.shape[1], np.bool_)
-        for _ in range(self.times):
-            rows = self.matrix[wanted]
-            is_among[rows.indices] = True
-            among = np.flatnonzero(is_among)
-            place[among] = np.arange(len(among))
-            found.append(csr_array((rows.data, place[rows.indices], rows.indptr), shape=(len(wanted), len(among))))
-            is_among[among], wanted = False, among
-        return found, wanted
+        needed, matrices = np.arange(start, stop), list[Any]()
+        compact_index, is_neighbor = np.empty(self.matrix.shape[1], np.int32), np.zeros(self.matrix.shape[1], np.bool_)
+        for _ in range(self.num_passes):
+            rows = self.matrix[needed]
+            is_neighbor[rows.indices] = True
+            neighbors = np.flatnonzero(is_neighbor)
+            compact_index[neighbors] = np.arange(len(neighbors))
+            matrices.append(
+                csr_array((rows.data, compact_index[rows.indices], rows.indptr), shape=(len(needed), len(neighbors)))
+            )
+            is_neighbor[neighbors], needed = False, neighbors
+        return matrices, needed
 
 
-class Sharing(NamedTuple):
+class NeighborFilter(NamedTuple):
     """How points share what their gather rays bring; see `relume.views.sharing`.
 
     Attributes:
-        even: of what is scattered evenly. highlights: of what is sent about one direction.
+        diffuse: of what is scattered evenly. highlights: of what is sent about one direction.
     """
 
-    even: Weights
-    highlights: Weights
+    diffuse: FilterWeights
+    highlights: FilterWeights
 
-    def of(self, term: Term) -> Weights:
+    def weights_for(self, term: Term) -> FilterWeights:
         """Those of what a term makes of the rays' light."""
-        return self.even if term.scatters_evenly else self.highlights
+        return self.diffuse if term.scatters_diffusely else self.highlights

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import Kernel, for_steps
+from relume.parallel import Kernel, parallel_for_cancellable
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class ResumableLoop:
     """Which steps of work on n rows are done.
 
     Attributes:
@@ -28,36 +28,39 @@ class Steps:
     lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     @classmethod
-    def of(cls, num_rows: int, grain: int) -> Steps:
+    def start(cls, num_rows: int, grain: int) -> ResumableLoop:
         """None of them."""
         return cls(num_rows, grain, np.zeros(-(-num_rows // grain), np.bool_))
 
-    def work(
+    def run(
         self,
         kernel: Kernel,
         progress: Callable[[float], object],
-        cancelled: Callable[[], bool],
-        what: str,
-        wanted: NDArray[np.bool_] | None = None,
+        is_canceled: Callable[[], bool],
+        label: str,
+        selected_rows: NDArray[np.bool_] | None = None,
     ) -> None:
         """Do what is lacking.
 
         Args:
-            kernel: called with the ends of the rows of a step. progress, cancelled, what: as of `for_steps`.
-            wanted: rows that are worked on, with those of their steps; None: all. (n,)
+            kernel: called with the ends of the rows of a step. progress, is_canceled, label: as of
+                `parallel_for_cancellable`.
+            selected_rows: rows that are worked on, with those of their steps; None: all. (n,)
         Raises:
-            CancelledError: `cancelled` said so; what was done stays.
+            CancelledError: `is_canceled` said so; what was done stays.
         """
         with self.lock:
-            lacking = np.flatnonzero(~self.done if wanted is None else self._having(wanted) & ~self.done)
+            pending = np.flatnonzero(
+                ~self.done if selected_rows is None else self._steps_containing(selected_rows) & ~self.done
+            )
 
             def step(start: int, stop: int) -> None:
-                for k in lacking[start:stop]:
+                for k in pending[start:stop]:
                     kernel(int(k) * self.grain, min((int(k) + 1) * self.grain, self.num_rows))
                     self.done[k] = True
 
-            for_steps(step, len(lacking), 1, progress, cancelled, what)
+            parallel_for_cancellable(step, len(pending), 1, progress, is_canceled, label)
 
-    def _having(self, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _steps_containing(self, selected_rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which steps have any of some rows."""
-        return np.logical_or.reduceat(wanted, np.arange(0, len(wanted), self.grain))
+        return np.logical_or.reduceat(selected_rows, np.arange(0, len(selected_rows), self.grain))

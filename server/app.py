@@ -10,17 +10,17 @@ from importlib.metadata import version
 import uvicorn
 from fastapi import Depends, FastAPI
 
-from relume.imageio.ocio.current import current, using
-from relume.resident import share_arenas
+from relume.imageio.ocio.current import get_config, using_config
+from relume.resident import limit_malloc_arenas
 from server import errors, openapi
-from server.access.gate import Gate
+from server.access.gate import AuthMiddleware
 from server.access.rules import methods_at
 from server.conditional import Conditional
-from server.files.door import UPLOADS_AT_ONCE, UPLOADS_EACH, Door
+from server.files.door import UPLOADS_AT_ONCE, UPLOADS_EACH, UploadMiddleware
 from server.guard import Guard
 from server.idempotency import Idempotency
 from server.library.opening import open_library
-from server.library.shelves import shelves_at
+from server.library.shelves import using_asset_stores
 from server.logs.requests import RequestIds
 from server.logs.setting_up import set_up
 from server.metrics import Metrics
@@ -46,8 +46,8 @@ from server.routes import (
 from server.routes.paging import check_query
 from server.routes.shelves import balls, btf_works, btfs, environments, images, library, materials
 from server.running.connection import Connection
-from server.running.leave import Leave
-from server.running.process import Process
+from server.running.leave import DrainState
+from server.running.process import ServerProcess
 from server.running.sockets import Socket
 from server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
 from server.settings import Settings
@@ -96,13 +96,13 @@ def create_app(
         clock: seconds, by which things that nobody uses grow old.
     """
     settings = settings or Settings()
-    metrics, leave = Metrics(), Leave()
+    metrics, drain = Metrics(), DrainState()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with shelves_at(settings.data), using(settings.ocio, settings.ocio_space):
-            current()  # what is wrong with it is said now
-            opening = open_services(settings, metrics, leave, open_library, open_bakes, open_batches, clock)
+        with using_asset_stores(settings.data), using_config(settings.ocio, settings.ocio_space):
+            get_config()  # what is wrong with it is said now
+            opening = open_services(settings, metrics, drain, open_library, open_bakes, open_batches, clock)
             async with opening as services:
                 app.state.services = services
                 yield
@@ -120,17 +120,17 @@ def create_app(
         generate_unique_id_function=lambda route: route.name,
     )
     openapi.install(app)
-    app.state.leave = leave
+    app.state.leave = drain
     errors.install(app, methods_at)
     # the last that is added is the first that a request passes
     app.add_middleware(Idempotency, store=lambda: app.state.services.idempotency)
     app.add_middleware(
-        Door,
+        UploadMiddleware,
         access=lambda: app.state.services.access,
-        each=UPLOADS_EACH if settings.login else UPLOADS_AT_ONCE,
-        shares=settings.turns,
+        max_per_user=UPLOADS_EACH if settings.login else UPLOADS_AT_ONCE,
+        weights=settings.turns,
     )
-    app.add_middleware(Gate, settings=settings, access=lambda: app.state.services.access, clock=clock)
+    app.add_middleware(AuthMiddleware, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(Conditional)
     app.add_middleware(
         Guard,
@@ -149,22 +149,22 @@ def create_app(
     return app
 
 
-def serve(settings: Settings, tell_started: Callable[[], object] = lambda: None) -> None:
+def serve(settings: Settings, on_started: Callable[[], object] = lambda: None) -> None:
     """Run the server until it is stopped, and tell once when it answers; blocks."""
     set_up(settings.log_format, settings.log_level)
-    share_arenas()
-    stoppable(create_app(settings), settings, tell_started).run()
+    limit_malloc_arenas()
+    create_server(create_app(settings), settings, on_started).run()
 
 
-def stoppable(app: FastAPI, settings: Settings, tell_started: Callable[[], object] = lambda: None) -> Process:
+def create_server(app: FastAPI, settings: Settings, on_started: Callable[[], object] = lambda: None) -> ServerProcess:
     """The server that runs the app, and takes leave of its sessions before it ends."""
-    return Process(
+    return ServerProcess(
         configure(app, settings),
-        leave=app.state.leave,
+        drain=app.state.leave,
         num_sessions=lambda: app.state.services.access.quotas.num_sessions,
         drain_seconds=settings.drain_seconds,
         stop_seconds=settings.stop_seconds,
-        tell_started=tell_started,
+        on_started=on_started,
     )
 
 

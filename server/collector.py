@@ -9,13 +9,13 @@ from opentelemetry.sdk.trace import ReadableSpan
 from opentelemetry.sdk.trace.export import SpanExporter, SpanExportResult
 
 from relume.errors import RelumeError
-from worker.database.faults import Absence
+from worker.database.faults import MissingDatabase
 
 EXPORTER = "opentelemetry.exporter.otlp.proto.http.trace_exporter"
 log = logging.getLogger(__name__)
 
 
-class Collector(SpanExporter):
+class TraceExporter(SpanExporter):
     """What an exporter sends to: that it is away is one line of the log, and that it is back another.
 
     OpenTelemetry's own writes four warnings for each batch, every five seconds; their first says why.
@@ -26,28 +26,28 @@ class Collector(SpanExporter):
         Args:
             exporter: sends.
         """
-        self._exporter, self._heard = exporter, list[str]()
-        self._away = Absence(log, "the collector of traces")
-        logging.getLogger(EXPORTER).addFilter(self._hear)
+        self._exporter, self._messages = exporter, list[str]()
+        self._outage = MissingDatabase(log, "the collector of traces")
+        logging.getLogger(EXPORTER).addFilter(self._collect_message)
 
-    def _hear(self, record: logging.LogRecord) -> bool:
-        self._heard.append(record.getMessage())
+    def _collect_message(self, record: logging.LogRecord) -> bool:
+        self._messages.append(record.getMessage())
         return False
 
     def export(self, spans: Sequence[ReadableSpan]) -> SpanExportResult:
         """Send some; those that cannot be sent are lost."""
-        self._heard.clear()
+        self._messages.clear()
         result = self._exporter.export(spans)
         if result is SpanExportResult.SUCCESS:
-            self._away.well()
+            self._outage.report_recovered()
         else:
-            self._away.meet(RelumeError(self._heard[0] if self._heard else "it takes none"))
+            self._outage.report_failure(RelumeError(self._messages[0] if self._messages else "it takes none"))
         return result
 
     def shutdown(self) -> None:
         """Send no more."""
         self._exporter.shutdown()
-        logging.getLogger(EXPORTER).removeFilter(self._hear)
+        logging.getLogger(EXPORTER).removeFilter(self._collect_message)
 
     def force_flush(self, timeout_millis: int = 30_000) -> bool:
         """Nothing is kept here."""

@@ -14,7 +14,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _CONTENT = (b"content-length", b"content-type", b"content-encoding", b"content-range", b"content-disposition")
-_MOST_HASHED = 4 << 20
+_MAX_HASHED_BYTES = 4 << 20
 
 
 class Conditional:
@@ -28,19 +28,19 @@ class Conditional:
         if scope["type"] != "http" or scope["method"] not in ("GET", "HEAD"):
             await self._app(scope, receive, send)
             return
-        answer = _Answer(scope, send)
+        answer = _ConditionalResponse(scope, send)
         with CancelScope() as running:
             answer.running = running
             await self._app({**scope, "method": "GET"}, receive, answer.send)
 
 
-class _Answer:
+class _ConditionalResponse:
     """One answer on its way; its start waits for the first part of its body."""
 
     running: CancelScope
 
     def __init__(self, scope: Scope, send: Send) -> None:
-        self._is_head, self._asked, self._send = scope["method"] == "HEAD", Headers(scope=scope), send
+        self._is_head, self._request_headers, self._send = scope["method"] == "HEAD", Headers(scope=scope), send
         self._start: Message | None = None
         self._is_over = False
 
@@ -51,39 +51,39 @@ class _Answer:
         if message["type"] == "http.response.start":
             self._start = message
             if self._is_head and _is_stream(message):  # its first part may be long in coming
-                await self._end(message, is_known=False)
+                await self._end(message, is_not_modified=False)
                 self.running.cancel()
             return
         if (start := self._start) is not None:
             self._start = None
-            _name(start, message)
-            if (is_known := self._is_known(start)) or self._is_head:
-                await self._end(start, is_known=is_known)
+            _add_etag(start, message)
+            if (is_not_modified := self._is_not_modified(start)) or self._is_head:
+                await self._end(start, is_not_modified=is_not_modified)
                 if message.get("more_body", False):
                     self.running.cancel()
                 return
             await self._send(start)
         await self._send(message)
 
-    async def _end(self, start: Message, *, is_known: bool) -> None:
+    async def _end(self, start: Message, *, is_not_modified: bool) -> None:
         """Answer without a body."""
         self._is_over = True
-        if is_known:
+        if is_not_modified:
             headers = [(name, value) for name, value in start["headers"] if name.lower() not in _CONTENT]
             start = {**start, "status": 304, "headers": headers}
         await self._send(start)
         await self._send({"type": "http.response.body", "body": b"", "more_body": False})
 
-    def _is_known(self, start: Message) -> bool:
+    def _is_not_modified(self, start: Message) -> bool:
         """Whether the client has what the answer would bring."""
         headers = Headers(raw=start["headers"])
         if start["status"] != 200:
             return False
-        if (tags := self._asked.get("if-none-match")) is not None:
+        if (tags := self._request_headers.get("if-none-match")) is not None:
             etag = headers.get("etag", "").removeprefix("W/")
-            known = [tag.strip().removeprefix("W/") for tag in tags.split(",")]
-            return bool(etag) and ("*" in known or etag in known)
-        if (since := self._asked.get("if-modified-since")) is not None and "last-modified" in headers:
+            etags = [tag.strip().removeprefix("W/") for tag in tags.split(",")]
+            return bool(etag) and ("*" in etags or etag in etags)
+        if (since := self._request_headers.get("if-modified-since")) is not None and "last-modified" in headers:
             try:
                 return parsedate_to_datetime(headers["last-modified"]) <= parsedate_to_datetime(since)
             except (ValueError, TypeError):  # no date, or one without a zone: passed over
@@ -95,12 +95,12 @@ def _is_stream(start: Message) -> bool:
     return "content-length" not in Headers(raw=start["headers"])
 
 
-def _name(start: Message, body: Message) -> None:
+def _add_etag(start: Message, body: Message) -> None:
     """Give whole JSON that has no ETag one."""
     headers = MutableHeaders(raw=start["headers"])
     content = body.get("body", b"")
     is_json = headers.get("content-type", "").partition(";")[0] == "application/json"
-    is_whole = not body.get("more_body", False) and len(content) <= _MOST_HASHED
+    is_whole = not body.get("more_body", False) and len(content) <= _MAX_HASHED_BYTES
     if start["status"] == 200 and is_json and is_whole and "etag" not in headers:
         headers["ETag"] = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
         start["headers"] = headers.raw

@@ -19,14 +19,14 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 
 from relume import errors as relume_errors
-from relume.errors import ProtocolError, RelumeError, is_no_room
-from server.form_errors import places_of
+from relume.errors import ProtocolError, RelumeError, is_disk_full
+from server.form_errors import list_field_errors
 from server.wire.protocol import Problem
-from worker.database.faults import database_away, is_away, told
+from worker.database.faults import database_outage, describe_error, is_unavailable
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
-_MOST_SAID = 3
+_MAX_LISTED_FIELDS = 3
 _FIELD = re.compile(r"/.*|[a-z_]+(/\w+)*")
 
 CLOSE_NORMAL = 1000
@@ -97,11 +97,11 @@ class QuotaError(RelumeError):
     """Who calls has as much as one may."""
 
 
-class LeavingError(RelumeError):
+class DrainingError(RelumeError):
     """The server is being stopped; another, or it itself in a while, serves what was asked."""
 
 
-class ElsewhereError(RelumeError):
+class OtherServerError(RelumeError):
     """Another server has the room; a balancer finds it by trying one after the other."""
 
 
@@ -126,7 +126,7 @@ class RateError(RelumeError):
 
 
 @dataclass(frozen=True)
-class Row:
+class ErrorMapping:
     """What a client is told about one kind of exception.
 
     Attributes:
@@ -141,65 +141,65 @@ class Row:
 
 
 # The first row whose exception fits is taken: subclasses stand before their bases.
-TABLE: Sequence[tuple[type[Exception], Row]] = (
-    (relume_errors.NotFoundError, Row(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
-    (NotReadyError, Row(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
-    (InProgressError, Row(409, "in-progress", "Not answered yet", CLOSE_POLICY)),
-    (KeyReusedError, Row(422, "key-reused", "Key of another call", CLOSE_POLICY)),
-    (InUseError, Row(409, "in-use", "In use", CLOSE_NOT_READY)),
-    (LeavingError, Row(503, "leaving", "Being stopped", CLOSE_RESTART)),
-    (ElsewhereError, Row(404, "elsewhere", "On another server", CLOSE_RESTART)),
-    (BusyError, Row(503, "busy", "Too busy", CLOSE_BUSY)),
-    (NearlyFullError, Row(507, "disk", "Disk is nearly full", CLOSE_INTERNAL)),
-    (TooLargeError, Row(413, "too-large", "Too large", CLOSE_TOO_BIG)),
-    (PreconditionFailedError, Row(412, "changed", "Changed in the meantime", CLOSE_POLICY)),
-    (PreconditionRequiredError, Row(428, "precondition-required", "Precondition required", CLOSE_POLICY)),
-    (ForbiddenOriginError, Row(403, "forbidden-origin", "Origin not allowed", CLOSE_POLICY)),
-    (LoginError, Row(401, "login", "Log in first", CLOSE_LOGIN)),
-    (ForbiddenError, Row(403, "forbidden", "Not allowed to you", CLOSE_FORBIDDEN)),
-    (RangeError, Row(416, "range", "No such bytes", CLOSE_POLICY)),
-    (QuotaError, Row(429, "quota", "As much as one may have", CLOSE_BUSY)),
-    (RateError, Row(429, "rate", "Too many calls", CLOSE_BUSY)),
-    (relume_errors.SceneError, Row(422, "scene", "Scene cannot be used", CLOSE_INTERNAL)),
-    (relume_errors.MaterialError, Row(422, "material", "Measured material cannot be used", CLOSE_INTERNAL)),
-    (relume_errors.ParameterError, Row(422, "parameter", "Value not allowed", CLOSE_POLICY)),
-    (relume_errors.ShapeMismatchError, Row(422, "shape", "Shapes do not fit", CLOSE_POLICY)),
-    (relume_errors.MemoryBudgetError, Row(422, "memory-budget", "Needs too much memory", CLOSE_INTERNAL)),
-    (relume_errors.DiskBudgetError, Row(507, "disk", "Disk is too full", CLOSE_INTERNAL)),
-    (relume_errors.PlanError, Row(422, "plan", "Cannot be planned", CLOSE_INTERNAL)),
-    (relume_errors.StoreNotFoundError, Row(404, "store-not-found", "No such bake store", CLOSE_NOT_FOUND)),
-    (relume_errors.StoreError, Row(409, "store", "Bake store cannot be used", CLOSE_DAMAGED)),
-    (relume_errors.EditNotSupportedError, Row(409, "edit-not-supported", "Edit not supported", CLOSE_POLICY)),
-    (relume_errors.NotMadeError, Row(409, "not-made", "Cannot be made", CLOSE_INTERNAL)),
-    (relume_errors.EditError, Row(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
-    (relume_errors.ProtocolError, Row(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
-    (relume_errors.CancelledError, Row(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
-    (relume_errors.DiskFullError, Row(507, "disk", "Disk is full", CLOSE_INTERNAL)),
-    (relume_errors.StorageError, Row(503, "storage", "Object storage cannot be used", CLOSE_BUSY)),
-    (relume_errors.DatabaseDamagedError, Row(503, "database", "Database damaged", CLOSE_BUSY)),
-    (RelumeError, Row(500, "failure", "Failure", CLOSE_INTERNAL)),
-    (OperationalError, Row(503, "database", "Database not reachable", CLOSE_BUSY)),
-    (PoolTimeoutError, Row(503, "database", "Database too slow", CLOSE_BUSY)),
-    (OSError, Row(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
+TABLE: Sequence[tuple[type[Exception], ErrorMapping]] = (
+    (relume_errors.NotFoundError, ErrorMapping(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
+    (NotReadyError, ErrorMapping(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
+    (InProgressError, ErrorMapping(409, "in-progress", "Not answered yet", CLOSE_POLICY)),
+    (KeyReusedError, ErrorMapping(422, "key-reused", "Key of another call", CLOSE_POLICY)),
+    (InUseError, ErrorMapping(409, "in-use", "In use", CLOSE_NOT_READY)),
+    (DrainingError, ErrorMapping(503, "leaving", "Being stopped", CLOSE_RESTART)),
+    (OtherServerError, ErrorMapping(404, "elsewhere", "On another server", CLOSE_RESTART)),
+    (BusyError, ErrorMapping(503, "busy", "Too busy", CLOSE_BUSY)),
+    (NearlyFullError, ErrorMapping(507, "disk", "Disk is nearly full", CLOSE_INTERNAL)),
+    (TooLargeError, ErrorMapping(413, "too-large", "Too large", CLOSE_TOO_BIG)),
+    (PreconditionFailedError, ErrorMapping(412, "changed", "Changed in the meantime", CLOSE_POLICY)),
+    (PreconditionRequiredError, ErrorMapping(428, "precondition-required", "Precondition required", CLOSE_POLICY)),
+    (ForbiddenOriginError, ErrorMapping(403, "forbidden-origin", "Origin not allowed", CLOSE_POLICY)),
+    (LoginError, ErrorMapping(401, "login", "Log in first", CLOSE_LOGIN)),
+    (ForbiddenError, ErrorMapping(403, "forbidden", "Not allowed to you", CLOSE_FORBIDDEN)),
+    (RangeError, ErrorMapping(416, "range", "No such bytes", CLOSE_POLICY)),
+    (QuotaError, ErrorMapping(429, "quota", "As much as one may have", CLOSE_BUSY)),
+    (RateError, ErrorMapping(429, "rate", "Too many calls", CLOSE_BUSY)),
+    (relume_errors.SceneError, ErrorMapping(422, "scene", "Scene cannot be used", CLOSE_INTERNAL)),
+    (relume_errors.MaterialError, ErrorMapping(422, "material", "Measured material cannot be used", CLOSE_INTERNAL)),
+    (relume_errors.ParameterError, ErrorMapping(422, "parameter", "Value not allowed", CLOSE_POLICY)),
+    (relume_errors.ShapeMismatchError, ErrorMapping(422, "shape", "Shapes do not fit", CLOSE_POLICY)),
+    (relume_errors.MemoryBudgetError, ErrorMapping(422, "memory-budget", "Needs too much memory", CLOSE_INTERNAL)),
+    (relume_errors.DiskBudgetError, ErrorMapping(507, "disk", "Disk is too full", CLOSE_INTERNAL)),
+    (relume_errors.PlanError, ErrorMapping(422, "plan", "Cannot be planned", CLOSE_INTERNAL)),
+    (relume_errors.StoreNotFoundError, ErrorMapping(404, "store-not-found", "No such bake store", CLOSE_NOT_FOUND)),
+    (relume_errors.StoreError, ErrorMapping(409, "store", "Bake store cannot be used", CLOSE_DAMAGED)),
+    (relume_errors.EditNotSupportedError, ErrorMapping(409, "edit-not-supported", "Edit not supported", CLOSE_POLICY)),
+    (relume_errors.ResultUnavailableError, ErrorMapping(409, "not-made", "Cannot be made", CLOSE_INTERNAL)),
+    (relume_errors.EditError, ErrorMapping(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
+    (relume_errors.ProtocolError, ErrorMapping(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
+    (relume_errors.CancelledError, ErrorMapping(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
+    (relume_errors.DiskFullError, ErrorMapping(507, "disk", "Disk is full", CLOSE_INTERNAL)),
+    (relume_errors.StorageError, ErrorMapping(503, "storage", "Object storage cannot be used", CLOSE_BUSY)),
+    (relume_errors.DatabaseDamagedError, ErrorMapping(503, "database", "Database damaged", CLOSE_BUSY)),
+    (RelumeError, ErrorMapping(500, "failure", "Failure", CLOSE_INTERNAL)),
+    (OperationalError, ErrorMapping(503, "database", "Database not reachable", CLOSE_BUSY)),
+    (PoolTimeoutError, ErrorMapping(503, "database", "Database too slow", CLOSE_BUSY)),
+    (OSError, ErrorMapping(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
 )
-SAID = (BusyError, LeavingError, NearlyFullError)
+NOT_LOGGED = (BusyError, DrainingError, NearlyFullError)
 """No faults: the log says once when they begin, or metrics how much there is, however often somebody asks meanwhile."""
-DEFECT = Row(500, "defect", "Defect in the server", CLOSE_INTERNAL)
+DEFECT = ErrorMapping(500, "defect", "Defect in the server", CLOSE_INTERNAL)
 
 
-def row_of(error: Exception) -> Row:
+def find_mapping(error: Exception) -> ErrorMapping:
     """The table's row for an exception; `DEFECT` for what nobody foresaw."""
-    return next((row for kind, row in TABLE if isinstance(error, kind)), DEFECT)
+    return next((mapping for kind, mapping in TABLE if isinstance(error, kind)), DEFECT)
 
 
-def close_code_of(error: Exception) -> int:
+def find_close_code(error: Exception) -> int:
     """The WebSocket close code with which a session ends."""
-    return error.close_code if isinstance(error, ProtocolError) else row_of(error).close_code
+    return error.close_code if isinstance(error, ProtocolError) else find_mapping(error).close_code
 
 
-def problem_of(error: Exception) -> Problem:
+def make_problem(error: Exception) -> Problem:
     """The RFC 9457 body; only messages that relume wrote itself reach the client, never a path or a trace."""
-    row = row_of(error)
+    mapping = find_mapping(error)
     extra: dict[str, Any] = {}
     if isinstance(error, relume_errors.ParameterError):
         extra = {"parameter": error.name, "allowed": error.allowed}
@@ -209,16 +209,18 @@ def problem_of(error: Exception) -> Problem:
         detail = str(error)
     elif isinstance(error, OperationalError | PoolTimeoutError):
         detail = "try again in a while; if it stays so, the server's log says why"
-    elif isinstance(error, OSError) and is_no_room(error):
+    elif isinstance(error, OSError) and is_disk_full(error):
         detail = "the disk is full; free some space, then try again"
     elif isinstance(error, OSError):
         detail = f"{error.strerror or 'the disk failed'}; free some space or look into the server's log"
     else:
         detail = "look into the server's log and report it"
-    return Problem(type=f"urn:relume:problem:{row.slug}", title=row.title, status=row.status, detail=detail, **extra)
+    return Problem(
+        type=f"urn:relume:problem:{mapping.slug}", title=mapping.title, status=mapping.status, detail=detail, **extra
+    )
 
 
-def headers_of(error: Exception) -> dict[str, str]:
+def make_problem_headers(error: Exception) -> dict[str, str]:
     """What HTTP wants said beside the body."""
     if isinstance(error, LoginError):
         return {"WWW-Authenticate": "Bearer"}
@@ -230,28 +232,28 @@ def headers_of(error: Exception) -> dict[str, str]:
 
 
 def validation_problem(
-    errors: Sequence[Any], sent: object = None, status: int = 422, *, is_message: bool = False
+    errors: Sequence[Any], document: object = None, status: int = 422, *, is_message: bool = False
 ) -> Problem:
-    """The body for a request or message that does not have the declared form; arguments as of `places_of`."""
-    places = places_of(errors, sent, is_message=is_message)
-    more = f"; and {len(places) - _MOST_SAID} more" if len(places) > _MOST_SAID else ""
-    detail = "; ".join(place["detail"] for place in places[:_MOST_SAID]) + more
+    """The body for a request or message that does not have the declared form; arguments as of `list_field_errors`."""
+    fields = list_field_errors(errors, document, is_message=is_message)
+    more = f"; and {len(fields) - _MAX_LISTED_FIELDS} more" if len(fields) > _MAX_LISTED_FIELDS else ""
+    detail = "; ".join(field["detail"] for field in fields[:_MAX_LISTED_FIELDS]) + more
     return Problem(
-        type="urn:relume:problem:form", title="Not of the declared form", status=status, detail=detail, errors=places
+        type="urn:relume:problem:form", title="Not of the declared form", status=status, detail=detail, errors=fields
     )
 
 
-def http_problem(error: HTTPException, method: str, able: Sequence[str]) -> Problem:
+def http_problem(error: HTTPException, method: str, allowed_methods: Sequence[str]) -> Problem:
     """The body for what the framework refuses before a route has it: no such call, or a body that is none.
 
     Args:
-        method: of the call. able: methods that its address takes.
+        method: of the call. allowed_methods: methods that its address takes.
     """
     status, detail = error.status_code, str(error.detail)
     if status == HTTPStatus.BAD_REQUEST:
         detail = f"the body cannot be read ({detail.rstrip('.')}); send what /api/openapi.json describes"
     if status == HTTPStatus.METHOD_NOT_ALLOWED:
-        detail = f"{method} is not taken at this address; use {' or '.join(able) or 'another'}"
+        detail = f"{method} is not taken at this address; use {' or '.join(allowed_methods) or 'another'}"
     slug = {400: "form", 405: "method"}.get(status, "not-found")
     title = HTTPStatus(status).phrase
     return Problem(type=f"urn:relume:problem:{slug}", title=title, status=status, detail=detail)
@@ -266,10 +268,10 @@ def problem_response(problem: Problem, headers: Mapping[str, str] | None = None)
 def message_problem(error: ValidationError, text: str) -> Problem:
     """The body for a session message that does not have the declared form. text: of the message."""
     try:
-        sent = json.loads(text)
+        document = json.loads(text)
     except (ValueError, RecursionError):
-        sent = None
-    return validation_problem(error.errors(include_url=False), sent, 400, is_message=True)
+        document = None
+    return validation_problem(error.errors(include_url=False), document, 400, is_message=True)
 
 
 OPENAPI_RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -286,15 +288,15 @@ def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
         methods_at: what a path takes.
     """
 
-    async def on_known(_: Request, error: Exception) -> Response:
-        if is_away(error):
-            database_away.meet(error)
-        elif row_of(error).status >= 500 and not isinstance(error, SAID):
-            log.error("%s: %s", type(error).__name__, told(error))
-        return problem_response(problem_of(error), headers_of(error))
+    async def on_mapped_error(_: Request, error: Exception) -> Response:
+        if is_unavailable(error):
+            database_outage.report_failure(error)
+        elif find_mapping(error).status >= 500 and not isinstance(error, NOT_LOGGED):
+            log.error("%s: %s", type(error).__name__, describe_error(error))
+        return problem_response(make_problem(error), make_problem_headers(error))
 
     async def on_defect(_: Request, error: Exception) -> Response:
-        return problem_response(problem_of(error))
+        return problem_response(make_problem(error))
 
     async def on_http(request: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
@@ -308,7 +310,7 @@ def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
         return problem_response(validation_problem(error.errors(), error.body))
 
     for kind in (RelumeError, OperationalError, PoolTimeoutError, OSError):
-        app.add_exception_handler(kind, on_known)
+        app.add_exception_handler(kind, on_mapped_error)
     app.add_exception_handler(HTTPException, on_http)
     app.add_exception_handler(RequestValidationError, on_validation)
     app.add_exception_handler(Exception, on_defect)

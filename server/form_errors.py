@@ -12,8 +12,8 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-MOST = 20
-_SHOWN = 80
+MAX_FIELDS = 20
+_MAX_VALUE_CHARS = 80
 _QUOTED = re.compile(r"'((?:[^'\\]|\\.)*)'")
 _Error = Mapping[str, Any]
 
@@ -50,71 +50,80 @@ _PATTERNS = {
 _LISTS = {"size": "[width, height] in pixels", "to_world": "16 numbers, by row", "about": "[x, y, z] in metres"}
 
 
-class _Placed(NamedTuple):
+class _LocatedError(NamedTuple):
     """An error, the part of the call that it is in, its path there, and whether it is of one of several forms."""
 
-    part: str
+    location: str
     path: tuple[str | int, ...]
-    is_of_a_form: bool
+    is_union_branch: bool
     error: _Error
 
 
-def places_of(errors: Sequence[_Error], sent: object, *, is_message: bool = False) -> list[dict[str, str]]:
+def list_field_errors(errors: Sequence[_Error], document: object, *, is_message: bool = False) -> list[dict[str, str]]:
     """One entry for each field that is not as declared: `pointer` into the body, or `parameter` of the query, the path
     or the headers, and `detail`, a sentence.
 
     Args:
-        errors: of pydantic. sent: the body or message as it was parsed. is_message: it is one of a session.
+        errors: of pydantic. document: the body or message as it was parsed. is_message: it is one of a session.
     """
     fields: dict[tuple[str, tuple[str | int, ...]], list[_Error]] = defaultdict(list)
-    placed = [_place(error, sent, is_message) for error in errors]
-    for each in placed:
-        is_outdone = each.is_of_a_form and any(
-            other.part == each.part and len(other.path) > len(each.path) and other.path[: len(each.path)] == each.path
-            for other in placed
+    located = [_locate_error(error, document, is_message) for error in errors]
+    for error_entry in located:
+        is_outdone = error_entry.is_union_branch and any(
+            deeper.location == error_entry.location
+            and len(deeper.path) > len(error_entry.path)
+            and deeper.path[: len(error_entry.path)] == error_entry.path
+            for deeper in located
         )
         if not is_outdone:  # another of the forms was meant, which has an error farther in
-            fields[each.part, each.path].append(each.error)
-    return [_said(part, path, found) for (part, path), found in list(fields.items())[:MOST]]
+            fields[error_entry.location, error_entry.path].append(error_entry.error)
+    return [
+        _describe_field(location, path, field_errors)
+        for (location, path), field_errors in list(fields.items())[:MAX_FIELDS]
+    ]
 
 
-def _place(error: _Error, sent: object, is_message: bool) -> _Placed:
+def _locate_error(error: _Error, document: object, is_message: bool) -> _LocatedError:
     path = tuple(error["loc"])
-    part = "message" if is_message else str(path[0]) if path else "body"
+    location = "message" if is_message else str(path[0]) if path else "body"
     path = path if is_message else path[1:]
     if error["type"] == "json_invalid":
-        return _Placed(part, (), False, error)
-    if part not in ("body", "message"):
-        return _Placed(part, path, False, error)
+        return _LocatedError(location, (), False, error)
+    if location not in ("body", "message"):
+        return _LocatedError(location, path, False, error)
     is_absent = error["type"] in ("missing", "extra_forbidden", "union_tag_not_found")
-    known = _known(path, sent if is_message or not hasattr(sent, "multi_items") else dict(sent), is_absent)  # type: ignore[call-overload]
+    existing_path = _existing_path(
+        path,
+        document if is_message or not hasattr(document, "multi_items") else dict(document),  # type: ignore[call-overload]
+        is_absent,
+    )
     if error["type"].startswith("union_tag") and (name := _QUOTED.search(error["ctx"]["discriminator"])):
-        known = (*known, name[1])
-    return _Placed(part, known, len(known) < len(path), error)
+        existing_path = (*existing_path, name[1])
+    return _LocatedError(location, existing_path, len(existing_path) < len(path), error)
 
 
-def _known(path: Sequence[str | int], value: object, is_absent: bool) -> tuple[str | int, ...]:
+def _existing_path(path: Sequence[str | int], value: object, is_absent: bool) -> tuple[str | int, ...]:
     """The longest path of fields that are there; what is no field names one of several forms."""
     if not path:
         return ()
-    first, rest = path[0], path[1:]
-    without = _known(rest, value, is_absent)
+    first, remaining = path[0], path[1:]
+    without = _existing_path(remaining, value, is_absent)
     is_entry = isinstance(value, list | tuple) and isinstance(first, int) and first < len(value)
     if is_entry or (isinstance(value, Mapping) and first in value):
         inner = value[first]  # type: ignore[index]
-    elif not rest and is_absent and isinstance(value, Mapping):
+    elif not remaining and is_absent and isinstance(value, Mapping):
         return (first,)
     else:
         return without
-    within = (first, *_known(rest, inner, is_absent))
+    within = (first, *_existing_path(remaining, inner, is_absent))
     return within if len(within) >= len(without) else without
 
 
-def _said(part: str, path: tuple[str | int, ...], errors: Sequence[_Error]) -> dict[str, str]:
-    if part in ("body", "message"):
+def _describe_field(location: str, path: tuple[str | int, ...], errors: Sequence[_Error]) -> dict[str, str]:
+    if location in ("body", "message"):
         pointer = "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in path)
-        return {"pointer": pointer, "detail": _sentence(pointer or f"the {part}", path, errors)}
-    name = str(path[0]) if path else part
+        return {"pointer": pointer, "detail": _sentence(pointer or f"the {location}", path, errors)}
+    name = str(path[0]) if path else location
     return {"parameter": name, "detail": _sentence(name, path, errors)}
 
 
@@ -131,11 +140,13 @@ def _sentence(name: str, path: Sequence[str | int], errors: Sequence[_Error]) ->
     if first["type"].startswith("model_") and not path:
         return f"{name} is no JSON object; send one, with Content-Type: application/json"
     if first["type"] in ("value_error", "assertion_error"):
-        return _of_a_check(name, str(first["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, "))
-    return f"{name} is {shown(first['input'])}; give {_allowed(path, errors)}"
+        return _describe_validator_error(
+            name, str(first["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
+        )
+    return f"{name} is {format_value(first['input'])}; give {_allowed(path, errors)}"
 
 
-def _of_a_check(name: str, message: str) -> str:
+def _describe_validator_error(name: str, message: str) -> str:
     if message.startswith("Expected UploadFile"):
         return f"{name} is a text; give a file, with a file name in its part of the form"
     return f"{name}: {message[:300]}"
@@ -144,15 +155,17 @@ def _of_a_check(name: str, message: str) -> str:
 def _allowed(path: Sequence[str | int], errors: Sequence[_Error]) -> str:
     """What the forms that a field may have allow together."""
     choices = [choice for error in errors for choice in _choices(error)]
-    others = [_allowed_by(error, path) for error in errors if not _choices(error)]
-    listed = [_or([f"'{choice}'" for choice in dict.fromkeys(choices)])] if choices else []
-    return ", or ".join(dict.fromkeys([*listed, *others]))
+    descriptions = [_allowed_by(error, path) for error in errors if not _choices(error)]
+    alternatives = [_join_alternatives([f"'{choice}'" for choice in dict.fromkeys(choices)])] if choices else []
+    return ", or ".join(dict.fromkeys([*alternatives, *descriptions]))
 
 
 def _choices(error: _Error) -> list[str]:
     context = error.get("ctx", {})
-    said = {"literal_error": "expected", "enum": "expected", "union_tag_invalid": "expected_tags"}.get(error["type"])
-    return _QUOTED.findall(str(context[said])) if said in context else []
+    context_key = {"literal_error": "expected", "enum": "expected", "union_tag_invalid": "expected_tags"}.get(
+        error["type"]
+    )
+    return _QUOTED.findall(str(context[context_key])) if context_key in context else []
 
 
 def _allowed_by(error: _Error, path: Sequence[str | int]) -> str:
@@ -171,18 +184,22 @@ def _plain(value: object) -> object:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _or(words: Sequence[str]) -> str:
-    return " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+def _join_alternatives(alternatives: Sequence[str]) -> str:
+    return (
+        " or ".join([", ".join(alternatives[:-1]), alternatives[-1]])
+        if len(alternatives) > 1
+        else "".join(alternatives)
+    )
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     """A value as a sentence repeats it, at most 80 characters."""
     if isinstance(value, str):
-        text = repr(value[: 2 * _SHOWN])
+        text = repr(value[: 2 * _MAX_VALUE_CHARS])
     elif value is None or isinstance(value, bool | int | float):
         text = json.dumps(value)
     elif isinstance(value, Mapping | list | tuple):
         text = "an object" if isinstance(value, Mapping) else f"a list of {len(value)}"
     else:
         text = "a file" if hasattr(value, "filename") else "of another kind"
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+    return text if len(text) <= _MAX_VALUE_CHARS else text[: _MAX_VALUE_CHARS - 3] + "..."

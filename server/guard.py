@@ -20,7 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from relume.errors import ParameterError
 from relume.measured.merl import FILE_BYTES
-from server.errors import ForbiddenOriginError, TooLargeError, problem_of, problem_response
+from server.errors import ForbiddenOriginError, TooLargeError, make_problem, problem_response
 
 # as large as the settings allow: an environment of 4K is 25 MB, one of 8K some 100
 UPLOADS = (
@@ -60,8 +60,8 @@ def origin_is_allowed(headers: Headers, allowed_origins: Sequence[str]) -> bool:
     origin = headers.get("origin")
     if origin is None or origin in allowed_origins:
         return True
-    parts = urlsplit(origin)
-    return parts.scheme in ("http", "https") and parts.netloc.lower() == headers.get("host", "").lower()
+    origin_url = urlsplit(origin)
+    return origin_url.scheme in ("http", "https") and origin_url.netloc.lower() == headers.get("host", "").lower()
 
 
 class Guard:
@@ -89,7 +89,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
         if scope["type"] == "http":
-            send = self._dressed(scope, send)
+            send = self._with_safe_headers(scope, send)
         refusal = self._refusal(scope)
         if refusal is not None:
             await _refuse(refusal, scope, receive, send)
@@ -115,12 +115,12 @@ class Guard:
             return ForbiddenOriginError("the Host or Origin header cannot be read; send a proper one")
         return None
 
-    def _dressed(self, scope: Scope, send: Send) -> Send:
+    def _with_safe_headers(self, scope: Scope, send: Send) -> Send:
         """Adds the safe headers to whatever is answered, and counts it."""
 
         start_s = time.perf_counter()
 
-        async def dressed(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 self._count(scope["method"], message["status"], time.perf_counter() - start_s)
                 headers = MutableHeaders(scope=message)
@@ -131,7 +131,7 @@ class Guard:
                     headers.add_vary_header("Cookie, Authorization")
             await send(message)
 
-        return dressed
+        return send_with_headers
 
     def _limit(self, scope: Scope) -> int:
         path = scope["path"]
@@ -139,8 +139,8 @@ class Guard:
             return self._max_upload_bytes
         if path == "/api/materials/measured":
             return MAX_MATERIAL_BYTES
-        most = self._max_body_bytes if path in LARGER else MAX_LOGIN_BYTES if path in LOGINS else MAX_JSON_BYTES
-        return min(most, self._max_body_bytes)
+        max_bytes = self._max_body_bytes if path in LARGER else MAX_LOGIN_BYTES if path in LOGINS else MAX_JSON_BYTES
+        return min(max_bytes, self._max_body_bytes)
 
     def _too_large(self, scope: Scope) -> TooLargeError:
         return TooLargeError(f"the request is larger than {self._limit(scope):,} bytes; send less")
@@ -175,7 +175,7 @@ class Guard:
 
 
 async def _refuse(error: Exception, scope: Scope, receive: Receive, send: Send) -> None:
-    problem = problem_of(error)
+    problem = make_problem(error)
     response = problem_response(problem, {"Connection": "close"} if problem.status == 413 else None)
     if scope["type"] == "websocket" and "websocket.http.response" not in scope.get("extensions", {}):
         await send({"type": "websocket.close", "code": 1008, "reason": problem.detail})

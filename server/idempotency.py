@@ -19,9 +19,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from relume.errors import ParameterError
 from server.access.roles import KEY as CALLER
 from server.access.rules import is_change
-from server.errors import InProgressError, KeyReusedError, headers_of, problem_of, problem_response
-from server.records.idempotency import Answer, Before, IdempotencyStore
-from worker.database.faults import AWAY, database_away, told
+from server.errors import InProgressError, KeyReusedError, make_problem, make_problem_headers, problem_response
+from server.records.idempotency import Answer, EarlierCall, IdempotencyStore
+from worker.database.faults import DATABASE_ERRORS, database_outage, describe_error
 
 log = logging.getLogger(__name__)
 HEADER, REPLAYED = "Idempotency-Key", "Idempotency-Replayed"
@@ -50,7 +50,7 @@ class Idempotency:
             await self._app(scope, receive, send)
         elif _FORM.fullmatch(key) is None:
             error = ParameterError(HEADER, key, "1 to 200 printable ASCII characters without blanks")
-            await problem_response(problem_of(error))(scope, receive, send)
+            await problem_response(make_problem(error))(scope, receive, send)
         else:
             call = _Call(self._store(), scope, key, receive, send)
             await call.run(self._app)
@@ -61,66 +61,66 @@ class _Call:
 
     def __init__(self, store: IdempotencyStore, scope: Scope, key: str, receive: Receive, send: Send) -> None:
         self._store, self._scope, self._receive, self._send = store, scope, receive, send
-        self._who = scope[CALLER].name, key
+        self._client_and_key = scope[CALLER].name, key
         boundary = _BOUNDARY.search(Headers(scope=scope).get("content-type", ""))
         self._digest = _Digest(b"" if boundary is None else boundary[1].encode("latin-1"))
         self._digest.add(f"{scope['path']}?".encode() + scope["query_string"] + b"\n")
         self._is_form, self._early = boundary is not None, list[Message]()
-        self._is_begun, self._is_answered = False, False
+        self._has_claim, self._is_answered = False, False
         self._status, self._headers, self._body = 0, Headers(), bytearray()
 
     async def run(self, app: ASGIApp) -> None:
         """Do it, or answer as before."""
         try:
             if not self._is_form:  # small, and routes that take none would not ask for it
-                read = [await self._counted()]
-                while read[-1].get("more_body", False):
-                    read.append(await self._counted())
-                self._early = read
-            await app(self._scope, self._counted, self._kept)
+                messages = [await self._receive_hashed()]
+                while messages[-1].get("more_body", False):
+                    messages.append(await self._receive_hashed())
+                self._early = messages
+            await app(self._scope, self._receive_hashed, self._send_and_store)
         except _OverError:
             return
         finally:
-            if self._is_begun and self._status // 100 != 2:
-                await run_sync(self._store.drop, *self._who)
+            if self._has_claim and self._status // 100 != 2:
+                await run_sync(self._store.drop, *self._client_and_key)
 
-    async def _counted(self) -> Message:
+    async def _receive_hashed(self) -> Message:
         """The body on its way to the app, which gets the end of it only where the call is to be done."""
         if self._early:
             return self._early.pop(0)
         message = await self._receive()
         if message["type"] == "http.request":
             self._digest.add(message.get("body", b""))
-            if not message.get("more_body", False) and not self._is_begun:
-                await self._begin()
+            if not message.get("more_body", False) and not self._has_claim:
+                await self._claim_key()
         return message
 
-    async def _begin(self) -> None:
+    async def _claim_key(self) -> None:
         """Take the key. Raises _OverError where the call is answered already: as before, or by a refusal."""
         try:
-            before = await run_sync(self._store.begin, *self._who, self._digest.hex())
-        except AWAY as error:
-            database_away.meet(error)
-            response = problem_response(problem_of(error))
+            before = await run_sync(self._store.claim, *self._client_and_key, self._digest.hex())
+        except DATABASE_ERRORS as error:
+            database_outage.report_failure(error)
+            response = problem_response(make_problem(error))
         else:
             if before is None:
-                self._is_begun = True
+                self._has_claim = True
                 return
             response = self._response(before)
         self._is_answered = True
         await response(self._scope, self._receive, self._send)
         raise _OverError
 
-    def _response(self, before: Before) -> Response:
+    def _response(self, before: EarlierCall) -> Response:
         if before.digest != self._digest.hex():
             error: Exception = KeyReusedError(f"this {HEADER} was used for another call; give each call its own")
         elif before.answer is None:
             error = InProgressError(f"a call with this {HEADER} is not answered yet; ask again in a while")
         else:
-            return _again(before.answer)
-        return problem_response(problem_of(error), headers_of(error))
+            return _replay_answer(before.answer)
+        return problem_response(make_problem(error), make_problem_headers(error))
 
-    async def _kept(self, message: Message) -> None:
+    async def _send_and_store(self, message: Message) -> None:
         """The answer on its way to the client, which gets the end of it when it is kept."""
         if self._is_answered:  # the app says that it could not read the body
             return
@@ -128,28 +128,28 @@ class _Call:
             self._status, self._headers = message["status"], Headers(raw=message["headers"])
         else:
             self._body += message.get("body", b"")
-            if not message.get("more_body", False) and self._is_begun and self._status // 100 == 2:
+            if not message.get("more_body", False) and self._has_claim and self._status // 100 == 2:
                 headers = self._headers
                 answer = Answer(self._status, headers.get("location"), headers.get("content-type"), bytes(self._body))
-                await self._keep(answer)
+                await self._store_answer(answer)
         await self._send(message)
 
-    async def _keep(self, answer: Answer) -> None:
+    async def _store_answer(self, answer: Answer) -> None:
         try:
-            await run_sync(self._store.end, *self._who, answer)
-        except AWAY as error:  # it was made all the same
-            log.error("the answer to a call with a key could not be kept (%s)", told(error))
+            await run_sync(self._store.end, *self._client_and_key, answer)
+        except DATABASE_ERRORS as error:  # it was made all the same
+            log.error("the answer to a call with a key could not be kept (%s)", describe_error(error))
 
 
-def _again(answer: Answer) -> Response:
+def _replay_answer(answer: Answer) -> Response:
     """What was answered before; where that was too large to be kept, the way to what was made."""
-    is_kept = answer.body is not None
-    response = Response(answer.body or b"", answer.status if is_kept or answer.location is None else 303)
+    has_body = answer.body is not None
+    response = Response(answer.body or b"", answer.status if has_body or answer.location is None else 303)
     headers = MutableHeaders(raw=response.raw_headers)
     headers[REPLAYED] = "true"
     if answer.location is not None:
         headers["Location"] = answer.location
-    if is_kept and answer.media_type is not None:
+    if has_body and answer.media_type is not None:
         headers["Content-Type"] = answer.media_type
     return response
 
@@ -160,17 +160,17 @@ class _Digest:
     def __init__(self, boundary: bytes) -> None:
         self._hash, self._boundary, self._tail = hashlib.sha256(), boundary, b""
 
-    def add(self, part: bytes) -> None:
+    def add(self, data: bytes) -> None:
         """The next bytes."""
         if not self._boundary:
-            self._hash.update(part)
+            self._hash.update(data)
             return
-        *pieces, rest = (self._tail + part).split(self._boundary)
+        *pieces, remainder = (self._tail + data).split(self._boundary)
         for piece in pieces:
             self._hash.update(piece + b"\0")
-        keep = len(self._boundary) - 1  # a boundary may go on in the next part
-        self._tail = rest[len(rest) - keep :] if len(rest) > keep else rest
-        self._hash.update(rest[: len(rest) - len(self._tail)])
+        num_pending = len(self._boundary) - 1  # a boundary may go on in the next part
+        self._tail = remainder[len(remainder) - num_pending :] if len(remainder) > num_pending else remainder
+        self._hash.update(remainder[: len(remainder) - len(self._tail)])
 
     def hex(self) -> str:
         """Of all so far."""

@@ -9,40 +9,40 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Proc
 from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.registry import Collector
 
-from relume.memory import Holder
-from worker.database.faults import AWAY
+from relume.memory import CacheOwner
+from worker.database.faults import DATABASE_ERRORS
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS"})
 LATENCY_S = (0.001, 0.002, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.033, 0.060, 0.100, 0.250, 1.0, 4.0)
 
 
-class _MemoryCollector(Collector):
+class _CacheCollector(Collector):
     """What is in the memory: kinds and bakes come and go."""
 
-    def __init__(self, held: Callable[[], Mapping[Holder, int]]) -> None:
-        self._held = held
+    def __init__(self, bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]) -> None:
+        self._bytes_by_owner = bytes_by_owner
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
         """One gauge."""
-        found = GaugeMetricFamily("relume_memory_bytes", "Bytes made from bakes, by kind", labels=["kind", "bake"])
-        for holder, num_bytes in self._held().items():
-            found.add_metric(holder, num_bytes)
-        yield found
+        gauge = GaugeMetricFamily("relume_memory_bytes", "Bytes made from bakes, by kind", labels=["kind", "bake"])
+        for owner, num_bytes in self._bytes_by_owner().items():
+            gauge.add_metric(owner, num_bytes)
+        yield gauge
 
 
-class _WorkCollector(Collector):
+class _JobCollector(Collector):
     """How much long work waits and runs; nothing while the database is away."""
 
-    def __init__(self, counted: Callable[[], Mapping[tuple[str, str], int]]) -> None:
-        self._counted = counted
+    def __init__(self, count_jobs: Callable[[], Mapping[tuple[str, str], int]]) -> None:
+        self._count_jobs = count_jobs
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
         """One gauge."""
-        found = GaugeMetricFamily("relume_work", "Long work by kind and state", labels=["kind", "state"])
-        with suppress(*AWAY):
-            for labels, count in self._counted().items():
-                found.add_metric(labels, count)
-        yield found
+        gauge = GaugeMetricFamily("relume_work", "Long work by kind and state", labels=["kind", "state"])
+        with suppress(*DATABASE_ERRORS):
+            for labels, count in self._count_jobs().items():
+                gauge.add_metric(labels, count)
+        yield gauge
 
 
 class Metrics:
@@ -61,7 +61,7 @@ class Metrics:
         )
         self.refused_sessions.labels("busy")  # an increase is one of what was there before
         self.request_seconds = self._histogram("relume_http_request_seconds", "Request received to answer begun")
-        self._leaving = Gauge("relume_leaving", "Whether the server is being stopped, 0 or 1", registry=registry)
+        self._draining = Gauge("relume_leaving", "Whether the server is being stopped, 0 or 1", registry=registry)
         self._free = Gauge("relume_disk_free_bytes", "Room on the disk of the data directory", registry=registry)
         self._least_free = Gauge("relume_disk_floor_bytes", "Room below which /readyz says no", registry=registry)
         self.edit_to_socket = self._histogram("relume_edit_to_socket_seconds", "Edit received to frame handed over")
@@ -69,33 +69,37 @@ class Metrics:
         self.encode = self._histogram("relume_frame_encode_seconds", "Encoding a frame")
         self.freeze = self._histogram("relume_freeze_seconds", "Freezing a curve")
         self._cache = Gauge("relume_frozen_cache_bytes", "Bytes of all that was made from bakes", registry=registry)
-        self._held = Gauge("relume_held_bytes", "Bytes of arrays that the server holds", ["holder"], registry=registry)
+        self._live_bytes = Gauge(
+            "relume_held_bytes", "Bytes of arrays that the server holds", ["holder"], registry=registry
+        )
         self._workers = Gauge(
             "relume_workers_resident_bytes", "Memory of the server's own worker processes", registry=registry
         )
         ProcessCollector(registry=registry)  # process_resident_memory_bytes and the like
 
-    def watch_memory(self, used_bytes: Callable[[], int], held: Callable[[], Mapping[Holder, int]]) -> None:
+    def watch_cache(
+        self, used_bytes: Callable[[], int], bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]
+    ) -> None:
         """Where it is read from what the memory holds, in all and by kind and bake."""
         self._cache.set_function(used_bytes)
-        self.registry.register(_MemoryCollector(held))
+        self.registry.register(_CacheCollector(bytes_by_owner))
 
-    def watch_holders(self, holders: Mapping[str, Callable[[], int]]) -> None:
+    def watch_owners(self, owners: Mapping[str, Callable[[], int]]) -> None:
         """Where it is read from who holds memory in this process; what two hold is counted by one."""
-        for holder, held_bytes in holders.items():
-            self._held.labels(holder).set_function(held_bytes)
+        for owner, get_bytes in owners.items():
+            self._live_bytes.labels(owner).set_function(get_bytes)
 
     def watch_workers(self, resident_bytes: Callable[[], int]) -> None:
         """Where the memory of the server's own worker processes is read from."""
         self._workers.set_function(resident_bytes)
 
-    def watch_work(self, counted: Callable[[], Mapping[tuple[str, str], int]]) -> None:
+    def watch_jobs(self, count_jobs: Callable[[], Mapping[tuple[str, str], int]]) -> None:
         """Where it is read from how much long work there is, by kind and state."""
-        self.registry.register(_WorkCollector(counted))
+        self.registry.register(_JobCollector(count_jobs))
 
-    def watch_readiness(self, is_leaving: Callable[[], bool], free_bytes: Callable[[], int], least_bytes: int) -> None:
+    def watch_readiness(self, is_draining: Callable[[], bool], free_bytes: Callable[[], int], least_bytes: int) -> None:
         """Where it is read from what /readyz asks."""
-        self._leaving.set_function(is_leaving)
+        self._draining.set_function(is_draining)
         self._free.set_function(free_bytes)
         self._least_free.set(least_bytes)
 

@@ -46,13 +46,13 @@ def install(app: FastAPI) -> None:
 
 
 def _description(app: FastAPI) -> dict[str, Any]:
-    found = get_openapi(title=app.title, version=app.version, summary=app.summary, routes=app.routes)
-    components = found["components"]
+    document = get_openapi(title=app.title, version=app.version, summary=app.summary, routes=app.routes)
+    components = document["components"]
     schemas = {**_looks(), "Problem": Problem.model_json_schema()}
     components["schemas"] = dict(sorted({**schemas, **components["schemas"]}.items()))
     components["securitySchemes"] = _SCHEMES
-    found["security"] = [{"token": []}, {"cookie": []}, {}]
-    for path, method, operation in _operations(found):
+    document["security"] = [{"token": []}, {"cookie": []}, {}]
+    for path, method, operation in _operations(document):
         if method == "post" and is_change("POST", path):
             operation.setdefault("parameters", []).append(_KEY_PARAMETER)
         for response in operation["responses"].values():
@@ -60,9 +60,9 @@ def _description(app: FastAPI) -> dict[str, Any]:
                 if media_type.startswith(("image/", "video/")) or media_type == "application/octet-stream":
                     content["schema"] = _BINARY
     _name_binary(components["schemas"])
-    for body in ("LooksBody", "LooksRequest", "RenderRequest", "ShareBody", "ShareRequest", "TruthRequest"):
+    for body in ("LooksBody", "LooksRequest", "RenderRequest", "ShareBody", "ShareRequest", "ComparisonRequest"):
         _refer_to_look(components["schemas"][body]["properties"])
-    return found
+    return document
 
 
 def _looks() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Everything that lives as long as the server: opened at start, closed at the end; routes ask for `Shared`."""
+"""Everything that lives as long as the server: opened at start, closed at the end; routes ask for `ServicesDep`."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from typing import Annotated, NamedTuple
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from relume.environments.built_in import built_in
-from relume.resident import held_bytes
+from relume.environments.built_in import load_built_in
+from relume.resident import live_bytes
 from server.access import tables as access_tables  # noqa: F401  like those of the records
-from server.access.access import Access
-from server.apart.ahead import Ahead
-from server.apart.pool import Pool
+from server.access.access import AuthServices
+from server.apart.ahead import Prewarmer
+from server.apart.pool import ProcessPool
 from server.apart.step import Batches
 from server.apart.thumbnails import Thumbnails
 from server.files.answers import Answers
 from server.files.importers import Importers
 from server.files.importing import remove_strays
 from server.files.intake import Intake
-from server.library.caretaker import Caretaker
+from server.library.caretaker import CacheEvictor
 from server.library.disk import free_bytes
-from server.library.once import Once
+from server.library.once import SingleFlight
 from server.library.ports import Library
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
-from server.live.rooms.comment_news import CommentNews
-from server.live.rooms.keeper import Keeper
+from server.live.rooms.comment_news import CommentSync
+from server.live.rooms.keeper import RoomLease
 from server.live.rooms.rooms import Rooms
-from server.live.sending.bake_news import BakeNews
+from server.live.sending.bake_news import BakeUpdates
 from server.live.session import SessionServices
 from server.live.state.resume import ResumeStore
 from server.metrics import Metrics
 from server.queues.btfs import BtfQueue
 from server.queues.comparisons import ComparisonQueue
-from server.queues.counting import count_work
+from server.queues.counting import count_jobs
 from server.queues.renders import RenderQueue
 from server.queues.work import Quota
 from server.records.comments import CommentStore
@@ -47,13 +47,13 @@ from server.records.idempotency import IdempotencyStore
 from server.records.looks import LookStore
 from server.records.room_leases import RoomLeases
 from server.records.shares import ShareStore
-from server.running.leave import Leave
+from server.running.leave import DrainState
 from server.settings import Settings
 from server.traces import Traces, open_traces
 from worker.executor import num_cores
 from worker.scenes import get_scene
 from worker.service import BakeService
-from worker.tasks import kept_bytes
+from worker.tasks import cached_bytes
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Services:
     """What routes use.
 
     Attributes:
-        leave: whether the server is taking it. access: who may do what, how much of it, and the audit.
+        drain: whether the server is taking it. access: who may do what, how much of it, and the audit.
         pictures: makes small pictures, and what else takes its time and several may ask for at once.
         answers: large ones.
         intake: has files read, and takes over what comes of it.
@@ -69,8 +69,8 @@ class Services:
 
     settings: Settings
     metrics: Metrics
-    leave: Leave
-    access: Access
+    drain: DrainState
+    access: AuthServices
     bakes: BakeService
     looks: LookStore
     shares: ShareStore
@@ -81,9 +81,9 @@ class Services:
     btfs: BtfQueue
     threads: Threads
     transfers: TransferPool
-    caretaker: Caretaker
+    cache_evictor: CacheEvictor
     thumbnails: Thumbnails
-    pictures: Once
+    pictures: SingleFlight
     answers: Answers
     live: SessionServices
     intake: Intake
@@ -98,21 +98,21 @@ OpenBatches = Callable[[Settings, Library], Batches]
 
 def open_bakes(settings: Settings) -> BakeService:
     """relume's own bake service."""
-    return BakeService(settings.data, settings.database_url, settings.scheduler, shares=settings.turns)
+    return BakeService(settings.data, settings.database_url, settings.scheduler, client_weights=settings.turns)
 
 
 def open_batches(settings: Settings, library: Library) -> Batches:
     """Processes of their own, which have a library of their own."""
     num, num_threads = settings.batch_processes, max(1, num_cores() // settings.batch_processes)
     limits = settings.batch_bytes, num_threads, settings.batch_nice
-    return Pool(settings.data, num, *limits, settings.idle_seconds)
+    return ProcessPool(settings.data, num, *limits, settings.idle_seconds)
 
 
 @asynccontextmanager
 async def open_services(
     settings: Settings,
     metrics: Metrics,
-    leave: Leave,
+    drain: DrainState,
     open_library: OpenLibrary,
     bakes: OpenBakes,
     batches: OpenBatches,
@@ -126,7 +126,7 @@ async def open_services(
         def at_end(close: Callable[[], None]) -> None:
             ends.push_async_callback(asyncio.to_thread, close)
 
-        def beside(work: Coroutine[None, None, None]) -> None:
+        def run_in_background(work: Coroutine[None, None, None]) -> None:
             ends.callback(asyncio.create_task(work).cancel)
 
         if (traces := open_traces() if settings.traces else None) is not None:
@@ -136,40 +136,40 @@ async def open_services(
         service = await asyncio.to_thread(bakes, settings)
         at_end(service.close)
         batch, sessions = batches(settings, library), service.ledger.sessions
-        access = Access(sessions, settings)
+        access = AuthServices(sessions, settings)
         transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
         thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
         at_end(thumbnails.close)
         at_end(batch.close)  # before them: they wait for it
-        pictures, answers = Once(NUM_PICTURES, "relume-picture"), Answers(settings.data)
+        pictures, answers = SingleFlight(NUM_PICTURES, "relume-picture"), Answers(settings.data)
         at_end(pictures.close)
         at_end(answers.close)
-        caretaker = Caretaker(transfers, threads, library.shrink_cache, library.cache_used_bytes, batch.let_go)
+        cache_evictor = CacheEvictor(transfers, threads, library.trim_cache, library.cache_used_bytes, batch.release)
         _watch_memory(metrics, library, transfers)
-        _watch_work(metrics, settings, service, batch, leave)
+        _watch_jobs(metrics, settings, service, batch, drain)
         await asyncio.to_thread(service.start)
         queues = _queues(settings, service, batch, access)
         for queue in queues:
             at_end(queue.close)
             queue.start()
-        ahead = Ahead(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
-        at_end(ahead.close)
+        prewarmer = Prewarmer(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
+        at_end(prewarmer.close)
         if settings.ahead:
-            ahead.start()
+            prewarmer.start()
         importers = Importers()
         at_end(importers.close)
         if settings.importer_at_start:
             importers.start()
         rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
-        keeper = Keeper(rooms, RoomLeases(sessions), leave, threads.news)
-        ends.push_async_callback(keeper.close)
+        room_lease = RoomLease(rooms, RoomLeases(sessions), drain, threads.queries)
+        ends.push_async_callback(room_lease.close)
         ends.callback(rooms.close)
-        for work in (caretaker.run(), CommentNews(rooms, comments.marks, threads.news).run(), keeper.run()):
-            beside(work)
+        for work in (cache_evictor.run(), CommentSync(rooms, comments.marks, threads.queries).run(), room_lease.run()):
+            run_in_background(work)
         yield Services(
             settings=settings,
             metrics=metrics,
-            leave=leave,
+            drain=drain,
             access=access,
             bakes=service,
             looks=LookStore(sessions),
@@ -179,11 +179,11 @@ async def open_services(
             **queues._asdict(),
             threads=threads,
             transfers=transfers,
-            caretaker=caretaker,
+            cache_evictor=cache_evictor,
             thumbnails=thumbnails,
             pictures=pictures,
             answers=answers,
-            live=_live(settings, metrics, traces, library, threads, service, access, leave, rooms, keeper),
+            live=_live(settings, metrics, traces, library, threads, service, access, drain, rooms, room_lease),
             intake=Intake(settings, service.ledger, access.quotas, importers),
         )
 
@@ -196,28 +196,31 @@ class _Queues(NamedTuple):
     btfs: BtfQueue
 
 
-def _queues(settings: Settings, service: BakeService, batch: Batches, access: Access) -> _Queues:
-    sessions, quota = service.ledger.sessions, Quota(settings.max_queued, settings.most_queued_each, settings.turns)
+def _queues(settings: Settings, service: BakeService, batch: Batches, access: AuthServices) -> _Queues:
+    sessions, quota = (
+        service.ledger.sessions,
+        Quota(settings.max_queued, settings.max_queued_per_client, settings.turns),
+    )
 
     def scene_name(bake: str) -> str:
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name
 
-    def btf_is_made(work: str, material: str, num_bytes: int) -> None:
-        access.quotas.become(("btf-work", work), ("btf", material), num_bytes)
+    def on_btf_ready(work: str, material: str, num_bytes: int) -> None:
+        access.quotas.convert(("btf-work", work), ("btf", material), num_bytes)
 
-    def btf_failed(work: str) -> None:
-        access.quotas.measured("btf-work", work, 0)
+    def on_btf_failed(work: str) -> None:
+        access.quotas.set_bytes("btf-work", work, 0)
 
     return _Queues(
-        RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.measured, "render")),
+        RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.set_bytes, "render")),
         ComparisonQueue(sessions, settings.data, batch.run, quota),
-        BtfQueue(sessions, settings.data, batch.run, quota, btf_is_made, btf_failed),
+        BtfQueue(sessions, settings.data, batch.run, quota, on_btf_ready, on_btf_failed),
     )
 
 
 def _live(
     settings: Settings, metrics: Metrics, traces: Traces | None, library: Library, threads: Threads,
-    service: BakeService, access: Access, leave: Leave, rooms: Rooms, keeper: Keeper,
+    service: BakeService, access: AuthServices, drain: DrainState, rooms: Rooms, room_lease: RoomLease,
 ) -> SessionServices:  # fmt: skip
     """What live sessions need of all this."""
     return SessionServices(
@@ -227,39 +230,39 @@ def _live(
         traces=traces,
         resumes=ResumeStore(settings.resume_seconds),
         rooms=rooms,
-        keeper=keeper,
-        bake_news=BakeNews(service.bakes, threads.news),
+        room_lease=room_lease,
+        bake_updates=BakeUpdates(service.bakes, threads.queries),
         access=access,
-        leave=leave,
+        drain=drain,
         ack_seconds=settings.ack_seconds,
         drain_seconds=settings.drain_seconds,
     )
 
 
-def _watch_work(metrics: Metrics, settings: Settings, service: BakeService, batch: Batches, leave: Leave) -> None:
+def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, batch: Batches, drain: DrainState) -> None:
     """Have it shown what works and waits, and whether there is room for more."""
     metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
-    metrics.watch_work(lambda: count_work(service.ledger.sessions))
-    metrics.watch_readiness(lambda: leave.is_taken, lambda: free_bytes(settings.data), settings.least_free_bytes)
+    metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions))
+    metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.least_free_bytes)
 
 
 def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -> None:
     """Have it shown who holds memory in this process."""
-    metrics.watch_memory(library.cache_used_bytes, library.held_bytes)
-    metrics.watch_holders(
+    metrics.watch_cache(library.cache_used_bytes, library.bytes_by_owner)
+    metrics.watch_owners(
         {
             "frozen_cache": library.cache_used_bytes,
-            "open_bakes": lambda: held_bytes(transfers.opened),
-            "bake_tasks": kept_bytes,
-            "environments": lambda: held_bytes(built_in),
+            "open_bakes": lambda: live_bytes(transfers.open_bakes),
+            "bake_tasks": cached_bytes,
+            "environments": lambda: live_bytes(load_built_in),
         }
     )
 
 
-def services(connection: HTTPConnection) -> Services:
+def get_services(connection: HTTPConnection) -> Services:
     """The app's services, for routes."""
-    found: Services = connection.app.state.services
-    return found
+    app_services: Services = connection.app.state.services
+    return app_services
 
 
-Shared = Annotated[Services, Depends(services)]
+ServicesDep = Annotated[Services, Depends(get_services)]

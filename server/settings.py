@@ -18,17 +18,17 @@ GIB = 1024**3
 RoleName = Literal["view", "edit", "admin"]
 
 
-def _quarter_of_memory() -> int:
+def _default_cache_bytes() -> int:
     """A quarter of the memory of the machine or the container in bytes, at most 6 GiB."""
-    return min(_memory() // 4, 6 * GIB)
+    return min(_machine_bytes() // 4, 6 * GIB)
 
 
-def _third_of_memory() -> int:
+def _default_import_bytes() -> int:
     """What one import may take where two run at once, at most 8 GiB; the program itself takes one."""
-    return max(GIB, min(_memory() // 3, 8 * GIB))
+    return max(GIB, min(_machine_bytes() // 3, 8 * GIB))
 
 
-def _memory() -> int:
+def _machine_bytes() -> int:
     from worker.budget import machine_bytes  # loads much that other settings do without
 
     return machine_bytes()
@@ -47,7 +47,7 @@ def _check_proxy(text: str) -> str:
     return text
 
 
-ProxyPlace = Annotated[str, AfterValidator(_check_proxy)]
+ProxyAddress = Annotated[str, AfterValidator(_check_proxy)]
 """An IP address, a network as 10.0.0.0/8, or a name that is looked up."""
 
 
@@ -74,11 +74,13 @@ class Settings(BaseSettings):
     client: Path = Field(
         default=Path(__file__).resolve().parent.parent / "client_web" / "dist", description="the built editor"
     )
-    cache_bytes: int = Field(default_factory=_quarter_of_memory, gt=0, description="budget of what is made from bakes")
+    cache_bytes: int = Field(
+        default_factory=_default_cache_bytes, gt=0, description="budget of what is made from bakes"
+    )
     cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="of them, kept of bakes that nobody uses")
     batch_processes: int = Field(default=1, ge=1, le=64, description="processes for renders and comparisons")
     batch_bytes: int = Field(
-        default_factory=lambda: _quarter_of_memory() // 2, gt=0, description="that each keeps of what it makes"
+        default_factory=lambda: _default_cache_bytes() // 2, gt=0, description="that each keeps of what it makes"
     )
     batch_nice: int = Field(default=10, ge=0, le=19, description="how much they yield to all else, as nice(1) says")
     ahead: bool = Field(default=True, description="whether what a bake shows first is made before anybody opens it")
@@ -100,7 +102,7 @@ class Settings(BaseSettings):
     )
     import_seconds: int = Field(default=300, ge=1, description="time a scene import may take")
     import_bytes: int = Field(
-        default_factory=_third_of_memory, gt=0, description="address space a scene import may use"
+        default_factory=_default_import_bytes, gt=0, description="address space a scene import may use"
     )
     importer_at_start: bool = Field(default=True, description="whether what imports need is loaded before the first")
     ack_seconds: float = Field(default=30.0, gt=0, description="how long a client may leave frames unacknowledged")
@@ -109,7 +111,7 @@ class Settings(BaseSettings):
     https_only: bool = Field(
         default=False, description="whether people reach it by https alone: Secure cookies, Strict-Transport-Security"
     )
-    trusted_proxies: list[ProxyPlace] = Field(
+    trusted_proxies: list[ProxyAddress] = Field(
         default=[], description="addresses, networks or names of proxies that say where a call comes from, as JSON list"
     )
     user_header: str = Field(default="", description="header in which they say who calls; empty: they say it of nobody")
@@ -141,7 +143,7 @@ class Settings(BaseSettings):
     )
 
     @property
-    def most_queued_each(self) -> int:
+    def max_queued_per_client(self) -> int:
         """How much work of a kind one client may have waiting: without a setting, what leaves room for three others.
 
         Where nobody logs in, all are one client, who may have all.

@@ -23,31 +23,31 @@ SERVICE = "relume"
 
 
 @dataclass(frozen=True)
-class Times:
+class SpanTimes:
     """When the parts of an answer were done, seconds of `time.perf_counter`.
 
     Attributes:
-        received_s: the edit, or the eye, came out of the socket. taken_s: it was checked and applied.
+        received_s: the edit, or the eye, came out of the socket. applied_s: it was checked and applied.
         started_s: a thread began to bring the picture on. updated_s: that was done. encoded_s: the frame was packed.
-        sending_s: it was given to the socket. sent_s: the socket had taken it.
+        send_start_s: it was given to the socket. send_end_s: the socket had taken it.
     """
 
     received_s: float
-    taken_s: float
+    applied_s: float
     started_s: float
     updated_s: float
     encoded_s: float
-    sending_s: float
-    sent_s: float
+    send_start_s: float
+    send_end_s: float
 
-    def parts(self) -> Mapping[str, tuple[float, float]]:
+    def spans(self) -> Mapping[str, tuple[float, float]]:
         """Spans in a frame's: from when to when."""
         return {
-            "take": (self.received_s, self.taken_s),
-            "wait": (self.taken_s, self.started_s),
+            "take": (self.received_s, self.applied_s),
+            "wait": (self.applied_s, self.started_s),
             "update": (self.started_s, self.updated_s),
             "encode": (self.updated_s, self.encoded_s),
-            "send": (self.sending_s, self.sent_s),
+            "send": (self.send_start_s, self.send_end_s),
         }
 
 
@@ -57,7 +57,7 @@ class Traces:
     def __init__(self, provider: TracerProvider) -> None:
         self._provider, self._tracer = provider, provider.get_tracer(SERVICE)
 
-    def frame(self, name: str, times: Times, attributes: Mapping[str, str | int | bool]) -> None:
+    def record_frame(self, name: str, times: SpanTimes, attributes: Mapping[str, str | int | bool]) -> None:
         """An edit has been answered by a frame.
 
         Args:
@@ -67,27 +67,31 @@ class Traces:
 
         zero_ns = _zero_ns()
         span = self._span(name, times.received_s, attributes, zero_ns)
-        within = set_span_in_context(span)
-        for part, (start_s, end_s) in times.parts().items():
-            of_part = self._tracer.start_span(f"{name}.{part}", within, start_time=zero_ns + round(start_s * 1e9))
-            of_part.end(zero_ns + round(end_s * 1e9))
-        span.end(zero_ns + round(times.sent_s * 1e9))
+        context = set_span_in_context(span)
+        for span_name, (start_s, end_s) in times.spans().items():
+            child_span = self._tracer.start_span(
+                f"{name}.{span_name}", context, start_time=zero_ns + round(start_s * 1e9)
+            )
+            child_span.end(zero_ns + round(end_s * 1e9))
+        span.end(zero_ns + round(times.send_end_s * 1e9))
 
-    def frozen(self, start_s: float, attributes: Mapping[str, str | int | bool]) -> None:
+    def record_freeze(self, start_s: float, attributes: Mapping[str, str | int | bool]) -> None:
         """A curve, or what else stands still beside a hand, has been made ready; it took from then until now."""
         self._span("freeze", start_s, attributes, _zero_ns()).end()
 
-    def refused(self, received_s: float, why: str, attributes: Mapping[str, str | int | bool]) -> None:
+    def record_refusal(self, received_s: float, reason: str, attributes: Mapping[str, str | int | bool]) -> None:
         """An edit that came then was refused."""
         from opentelemetry.trace import Status, StatusCode
 
         span = self._span("edit", received_s, attributes, _zero_ns())
-        span.set_status(Status(StatusCode.ERROR, why))
+        span.set_status(Status(StatusCode.ERROR, reason))
         span.end()
 
     def _span(self, name: str, start_s: float, attributes: Mapping[str, str | int | bool], zero_ns: int) -> Span:
-        about = {f"relume.{key}": value for key, value in {**current(), **attributes}.items() if key != "user"}
-        return self._tracer.start_span(name, start_time=zero_ns + round(start_s * 1e9), attributes=about)
+        span_attributes = {
+            f"relume.{key}": value for key, value in {**current(), **attributes}.items() if key != "user"
+        }
+        return self._tracer.start_span(name, start_time=zero_ns + round(start_s * 1e9), attributes=span_attributes)
 
     def close(self) -> None:
         """Send what waits."""
@@ -100,7 +104,7 @@ def open_traces(exporter: SpanExporter | None = None) -> Traces:
     from opentelemetry.sdk.trace import TracerProvider
     from opentelemetry.sdk.trace.export import BatchSpanProcessor
 
-    from server.collector import Collector
+    from server.collector import TraceExporter
 
     if exporter is None:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
@@ -110,7 +114,7 @@ def open_traces(exporter: SpanExporter | None = None) -> Traces:
     if str(resource.attributes[SERVICE_NAME]).startswith("unknown_service"):
         resource = resource.merge(Resource({SERVICE_NAME: SERVICE}))
     provider = TracerProvider(resource=resource, shutdown_on_exit=False)
-    provider.add_span_processor(BatchSpanProcessor(Collector(exporter)))
+    provider.add_span_processor(BatchSpanProcessor(TraceExporter(exporter)))
     return Traces(provider)
 
 

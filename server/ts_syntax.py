@@ -30,12 +30,12 @@ def ts_type(schema: Mapping[str, Any]) -> str:
         return literal(schema["const"])
     if "enum" in schema:
         return " | ".join(literal(value) for value in schema["enum"])
-    if parts := schema.get("anyOf", schema.get("oneOf")):
-        return " | ".join(dict.fromkeys(ts_type(part) for part in parts))
+    if members := schema.get("anyOf", schema.get("oneOf")):
+        return " | ".join(dict.fromkeys(ts_type(member) for member in members))
     kind = schema.get("type")
     if kind == "array":
         if "prefixItems" in schema:
-            return "[" + ", ".join(ts_type(part) for part in schema["prefixItems"]) + "]"
+            return "[" + ", ".join(ts_type(member) for member in schema["prefixItems"]) + "]"
         item = ts_type(schema.get("items", {}))
         return f"({item})[]" if " | " in item else f"{item}[]"
     if kind == "object":
@@ -48,10 +48,10 @@ def ts_type(schema: Mapping[str, Any]) -> str:
 def literal(value: Any) -> str:
     """A value of JSON as it stands in TypeScript; whole numbers have no decimal point."""
     if isinstance(value, Mapping):
-        fields = ", ".join(f"{name}: {literal(part)}" for name, part in value.items())
+        fields = ", ".join(f"{name}: {literal(item)}" for name, item in value.items())
         return f"{{ {fields} }}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(literal(part) for part in value)}]"
+        return f"[{', '.join(literal(item) for item in value)}]"
     return f"{value:.15g}" if isinstance(value, float) else json.dumps(value)
 
 

@@ -49,12 +49,12 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.FocusMessage,
     protocol.RegionMessage,
     protocol.AckMessage,
-    protocol.StreamMessage,
-    protocol.ProbeMessage,
-    protocol.BrushMessage,
-    protocol.TouchMessage,
-    protocol.EyeMessage,
-    protocol.EvaluateMessage,
+    protocol.EncodingMessage,
+    protocol.InspectMessage,
+    protocol.HighlightMessage,
+    protocol.PrepareMessage,
+    protocol.CameraMessage,
+    protocol.RendererMessage,
     rooms.PresenceMessage,
     connection.PingMessage,
 )
@@ -62,12 +62,12 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.HelloMessage,
     protocol.StatusMessage,
     protocol.ProblemMessage,
-    protocol.ProbeAnswer,
+    protocol.InspectAnswer,
     protocol.CurveMessage,
     protocol.BakeMessage,
-    connection.LeavingMessage,
+    connection.DrainMessage,
     rooms.RoomMessage,
-    rooms.SharedMessage,
+    rooms.RoomUpdate,
     rooms.CommentsMessage,
     connection.PongMessage,
 )
@@ -78,7 +78,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     renders.LooksRequest,
     renders.RenderRequest,
     models.TermsRequest,
-    bodies.TruthRequest,
+    bodies.ComparisonRequest,
     bodies.ShareRequest,
     comments.CommentRequest,
     comments.CommentChange,
@@ -88,15 +88,15 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     protocol.Problem,
     *SERVER_MESSAGES,
     protocol.FrameHeader,
-    surface.SurfaceBody,
+    surface.FreeCameraBody,
     bodies.SceneBody,
     cameras.CameraEntry,
-    cameras.FinderBody,
-    cameras.PlaceBody,
-    bodies.BuiltInBody,
+    cameras.ViewportBody,
+    cameras.PickBody,
+    bodies.ExampleSceneBody,
     color.ColorBody,
     models.ModelBody,
-    models.InOutBody,
+    models.ZernikeFitBody,
     models.AlbedoBody,
     bodies.MaterialBody,
     bodies.MaterialMapBody,
@@ -105,14 +105,14 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     images.MetalnessBody,
     bodies.MeasuredBody,
     bodies.BtfBody,
-    btfs.BtfWorkBody,
+    btfs.BtfJobBody,
     bodies.PlanBody,
     bodies.BakeBody,
     bodies.DryRunBody,
     renders.LooksBody,
     renders.RenderBody,
-    bodies.TruthBody,
-    bodies.TruthPlanBody,
+    bodies.ComparisonBody,
+    bodies.ComparisonPlanBody,
     access.MeBody,
     bodies.LookEntry,
     bodies.ShareEntry,
@@ -123,49 +123,49 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
 
 def generate_protocol() -> str:
     """Messages and bodies; the same models give the same text."""
-    parts = [HEAD]
+    blocks = [HEAD]
     limits = "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN", "MAX_EYE_PIXELS"
     for name in ("SUBPROTOCOL", *limits, "SURFACE_LAYOUT"):
         value = getattr(protocol, name)
-        parts.append(f"export const {name} = {literal(value)};")
-    parts.append(f"export const MAX_PERSON_NAME = {rooms.MAX_PERSON_NAME};")
-    parts.append(f"export const ROOM_PREFIX = {rooms.ROOM_PREFIX};")
-    parts.append(f"export const MAX_COMMENT = {comments.MAX_COMMENT};")
-    parts.append(f"export const LUT_SIZE = {literal(SIZE)};")
-    parts.append(f"export const LUT_GAIN = {literal(GAIN)};")
-    for mode, of_mode in (("validation", INPUTS), ("serialization", OUTPUTS)):
-        _, schema = models_json_schema([(m, mode) for m in of_mode], by_alias=True)  # type: ignore[misc]
-        parts.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
-    parts = list(dict.fromkeys(parts))  # a part of inputs and outputs alike is written once
-    parts.append(union("ClientMessage", CLIENT_MESSAGES))
-    parts.append(union("ServerMessage", SERVER_MESSAGES))
-    return "\n\n".join(parts) + "\n"
+        blocks.append(f"export const {name} = {literal(value)};")
+    blocks.append(f"export const MAX_PERSON_NAME = {rooms.MAX_PERSON_NAME};")
+    blocks.append(f"export const ROOM_PREFIX = {rooms.ROOM_PREFIX};")
+    blocks.append(f"export const MAX_COMMENT = {comments.MAX_COMMENT};")
+    blocks.append(f"export const LUT_SIZE = {literal(SIZE)};")
+    blocks.append(f"export const LUT_GAIN = {literal(GAIN)};")
+    for mode, mode_models in (("validation", INPUTS), ("serialization", OUTPUTS)):
+        _, schema = models_json_schema([(m, mode) for m in mode_models], by_alias=True)  # type: ignore[misc]
+        blocks.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
+    blocks = list(dict.fromkeys(blocks))  # a part of inputs and outputs alike is written once
+    blocks.append(union("ClientMessage", CLIENT_MESSAGES))
+    blocks.append(union("ServerMessage", SERVER_MESSAGES))
+    return "\n\n".join(blocks) + "\n"
 
 
 def generate_look() -> str:
     """The look document: its types, what of it is as nobody has said anything, and the ranges of its numbers."""
     _, schema = models_json_schema([(Look, "validation")])
     lights: tuple[type[BaseModel], ...] = get_args(get_args(LightLook)[0])
-    parts = [HEAD, *(interface(name, body, "validation") for name, body in sorted(schema["$defs"].items()))]
-    parts.append(union("LightLook", lights))
-    parts.append('type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { kind: K }> };')
+    blocks = [HEAD, *(interface(name, body, "validation") for name, body in sorted(schema["$defs"].items()))]
+    blocks.append(union("LightLook", lights))
+    blocks.append('type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { kind: K }> };')
     kinds = [str(get_args(light.model_fields["kind"].annotation)[0]) for light in lights]
     defaults = "".join(f"  {kind}: {literal(default_light(kind))},\n" for kind in kinds)
-    parts.append(
+    blocks.append(
         f"/** A light of each kind, complete. */\nexport const DEFAULT_LIGHTS: LightsByKind = {{\n{defaults}}};"
     )
     sections = "".join(f"  {name}: {literal(fields)},\n" for name, fields in DEFAULTS.items())
     names = " | ".join(literal(name) for name in DEFAULTS)
-    parts.append(f"export const DEFAULTS: Readonly<Pick<Look, {names}>> = {{\n{sections}}};")
-    ranges = "".join(f"  {name}: {_ranges(fields)},\n" for name, fields in {**RANGES, **_OTHER_RANGES}.items())
-    parts.append(
+    blocks.append(f"export const DEFAULTS: Readonly<Pick<Look, {names}>> = {{\n{sections}}};")
+    ranges = "".join(f"  {name}: {_ranges(fields)},\n" for name, fields in {**RANGES, **_EXTRA_RANGES}.items())
+    blocks.append(
         f"/** What numbers may be, each of those of a field. */\nexport const RANGES = {{\n{ranges}}} as const;"
     )
-    parts.append("\n".join(f"export const {name} = {literal(value)};" for name, value in _MAXIMA.items()))
-    return "\n\n".join(parts) + "\n"
+    blocks.append("\n".join(f"export const {name} = {literal(value)};" for name, value in _MAXIMA.items()))
+    return "\n\n".join(blocks) + "\n"
 
 
-_OTHER_RANGES = {"light": LIGHT_RANGES, "term": {"color": (0.0, MAX_COLOR)}}
+_EXTRA_RANGES = {"light": LIGHT_RANGES, "term": {"color": (0.0, MAX_COLOR)}}
 _MAXIMA = {
     "MAX_TERMS": MAX_TERMS,
     "MAX_LIGHTS": MAX_LIGHTS,
@@ -177,7 +177,7 @@ _MAXIMA = {
 
 
 def _ranges(fields: Mapping[str, tuple[float, float]]) -> str:
-    return literal({name: {"minimum": least, "maximum": most} for name, (least, most) in fields.items()})
+    return literal({name: {"minimum": minimum, "maximum": maximum} for name, (minimum, maximum) in fields.items()})
 
 
 def main() -> int:

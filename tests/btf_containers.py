@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-RINGS = [(0.0, 1, 0.0), (40.0, 4, 15.0), (70.5, 5, 0.0)]  # θ, directions, φ of the first, degrees
-ANGLES = np.array([(theta, start + 360 * k / n) for theta, n, start in RINGS for k in range(n)])
+ELEVATION_RINGS = [(0.0, 1, 0.0), (40.0, 4, 15.0), (70.5, 5, 0.0)]  # θ, directions, φ of the first, degrees
+ANGLES = np.array([(theta, start + 360 * k / n) for theta, n, start in ELEVATION_RINGS for k in range(n)])
 SIZE = (6, 5)
 YUV_TO_RGB = np.array([[1, 0, 1.13983], [1, -0.39465, -0.5806], [1, 2.03211, 0]])
 
@@ -35,36 +35,43 @@ def random_factors(num=100, ranks=(4, 2, 3)):
     return [tuple(rng.uniform(0.05, 0.5, (rows, rank)).astype(np.float16) for rows in (num, texels)) for rank in ranks]
 
 
-def described(file):
-    parts = [b"".join(text.ljust(80, b"\0") for text in (b"Dome", b"sensor", b"lamp")), struct.pack("<4f", 1, 1, 1, 1)]
+def encode_header(file):
+    chunks = [b"".join(text.ljust(80, b"\0") for text in (b"Dome", b"sensor", b"lamp")), struct.pack("<4f", 1, 1, 1, 1)]
     if file.version > 1:
-        parts.append(struct.pack("<I", file.cosine))
+        chunks.append(struct.pack("<I", file.cosine))
     if file.version > 2:
-        parts += [struct.pack("<I", len(file.xml)), file.xml]
+        chunks += [struct.pack("<I", len(file.xml)), file.xml]
     if file.version > 3:
-        parts += [struct.pack("<I", 3), *(struct.pack("<I", 1) + name for name in (b"R", b"G", b"B"))]
-    body = struct.pack("<I", file.version) + b"".join(parts)
+        chunks += [struct.pack("<I", 3), *(struct.pack("<I", 1) + name for name in (b"R", b"G", b"B"))]
+    body = struct.pack("<I", file.version) + b"".join(chunks)
     return struct.pack("<I", len(body) + 4) + body
 
 
-def content(file):
-    views, lights = (np.radians(some).astype("<f4") for some in (file.views, file.lights))
-    parts = [file.signature, described(file), struct.pack("<I", len(views))]
+def encode_container(file):
+    views, lights = (np.radians(angles).astype("<f4") for angles in (file.views, file.lights))
+    chunks = [file.signature, encode_header(file), struct.pack("<I", len(views))]
     for view in views:
-        parts += [view.tobytes(), struct.pack("<I", len(lights)), lights.tobytes()]
-    parts += [struct.pack("<III", file.size[1], file.size[0], file.rotations), bytes(36 * file.rotations)]
-    parts.append(struct.pack("<Ii12f", max(u.shape[1] for u, _ in file.channels), file.model, *[0.0] * 12))
-    for left, right in file.channels:
-        left, right = (right, left) if file.is_transposed else (left, right)
-        parts.append(struct.pack("<BIII", np.dtype(file.kind).itemsize, left.shape[1], len(left), len(right)))
-        parts += [np.asarray(some, file.kind).tobytes() for some in (np.ones(left.shape[1]), left, right)]
-    return b"".join(parts)
+        chunks += [view.tobytes(), struct.pack("<I", len(lights)), lights.tobytes()]
+    chunks += [struct.pack("<III", file.size[1], file.size[0], file.rotations), bytes(36 * file.rotations)]
+    chunks.append(struct.pack("<Ii12f", max(u.shape[1] for u, _ in file.channels), file.model, *[0.0] * 12))
+    for left_factor, right_factor in file.channels:
+        left_factor, right_factor = (right_factor, left_factor) if file.is_transposed else (left_factor, right_factor)
+        chunks.append(
+            struct.pack(
+                "<BIII", np.dtype(file.kind).itemsize, left_factor.shape[1], len(left_factor), len(right_factor)
+            )
+        )
+        chunks += [
+            np.asarray(angles, file.kind).tobytes()
+            for angles in (np.ones(left_factor.shape[1]), left_factor, right_factor)
+        ]
+    return b"".join(chunks)
 
 
 def container(path, **changes):
     """Write one; returns path and what it was written from."""
     file = replace(Written(channels=random_factors()), **changes)
-    path.write_bytes(content(file))
+    path.write_bytes(encode_container(file))
     return path, file
 
 

@@ -11,7 +11,7 @@ from relume.color import srgb_encode
 DIRECTIONS = [(0, 0), *((40, phi) for phi in (0, 90, 180, 270)), *((70, phi) for phi in (0, 72, 144, 216, 288))]
 
 
-def image_of(view, light, size=(6, 5), kind="PNG"):
+def make_image(view, light, size=(6, 5), kind="PNG"):
     """A picture that says who lights it and who looks."""
     value = 0.05 + 0.07 * DIRECTIONS.index(view) + 0.02 * DIRECTIONS.index(light)
     row, column = np.mgrid[: size[0], : size[1]]
@@ -21,12 +21,12 @@ def image_of(view, light, size=(6, 5), kind="PNG"):
     return file.getvalue(), linear
 
 
-def name_of(view, light, number=0):
+def make_image_name(view, light, number=0):
     return f"tv{view[0]:03}/{number:05} tl{light[0]:03} pl{light[1]:03} tv{view[0]:03} pv{view[1]:03}.png"
 
 
 def zipped(path, change=lambda files: None):
-    files = {name_of(view, light): image_of(view, light)[0] for view in DIRECTIONS for light in DIRECTIONS}
+    files = {make_image_name(view, light): make_image(view, light)[0] for view in DIRECTIONS for light in DIRECTIONS}
     files["readme.txt"] = b"measured by nobody"
     change(files)
     with zipfile.ZipFile(path, "w") as file:

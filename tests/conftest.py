@@ -28,7 +28,7 @@ FIRST = (*TOGETHER, "worker")  # files of the last are long, and wait for proces
 
 
 class _Sharing(LoadScopeScheduling):
-    """Where tests are shared out to processes, those of a file, or of a folder in `TOGETHER`, go to the same one."""
+    """Where tests are shared out to processes, those of a file, or of a folder in `ROOM_FIELDS`, go to the same one."""
 
     def _split_scope(self, nodeid: str) -> str:
         path = Path(nodeid.partition("::")[0])
@@ -47,15 +47,15 @@ def pytest_xdist_auto_num_workers() -> int:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What takes longest begins, so that no process is left alone with it at the end."""
-    order = {folder: place for place, folder in enumerate(FIRST)}
+    order = {folder: position for position, folder in enumerate(FIRST)}
     items.sort(key=lambda item: order.get(item.path.parent.name, len(FIRST)))
 
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder of real scenes and environments; tests that need it skip where there is none."""
-    beside = Path(__file__).parents[2] / "shared" / "data"
-    folder = Path(os.environ.get("RELUME_SHARED_DATA", beside))
+    data_folder = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("RELUME_SHARED_DATA", data_folder))
     if not folder.is_dir():
         pytest.skip("there is no folder of shared data; RELUME_SHARED_DATA names it")
     return folder

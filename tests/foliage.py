@@ -13,13 +13,13 @@ _LENGTH, _WIDTH = 0.3, 0.004
 def tuft(num_blades: int = 60_000) -> Scene:
     """Thin quads that fill a cube, turned every way, seen by one camera; a pixel sees several of them."""
     rng = np.random.default_rng(5)
-    centre = rng.uniform(-1, 1, (num_blades, 3))
-    along, any_way = rng.normal(size=(2, num_blades, 3))
+    center = rng.uniform(-1, 1, (num_blades, 3))
+    along, random_direction = rng.normal(size=(2, num_blades, 3))
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    across = np.cross(along, any_way)
+    across = np.cross(along, random_direction)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     half, side = _LENGTH / 2 * along, _WIDTH / 2 * across
-    corners = np.stack([centre - half - side, centre - half + side, centre + half + side, centre + half - side], axis=1)
+    corners = np.stack([center - half - side, center - half + side, center + half + side, center + half - side], axis=1)
     faces = 4 * np.arange(num_blades)[:, None, None] + [[0, 1, 2], [0, 2, 3]]
     num_corners = 4 * num_blades
     mesh = Mesh(

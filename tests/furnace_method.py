@@ -16,68 +16,68 @@ from typing import Any
 
 import numpy as np
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
 from relume.environments.equirect import texel_solid_angles
 from relume.light.gather_rays import make_pattern
-from relume.memory import Memory
-from relume.methods.opened.baked_views import BakedViews, FewSamples
-from relume.methods.opened.described import described
+from relume.memory import Cache
+from relume.methods.opened.baked_views import BakedFixedViews, SampledTransfer
+from relume.methods.opened.described import read_fields
 from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
 from relume.methods.store_io import SHARD_ROWS
-from relume.picture.light import Light
-from relume.picture.transfer import Arriving, Axis
-from relume.project.sent import Sent, evenly
+from relume.picture.light import Illumination
+from relume.picture.transfer import EditAxis, LightsAndPoints
+from relume.project.sent import OutgoingLight, isotropic
 from relume.scene.model import Scene
-from relume.trace.cell_tree import NO_CELL
-from relume.trace.cells import choose_cells
-from relume.trace.links import trace_links
-from relume.views.store_io import read_points
+from relume.trace.cell_tree import NO_PATCH
+from relume.trace.cells import choose_patches
+from relume.trace.links import trace_gather_rays
+from relume.views.store_io import read_surface_points
 from relume.views.view import View
 
 RAYS, GLOW, SEED = 256, 0.5, 11
 _HITS, _CELLS = 1, 64
 
 
-class FurnaceViews(BakedViews):
+class FurnaceViews(BakedFixedViews):
     """What is seen in it; light and its ways are the method's own, everything else is shared."""
 
-    axes = frozenset((Axis.CURVE, Axis.PARAMETER, Axis.ENVIRONMENT))
+    axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.ENVIRONMENT))
 
-    def glow(self, light: Light) -> Sent:
+    def glow(self, light: Illumination) -> OutgoingLight:
         """What the one surface sends, the same everywhere."""
-        radiance = self.radiance_of(light.environment.map).astype(np.float64)
-        share = texel_solid_angles(*radiance.shape[:2]) / (4 * np.pi)
-        glow = np.zeros((NO_CELL + 1, 3), np.float32)
+        radiance = self.environment_radiance(light.environment.map).astype(np.float64)
+        row_fraction = texel_solid_angles(*radiance.shape[:2]) / (4 * np.pi)
+        glow = np.zeros((NO_PATCH + 1, 3), np.float32)
         if light.paths.direct:
-            glow[0] = GLOW * np.einsum("h,hwc->c", share, radiance) * light.environment_gain
-        return evenly(glow)
+            glow[0] = GLOW * np.einsum("h,hwc->c", row_fraction, radiance) * light.environment_gain
+        return isotropic(glow)
 
-    def arriving(self, view: View, material: int, light: Light, memory: Memory) -> Arriving:
+    def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
         """The glow along gather rays, and no light of the environment's own."""
         receivers = view.receivers(material, self.glow(light), is_lit=False)
-        return self.lights.none(), receivers
+        return self.lights.empty(), receivers
 
-    def some(self, view: View, material: int, chosen: np.ndarray, *, reflects: bool) -> FewSamples:
+    def subset(self, view: View, material: int, sample_indices: np.ndarray, *, has_indirect: bool) -> SampledTransfer:
         """A few samples, for previews."""
-        return _FewGlowing(self, view, material, chosen)
+        return _FurnaceSamples(self, view, material, sample_indices)
 
 
-class _FewGlowing:
+class _FurnaceSamples:
     """A few samples of a material, shaded at once in any light."""
 
-    def __init__(self, furnace: FurnaceViews, view: View, material: int, chosen: np.ndarray) -> None:
-        self._furnace, self._view, self._material, self._chosen = furnace, view, material, chosen
+    def __init__(self, furnace: FurnaceViews, view: View, material: int, sample_indices: np.ndarray) -> None:
+        self._furnace, self._view, self._material, self._sample_indices = furnace, view, material, sample_indices
 
     @property
     def num_bytes(self) -> int:
         """Memory they hold."""
-        return self._chosen.nbytes
+        return self._sample_indices.nbytes
 
-    def arriving(self, light: Light) -> Arriving:
+    def incident_light(self, light: Illumination) -> LightsAndPoints:
         """The same as at all samples, for these."""
-        whole = self._view.receivers(self._material, is_lit=False)
-        rays = self._view.gather_rays(self._material, self._furnace.glow(light)).alone(self._chosen)
-        return self._furnace.lights.none(), replace(whole.places(self._chosen), rays=(rays,))
+        material_points = self._view.receivers(self._material, is_lit=False)
+        rays = self._view.gather_rays(self._material, self._furnace.glow(light)).unshared(self._sample_indices)
+        return self._furnace.lights.empty(), replace(material_points.without_light(self._sample_indices), rays=(rays,))
 
 
 class FurnaceMethod:
@@ -93,9 +93,9 @@ class FurnaceMethod:
         """Upper bounds: the views', with rays in the place of bits."""
         views = self._views.plan(scene, recipe)
         samples = views.num_view_samples
-        more = samples * (2 * RAYS + 4)
+        ray_bytes = samples * (2 * RAYS + 4)
         num_rays = samples * (RAYS + recipe.num_lights)
-        return Plan(samples, num_rays, views.store_bytes + more, views.peak_bytes + more)
+        return Plan(samples, num_rays, views.store_bytes + ray_bytes, views.peak_bytes + ray_bytes)
 
     def prepare(self, scene: Scene) -> None:
         """Build the triangles' search tree."""
@@ -119,21 +119,29 @@ class FurnaceMethod:
             return self._views.arrays(stage, scene, recipe, store)
         return [
             ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
-            for k, rows in enumerate(self._views.sampled_of(store).num_surface_samples)
+            for k, rows in enumerate(self._views.view_stage(store).num_surface_samples)
             for name, width, dtype in (("links", (RAYS,), "uint16"), ("number", (), "uint32"))
         ]
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
         """One task; seeds are rows, so the same task gives the same bits anywhere."""
         if task.stage < _HITS:
             return self._views.compute(scene, recipe, task, store)
-        k, geometry = recipe.views.index(task.view), self._views.geometry_of(scene)
-        tree = choose_cells(scene, geometry, recipe.views, recipe.size, _CELLS).tree
-        points = read_points(store, k, task.start, task.stop, np.arange(task.start, task.stop, dtype=np.uint32))
-        links = trace_links(geometry, tree, points, points.normal, make_pattern(RAYS, 0, SEED + 1 + k))
-        hits = np.where(links.cell == NO_CELL, NO_CELL, 0).astype(np.uint16)
-        return Written({f"views/{k}/links": hits, f"views/{k}/number": points.seed}, links.num_rays, links.trace_s)
+        k, geometry = recipe.views.index(task.group), self._views.geometry_of(scene)
+        tree = choose_patches(scene, geometry, recipe.views, recipe.size, _CELLS).tree
+        surface_points = read_surface_points(
+            store, k, task.start, task.stop, np.arange(task.start, task.stop, dtype=np.uint32)
+        )
+        gather_hits = trace_gather_rays(
+            geometry, tree, surface_points, surface_points.normal, make_pattern(RAYS, 0, SEED + 1 + k)
+        )
+        hits = np.where(gather_hits.patch == NO_PATCH, NO_PATCH, 0).astype(np.uint16)
+        return TaskOutput(
+            {f"views/{k}/links": hits, f"views/{k}/number": surface_points.seed},
+            gather_hits.num_rays,
+            gather_hits.trace_s,
+        )
 
-    def open(self, store: StoreReader, key: str, memory: Memory) -> FurnaceViews:
+    def open(self, store: StoreReader, key: str, cache: Cache) -> FurnaceViews:
         """Views that are lit by the glow alone."""
-        return FurnaceViews(**described(store, key, memory))
+        return FurnaceViews(**read_fields(store, key, cache))

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 import PIL.Image
 
-LEFT = 0.956463  # of light by what a dielectric of index 1.5 reflects first
+DIELECTRIC_TRANSMISSION = 0.956463  # of light by what a dielectric of index 1.5 reflects first
 FLOAT, U8, U16, U32 = 5126, 5121, 5123, 5125
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 COMPONENTS = {"f4": FLOAT, "u1": U8, "u2": U16, "u4": U32, "i1": 5120, "i2": 5122}
@@ -98,12 +98,14 @@ def self_contained(path: Path) -> bytes:
     data = path.read_bytes()
     try:
         document = json.loads(data)
-        parts = [*document.get("buffers", []), *document.get("images", [])]
-        for part in parts:
-            uri = part.get("uri", "data:")
-            beside = path.parent / unquote(uri)
-            if not uri.startswith("data:") and ".." not in uri and beside.is_file():
-                part["uri"] = "data:application/octet-stream;base64," + base64.b64encode(beside.read_bytes()).decode()
+        resources = [*document.get("buffers", []), *document.get("images", [])]
+        for resource in resources:
+            uri = resource.get("uri", "data:")
+            resource_path = path.parent / unquote(uri)
+            if not uri.startswith("data:") and ".." not in uri and resource_path.is_file():
+                resource["uri"] = (
+                    "data:application/octet-stream;base64," + base64.b64encode(resource_path.read_bytes()).decode()
+                )
         return json.dumps(document).encode()
     except (ValueError, AttributeError, TypeError, OSError):
         return data

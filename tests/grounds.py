@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from tiny_scenes import looking, scene_of, sphere
+from tiny_scenes import make_camera, make_tiny_scene, sphere
 
 from relume.scene.ground import with_ground
 from relume.scene.model import Light, Material
@@ -13,16 +13,16 @@ from relume.scene.model import Light, Material
 SIZE = (40, 30)
 CENTRE, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35
 RED = Material("Ball", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},))
-SHINING = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "on": False})
-CAMERA = looking("front", (0.5, 2.2, 3.2), (0, 0.25, 0), 0.7)
-POINT = {"kind": "point", "position": [0.4, 2.0, 0.3], "emission": [5.0, 5.0, 5.0]}
+EMISSIVE_BALL = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "on": False})
+CAMERA = make_camera("front", (0.5, 2.2, 3.2), (0, 0.25, 0), 0.7)
+POINT_LIGHT = {"kind": "point", "position": [0.4, 2.0, 0.3], "emission": [5.0, 5.0, 5.0]}
 
 
 def ball_scene(environment):
     """A red ball, which may shine, above a ground."""
-    ball = sphere("ball", CENTRE, RADIUS, 0, rings=24)
-    scene = scene_of(ball, camera=CAMERA, environment=environment, materials=[RED])
-    return with_ground(replace(scene, lights=(SHINING,)))
+    ball = sphere("ball", CENTRE, RADIUS, 0, num_rings=24)
+    scene = make_tiny_scene(ball, camera=CAMERA, environment=environment, materials=[RED])
+    return with_ground(replace(scene, lights=(EMISSIVE_BALL,)))
 
 
 def background(**fields):
@@ -33,7 +33,7 @@ def environment(**fields):
     return lambda document: document["environment"].update(fields)
 
 
-def show(paths):
+def set_paths(paths):
     return lambda document: document["transport"].update(show=paths)
 
 
@@ -41,17 +41,17 @@ def plain_ground(document):
     document["materials"]["Ground"]["catcher"] = False
 
 
-def changes(*several):
+def changes(*edits):
     def change(document):
-        for one in several:
-            one(document)
+        for edit in edits:
+            edit(document)
 
     return change
 
 
-def lamp_alone(document):
+def set_only_area_light(document):
     document["environment"]["scale"] = 0.0
-    document["lights"]["Lamp"] = POINT
+    document["lights"]["Lamp"] = POINT_LIGHT
 
 
 def inner(transfer, name):
@@ -61,11 +61,11 @@ def inner(transfer, name):
     return (view.material_ids() == number) & (np.diff(view.first) == 1).reshape(view.height, view.width)
 
 
-def spot_alone(document):
+def set_only_spot_light(document):
     document["environment"]["scale"] = 0.0
-    document["lights"]["Lamp"] = {**POINT, "kind": "spot", "direction": [0.0, -1.0, 0.0], "cone": [15.0, 20.0]}
+    document["lights"]["Lamp"] = {**POINT_LIGHT, "kind": "spot", "direction": [0.0, -1.0, 0.0], "cone": [15.0, 20.0]}
 
 
-def shining_ball_alone(document):
+def set_only_emissive_ball(document):
     document["environment"]["scale"] = 0.0
     document["lights"]["Ball"]["on"] = True

@@ -14,7 +14,7 @@ import relume.operators.shade
 from relume.project.projector import Projector
 
 
-def leaves(term, contraction, lights, receivers, beside=None):
+def shade_by_subdivision(term, contraction, lights, receivers, base_radiance=None):
     """As fine beside any other light."""
     return Projector(term, contraction, lights, receivers)
 
@@ -22,5 +22,5 @@ def leaves(term, contraction, lights, receivers, beside=None):
 @pytest.fixture(scope="module", autouse=True)
 def by_leaves() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(relume.operators.shade, "Shader", leaves)
+        patch.setattr(relume.operators.shade, "Shader", shade_by_subdivision)
         yield

@@ -11,9 +11,9 @@ PLASTIC = (
 )
 
 
-def planes_of(documents=PLASTIC):
+def make_planes(documents=PLASTIC):
     """A sum of terms as the planes of a MERL file, -1 where a direction lies below the horizon."""
     wi, wo = grid_directions()
-    seen = (wi[..., 2] > 0) & (wo[..., 2] > 0)
+    above_horizon = (wi[..., 2] > 0) & (wo[..., 2] > 0)
     value = sum(eval_brdf(document, wi, wo) for document in documents)
-    return np.where(seen, np.moveaxis(value / CHANNEL_SCALE, -1, 0), NOT_MEASURED)
+    return np.where(above_horizon, np.moveaxis(value / CHANNEL_SCALE, -1, 0), NOT_MEASURED)

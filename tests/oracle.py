@@ -16,28 +16,28 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import twins
 
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.render.image import render_image
 
-KEPT = ("derived", "edited")  # folders of images that sessions keep in a store
+DERIVED_FOLDERS = ("derived", "edited")  # folders of images that sessions keep in a store
 
 
 @contextmanager
-def copied(transfer) -> Iterator[Transfer]:
+def open_copy(transfer) -> Iterator[FixedViewTransfer]:
     """The bake of a transfer, opened anew from a place where nobody has shown it; its files are links."""
     store = Path(transfer.key)
     with TemporaryDirectory(dir=store.parent) as folder:
-        other = Path(folder) / store.name
-        shutil.copytree(store, other, copy_function=os.link, ignore=shutil.ignore_patterns(*KEPT))
-        yield open_transfer(other, Memory(1 << 30))
+        copy = Path(folder) / store.name
+        shutil.copytree(store, copy, copy_function=os.link, ignore=shutil.ignore_patterns(*DERIVED_FOLDERS))
+        yield open_transfer(copy, Cache(1 << 30))
 
 
-def rendered_afresh(transfer, look, view="front", **options):
+def render_uncached(transfer, look, view="front", **options):
     """`render_image` from a copy."""
-    with copied(transfer) as other:
-        return render_image(other, view, look, **options)
+    with open_copy(transfer) as copy:
+        return render_image(copy, view, look, **options)
 
 
 def exact_image(transfer, look, view="front"):
@@ -46,7 +46,7 @@ def exact_image(transfer, look, view="front"):
     Both sum the same light in float32, in another order: a relative error of its unit, 6e-8, for each of up to 1000
     lights and rays that come to a sample.
     """
-    with copied(transfer) as other:
-        image, twin = render_image(other, view, look), twins.full_evaluation(other, view, look)
-    np.testing.assert_allclose(image, twin, rtol=1e-4, atol=1e-7 * twin.max())
+    with open_copy(transfer) as copy:
+        image, expected = render_image(copy, view, look), twins.full_evaluation(copy, view, look)
+    np.testing.assert_allclose(image, expected, rtol=1e-4, atol=1e-7 * expected.max())
     return image

@@ -23,14 +23,14 @@ GRID_FACES = 2 * (SIDE - 1) ** 2
 def grid() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions, texture coordinates and triangles of a grid in the plane z = 0, one unit by half a one each cell."""
     y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
-    cells = np.array([[i, i + 1, i + SIDE + 1, i, i + SIDE + 1, i + SIDE] for i in range(SIDE * SIDE - SIDE - 1)])
-    cells = cells[np.arange(len(cells)) % SIDE != SIDE - 1]
+    quads = np.array([[i, i + 1, i + SIDE + 1, i, i + SIDE + 1, i + SIDE] for i in range(SIDE * SIDE - SIDE - 1)])
+    quads = quads[np.arange(len(quads)) % SIDE != SIDE - 1]
     positions = np.stack([x, 0.5 * y, 0 * x], -1).astype(np.float32)
     uvs = (np.stack([x, y], -1) / (SIDE - 1)).astype(np.float32)
-    return positions, uvs, cells.reshape(-1, 3).astype(np.uint32)
+    return positions, uvs, quads.reshape(-1, 3).astype(np.uint32)
 
 
-def shown(glb: Glb, attributes: dict[str, int], indices: int, **more: Any) -> Glb:
+def add_primitive_node(glb: Glb, attributes: dict[str, int], indices: int, **more: Any) -> Glb:
     """The document with a node that shows a primitive."""
     primitive = {"attributes": attributes, "indices": indices, **more}
     glb.document["meshes"] = [{"name": "grid", "primitives": [primitive]}]
@@ -49,25 +49,27 @@ def draco_bytes(level: int = 7) -> tuple[bytes, int]:
     """The grid packed by Draco, its texture coordinates number 7; and the number of its positions."""
     positions, uvs, faces = grid()
     options = {"quantization_bits": 14, "compression_level": level, "preserve_order": level == 0}
-    packed = DracoPy.encode(positions, faces, generic_attributes={7: uvs}, **options)
-    (place,) = (each["unique_id"] for each in DracoPy.decode(packed).attributes if each["attribute_type"] == 0)
-    return packed, place
+    compressed = DracoPy.encode(positions, faces, generic_attributes={7: uvs}, **options)
+    (position_id,) = (
+        each["unique_id"] for each in DracoPy.decode(compressed).attributes if each["attribute_type"] == 0
+    )
+    return compressed, position_id
 
 
 def draco_glb(data: bytes | None = None, level: int = 7) -> Glb:
     """The grid packed by Draco, or other data in its place."""
     positions, _, faces = grid()
-    packed, place = draco_bytes(level)
+    compressed, position_id = draco_bytes(level)
     glb = Glb()
-    view = glb.view(packed if data is None else data)
+    view = glb.view(compressed if data is None else data)
     attributes = {
         "POSITION": empty_accessor(glb, len(positions), "VEC3"),
         "TEXCOORD_0": empty_accessor(glb, len(positions), "VEC2"),
     }
     indices = empty_accessor(glb, faces.size, "SCALAR", 5125)
-    part = {"bufferView": view, "attributes": {"POSITION": place, "TEXCOORD_0": 7}}
+    extension = {"bufferView": view, "attributes": {"POSITION": position_id, "TEXCOORD_0": 7}}
     glb.document["extensionsRequired"] = glb.document["extensionsUsed"] = ["KHR_draco_mesh_compression"]
-    return shown(glb, attributes, indices, extensions={"KHR_draco_mesh_compression": part})
+    return add_primitive_node(glb, attributes, indices, extensions={"KHR_draco_mesh_compression": extension})
 
 
 def meshopt_glb(name: str = "EXT_meshopt_compression") -> Glb:
@@ -75,25 +77,30 @@ def meshopt_glb(name: str = "EXT_meshopt_compression") -> Glb:
     glb = Glb()
 
     def accessor(vector: str, kind: str, component: int, **more: Any) -> int:
-        packed = VECTORS[vector]
-        data = base64.b64decode(packed["packed"])
-        place = glb.view(data)
-        view = glb.document["bufferViews"][place]
-        told = {key: packed[key] for key in ("mode", "count", "filter")}
-        told |= {"buffer": 0, "byteOffset": view["byteOffset"], "byteLength": len(data), "byteStride": packed["stride"]}
-        view |= {"buffer": 1, "byteOffset": 0, "byteLength": packed["count"] * packed["stride"]}
-        view["extensions"] = {name: told}
-        if packed["mode"] == "ATTRIBUTES":
-            view["byteStride"] = packed["stride"]
-        index = empty_accessor(glb, packed["count"], kind, component)
-        glb.document["accessors"][index] |= {"bufferView": place, **more}
+        vector_entry = VECTORS[vector]
+        data = base64.b64decode(vector_entry["packed"])
+        view_index = glb.view(data)
+        view = glb.document["bufferViews"][view_index]
+        extension = {key: vector_entry[key] for key in ("mode", "count", "filter")}
+        extension |= {
+            "buffer": 0,
+            "byteOffset": view["byteOffset"],
+            "byteLength": len(data),
+            "byteStride": vector_entry["stride"],
+        }
+        view |= {"buffer": 1, "byteOffset": 0, "byteLength": vector_entry["count"] * vector_entry["stride"]}
+        view["extensions"] = {name: extension}
+        if vector_entry["mode"] == "ATTRIBUTES":
+            view["byteStride"] = vector_entry["stride"]
+        index = empty_accessor(glb, vector_entry["count"], kind, component)
+        glb.document["accessors"][index] |= {"bufferView": view_index, **more}
         return index
 
     attributes = {
         "POSITION": accessor("places of the grid", "VEC3", 5126),
         "NORMAL": accessor("normals of the grid", "VEC3", 5120, normalized=True),
     }
-    shown(glb, attributes, accessor("grid, 2 bytes", "SCALAR", 5123))
+    add_primitive_node(glb, attributes, accessor("grid, 2 bytes", "SCALAR", 5123))
     glb.document["extensionsRequired"] = glb.document["extensionsUsed"] = [name, "KHR_mesh_quantization"]
     glb.document["buffers"] = [
         {"byteLength": len(glb.binary)},

@@ -3,55 +3,55 @@
 from __future__ import annotations
 
 import numpy as np
-from sessions import BUDGET, settle
+from sessions import BUDGET, run_until_exact
 
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.picture.picture import Picture
 
 BALL, WALL = "/materials/Ball/terms/1/curves/", "/materials/Wall/terms/0/curves/"
 
 
-def quiet(share):
+def ignore_progress(fraction):
     """Progress that nobody watches."""
 
 
-def opened(transfer, *touched, cache=None, view="front", look=None):
+def open_exact_picture(transfer, *touched, cache=None, view="front", look=None):
     """An exact picture, some curves opened one after another."""
-    picture = Picture(transfer, view, cache or Memory(BUDGET))
+    picture = Picture(transfer, view, cache or Cache(BUDGET))
     if look is not None:
         picture.set_look(look)
-    settle(picture)
+    run_until_exact(picture)
     for pointer in touched:
-        picture.touch(pointer)
-        settle(picture)
+        picture.prepare(pointer)
+        run_until_exact(picture)
     return picture
 
 
-def sigma(value, **more):
+def set_sigma(value, **more):
     def change(document):
         document["materials"]["Ball"]["terms"][1]["params"].update(sigma=value, **more)
 
     return change
 
 
-def ball_alone(document):
+def set_single_term_ball(document):
     """The ball with a single coloured, textured term."""
     document["materials"]["Ball"]["terms"] = [
         {"model": "cook_torrance", "color": [0.9, 0.5, 0.2], "params": {"sigma": 0.3}, "texture": "diffuse"}
     ]
 
 
-def pixels_of_ball_alone(transfer, view="front"):
+def find_pure_ball_pixels(transfer, view="front"):
     """Pixels that see nothing but the ball. (height, width) bool"""
     v = transfer.views[view]
     rows = v.rows(2)
     count = np.bincount(v.pixel, minlength=v.width * v.height)
-    of_ball = np.bincount(v.pixel[rows], minlength=v.width * v.height)
-    return (count == of_ball).reshape(v.height, v.width)
+    ball_count = np.bincount(v.pixel[rows], minlength=v.width * v.height)
+    return (count == ball_count).reshape(v.height, v.width)
 
 
-def turned_by(degrees):
-    def turn(document):
+def rotate_environment(degrees):
+    def change(document):
         document["environment"]["rotation"] = degrees
 
-    return turn
+    return change

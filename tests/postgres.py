@@ -17,7 +17,7 @@ import pytest
 
 MISSING = "PostgreSQL is not installed (Debian: apt-get install --no-install-recommends postgresql)"
 USER = "relume"
-ROOM_BYTES = 2 << 30  # 8 MB a database, of all processes of tests
+REQUIRED_BYTES = 2 << 30  # 8 MB a database, of all processes of tests
 
 
 def _program(name: str) -> str | None:
@@ -33,8 +33,8 @@ class Cluster:
         self._initdb, self._ctl = _program("initdb"), _program("pg_ctl")
         if self._initdb is None or self._ctl is None:
             pytest.skip(MISSING)
-        self._user = _somebody() if os.geteuid() == 0 else None  # it refuses to run as root
-        self._folder = Path(tempfile.mkdtemp(prefix="relume-postgresql-", dir=_in_memory()))
+        self._user = _find_unprivileged_user() if os.geteuid() == 0 else None  # it refuses to run as root
+        self._folder = Path(tempfile.mkdtemp(prefix="relume-postgresql-", dir=_find_ram_folder()))
         with socket.create_server(("127.0.0.1", 0)) as free:
             self._port = free.getsockname()[1]
         if self._user is not None:
@@ -75,15 +75,15 @@ class Cluster:
         subprocess.run(command, check=True, user=uid, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT, cwd="/")
 
 
-def _in_memory() -> str | None:
+def _find_ram_folder() -> str | None:
     """A folder that no disk has to follow, where there is room in one: a database is 300 files, and removing those of a
     test file took half a minute on a disk that other tests wrote to."""
     shared = "/dev/shm"
-    has_room = os.access(shared, os.W_OK) and shutil.disk_usage(shared).free > ROOM_BYTES
+    has_room = os.access(shared, os.W_OK) and shutil.disk_usage(shared).free > REQUIRED_BYTES
     return shared if has_room else None
 
 
-def _somebody() -> pwd.struct_passwd:
+def _find_unprivileged_user() -> pwd.struct_passwd:
     """A user that is not root."""
     for name in ("postgres", "nobody"):
         try:

@@ -11,68 +11,68 @@ from relume.bake import Recipe
 from relume.brdf.registry import TERMS
 from relume.brdf.term import VIEW
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.transfer import Axis
-from relume.store import bake_here
+from relume.picture.transfer import EditAxis
+from relume.store import bake_in_process
 
 BUDGET = 1 << 28
 
 
-def bake_corner(scene, method, folder):
+def bake_corner_scene(scene, method, folder):
     """Its view "front" in 40×30 under 400 lights, opened."""
     recipe = Recipe(method, ("front",), (40, 30), 400)
-    return open_transfer(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return open_transfer(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
-def look_of(transfer, change=lambda document: None):
+def make_look(transfer, change=lambda document: None):
     """The default look after `change` has edited a copy of its document in place."""
     document = copy.deepcopy(transfer.default_look)
     change(document)
     return validate(document, transfer.default_look)
 
 
-def settle(picture):
+def run_until_exact(picture):
     """Freeze and advance until the picture is exact and nothing waits."""
     for _ in range(200):
         advance = picture.advance(None)
         if picture.next_job() is None and advance.exact:
             return picture
-        picture.freeze(lambda share: None, lambda: False)
+        picture.run_next_job(lambda share: None, lambda: False)
     raise AssertionError(f"the picture still waits for {picture.next_job()}")
 
 
-def make_next(picture):
+def run_next_job(picture):
     """Make what waits, whatever it is; returns it."""
     need = picture.next_job()
-    picture.install(need, need.make(lambda share: None, lambda: False))
+    picture.install(need, need.run(lambda share: None, lambda: False))
     return need
 
 
-def is_waiting(picture):
+def has_pending_job(picture):
     """Whether anything is lacking, for the look or for what is touched."""
     return picture.next_job() is not None
 
 
-def reflects(transfer):
+def has_bounces(transfer):
     """Whether light between surfaces was baked."""
-    return Axis.BOUNCES in transfer.axes
+    return EditAxis.BOUNCES in transfer.axes
 
 
-def relative_rmse(found, expected):
+def relative_rmse(values, expected):
     """Root mean square of the difference in units of that of what is expected."""
-    return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+    return np.sqrt(np.mean((values - expected) ** 2) / np.mean(expected**2))
 
 
-def random_term(rng):
+def make_random_term(rng):
     """A term of any model with parameters in a lively range."""
     model = list(ANALYTIC)[rng.integers(len(ANALYTIC))]
     term = {"model": model, "color": rng.uniform(0, 1, 3).round(3).tolist(), "params": {}, "curves": {}}
     fixed = TERMS[model].fixed
-    return term | {"params": {p.name: random_value(rng, p, p.name in fixed) for p in TERMS[model].parameters}}
+    return term | {"params": {p.name: make_random_value(rng, p, p.name in fixed) for p in TERMS[model].parameters}}
 
 
-def random_value(rng, parameter, is_fixed):
+def make_random_value(rng, parameter, is_fixed):
     """A number or, where it is not fixed at freeze, three, away from the ends of the parameter's range."""
     low, high = parameter.minimum, parameter.maximum
     at = rng.uniform(0.1, 0.9, 3 if rng.random() < 0.2 and not is_fixed else 1)
@@ -80,15 +80,17 @@ def random_value(rng, parameter, is_fixed):
     return values.tolist() if len(values) == 3 else float(values[0])
 
 
-def random_curve(rng, num_bands):
+def make_random_curve(rng, num_bands):
     """A curve drawn by hand, as points or bands, of one colour or several."""
     angles = np.sort(rng.choice(np.arange(1, 90), rng.integers(2, 7), replace=False))
-    points = [[float(angle), float(value)] for angle, value in zip(angles, rng.uniform(0, 2, len(angles)), strict=True)]
-    drawn = {"points": points} if rng.random() < 0.7 else {"bands": rng.uniform(0, 2, num_bands).tolist()}
+    control_points = [
+        [float(angle), float(value)] for angle, value in zip(angles, rng.uniform(0, 2, len(angles)), strict=True)
+    ]
+    drawn = {"points": control_points} if rng.random() < 0.7 else {"bands": rng.uniform(0, 2, num_bands).tolist()}
     return drawn | ({"channels": "rgb"[rng.integers(3)]} if rng.random() < 0.3 else {})
 
 
-def random_edit(rng, document):
+def apply_random_edit(rng, document):
     """Edit a complete look document in place, as an editor might; returns what was done."""
     name = list(document["materials"])[rng.integers(len(document["materials"]))]
     terms = document["materials"][name]["terms"]
@@ -101,7 +103,7 @@ def random_edit(rng, document):
         document["environment"]["color"] = rng.uniform(0, 1, 3).tolist()
         return kind
     if kind == "add" and len(terms) < 3:
-        terms.append(random_term(rng))
+        terms.append(make_random_term(rng))
         return kind
     if kind == "remove" and len(terms) > 1:
         del terms[rng.integers(len(terms))]
@@ -112,16 +114,16 @@ def random_edit(rng, document):
         parameter = declared.parameters[rng.integers(len(declared.parameters))]
         term["params"] = {
             **term["params"],
-            parameter.name: random_value(rng, parameter, parameter.name in declared.fixed),
+            parameter.name: make_random_value(rng, parameter, parameter.name in declared.fixed),
         }
     elif kind == "curve":
         curves = [curve for curve in declared.curves if curve is not VIEW]  # which multiplies finished samples, no more
         curve = curves[rng.integers(len(curves))]
-        term["curves"] = {**term["curves"], curve.name: random_curve(rng, curve.num_bands)}
+        term["curves"] = {**term["curves"], curve.name: make_random_curve(rng, curve.num_bands)}
     elif kind == "reset":
         term["curves"] = {}
     elif kind == "model":
-        terms[k] = random_term(rng)
+        terms[k] = make_random_term(rng)
     elif kind == "texture":
         term["texture"] = [None, "diffuse", "specular"][rng.integers(3)]
     else:

@@ -6,21 +6,21 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from sessions import bake_corner
-from tiny_scenes import looking, quad, scene_of, still_life
+from sessions import bake_corner_scene
+from tiny_scenes import make_camera, make_tiny_scene, quad, still_life
 
 from relume.bake import Recipe
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods import moving_error
 from relume.methods.registry import METHODS, open_transfer
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 
 @pytest.fixture(scope="module", autouse=True)
 def unmeasured():
     """Bakes of moving views do not measure what they are off by, a third of their time, where no test asks for it."""
-    with patch.object(moving_error, "measured", return_value=np.full(2, np.nan, np.float32)):
+    with patch.object(moving_error, "measure_error", return_value=np.full(2, np.nan, np.float32)):
         yield
 
 
@@ -28,13 +28,13 @@ def unmeasured():
 def baked(tmp_path_factory):
     """The still life in two views of 64×48 under 100 lights."""
     recipe = Recipe("direct", ("front", "left"), (64, 48), 100)
-    return bake_here(METHODS["direct"], still_life(), recipe, tmp_path_factory.mktemp("bake") / "store.zarr")
+    return bake_in_process(METHODS["direct"], still_life(), recipe, tmp_path_factory.mktemp("bake") / "store.zarr")
 
 
 @pytest.fixture(scope="session")
 def transfer(baked):
     """The bake, opened."""
-    return open_transfer(baked, Memory(1 << 30))
+    return open_transfer(baked, Cache(1 << 30))
 
 
 @pytest.fixture(scope="session")
@@ -49,13 +49,13 @@ def corner():
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     red = quad("red", [[-1, 0, 1], [-1, 0, -1], [-1, 1.5, -1], [-1, 1.5, 1]], 1, tangent=(0, 1, 0))
     blue = quad("blue", [[-1, 0, -1], [1, 0, -1], [1, 1.5, -1], [-1, 1.5, -1]], 2)
-    sky = np.full((16, 32, 3), 0.3, np.float32)
-    sky[2:5, 16:20] = 30
-    camera = looking("front", (1.2, 1.6, 2.2), (-0.2, 0.4, -0.3), 0.7)
-    return scene_of(floor, red, blue, camera=camera, environment=sky, materials=materials)
+    environment_radiance = np.full((16, 32, 3), 0.3, np.float32)
+    environment_radiance[2:5, 16:20] = 30
+    camera = make_camera("front", (1.2, 1.6, 2.2), (-0.2, 0.4, -0.3), 0.7)
+    return make_tiny_scene(floor, red, blue, camera=camera, environment=environment_radiance, materials=materials)
 
 
 @pytest.fixture(scope="session")
 def gathered(corner, tmp_path_factory):
     """The corner's bake with light between its surfaces, opened."""
-    return bake_corner(corner, "gather", tmp_path_factory.mktemp("corner"))
+    return bake_corner_scene(corner, "gather", tmp_path_factory.mktemp("corner"))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.scene.coding import rows_of
+from relume.scene.coding import decode_rows
 from relume.scene.model import Texture
 
 
-def values_of(texture: Texture) -> np.ndarray:
+def get_texture_values(texture: Texture) -> np.ndarray:
     """Linear RGB, or normals. (height, width, 3) float32"""
-    return np.concatenate(list(rows_of(texture)))
+    return np.concatenate(list(decode_rows(texture)))

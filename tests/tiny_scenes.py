@@ -6,17 +6,19 @@ import numpy as np
 
 from relume.environments.equirect import texel_directions
 from relume.environments.model import Environment
-from relume.light.local import Triangles
-from relume.points import Points
+from relume.light.local import LightTriangles
+from relume.points import SurfacePoints
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene, Texture
 from relume.trace.tangents import any_tangent
 
 
-def points_at(position, normal, first=0):
+def make_surface_points(position, normal, first=0):
     """Points with any tangents; the first has this seed."""
     position, normal = (np.ascontiguousarray(a, np.float32) for a in (position, normal))
-    return Points(position, normal, any_tangent(normal), np.arange(first, first + len(position), dtype=np.uint32))
+    return SurfacePoints(
+        position, normal, any_tangent(normal), np.arange(first, first + len(position), dtype=np.uint32)
+    )
 
 
 def mesh(name, positions, faces, material, normals=None, tangents=None, uvs=None):
@@ -38,74 +40,76 @@ def quad(name, corners, material, tangent=(1, 0, 0)):
     return mesh(name, corners, [[0, 1, 2], [0, 2, 3]], material, tangents=np.tile([*tangent, 1.0], (4, 1)), uvs=uvs)
 
 
-def sphere(name, centre, radius, material, rings=12, inside=False):
-    """A ball of 4 · rings² triangles less the poles', smooth normals; `inside`: seen from its inner side."""
-    theta, phi = np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, 2 * rings + 1)
+def sphere(name, center, radius, material, num_rings=12, inside=False):
+    """A ball of 4 · rings² triangles less the poles', smooth normals; `relative_path`: seen from its inner side."""
+    theta, phi = np.linspace(0, np.pi, num_rings + 1), np.linspace(0, 2 * np.pi, 2 * num_rings + 1)
     theta, phi = (grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij"))
     normals = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=1)
     tangents = np.stack([-np.sin(phi), 0 * phi, np.cos(phi), 1 + 0 * phi], axis=1)
     uvs = np.stack([phi / (2 * np.pi), theta / np.pi], axis=1)
     faces = []
-    for ring in range(rings):
-        for k in range(2 * rings):
-            a = ring * (2 * rings + 1) + k
-            b = a + 2 * rings + 1
+    for ring in range(num_rings):
+        for k in range(2 * num_rings):
+            a = ring * (2 * num_rings + 1) + k
+            b = a + 2 * num_rings + 1
             faces += [[a, a + 1, b]] if ring > 0 else []
-            faces += [[a + 1, b + 1, b]] if ring < rings - 1 else []
-    positions = np.asarray(centre) + radius * normals
+            faces += [[a + 1, b + 1, b]] if ring < num_rings - 1 else []
+    positions = np.asarray(center) + radius * normals
     faces = np.asarray(faces)
     if inside:
         normals, faces = -normals, faces[:, ::-1]
     return mesh(name, positions, faces, material, normals, tangents, uvs)
 
 
-def torus(name, radius, tube, material, steps=192, around=24, tilt=0.5):
+def torus(name, radius, tube, material, num_steps=192, num_tube_steps=24, tilt=0.5):
     """A ring about the origin, smooth normals, its axis tilted from +Y towards the viewer on +Z, radians."""
-    u, v = np.linspace(0, 2 * np.pi, steps + 1), np.linspace(0, 2 * np.pi, around + 1)
+    u, v = np.linspace(0, 2 * np.pi, num_steps + 1), np.linspace(0, 2 * np.pi, num_tube_steps + 1)
     u, v = (grid.ravel() for grid in np.meshgrid(u, v, indexing="ij"))
     normals = np.stack([np.cos(u) * np.cos(v), np.sin(v), np.sin(u) * np.cos(v)], axis=1)
     positions = radius * np.stack([np.cos(u), 0 * u, np.sin(u)], axis=1) + tube * normals
     cos, sin = np.cos(tilt), np.sin(tilt)
-    turn = np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
-    a = (np.arange(steps)[:, None] * (around + 1) + np.arange(around)).ravel()
-    b = a + around + 1
+    rotation = np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
+    a = (np.arange(num_steps)[:, None] * (num_tube_steps + 1) + np.arange(num_tube_steps)).ravel()
+    b = a + num_tube_steps + 1
     faces = np.concatenate([np.stack([a, a + 1, b], axis=1), np.stack([a + 1, b + 1, b], axis=1)])
-    return mesh(name, positions @ turn, faces, material, normals @ turn)
+    return mesh(name, positions @ rotation, faces, material, normals @ rotation)
 
 
-def shining(corners, is_two_sided):
+def make_emissive_triangles(corners, is_two_sided):
     """Triangles that shine evenly. corners: (T, 3, 3)"""
-    return Triangles(np.asarray(corners, np.float32), np.ones(len(corners), np.float32), is_two_sided)
+    return LightTriangles(np.asarray(corners, np.float32), np.ones(len(corners), np.float32), is_two_sided)
 
 
-def looking(name, eye, target, yfov):
-    """A camera at `eye` that has `target` in its middle, upright."""
-    eye, target = np.asarray(eye, float), np.asarray(target, float)
-    back = (eye - target) / np.linalg.norm(eye - target)
+def make_camera(name, origin, target, yfov):
+    """A camera at `origin` that has `target_bands` in its middle, upright."""
+    origin, target = np.asarray(origin, float), np.asarray(target, float)
+    back = (origin - target) / np.linalg.norm(origin - target)
     right = np.cross([0, 1, 0], back)
     right /= np.linalg.norm(right)
     to_world = np.eye(4)
     to_world[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
-    to_world[:3, 3] = eye
+    to_world[:3, 3] = origin
     return Camera(name, to_world, yfov)
 
 
 def studio(height=32, key=60.0):
     """An environment that is dim and coloured all round, with a warm softbox and a small cold spot."""
     d = texel_directions(height, 2 * height).astype(float)
-    sky = 0.3 + 0.2 * d[..., 1:2] * [0.5, 0.8, 1.0] + 0.1 * d[..., :1] * [1.0, 0.2, -0.6]
+    ambient = 0.3 + 0.2 * d[..., 1:2] * [0.5, 0.8, 1.0] + 0.1 * d[..., :1] * [1.0, 0.2, -0.6]
 
     def spot(towards, width):
         towards = np.asarray(towards) / np.linalg.norm(towards)
         return np.exp((d @ towards - 1) / width**2)[..., None]
 
-    light = sky + key * spot([-1, 1.5, 1], 0.15) * [1, 0.9, 0.7] + 0.5 * key * spot([2, 1, 0.3], 0.06) * [0.5, 0.7, 1]
+    light = (
+        ambient + key * spot([-1, 1.5, 1], 0.15) * [1, 0.9, 0.7] + 0.5 * key * spot([2, 1, 0.3], 0.06) * [0.5, 0.7, 1]
+    )
     return np.maximum(light, 0).astype(np.float32)
 
 
-def checker(size=16, squares=8):
+def checker(size=16, num_squares=8):
     """A texture of black and white squares."""
-    row = np.arange(size) * squares // size
+    row = np.arange(size) * num_squares // size
     on = (row[:, None] + row) % 2
     return Texture(np.repeat(on[..., None], 3, axis=2).astype(np.float32))
 
@@ -115,12 +119,12 @@ def corner(materials):
     meshes = [
         quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
         quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1),
-        sphere("ball", [0.2, 0.3, 0.1], 0.3, 0, rings=8),
+        sphere("ball", [0.2, 0.3, 0.1], 0.3, 0, num_rings=8),
     ]
-    sky = np.full((16, 32, 3), 0.3, np.float32)
-    sky[2:5, 14:18] = 30
-    camera = looking("front", (0.6, 1.2, 2.4), (0, 0.2, 0), 0.7)
-    return scene_of(*meshes, camera=camera, environment=sky, materials=materials)
+    radiance = np.full((16, 32, 3), 0.3, np.float32)
+    radiance[2:5, 14:18] = 30
+    camera = make_camera("front", (0.6, 1.2, 2.4), (0, 0.2, 0), 0.7)
+    return make_tiny_scene(*meshes, camera=camera, environment=radiance, materials=materials)
 
 
 def still_life():
@@ -140,17 +144,20 @@ def still_life():
         ),
     }
     textures = {"Floor": {"diffuse": checker()}}
-    materials = [Material(name, of, textures.get(name, {})) for name, of in terms.items()]
+    materials = [Material(name, brdf_terms, textures.get(name, {})) for name, brdf_terms in terms.items()]
     meshes = [
         quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0),
         quad("wall", [[-2, 0, -1], [2, 0, -1], [2, 1.2, -1], [-2, 1.2, -1]], 1),
-        sphere("ball", [0.1, 0.5, 0], 0.5, 2, rings=10),
+        sphere("ball", [0.1, 0.5, 0], 0.5, 2, num_rings=10),
     ]
-    cameras = [looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8), looking("left", [-2.5, 1.5, 1.5], [0, 0.4, 0], 0.7)]
+    cameras = [
+        make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8),
+        make_camera("left", [-2.5, 1.5, 1.5], [0, 0.4, 0], 0.7),
+    ]
     return make_scene("still life", meshes, materials, cameras, Environment("studio", studio()))
 
 
-def scene_of(*meshes, camera, environment=None, materials=None) -> Scene:
+def make_tiny_scene(*meshes, camera, environment=None, materials=None) -> Scene:
     """A scene of some meshes and one camera; white Lambert materials where none are given."""
     if materials is None:
         count = 1 + max(m.material for m in meshes)

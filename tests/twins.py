@@ -10,15 +10,15 @@ from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.methods.cells.between import sent_between
-from relume.methods.cells.in_lobes import sent_in_lobes
-from relume.methods.on_cells import LightOnCells
-from relume.picture.light import light_of
-from relume.picture.transfer import Axis
-from relume.points import Points
+from relume.methods.cells.between import solve_indirect
+from relume.methods.cells.in_lobes import outgoing_in_highlights
+from relume.methods.on_cells import DirectPatchLight
+from relume.picture.light import illumination_from_look
+from relume.picture.transfer import EditAxis
+from relume.points import SurfacePoints
 from relume.project.contraction import contract
 from relume.project.projector import Projector
-from relume.project.receivers import Receivers
+from relume.project.receivers import ShadingPoints
 from relume.project.sent import SIDE
 from relume.views.view import View
 
@@ -28,7 +28,7 @@ def unit(v):
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def make_receivers(count, num_lights, seed=0, horizon=0.15):
+def make_random_receivers(count, num_lights, seed=0, horizon=0.15):
     """Points with random frames and views that see every light above them."""
     rng = np.random.default_rng(seed)
     normal = unit(rng.normal(size=(count, 3)))
@@ -37,13 +37,15 @@ def make_receivers(count, num_lights, seed=0, horizon=0.15):
     facing = np.einsum("nc,nc->n", wo, normal)
     wo = unit(wo + np.where(facing < horizon, horizon - facing + np.abs(facing), 0)[:, None] * normal)
     visible = np.full((count, (num_lights + 7) // 8), 255, np.uint8)
-    return seen_from(wo, normal, tangent, visible)
+    return make_receivers_at_origin(wo, normal, tangent, visible)
 
 
-def seen_from(wo, normal, tangent, visible):
+def make_receivers_at_origin(wo, normal, tangent, visible):
     """Receivers with these frames, all in one place."""
     wo, normal, tangent = (np.ascontiguousarray(a, np.float32) for a in (wo, normal, tangent))
-    return Receivers(Points(np.zeros_like(normal), normal, tangent, np.arange(len(wo), dtype=np.uint32)), wo, visible)
+    return ShadingPoints(
+        SurfacePoints(np.zeros_like(normal), normal, tangent, np.arange(len(wo), dtype=np.uint32)), wo, visible
+    )
 
 
 def only_above(receivers, lights):
@@ -83,18 +85,18 @@ def pieces(lights, depth):
     return unit(corners.mean(axis=2)), area / area.sum(axis=1, keepdims=True)
 
 
-def samples_of(term, lights, receivers, row, divided):
+def shade_pieces(term, lights, receivers, row, light_pieces):
     """The light one receiver gets, piece by piece: q cos θi · power (K, 3), shares (K, P), local wi (K, P, 3), wo.
 
     divided: the `pieces` of the lights.
     """
-    seen = np.nonzero(visible_lights(receivers, lights.num_lights)[row])[0]
+    visible = np.nonzero(visible_lights(receivers, lights.num_lights)[row])[0]
     frame = frames(receivers)[row]
     wo = frame @ receivers.wo[row].astype(float)
-    wi = lights.direction[seen].astype(float) @ frame.T
-    shading = term.quotients(*wi.T, *(np.full(len(seen), o) for o in wo)).T * wi[:, 2:]
-    middles, shares = divided
-    return lights.irradiance[seen].astype(float) * shading, shares[seen], middles[seen] @ frame.T, wo
+    wi = lights.direction[visible].astype(float) @ frame.T
+    shading = term.quotients(*wi.T, *(np.full(len(visible), o) for o in wo)).T * wi[:, 2:]
+    middles, fractions = light_pieces
+    return lights.irradiance[visible].astype(float) * shading, fractions[visible], middles[visible] @ frame.T, wo
 
 
 def project(term, bands, active, lights, receivers, depth=5):
@@ -105,48 +107,48 @@ def project(term, bands, active, lights, receivers, depth=5):
     """
     num_bands = term.curve(active).num_bands if active else 1
     out = np.zeros((len(receivers.normal), num_bands, 3))
-    divided = pieces(lights, depth)
+    light_pieces = pieces(lights, depth)
     for row in range(len(out)):
-        power, shares, wi, wo = samples_of(term, lights, receivers, row, divided)
-        weight = power[:, None, :] * shares[..., None]
-        band = np.zeros(shares.shape, int)
+        power, fractions, wi, wo = shade_pieces(term, lights, receivers, row, light_pieces)
+        weight = power[:, None, :] * fractions[..., None]
+        band = np.zeros(fractions.shape, int)
         for curve in term.curves:
             if curve.outgoing:
                 continue
-            of_curve = band_of(curve, wi, wo)
+            curve_band = find_bands(curve, wi, wo)
             if curve.name == active:
-                band = of_curve
+                band = curve_band
             else:
-                weight = weight * np.moveaxis(bands[curve.name][:, of_curve], 0, -1)
+                weight = weight * np.moveaxis(bands[curve.name][:, curve_band], 0, -1)
         for c in range(3):
             out[row, :, c] = np.bincount(band.ravel(), weight[..., c].ravel(), num_bands)
     return out
 
 
-def band_of(curve, wi, wo):
+def find_bands(curve, wi, wo):
     """The band that the exact angle of each pair of directions falls in."""
     gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)
     return np.minimum((gamma * curve.num_bands / (np.pi / 2)).astype(int), curve.num_bands - 1)
 
 
-def project_points(term, bands, lights, receivers):
+def project_point_lights(term, bands, lights, receivers):
     """The environment as points: all power of a light at its direction, in the band its angle falls in. (n, 3)"""
     out = np.zeros((len(receivers.normal), 3))
     whole = pieces(lights, 0)
     for row in range(len(out)):
-        power, _, _, wo = samples_of(term, lights, receivers, row, whole)
-        seen = visible_lights(receivers, lights.num_lights)[row]
-        wi = lights.direction[seen].astype(float) @ frames(receivers)[row].T
+        power, _, _, wo = shade_pieces(term, lights, receivers, row, whole)
+        visible = visible_lights(receivers, lights.num_lights)[row]
+        wi = lights.direction[visible].astype(float) @ frames(receivers)[row].T
         for curve in term.curves:
             if not curve.outgoing:
-                power = power * bands[curve.name][:, band_of(curve, wi, wo)].T
+                power = power * bands[curve.name][:, find_bands(curve, wi, wo)].T
         out[row] = power.sum(axis=0)
     return out
 
 
-def integrate_texels(document, radiance, receivers, seen=None):
+def integrate_texels(document, radiance, receivers, visible=None):
     """The reflection integral of one term over all texels at exact angles. seen: (n, texels) bool. (n, 3)"""
-    term = TERMS[document["model"]].settled(document)
+    term = TERMS[document["model"]].normalized(document)
     height, width, _ = radiance.shape
     directions = texel_directions(height, width).reshape(-1, 3).astype(float)
     power = (radiance * texel_solid_angles(height, width)[:, None, None]).reshape(-1, 3)
@@ -154,12 +156,12 @@ def integrate_texels(document, radiance, receivers, seen=None):
     for row, frame in enumerate(frames(receivers)):
         wi, wo = directions @ frame.T, frame @ receivers.wo[row].astype(float)
         above = wi[:, 2] > 0
-        if seen is not None:
-            above &= seen[row]
+        if visible is not None:
+            above &= visible[row]
         wi = wi[above]
         weight = power[above] * term.quotients(*wi.T, *(np.full(len(wi), o) for o in wo)).T * wi[:, 2:]
         for curve in term.curves:
-            if not curve.outgoing:
+            if not curve.depends_on_view:
                 gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)
                 weight = weight * curve_values(document, curve, gamma).T
         out[row] = weight.sum(axis=0)
@@ -171,76 +173,83 @@ def stream(transport, change, image):
     return image + np.einsum("tcjs,cj->tcs", transport.astype(float), change)
 
 
-def arriving(transfer, view: View, index, look):
+def gather_incident_light(transfer, view: View, index, look):
     """All light of a look at a material's samples, every source summed in one go: its triangles, and its receivers."""
-    light = light_of(look, transfer.material_names, has_bounces=Axis.BOUNCES in transfer.axes)
+    light = illumination_from_look(look, transfer.material_names, has_bounces=EditAxis.BOUNCES in transfer.axes)
     gain = np.array(look.environment.gain, np.float32)
-    if Axis.LIGHT not in transfer.axes:  # a method whose light is its own
-        return transfer.arriving(view, index, light._replace(environment_gain=look.environment.gain), transfer.memory)
-    lights, reflected = transfer.lights_in(look.environment.key), None
-    if light.paths.reflect:
-        reflecting = transfer.cells.reflecting(light.reflectances)
-        on_cells = LightOnCells(
-            transfer.cells,
+    if EditAxis.LIGHT not in transfer.axes:  # a method whose light is its own
+        return transfer.incident_light(
+            view, index, light._replace(environment_gain=look.environment.gain), transfer.cache
+        )
+    lights, indirect = transfer.light_of_environment(look.environment.key), None
+    if light.paths.has_indirect:
+        reflecting = transfer.patches.reflectance_operator(light.reflectances)
+        patch_light = DirectPatchLight(
+            transfer.patches,
             transfer.local,
-            transfer.lights_in,
-            transfer.preview_lights_in,
-            transfer.memory,
+            transfer.light_of_environment,
+            transfer.preview_light_of_environment,
+            transfer.cache,
             transfer.key,
             transfer.harmonic,
         )
-        every = light._replace(environment_gain=look.environment.gain)
-        arrived = on_cells.arrived(every, reflecting, is_preview=False)
-        lobes = transfer.cells.lobes(light.reflectances, reflecting)
-        in_lobes = lobes, sent_in_lobes(transfer.cells, lobes, on_cells.straight(every, lobes.rows))
+        scaled_light = light._replace(environment_gain=look.environment.gain)
+        incident = patch_light.incident_light(scaled_light, reflecting, is_preview=False)
+        patch_lobes = transfer.patches.highlight_tables(light.reflectances, reflecting)
+        lobe_light = (
+            patch_lobes,
+            outgoing_in_highlights(transfer.patches, patch_lobes, patch_light.direct(scaled_light, patch_lobes.rows)),
+        )
         bounces = light.paths.first, light.paths.last
-        reflected = sent_between(transfer.cells, reflecting, arrived, *bounces, in_lobes).sent(transfer.cells)
-    local = transfer.local.all_rays(light, view.points(index))
-    straight = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.none()
-    return straight, view.receivers(index, reflected, local, is_lit=light.paths.direct)
+        indirect = solve_indirect(transfer.patches, reflecting, incident, *bounces, lobe_light).outgoing_light(
+            transfer.patches
+        )
+    local = transfer.local.rays_to(light, view.surface_points(index))
+    direct_lights = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.empty()
+    return direct_lights, view.receivers(index, indirect, local, is_lit=light.paths.direct)
 
 
-def sent_towards(sent, cell, direction, *, is_narrow=False):
+def evaluate_outgoing(outgoing, patch, direction, *, is_narrow=False):
     """What a cell sends in a unit direction, world space; for narrow lobes, without rings. (3,)"""
-    radiance, row = sent.even[cell].astype(float), sent.lobe[cell]
+    radiance, row = outgoing.isotropic[patch].astype(float), outgoing.lobe[patch]
     if row >= 0:
-        x, y = sent.frame[row].astype(float) @ direction
-        place = np.array([x, y]) / (1 + np.sqrt(max(0.0, 1 - x * x - y * y)))
-        across, along = np.clip(np.floor((place + 1) * SIDE / 2), 0, SIDE - 1).astype(int)
-        radiance += sent.scale[row] * (sent.smooth if is_narrow else sent.table)[row, across * SIDE + along]
+        x, y = outgoing.frame[row].astype(float) @ direction
+        disk_point = np.array([x, y]) / (1 + np.sqrt(max(0.0, 1 - x * x - y * y)))
+        across, along = np.clip(np.floor((disk_point + 1) * SIDE / 2), 0, SIDE - 1).astype(int)
+        radiance += outgoing.scale[row] * (outgoing.smooth if is_narrow else outgoing.table)[row, across * SIDE + along]
     return radiance
 
 
-def radiance_of(transfer, view: View, look):
+def shade_view(transfer, view: View, look):
     """Radiance of every view sample under a look, straight from the projector with no curve free. (n, 3)"""
     out = np.zeros((view.num_view_samples, 3))
     for index, name in enumerate(transfer.material_names):
         rows = view.rows(index)
         if rows.start == rows.stop:
             continue
-        lights, receivers = arriving(transfer, view, index, look)
-        for document, of_level in as_rough(view, index, look.materials[name].terms):
-            term = TERMS[document["model"]].settled(document)
+        lights, receivers = gather_incident_light(transfer, view, index, look)
+        for document, level_rows in split_by_roughness_level(view, index, look.materials[name].terms):
+            term = TERMS[document["model"]].normalized(document)
             bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
             projector = Projector(term, contract(term, bands, None), lights, receivers)
-            image = projector.project(of_level.start, of_level.stop)[:, 0].astype(float) * document["color"]
+            image = projector.project(level_rows.start, level_rows.stop)[:, 0].astype(float) * document["color"]
             texture = view.textures[index].get(document["texture"])
             if texture is not None:
-                image *= texture[of_level]
+                image *= texture[level_rows]
             for curve in term.curves:
-                if curve.outgoing:
-                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows][of_level])).T
-            out[rows][of_level] += image
-        out[rows] += shining(transfer, view, index, look)
+                if curve.depends_on_view:
+                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows][level_rows])).T
+            out[rows][level_rows] += image
+        out[rows] += evaluate_emission(transfer, view, index, look)
     if look.transport.paths.direct:
         background = transfer.background_in(look.environment.key, view)
         out[view.num_surface_samples :] = np.array(look.environment.gain) * background
     return out
 
 
-def as_rough(view: View, index, terms):
+def split_by_roughness_level(view: View, index, terms):
     """Each term with the samples that it is of: of one that follows a map of roughness, a term for every level."""
-    ratios, level = view.levels(index)
+    ratios, level = view.roughness_levels(index)
     assert np.all(np.diff(level.astype(int)) >= 0)  # samples of a level are a slice
     for term in terms:
         if not (ratios and term.get("roughness_map")):
@@ -248,28 +257,30 @@ def as_rough(view: View, index, terms):
             continue
         assert term["model"] == "ggx"
         for k, ratio in enumerate(ratios):
-            rough = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.03, 1).tolist()
-            of_level = slice(*np.searchsorted(level, [k, k + 1]))
-            yield {**term, "params": {**term["params"], "roughness": rough}}, of_level
+            roughness = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.03, 1).tolist()
+            level_rows = slice(*np.searchsorted(level, [k, k + 1]))
+            yield {**term, "params": {**term["params"], "roughness": roughness}}, level_rows
 
 
-def shining(transfer, view: View, index, look):
+def evaluate_emission(transfer, view: View, index, look):
     """What a material's samples send out themselves. (n, 3)"""
-    name, position = transfer.material_names[index], view.points(index).position
-    of_it = [light for light in look.lights.values() if light.geometry.material == name]
-    if not of_it or not look.transport.paths.direct:
+    name, position = transfer.material_names[index], view.surface_points(index).position
+    emitters = [light for light in look.lights.values() if light.geometry.material == name]
+    if not emitters or not look.transport.paths.direct:
         return np.zeros((len(position), 3))
-    eye = view.camera.to_world[:3, 3].astype(np.float32)
-    shines = np.outer(transfer.local.shines_at(index, eye, position), sum(np.array(light.gain) for light in of_it))
+    camera_position = view.camera.to_world[:3, 3].astype(np.float32)
+    emission = np.outer(
+        transfer.local.is_emissive_at(index, camera_position, position), sum(np.array(light.gain) for light in emitters)
+    )
     if transfer.store.attributes.get("has_emission_images"):
-        shines = shines * view.store.read("views/0/emission", view.rows(index).start, view.rows(index).stop)
-    return shines
+        emission = emission * view.store.read("views/0/emission", view.rows(index).start, view.rows(index).stop)
+    return emission
 
 
 def resolve(view: View, radiance):
     """Samples to pixels: the weighted sum of each pixel's. radiance (n, 3) -> (height, width, 3) float64"""
-    gains = np.empty((view.num_view_samples, view.gains.shape[1]))
-    gains[view.order] = view.gains
+    gains = np.empty((view.num_view_samples, view.throughput.shape[1]))
+    gains[view.order] = view.throughput
     out = np.zeros((view.width * view.height, 3))
     np.add.at(out, view.pixel.astype(int), gains * radiance)
     return out.reshape(view.height, view.width, 3)
@@ -278,7 +289,7 @@ def resolve(view: View, radiance):
 def full_evaluation(transfer, view_name, look):
     """The picture of a look, nothing incremental, frozen or cached. (height, width, 3) float64"""
     view = transfer.views[view_name]
-    return resolve(view, radiance_of(transfer, view, look))
+    return resolve(view, shade_view(transfer, view, look))
 
 
 def opacity_at(alpha, wrap, uv):

@@ -27,32 +27,34 @@ from relume.errors import (
     RelumeError,
     StorageError,
     bytes_text,
-    is_no_room,
+    is_disk_full,
 )
 from relume.folders import folder_bytes
 from relume.replacing import remove_folder
 from relume.scene.model import Scene
-from relume.store import code_of, fill, open_store, publish
-from relume.store.room import check_room
-from worker.database.patience import Given, Result, patiently
-from worker.lease import HEARTBEAT_S, LeaseKeeper, log_lost
+from relume.store import fill, open_store, publish, read_code
+from relume.store.room import check_disk_space
+from worker.database.patience import Given, Result, with_retry
+from worker.lease import HEARTBEAT_S, LeaseRenewer, log_lost_lease
 from worker.ledger import Ledger
-from worker.notes import forget_note, read_note
+from worker.notes import delete_note, read_note
 from worker.paths import bake_path, staging_path
-from worker.progress import Expected, Progress
-from worker.runs import begin_run, forget_run, name_run, run_of
+from worker.progress import ExpectedWork, Progress
+from worker.runs import delete_run, get_run, set_run, start_run
 from worker.status import Phase, TaskCost
 from worker.storage import push
-from worker.storage.parts import Parts, fetch_parts, forget_parts
-from worker.tasks import Job, idle_timer, run_task, scene_of
+from worker.storage.parts import PartialUploads, delete_partial, fetch_partial
+from worker.tasks import Job, idle_timer, load_registered_scene, run_task
 
-SCHEDULER_LOST = "the scheduler went away; start it, then bake again; finished parts are kept"
-UPGRADED = "relume has changed since this bake was begun; it starts again, so that its parts are of one version"
-TAKEN_OVER = "another machine had begun this bake; it starts again here"
+SCHEDULER_LOST_MESSAGE = "the scheduler went away; start it, then bake again; finished parts are kept"
+CODE_CHANGED_MESSAGE = (
+    "relume has changed since this bake was begun; it starts again, so that its parts are of one version"
+)
+TAKEN_OVER_MESSAGE = "another machine had begun this bake; it starts again here"
 log = logging.getLogger(__name__)
 
 MAX_ATTEMPTS = 3
-SAID_ONCE_S = 1.0
+LOSS_LOG_INTERVAL_S = 1.0
 
 
 @dataclass
@@ -60,10 +62,11 @@ class BakeRunner:
     """One run of a bake whose lease `owner` holds.
 
     Attributes:
-        window: how many tasks may be handed out at once now; the rest wait here, so that a cancel takes effect at once.
-        changed: called after every change of the ledger.
-        stopped: the service is closing; the bake stays `running` for the next start.
-        expected: what finished bakes tell of this one.
+        max_in_flight: how many tasks may be handed out at once now; the rest wait here, so that a cancel takes effect
+            at once.
+        on_change: called after every change of the ledger.
+        is_stopped: the service is closing; the bake stays `running` for the next start.
+        expected_work: what finished bakes tell of this one.
         working_since: when its first task began, by `time.monotonic`; None before.
     """
 
@@ -71,130 +74,132 @@ class BakeRunner:
     job: Job
     owner: str
     executor: Executor
-    window: Callable[[], int]
-    changed: Callable[[], None] = lambda: None
-    stopped: Callable[[], bool] = lambda: False
-    expected: Expected = field(default_factory=Expected)
+    max_in_flight: Callable[[], int]
+    on_change: Callable[[], None] = lambda: None
+    is_stopped: Callable[[], bool] = lambda: False
+    expected_work: ExpectedWork = field(default_factory=ExpectedWork)
     working_since: float | None = None
-    _flying: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
-    _entered: tuple[Phase | None, float] = (None, 0.0)
-    _parts: Parts | None = None
-    _lost_s: float = -inf
+    _in_flight: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
+    _phase_entered: tuple[Phase | None, float] = (None, 0.0)
+    _partial_uploads: PartialUploads | None = None
+    _last_loss_s: float = -inf
 
     def run(self) -> None:
         """Bake and publish; every failure ends in the ledger as a state and a sentence."""
-        with LeaseKeeper(self.ledger.keep_lease, self.job.bake_id, self.owner), idle_timer.kept_awake():
-            forget_note(self._staging)  # of an earlier run
+        with LeaseRenewer(self.ledger.renew_lease, self.job.bake_id, self.owner), idle_timer.keep_awake():
+            delete_note(self._staging)  # of an earlier run
             self._run()
-            forget_note(self._staging)
-        self.changed()
+            delete_note(self._staging)
+        self.on_change()
 
     def _run(self) -> None:
         identity = self.job.bake_id
         try:
             num_bytes = self._bake()
             push(self._target)
-            self._hold()
-            forget_run(self._staging)
+            self._renew_lease()
+            delete_run(self._staging)
             with suppress(StorageError):  # the bake is there; what is left over is deleted with its scene
-                forget_parts(identity)
+                delete_partial(identity)
         except CancelledError:
-            self._land()
-            is_held = self._ask(self.ledger.release, identity, self.owner)
+            self._drain()
+            has_lease = self._call_ledger(self.ledger.release, identity, self.owner)
         except Exception as error:  # whatever a method raises must not end the service
-            self._land()
-            if not self._is_there():  # deleted in the middle of a task, with what that wrote to
+            self._drain()
+            if not self._exists():  # deleted in the middle of a task, with what that wrote to
                 return
             if not isinstance(error, RelumeError | OSError):
                 log.exception("bake %s failed", identity, extra={"fields": {"bake": identity}})
-            is_held = self._ask(self.ledger.finish, identity, self.owner, "failed", self._sentence(error))
+            has_lease = self._call_ledger(
+                self.ledger.finish, identity, self.owner, "failed", self._error_message(error)
+            )
         else:
-            is_held = self._ask(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
-        if not is_held and self._is_there():
-            log_lost("bake", identity)
+            has_lease = self._call_ledger(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
+        if not has_lease and self._exists():
+            log_lost_lease("bake", identity)
 
-    def _hold(self) -> None:
+    def _renew_lease(self) -> None:
         """Renew the lease before files are changed that another process, if it has the bake now, goes on with.
 
         Raises:
             CancelledError: it has.
         """
-        if not self._ask(self.ledger.keep_lease, self.job.bake_id, self.owner):
+        if not self._call_ledger(self.ledger.renew_lease, self.job.bake_id, self.owner):
             raise CancelledError("another process has the bake")
 
     def _bake(self) -> int:
         job, target, staging = self.job, self._target, self._staging
         if target.exists():  # published, and then killed before the ledger knew
             return folder_bytes(target)
-        self._begin_or_go_on()
-        status = self._ask(self.ledger.bake, job.bake_id)
-        shown = status.progress if self._ask(self.ledger.finished_tasks, job.bake_id) else 0.0
-        progress = Progress(status.plan, shown, self.expected)
-        self._beat(progress, "reading")
-        scene = job.recipe.seen(scene_of(job.data_dir, job.scene_id))
-        fill.begin(job.method, scene, job.recipe, staging)
+        self._start_or_resume()
+        status = self._call_ledger(self.ledger.bake, job.bake_id)
+        initial_progress = status.progress if self._call_ledger(self.ledger.finished_tasks, job.bake_id) else 0.0
+        progress = Progress(status.plan, initial_progress, self.expected_work)
+        self._heartbeat(progress, "reading")
+        scene = job.recipe.add_cameras(load_registered_scene(job.data_dir, job.scene_id))
+        fill.create_staging_store(job.method, scene, job.recipe, staging)
         for stage in range(len(job.method.stages)):
             self._run_stage(scene, stage, progress)
-        self._beat(progress, "publishing")
+        self._heartbeat(progress, "publishing")
         try:
-            return publish(staging, target, self._hold)
+            return publish(staging, target, self._renew_lease)
         except ChunkDamagedError:
-            if self._ask(self.ledger.forget_tasks, job.bake_id, self.owner):
+            if self._call_ledger(self.ledger.delete_tasks, job.bake_id, self.owner):
                 shutil.rmtree(staging, ignore_errors=True)
             raise
 
-    def _begin_or_go_on(self) -> None:
+    def _start_or_resume(self) -> None:
         """Keep what an earlier run has finished where it is here and of the same code; else start from nothing."""
         identity, staging = self.job.bake_id, self._staging
-        run = self._ask(self.ledger.run, identity)
-        is_here = staging.exists() and run_of(staging) == run
-        finished = self._ask(self.ledger.finished_tasks, identity)
-        if not is_here and run is not None and fetch_parts(staging, identity, run, finished):
-            is_here = True
-            name_run(staging, run)
-        if is_here and code_of(staging) == self.job.code:
-            self._parts = Parts(staging, identity, run, finished) if run is not None else None
+        run = self._call_ledger(self.ledger.get_run, identity)
+        is_local = staging.exists() and get_run(staging) == run
+        finished_tasks = self._call_ledger(self.ledger.finished_tasks, identity)
+        if not is_local and run is not None and fetch_partial(staging, identity, run, finished_tasks):
+            is_local = True
+            set_run(staging, run)
+        if is_local and read_code(staging) == self.job.code:
+            self._partial_uploads = PartialUploads(staging, identity, run, finished_tasks) if run is not None else None
             return
         # where nothing is finished, what is here is left of one that was deleted
-        why = None if not finished else UPGRADED if is_here else TAKEN_OVER
-        if why is not None:
-            log.warning("bake %s: %s", identity, why, extra={"fields": {"bake": identity}})
-        self._hold()
+        reason = None if not finished_tasks else CODE_CHANGED_MESSAGE if is_local else TAKEN_OVER_MESSAGE
+        if reason is not None:
+            log.warning("bake %s: %s", identity, reason, extra={"fields": {"bake": identity}})
+        self._renew_lease()
         shutil.rmtree(staging, ignore_errors=True)
-        run = begin_run(staging)
-        if not self._ask(self.ledger.begin_anew, identity, self.owner, self.job.code, run, why):
+        run = start_run(staging)
+        if not self._call_ledger(self.ledger.restart, identity, self.owner, self.job.code, run, reason):
             raise CancelledError("the bake was stopped")
-        self._parts = Parts(staging, identity, run, ())
+        self._partial_uploads = PartialUploads(staging, identity, run, ())
 
     def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
         job = self.job
-        tasks = fill.begin_stage(job.method, scene, job.recipe, self._staging, stage)
+        tasks = fill.create_stage(job.method, scene, job.recipe, self._staging, stage)
         progress.begin_stage(tasks, last=stage == len(job.method.stages) - 1)
-        done = self._ask(self.ledger.finished_tasks, job.bake_id)
-        waiting: deque[tuple[Task, int]] = deque()
+        finished_costs = self._call_ledger(self.ledger.finished_tasks, job.bake_id)
+        pending: deque[tuple[Task, int]] = deque()
         for task in tasks:
-            if (cost := done.get((stage, task.index))) is not None:
-                progress.add(task, cost, here=False)
+            if (cost := finished_costs.get((stage, task.index))) is not None:
+                progress.add(task, cost, is_local=False)
             else:
-                waiting.append((task, 1))
-        self._beat(progress, self._phase(stage, progress))
-        while waiting or self._flying:
-            check_room(job.data_dir)
-            room = self._room(len(waiting))
-            while waiting and room > 0:
-                room -= 1
-                task, attempt = waiting.popleft()
-                self._flying[self.executor.submit(run_task, job, task)] = task, attempt
-            finished, _ = wait(self._flying, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
-            for future in finished:
-                self._collect(future, waiting, progress)
-            self._beat(progress, self._phase(stage, progress))
+                pending.append((task, 1))
+        self._heartbeat(progress, self._phase(stage, progress))
+        while pending or self._in_flight:
+            check_disk_space(job.data_dir)
+            num_free = self._num_free_slots(len(pending))
+            while pending and num_free > 0:
+                num_free -= 1
+                task, attempt = pending.popleft()
+                self._in_flight[self.executor.submit(run_task, job, task)] = task, attempt
+            done_futures, _ = wait(self._in_flight, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
+            for future in done_futures:
+                self._collect(future, pending, progress)
+            self._heartbeat(progress, self._phase(stage, progress))
 
-    def _room(self, num_waiting: int) -> int:
+    def _num_free_slots(self, num_pending: int) -> int:
         """How many tasks more may be handed out. Of the last none waits behind another at one process while the next is
         idle: a stage may have but one long task for each view."""
-        num_flying, most = len(self._flying), self.window()
-        return (most if num_waiting + num_flying > most else max(1, most // 2)) - num_flying
+        num_in_flight, max_tasks = len(self._in_flight), self.max_in_flight()
+        return (max_tasks if num_pending + num_in_flight > max_tasks else max(1, max_tasks // 2)) - num_in_flight
 
     def _phase(self, stage: int, progress: Progress) -> Phase:
         """What the processes are at: until one of them works, what they do to get ready."""
@@ -208,13 +213,13 @@ class BakeRunner:
             progress.begin_work()
         return "sampling" if stage == 0 else "tracing"
 
-    def _collect(self, future: Future[TaskCost], waiting: deque[tuple[Task, int]], progress: Progress) -> None:
-        task, attempt = self._flying.pop(future)
+    def _collect(self, future: Future[TaskCost], pending: deque[tuple[Task, int]], progress: Progress) -> None:
+        task, attempt = self._in_flight.pop(future)
         try:
             cost = future.result()
         except FutureCancelledError as error:  # nobody here cancels a task
-            self._flying.clear()  # handed out while the scheduler went away, they would never end
-            raise RelumeError(SCHEDULER_LOST) from error
+            self._in_flight.clear()  # handed out while the scheduler went away, they would never end
+            raise RelumeError(SCHEDULER_LOST_MESSAGE) from error
         except Exception as error:
             if not _is_lost_process(error):
                 raise
@@ -223,73 +228,73 @@ class BakeRunner:
                     f"{attempt} worker processes died of the same task, most likely for want of memory; free memory "
                     "or take fewer lights or a smaller size, then bake again; finished parts are kept"
                 ) from error
-            self._say_lost()
-            waiting.append((task, attempt + 1))
+            self._log_lost_worker()
+            pending.append((task, attempt + 1))
             return
         self._record(task, cost, attempt)
         self.working_since = self.working_since or time.monotonic() - cost.seconds
-        progress.add(task, cost, here=True)
+        progress.add(task, cost, is_local=True)
 
-    def _say_lost(self) -> None:
+    def _log_lost_worker(self) -> None:
         """Once of a process, which had more than one task."""
         now_s = time.monotonic()
-        if now_s > self._lost_s + SAID_ONCE_S:
-            about = {"fields": {"bake": self.job.bake_id}}
-            log.warning("a worker process died; what it was at is given to another", extra=about)
-        self._lost_s = now_s
+        if now_s > self._last_loss_s + LOSS_LOG_INTERVAL_S:
+            extra = {"fields": {"bake": self.job.bake_id}}
+            log.warning("a worker process died; what it was at is given to another", extra=extra)
+        self._last_loss_s = now_s
 
     def _record(self, task: Task, cost: TaskCost, attempt: int) -> None:
         """A task is finished: its shards are stored, where others may go on with them, before it counts."""
-        if self._parts is not None:
-            self._parts.store((task.stage, task.index))
-        if not self._ask(self.ledger.finish_task, self.job.bake_id, self.owner, task, cost, attempt):
+        if self._partial_uploads is not None:
+            self._partial_uploads.store((task.stage, task.index))
+        if not self._call_ledger(self.ledger.finish_task, self.job.bake_id, self.owner, task, cost, attempt):
             raise CancelledError("the bake was deleted, or another process has it")
 
-    def _beat(self, progress: Progress, phase: Phase) -> None:
+    def _heartbeat(self, progress: Progress, phase: Phase) -> None:
         """Record progress; raise CancelledError where somebody wants this run to end."""
-        if phase != self._entered[0]:
-            self._entered = phase, time.time()
-        entered = dict(zip(("phase", "phase_since"), self._entered, strict=True))
-        if self.stopped() or not self._ask(
-            self.ledger.beat, self.job.bake_id, self.owner, **progress.fields(), **entered
+        if phase != self._phase_entered[0]:
+            self._phase_entered = phase, time.time()
+        phase_fields = dict(zip(("phase", "phase_since"), self._phase_entered, strict=True))
+        if self.is_stopped() or not self._call_ledger(
+            self.ledger.heartbeat, self.job.bake_id, self.owner, **progress.fields(), **phase_fields
         ):
             raise CancelledError("the bake was stopped")
-        self.changed()
+        self.on_change()
 
-    def _land(self) -> None:
+    def _drain(self) -> None:
         """Wait for the tasks that run and keep what they finished; they would write after us otherwise."""
-        deadline = time.monotonic() + (0 if self.stopped() else 600)
-        while self._flying and time.monotonic() < deadline:
-            finished, _ = wait(self._flying, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
-            for future in finished:
-                task, attempt = self._flying.pop(future)
+        deadline = time.monotonic() + (0 if self.is_stopped() else 600)
+        while self._in_flight and time.monotonic() < deadline:
+            done_futures, _ = wait(self._in_flight, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
+            for future in done_futures:
+                task, attempt = self._in_flight.pop(future)
                 if not future.cancelled() and future.exception() is None:
                     try:
                         self._record(task, future.result(), attempt)
                     except CancelledError:
                         return
 
-    def _ask(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
+    def _call_ledger(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
         """Call the ledger; one that is away for a while delays the bake and ends nothing."""
-        return patiently(self.stopped, call, *args, **kwargs)
+        return with_retry(self.is_stopped, call, *args, **kwargs)
 
-    def _is_there(self) -> bool:
+    def _exists(self) -> bool:
         try:
-            self._ask(self.ledger.bake, self.job.bake_id)
+            self._call_ledger(self.ledger.bake, self.job.bake_id)
         except NotFoundError:
             return False
         return True
 
-    def _sentence(self, error: Exception) -> str:
+    def _error_message(self, error: Exception) -> str:
         """What went wrong and what to do, in one line."""
-        if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_no_room(error)):
-            needed = self._ask(self.ledger.bake, self.job.bake_id).plan.planned_bytes
-            missing = bytes_text(max(1_000_000, needed - folder_bytes(self._staging)))
-            return f"disk full; free {missing}, then bake again; finished parts are kept"
+        if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_disk_full(error)):
+            needed_bytes = self._call_ledger(self.ledger.bake, self.job.bake_id).plan.planned_bytes
+            missing_text = bytes_text(max(1_000_000, needed_bytes - folder_bytes(self._staging)))
+            return f"disk full; free {missing_text}, then bake again; finished parts are kept"
         if isinstance(error, RelumeError):
             return " ".join(str(error).split())
         if type(error).__name__ == "CommClosedError":  # submitting met a closed connection
-            return SCHEDULER_LOST
+            return SCHEDULER_LOST_MESSAGE
         if isinstance(error, MemoryError):
             return "out of memory; take fewer lights or a smaller size, then bake again; finished parts are kept"
         if isinstance(error, OSError):

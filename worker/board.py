@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from relume.errors import DiskFullError, NotFoundError
-from worker.database.faults import AWAY, Complaint
+from worker.database.faults import DATABASE_ERRORS, DatabaseError
 from worker.status import BakeStatus
 
 POLL_S = 0.5
@@ -23,10 +23,10 @@ class Subscription:
         latest: the newest state. is_closed: no change follows: it was closed, as where the bake was deleted.
     """
 
-    def __init__(self, board: StatusBoard, bake_id: str, first: BakeStatus) -> None:
+    def __init__(self, bus: StatusBus, bake_id: str, first: BakeStatus) -> None:
         self.bake_id = bake_id
         self.latest, self.is_closed = first, False
-        self._board = board
+        self._bus = bus
         self._changes: queue.SimpleQueue[BakeStatus | None] = queue.SimpleQueue()
         self._changes.put(first)
 
@@ -52,7 +52,7 @@ class Subscription:
 
     def close(self) -> None:
         """End the subscription; an iterator over it ends too."""
-        self._board.remove(self)
+        self._bus.remove(self)
         self.is_closed = True
         self._changes.put(None)
 
@@ -63,7 +63,7 @@ class Subscription:
         self.close()
 
 
-class StatusBoard:
+class StatusBus:
     """Looks at bakes for all subscriptions: at once when this process changed any, else every half second.
 
     Args:
@@ -75,9 +75,9 @@ class StatusBoard:
         self._lock = threading.Lock()
         self._subscriptions: set[Subscription] = set()
         self._wake = threading.Event()
-        self._closed = False
+        self._is_closed = False
         self._thread: threading.Thread | None = None
-        self._complaint = Complaint(log, "changes of bakes cannot be told")
+        self._database_error = DatabaseError(log, "changes of bakes cannot be told")
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake. Raises NotFoundError."""
@@ -95,13 +95,13 @@ class StatusBoard:
         with self._lock:
             self._subscriptions.discard(subscription)
 
-    def changed(self) -> None:
+    def notify_change(self) -> None:
         """The ledger was changed by this process."""
         self._wake.set()
 
     def close(self) -> None:
         """End all subscriptions and the thread."""
-        self._closed = True
+        self._is_closed = True
         self._wake.set()
         with self._lock:
             subscriptions, thread = list(self._subscriptions), self._thread
@@ -111,7 +111,7 @@ class StatusBoard:
             thread.join()
 
     def _watch(self) -> None:
-        while not self._closed:
+        while not self._is_closed:
             with self._lock:
                 subscriptions = list(self._subscriptions)
             self._wake.wait(POLL_S if subscriptions else None)
@@ -123,39 +123,39 @@ class StatusBoard:
                     for subscription in [s for s in subscriptions if s.bake_id == bake_id]:
                         subscription.close()
                     continue
-                except AWAY as error:
-                    self._complaint.meet(error)
+                except DATABASE_ERRORS as error:
+                    self._database_error.report_failure(error)
                     continue
-                self._complaint.well()
+                self._database_error.report_recovered()
                 for subscription in subscriptions:
                     if subscription.bake_id == bake_id:
                         subscription.put(status)
 
 
-class Hindered:
+class BlockedBake:
     """What hinders bakes that the ledger cannot be told of, as on a full disk, and how far each was then."""
 
     def __init__(self) -> None:
-        self._found: dict[str, tuple[float, str]] = {}
+        self._blocked: dict[str, tuple[float, str]] = {}
 
     def __bool__(self) -> bool:
         """Whether anything does."""
-        return bool(self._found)
+        return bool(self._blocked)
 
-    def meet(self, status: BakeStatus, error: Exception) -> None:
+    def report_blocked(self, status: BakeStatus, error: Exception) -> None:
         """A bake could not be claimed, or could not go on."""
         if isinstance(error, DiskFullError):
-            self._found[status.id] = status.progress, str(error)
+            self._blocked[status.id] = status.progress, str(error)
 
-    def over(self, bake_id: str) -> None:
+    def report_resumed(self, bake_id: str) -> None:
         """It goes on."""
-        self._found.pop(bake_id, None)
+        self._blocked.pop(bake_id, None)
 
-    def told(self, status: BakeStatus) -> BakeStatus:
+    def with_reason(self, status: BakeStatus) -> BakeStatus:
         """A status with what hinders it, unless it has gone on elsewhere."""
-        progress, said = self._found.get(status.id, (status.progress, ""))
+        progress, reason = self._blocked.get(status.id, (status.progress, ""))
         if status.final or status.progress > progress:
-            self.over(status.id)
-        elif said and status.problem is None:
-            return replace(status, problem=f"{said}; the bake goes on by itself")
+            self.report_resumed(status.id)
+        elif reason and status.problem is None:
+            return replace(status, problem=f"{reason}; the bake goes on by itself")
         return status

@@ -12,10 +12,10 @@ from relume.store.room import RESERVE_BYTES
 
 REMEDY = "take fewer lights, a smaller size or fewer views at once"
 
-MEMORY_SHARE = 0.9  # the rest is left for the server's own work and for the system
+MEMORY_FRACTION = 0.9  # the rest is left for the server's own work and for the system
 
 _GROUPS = Path("/sys/fs/cgroup")
-_OWN_GROUPS = Path("/proc/self/cgroup")
+_PROCESS_GROUPS = Path("/proc/self/cgroup")
 
 
 def machine_bytes() -> int:
@@ -29,25 +29,27 @@ def machine_bytes() -> int:
 
 def available_bytes() -> int:
     """Memory that may be taken now: the system's, or what the control group (a container) still allows."""
-    return min([_system_available_bytes(), *(max(0, limit - used) for limit, used in _groups())])
+    return min(
+        [_system_available_bytes(), *(max(0, limit_bytes - used_bytes) for limit_bytes, used_bytes in _groups())]
+    )
 
 
 def _groups() -> list[tuple[int, int]]:
     """Limit and use of memory of this process's control groups that have one, of version 2 and 1, bytes."""
-    found = []
-    for folder, limit, used in _group_folders():
+    limits = []
+    for folder, limit_name, usage_name in _group_folders():
         try:
-            found.append((int((folder / limit).read_text()), int((folder / used).read_text())))
+            limits.append((int((folder / limit_name).read_text()), int((folder / usage_name).read_text())))
         except (OSError, ValueError):  # none there, or "max"
             continue
-    return found
+    return limits
 
 
 def _group_folders() -> list[tuple[Path, str, str]]:
     """Where they may be: in a container the group is the root of what is seen, else it and all above it count."""
-    found = []
+    folders = []
     try:
-        lines = _OWN_GROUPS.read_text().splitlines()
+        lines = _PROCESS_GROUPS.read_text().splitlines()
     except OSError:  # not Linux
         return []
     for line in lines:
@@ -58,9 +60,13 @@ def _group_folders() -> list[tuple[Path, str, str]]:
             root, names = _GROUPS / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes")
         else:
             continue
-        own = root / path.lstrip("/")
-        found += [(folder, *names) for folder in (own, *own.parents) if folder == root or root in folder.parents]
-    return found
+        group_folder = root / path.lstrip("/")
+        folders += [
+            (folder, *names)
+            for folder in (group_folder, *group_folder.parents)
+            if folder == root or root in folder.parents
+        ]
+    return folders
 
 
 def _system_available_bytes() -> int:
@@ -85,11 +91,16 @@ def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
         MemoryBudgetError, DiskBudgetError: it does not fit; the message says what is needed, what there is, and what
             to do.
     """
-    memory = int(available_bytes() * MEMORY_SHARE)
-    needed = (plan.peak_bytes - plan.lone_bytes) * num_processes + plan.lone_bytes
-    if num_processes > 0 and needed > memory:
-        what = f"the memory of this bake in {num_processes} process{'es' if num_processes > 1 else ''}"
-        raise MemoryBudgetError(what, needed, memory, f"{REMEDY}, or a scene of fewer triangles")
-    free, taken = max(0, shutil.disk_usage(data_dir).free - RESERVE_BYTES), plan.planned_bytes + plan.scratch_bytes
-    if taken > free:
-        raise DiskBudgetError("the store of this bake on disk", taken, free, f"free some disk, or {REMEDY}")
+    allowed_bytes = int(available_bytes() * MEMORY_FRACTION)
+    needed_bytes = (plan.peak_bytes - plan.lone_bytes) * num_processes + plan.lone_bytes
+    if num_processes > 0 and needed_bytes > allowed_bytes:
+        label = f"the memory of this bake in {num_processes} process{'es' if num_processes > 1 else ''}"
+        raise MemoryBudgetError(label, needed_bytes, allowed_bytes, f"{REMEDY}, or a scene of fewer triangles")
+    free_disk_bytes, required_disk_bytes = (
+        max(0, shutil.disk_usage(data_dir).free - RESERVE_BYTES),
+        plan.planned_bytes + plan.scratch_bytes,
+    )
+    if required_disk_bytes > free_disk_bytes:
+        raise DiskBudgetError(
+            "the store of this bake on disk", required_disk_bytes, free_disk_bytes, f"free some disk, or {REMEDY}"
+        )

@@ -13,7 +13,7 @@ import dask
 from distributed import Nanny
 
 from relume.errors import ParameterError, PlanError
-from worker.executor import DASK_CONFIG, ONE_THREAD, YIELDING, check_certificates, num_cores
+from worker.executor import DASK_CONFIG, SINGLE_THREAD_ENV, WORKER_PRELOAD, check_certificates, num_cores
 
 log = logging.getLogger(__name__)
 
@@ -40,10 +40,10 @@ def join(scheduler: str, num_processes: int | None = None) -> int:
 
 
 async def _join(scheduler: str, num_processes: int) -> int:
-    asked = asyncio.Event()
+    stop_requested = asyncio.Event()
     loop = asyncio.get_running_loop()
     for name in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(name, asked.set)
+        loop.add_signal_handler(name, stop_requested.set)
     nannies = [_nanny(scheduler) for _ in range(num_processes)]
     async with contextlib.AsyncExitStack() as stack:
         try:
@@ -53,9 +53,9 @@ async def _join(scheduler: str, num_processes: int) -> int:
             raise PlanError(f"the scheduler {scheduler} does not answer ({error}); start it first") from error
         log.info("%d worker processes joined %s", num_processes, scheduler)
         ends = [asyncio.ensure_future(nanny.finished()) for nanny in nannies]  # type: ignore[no-untyped-call]
-        stop = asyncio.ensure_future(asked.wait())
+        stop = asyncio.ensure_future(stop_requested.wait())
         await asyncio.wait([stop, *ends], return_when=asyncio.FIRST_COMPLETED)
-    return 0 if asked.is_set() else 1
+    return 0 if stop_requested.is_set() else 1
 
 
 def _nanny(scheduler: str) -> Nanny:
@@ -65,6 +65,6 @@ def _nanny(scheduler: str) -> Nanny:
         dashboard=False,
         local_directory=tempfile.gettempdir(),
         death_timeout=JOIN_S,
-        env=ONE_THREAD,
-        preload=YIELDING,
+        env=SINGLE_THREAD_ENV,
+        preload=WORKER_PRELOAD,
     )

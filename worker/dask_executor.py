@@ -17,7 +17,7 @@ from relume.errors import RelumeError
 
 
 @dataclass(frozen=True)
-class _Failed:
+class _FailedCall:
     """What a call has raised, on its way back."""
 
     error: Exception
@@ -28,7 +28,7 @@ def _attempt(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
     try:
         return fn(*args, **kwargs)
     except (RelumeError, OSError, MemoryError) as error:
-        return _Failed(error)
+        return _FailedCall(error)
 
 
 class DaskExecutor(Executor):
@@ -45,11 +45,11 @@ class DaskExecutor(Executor):
         """Hand a call out. Its future raises KilledWorker where the worker died, CancelledError where all went away."""
         task = self._client.submit(_attempt, fn, *args, pure=False, **kwargs)
         outcome: Future[Any] = Future()
-        self._client.loop.add_callback(_follow, task, outcome)
+        self._client.loop.add_callback(_forward_outcome, task, outcome)
         return outcome
 
 
-async def _follow(task: Any, outcome: Future[Any]) -> None:
+async def _forward_outcome(task: Any, outcome: Future[Any]) -> None:
     """Give a Dask future's outcome to `outcome`; runs in the client's loop."""
     try:
         result = await task
@@ -59,7 +59,7 @@ async def _follow(task: Any, outcome: Future[Any]) -> None:
     except Exception as error:
         outcome.set_exception(error)
     else:
-        if isinstance(result, _Failed):
+        if isinstance(result, _FailedCall):
             outcome.set_exception(result.error)
         else:
             outcome.set_result(result)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from relume.bake import Plan
 from worker.executor import is_tiny, num_cores
 
-_FAR = 8.0  # times as much work as any that was measured
+_MAX_EXTRAPOLATION = 8.0  # times as much work as any that was measured
 
 
 @dataclass(frozen=True)
-class Finished:
+class CompletedBake:
     """What a finished bake took.
 
     Attributes:
@@ -26,7 +26,7 @@ class Finished:
     crowding: float = 1.0
 
 
-def load_of_machine() -> float:
+def machine_load() -> float:
     """How many threads want to run, the mean of the last minute; 0 where the system does not tell."""
     try:
         return os.getloadavg()[0]
@@ -39,7 +39,9 @@ def crowding(load: float) -> float:
     return max(1.0, load / num_cores())
 
 
-def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crowded: float = 1.0) -> float | None:
+def estimate_seconds(
+    plan: Plan, completed: Sequence[CompletedBake], num_workers: int, load_factor: float = 1.0
+) -> float | None:
     """Wall seconds that a bake will take; None where nothing was measured yet.
 
     A plan counts rays that are never traced: edges that are not there, lights behind the surface, shadows that are
@@ -50,22 +52,22 @@ def seconds_for(plan: Plan, finished: Sequence[Finished], num_workers: int, crow
 
     Args:
         plan: of the bake.
-        finished: bakes that were measured, of any scenes.
+        completed: bakes that were measured, of any scenes.
         num_workers: tasks that run at once.
-        crowded: how many will want each core while it runs.
+        load_factor: how many will want each core while it runs.
     """
-    others = [each for each in finished if each.plan.work_s] if plan.work_s else []
-    finished, work_of = (others, _work_s) if others else (finished, _num_rays)
-    alike = [each for each in finished if is_tiny(each.plan) == is_tiny(plan)] or finished
-    planned = sum(work_of(each.plan) for each in alike)
-    wall_s = sum(each.task_s / each.crowding / (1 if is_tiny(each.plan) else num_workers) for each in alike)
-    if not planned or not wall_s:
+    timed = [bake for bake in completed if bake.plan.work_s] if plan.work_s else []
+    completed, get_work = (timed, _work_s) if timed else (completed, _num_rays)
+    similar = [bake for bake in completed if is_tiny(bake.plan) == is_tiny(plan)] or completed
+    planned_work = sum(get_work(bake.plan) for bake in similar)
+    wall_s = sum(bake.task_s / bake.crowding / (1 if is_tiny(bake.plan) else num_workers) for bake in similar)
+    if not planned_work or not wall_s:
         return None
-    work, most = work_of(plan), max(map(work_of, (each.plan for each in alike)))
-    if work_of is _num_rays or work <= _FAR * most:
-        return crowded * work * wall_s / planned
-    beyond = min(wall_s / planned, 1 / (1 if is_tiny(plan) else num_workers))
-    return crowded * (wall_s / len(alike) + (work - planned / len(alike)) * beyond)
+    work, max_work = get_work(plan), max(map(get_work, (bake.plan for bake in similar)))
+    if get_work is _num_rays or work <= _MAX_EXTRAPOLATION * max_work:
+        return load_factor * work * wall_s / planned_work
+    extra_rate = min(wall_s / planned_work, 1 / (1 if is_tiny(plan) else num_workers))
+    return load_factor * (wall_s / len(similar) + (work - planned_work / len(similar)) * extra_rate)
 
 
 def _work_s(plan: Plan) -> float:

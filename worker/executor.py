@@ -33,10 +33,10 @@ TINY_BAKE_BYTES = 512 << 20  # on disk: points on millions of triangles take lon
 CONNECT_S = 10
 # Shading that somebody waits for is at 5 (`relume.parallel`): at 0, two processes left it a quarter of two cores.
 BAKE_NICE = 10
-YIELDING = ["worker.executor"]  # Dask's name for modules whose `dask_setup` runs in each process
+WORKER_PRELOAD = ["worker.executor"]  # Dask's name for modules whose `dask_setup` runs in each process
 
 # One Python thread per process, so one thread for every library below it.
-ONE_THREAD = dict.fromkeys(
+SINGLE_THREAD_ENV = dict.fromkeys(
     ("RELUME_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 
@@ -51,7 +51,7 @@ DASK_CONFIG: dict[str, Any] = {
     "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
 }
 # Pages that tell whoever connects what runs here.
-NO_PAGES: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+NO_HTTP_ROUTES: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
 
 
 def is_tiny(plan: Plan) -> bool:
@@ -83,16 +83,16 @@ class Executors:
         self.scheduler = scheduler
         self.num_workers = num_workers or num_cores()
         self._lock = threading.Lock()
-        self._here: ThreadPoolExecutor | None = None
+        self._local: ThreadPoolExecutor | None = None
         self._cluster: Any = None
         self._client: Any = None
 
-    def here(self) -> Executor:
+    def local(self) -> Executor:
         """This process, one task at a time; kernels split each task over their own threads."""
         with self._lock:
-            if self._here is None:
-                self._here = ThreadPoolExecutor(1, thread_name_prefix="relume-tiny-bake")
-            return self._here
+            if self._local is None:
+                self._local = ThreadPoolExecutor(1, thread_name_prefix="relume-tiny-bake")
+            return self._local
 
     def cluster(self) -> Executor:
         """The Dask cluster. Raises PlanError where the scheduler does not answer."""
@@ -131,9 +131,9 @@ class Executors:
     def close(self) -> None:
         """Stop what was started; running tasks are abandoned, their shards are whole or absent."""
         with self._lock:
-            if self._here is not None:
-                self._here.shutdown(wait=False, cancel_futures=True)
-                self._here = None
+            if self._local is not None:
+                self._local.shutdown(wait=False, cancel_futures=True)
+                self._local = None
             self._stop_cluster()
 
     def _stop_cluster(self) -> None:
@@ -169,7 +169,7 @@ class Executors:
         for name in ("distributed.scheduler", "distributed.nanny", "distributed.client"):
             # of a process that died the bake speaks itself
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        with _without_interrupts(), dask.config.set(NO_PAGES):
+        with _without_interrupts(), dask.config.set(NO_HTTP_ROUTES):
             self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=self.num_workers,
                 threads_per_worker=1,
@@ -180,8 +180,8 @@ class Executors:
                 dashboard_address="127.0.0.1:0",  # None would take Dask's usual port, and warn where it is taken
                 local_directory=tempfile.gettempdir(),
                 silence_logs=logging.ERROR,
-                env=ONE_THREAD,
-                preload=YIELDING,
+                env=SINGLE_THREAD_ENV,
+                preload=WORKER_PRELOAD,
             )
         return self._cluster
 
@@ -212,9 +212,9 @@ async def _kill_workers(cluster: Any) -> None:
     """
     for nanny in cluster.workers.values():
         nanny.close_gracefully()
-        keeper = nanny.process
-        if keeper is not None and keeper.process is not None:
-            await keeper.process.kill()  # waits its turn behind a start
+        worker_process = nanny.process
+        if worker_process is not None and worker_process.process is not None:
+            await worker_process.process.kill()  # waits its turn behind a start
 
 
 @contextlib.contextmanager
@@ -224,8 +224,8 @@ def _without_interrupts() -> Iterator[None]:
         yield
         return
     resource_tracker.ensure_running()  # starting it unblocks the signal
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)

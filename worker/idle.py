@@ -19,27 +19,27 @@ def idle_seconds() -> float:
 
 
 class IdleTimer:
-    """Calls `forget` once nothing has been at work for `after_s()` seconds; safe to use from several threads."""
+    """Calls `release` once nothing has been at work for `after_s()` seconds; safe to use from several threads."""
 
-    def __init__(self, after_s: Callable[[], float], forget: Callable[[], None]) -> None:
-        self._after_s, self._forget = after_s, forget
+    def __init__(self, after_s: Callable[[], float], release: Callable[[], None]) -> None:
+        self._after_s, self._release = after_s, release
         self._lock = threading.Lock()
-        self._at_work = 0
+        self._num_active = 0
         self._timer: threading.Timer | None = None
 
     @contextmanager
-    def kept_awake(self) -> Iterator[None]:
+    def keep_awake(self) -> Iterator[None]:
         """Nothing is forgotten while the block runs, and for a while after it."""
         with self._lock:
-            self._at_work += 1
+            self._num_active += 1
             self._stop()
         try:
             yield
         finally:
             with self._lock:
-                self._at_work -= 1
-                if self._at_work == 0:
-                    self._timer = threading.Timer(self._after_s(), self._forget)
+                self._num_active -= 1
+                if self._num_active == 0:
+                    self._timer = threading.Timer(self._after_s(), self._release)
                     self._timer.daemon = True
                     self._timer.start()
 

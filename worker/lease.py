@@ -17,7 +17,7 @@ import uuid
 from collections.abc import Callable
 from pathlib import Path
 
-from worker.database.faults import AWAY, Complaint
+from worker.database.faults import DATABASE_ERRORS, DatabaseError
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +28,7 @@ _NONCE = uuid.uuid4().hex
 _numbers = itertools.count()
 
 
-def _place_of_this_process() -> str:
+def _process_location() -> str:
     """The host's name, for people, and what makes it unique: this start of the kernel and the namespace of process
     numbers; the network card's address on systems that say neither."""
     try:
@@ -39,29 +39,29 @@ def _place_of_this_process() -> str:
     return f"{socket.gethostname()}:{boot}:{namespace}".replace("/", "-")
 
 
-_PLACE = _place_of_this_process()
+_LOCATION = _process_location()
 
 
 def new_owner() -> str:
     """A name for a service of this process that no other has."""
-    return f"{_PLACE}/{os.getpid()}/{_NONCE}/{next(_numbers)}"
+    return f"{_LOCATION}/{os.getpid()}/{_NONCE}/{next(_numbers)}"
 
 
 def owner_text(owner: str) -> str:
     """An owner as logs name it: host and process."""
-    place, pid, *_ = owner.split("/")
-    return f"{place.split(':')[0]}, process {pid}"
+    location, pid, *_ = owner.split("/")
+    return f"{location.split(':')[0]}, process {pid}"
 
 
-def log_taken_over(noun: str, identity: str, before: str) -> None:
+def log_taken_over(noun: str, identity: str, previous_owner: str) -> None:
     """Say that this process goes on with what another has left. noun, identity: the work; before: its last owner."""
     log.warning(
-        "%s %s is taken over from %s, which renews its lease no more", noun, identity, owner_text(before),
+        "%s %s is taken over from %s, which renews its lease no more", noun, identity, owner_text(previous_owner),
         extra={"fields": {noun.lower(): identity}},
     )  # fmt: skip
 
 
-def log_lost(noun: str, identity: str) -> None:
+def log_lost_lease(noun: str, identity: str) -> None:
     """Say that this process was paused, or cut off from the database, for longer than its lease. noun, identity: the
     work that it was at."""
     log.warning(
@@ -81,8 +81,8 @@ def is_alive(owner: str, heartbeat: float, now: float) -> bool:
 
 def may_run(owner: str) -> bool:
     """Whether an owner is there, as far as can be known from here: of other machines and containers nothing can."""
-    place, pid, nonce, _ = owner.split("/")
-    if place != _PLACE:
+    location, pid, nonce, _ = owner.split("/")
+    if location != _LOCATION:
         return True
     if int(pid) == os.getpid():
         return nonce == _NONCE
@@ -95,7 +95,7 @@ def may_run(owner: str) -> bool:
     return True
 
 
-class LeaseKeeper:
+class LeaseRenewer:
     """Calls `renew` for the lease of a bake or another work while it runs, also through long steps such as the check
     before publishing.
 
@@ -107,7 +107,7 @@ class LeaseKeeper:
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._run, name="relume-lease", daemon=True)
 
-    def __enter__(self) -> LeaseKeeper:
+    def __enter__(self) -> LeaseRenewer:
         self._thread.start()
         return self
 
@@ -116,10 +116,10 @@ class LeaseKeeper:
         self._thread.join()
 
     def _run(self) -> None:
-        complaint = Complaint(log, f"the lease of {self._work_id} cannot be renewed")
+        database_error = DatabaseError(log, f"the lease of {self._work_id} cannot be renewed")
         while not self._done.wait(HEARTBEAT_S):
             try:
                 self._renew(self._work_id, self._owner)
-                complaint.well()
-            except AWAY as error:  # a database that is away for some seconds costs no lease
-                complaint.meet(error)
+                database_error.report_recovered()
+            except DATABASE_ERRORS as error:  # a database that is away for some seconds costs no lease
+                database_error.report_failure(error)

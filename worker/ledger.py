@@ -25,11 +25,11 @@ from relume.code_version import bake_code
 from relume.errors import NotFoundError
 from worker.database.clock import epoch_s
 from worker.database.models import BakeRow, TaskRow
-from worker.estimate import Finished, crowding, load_of_machine
+from worker.estimate import CompletedBake, crowding, machine_load
 from worker.executor import is_tiny
 from worker.lease import is_alive, log_taken_over
 from worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
-from worker.turns import Waiting
+from worker.turns import WaitingBake
 
 
 class Ledger:
@@ -86,7 +86,7 @@ class Ledger:
         row = self._get(identity)
         if row is None:
             raise NotFoundError(f"there is no bake {identity[:40]}; queue one first")
-        return _status(row, self._ahead([row]))
+        return _status(row, self._queue_positions([row]))
 
     def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
         """All bakes, or those of a scene; newest first."""
@@ -95,16 +95,16 @@ class Ledger:
             query = query.where(BakeRow.scene_id == scene_id)
         with self.sessions() as session:
             rows = list(session.scalars(query))
-        ahead = self._ahead(rows)
-        return [_status(row, ahead) for row in rows]
+        queue_positions = self._queue_positions(rows)
+        return [_status(row, queue_positions) for row in rows]
 
-    def ready(self) -> list[str]:
+    def ready_bakes(self) -> list[str]:
         """Ids of all bakes that are, newest first."""
         query = select(BakeRow.id).where(BakeRow.state == "ready").order_by(BakeRow.created.desc(), BakeRow.id)
         with self.sessions() as session:
             return list(session.scalars(query))
 
-    def _ahead(self, rows: Sequence[BakeRow]) -> dict[str, int]:
+    def _queue_positions(self, rows: Sequence[BakeRow]) -> dict[str, int]:
         """How many bakes will run before each of those that are queued: tiny ones never wait for others, and clients
         have their turns, here as if their shares were equal."""
         if not any(row.state == "queued" for row in rows):
@@ -114,31 +114,31 @@ class Ledger:
         with self.sessions() as session:
             for row in session.scalars(query):
                 lanes[is_tiny(_plan(row.plan))].append(row)
-        return {identity: k for rows in lanes.values() for k, identity in enumerate(_in_turns(rows))}
+        return {identity: k for rows in lanes.values() for k, identity in enumerate(_fair_order(rows))}
 
     def cancel(self, identity: str) -> bool:
         """Cancel a bake that is queued or running; whoever runs it sees that at its next heartbeat."""
         return self._change(identity, ("queued", "running"), state="cancelled", seconds_left=None, phase=None)
 
-    def claimable(self) -> list[Waiting]:
+    def claimable(self) -> list[WaitingBake]:
         """Bakes that wait for somebody to run them, longest waiting first: queued, or left by an owner that is gone."""
         query = select(BakeRow, epoch_s()).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
         with self.sessions() as session:
             rows = [row for row, now in session.execute(query) if not _is_owned(row, now)]
-        return [Waiting(row.id, row.client or "", False, row.queued) for row in rows]
+        return [WaitingBake(row.id, row.client or "", False, row.queued) for row in rows]
 
     def claim(self, identity: str, owner: str) -> bool:
         """Take the lease of a bake and make it running. False where somebody else has it."""
         with self.sessions() as session:
-            found = session.execute(select(BakeRow, epoch_s()).where(BakeRow.id == identity)).first()
-        if found is None or _is_owned(*found):
+            row_and_time = session.execute(select(BakeRow, epoch_s()).where(BakeRow.id == identity)).first()
+        if row_and_time is None or _is_owned(*row_and_time):
             return False
-        row = found[0]
-        unchanged = or_(BakeRow.owner.is_(None), BakeRow.owner == row.owner)
+        row = row_and_time[0]
+        is_unchanged = or_(BakeRow.owner.is_(None), BakeRow.owner == row.owner)
         is_claimed = self._change(
             identity,
             ("queued", "running"),
-            unchanged,
+            is_unchanged,
             state="running",
             owner=owner,
             heartbeat=epoch_s(),
@@ -149,12 +149,12 @@ class Ledger:
             log_taken_over("bake", identity, str(row.owner))
         return is_claimed
 
-    def beat(self, identity: str, owner: str, **progress: float | str | None) -> bool:
+    def heartbeat(self, identity: str, owner: str, **progress: float | str | None) -> bool:
         """Record progress. False where the bake was cancelled or taken over: stop."""
-        mine = BakeRow.owner == owner
-        return self._change(identity, ("running",), mine, heartbeat=epoch_s(), **progress)
+        is_owner = BakeRow.owner == owner
+        return self._change(identity, ("running",), is_owner, heartbeat=epoch_s(), **progress)
 
-    def keep_lease(self, identity: str, owner: str) -> bool:
+    def renew_lease(self, identity: str, owner: str) -> bool:
         """Renew the lease of a bake in whatever state it is. False where somebody else holds it."""
         return self._change(identity, None, BakeRow.owner == owner, heartbeat=epoch_s())
 
@@ -171,10 +171,10 @@ class Ledger:
         Returns:
             As `release`.
         """
-        mine = BakeRow.owner == owner
-        done = {"progress": 1.0, "crowding": crowding(load_of_machine())} if state == "ready" else {}
-        ended = {"problem": problem, "bytes": num_bytes, "seconds_left": None, "phase": None, **done}
-        self._change(identity, ("running",), mine, state=state, **ended)
+        is_owner = BakeRow.owner == owner
+        ready_fields = {"progress": 1.0, "crowding": crowding(machine_load())} if state == "ready" else {}
+        final_fields = {"problem": problem, "bytes": num_bytes, "seconds_left": None, "phase": None, **ready_fields}
+        self._change(identity, ("running",), is_owner, state=state, **final_fields)
         return self.release(identity, owner)
 
     def release(self, identity: str, owner: str) -> bool:
@@ -212,7 +212,7 @@ class Ledger:
             session.merge(row)
         return True
 
-    def forget_tasks(self, identity: str, owner: str | None = None) -> bool:
+    def delete_tasks(self, identity: str, owner: str | None = None) -> bool:
         """Start a bake from nothing: its unfinished store is gone or damaged.
 
         Args:
@@ -227,26 +227,26 @@ class Ledger:
             session.execute(update(BakeRow).where(BakeRow.id == identity).values(progress=0.0))
         return True
 
-    def run(self, identity: str) -> str | None:
+    def get_run(self, identity: str) -> str | None:
         """The name of a bake's beginning."""
         row = self._get(identity)
         return None if row is None else row.run
 
-    def begin_anew(self, identity: str, owner: str, code: str, run: str, why: str | None) -> bool:
+    def restart(self, identity: str, owner: str, code: str, run: str, reason: str | None) -> bool:
         """Start a bake from nothing, under this code.
 
         Args:
             identity: of the bake. owner: the process that runs it. code: that will make all of it.
             run: names this beginning.
-            why: one sentence for people where it had been begun before.
+            reason: one sentence for people where it had been begun before.
         Returns:
             False where somebody else holds the lease, or it was cancelled.
         """
-        if not self.forget_tasks(identity, owner):
+        if not self.delete_tasks(identity, owner):
             return False
-        return self._change(identity, ("running",), BakeRow.owner == owner, code=code, run=run, problem=why)
+        return self._change(identity, ("running",), BakeRow.owner == owner, code=code, run=run, problem=reason)
 
-    def finished_bakes(self, limit: int) -> list[Finished]:
+    def finished_bakes(self, limit: int) -> list[CompletedBake]:
         """What the newest ready bakes took."""
         task_s = func.sum(TaskRow.seconds)
         query = (
@@ -259,7 +259,7 @@ class Ledger:
         )
         with self.sessions() as session:
             rows = list(session.execute(query))
-        return [Finished(_plan(plan), float(seconds), crowded or 1.0) for plan, seconds, crowded in rows]
+        return [CompletedBake(_plan(plan), float(seconds), crowded or 1.0) for plan, seconds, crowded in rows]
 
     def stage_seconds(self, scene_id: str, method: str, num_workers: int, limit: int) -> dict[int, float]:
         """What each stage took of the newest ready bakes of a method, of this scene where there are any.
@@ -273,16 +273,18 @@ class Ledger:
         """
         is_like = BakeRow.recipe.contains(f'"method":{json.dumps(method)}', autoescape=True)
         newest = select(BakeRow.id, BakeRow.scene_id, BakeRow.plan).where(BakeRow.state == "ready", is_like)
-        of_tasks = select(TaskRow.bake_id, TaskRow.stage, func.sum(TaskRow.seconds), func.count())
-        found: dict[int, float] = {}
+        task_query = select(TaskRow.bake_id, TaskRow.stage, func.sum(TaskRow.seconds), func.count())
+        seconds_by_stage: dict[int, float] = {}
         with self.sessions() as session:
             bakes = list(session.execute(newest.order_by(BakeRow.created.desc()).limit(limit)))
-            alike = [bake for bake in bakes if bake[1] == scene_id] or bakes
-            at_once = {bake: 1 if is_tiny(_plan(plan)) else num_workers for bake, _, plan in alike}
-            query = of_tasks.where(TaskRow.bake_id.in_(at_once)).group_by(TaskRow.bake_id, TaskRow.stage)
+            similar = [bake for bake in bakes if bake[1] == scene_id] or bakes
+            num_parallel = {bake: 1 if is_tiny(_plan(plan)) else num_workers for bake, _, plan in similar}
+            query = task_query.where(TaskRow.bake_id.in_(num_parallel)).group_by(TaskRow.bake_id, TaskRow.stage)
             for bake, stage, seconds, count in session.execute(query):
-                found[stage] = found.get(stage, 0.0) + float(seconds) / min(count, at_once[bake])
-        return found
+                seconds_by_stage[stage] = seconds_by_stage.get(stage, 0.0) + float(seconds) / min(
+                    count, num_parallel[bake]
+                )
+        return seconds_by_stage
 
     def _get(self, identity: str) -> BakeRow | None:
         with self.sessions() as session:
@@ -310,7 +312,7 @@ def _is_owned(row: BakeRow, now: float) -> bool:
     return row.owner is not None and is_alive(row.owner, row.heartbeat, now)
 
 
-def _in_turns(rows: Sequence[BakeRow]) -> list[str]:
+def _fair_order(rows: Sequence[BakeRow]) -> list[str]:
     """Ids, those that run first, then each client's first, each one's second, …; `rows` are in the order of coming."""
     counts = Counter[str]()
     ranks = []
@@ -321,16 +323,16 @@ def _in_turns(rows: Sequence[BakeRow]) -> list[str]:
 
 
 def _plan_json(plan: Plan) -> str:
-    kept = asdict(plan)
-    del kept["lone_bytes"]  # of no use any more; an older relume on the same ledger does not know it
-    return json.dumps(kept)
+    document = asdict(plan)
+    del document["lone_bytes"]  # of no use any more; an older relume on the same ledger does not know it
+    return json.dumps(document)
 
 
 def _plan(text: str) -> Plan:
     return Plan(**json.loads(text))
 
 
-def _status(row: BakeRow, ahead: Mapping[str, int]) -> BakeStatus:
+def _status(row: BakeRow, queue_positions: Mapping[str, int]) -> BakeStatus:
     return BakeStatus(
         id=row.id,
         scene=row.scene_id,
@@ -338,7 +340,7 @@ def _status(row: BakeRow, ahead: Mapping[str, int]) -> BakeStatus:
         progress=row.progress,
         phase=cast("Phase | None", row.phase),
         phase_since=row.phase_since if row.phase else None,
-        ahead=ahead.get(row.id, 0) if row.state == "queued" else 0,
+        ahead=queue_positions.get(row.id, 0) if row.state == "queued" else 0,
         rays_per_second=row.rays_per_second,
         seconds_left=row.seconds_left,
         bytes=row.bytes,

@@ -14,11 +14,11 @@ from typing import Any, Literal
 from numba.core import event
 
 from relume.errors import RelumeError
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
-Note = Literal["reading", "building", "compiling", "working"]
+Activity = Literal["reading", "building", "compiling", "working"]
 
-_NOTES: tuple[Note, ...] = ("reading", "building", "compiling", "working")
+_ACTIVITIES: tuple[Activity, ...] = ("reading", "building", "compiling", "working")
 
 
 def note_path(staging: Path) -> Path:
@@ -26,67 +26,67 @@ def note_path(staging: Path) -> Path:
     return staging.with_suffix(".phase")
 
 
-def read_note(staging: Path) -> Note | None:
+def read_note(staging: Path) -> Activity | None:
     """What was noted last; None where nothing was."""
     try:
         text = note_path(staging).read_text()
     except OSError:
         return None
-    return next((note for note in _NOTES if note == text), None)
+    return next((note for note in _ACTIVITIES if note == text), None)
 
 
-def forget_note(staging: Path) -> None:
+def delete_note(staging: Path) -> None:
     """Remove it, where there is one."""
     with suppress(OSError):
         note_path(staging).unlink(missing_ok=True)
 
 
-class Notebook:
+class TaskNotes:
     """Notes of one task; kernels that are compiled meanwhile are noted as well."""
 
     def __init__(self, staging: Path) -> None:
         self._path = note_path(staging)
-        self._latest: Note | None = None
+        self._latest: Activity | None = None
 
-    def note(self, what: Note) -> None:
+    def note(self, activity: Activity) -> None:
         """Say what the process is at. A disk that is full or read-only costs the words alone."""
-        self._latest = what
-        self._write(what)
+        self._latest = activity
+        self._write(activity)
 
-    def _write(self, what: Note) -> None:
-        with suppress(RelumeError), replacing(self._path) as unfinished:
-            unfinished.write_text(what)
+    def _write(self, activity: Activity) -> None:
+        with suppress(RelumeError), atomic_write(self._path) as unfinished:
+            unfinished.write_text(activity)
 
     @contextmanager
     def watching_compiler(self) -> Iterator[None]:
         """While the block runs, kernels that this process compiles are noted."""
-        listener = _Compiling(self)
+        listener = _CompileListener(self)
         event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
         try:
             yield
         finally:
             event.unregister("numba:compile", listener)  # type: ignore[no-untyped-call]
 
-    def compiling(self, is_so: bool) -> None:
+    def set_compiling(self, is_compiling: bool) -> None:
         """A kernel is being compiled, or was: what was noted before goes on."""
-        if is_so:
+        if is_compiling:
             self._write("compiling")
         elif self._latest is not None:
             self._write(self._latest)
 
 
-class _Compiling(event.Listener):
+class _CompileListener(event.Listener):
     """Kernels that call others are compiled with them: the outermost counts."""
 
-    def __init__(self, notes: Notebook) -> None:
+    def __init__(self, notes: TaskNotes) -> None:
         self._notes, self._depth = notes, 0
 
     def on_start(self, event: Any) -> None:
         self._depth += 1
         if self._depth == 1:
-            self._notes.compiling(True)
+            self._notes.set_compiling(True)
 
     def on_end(self, event: Any) -> None:
         self._depth -= 1
         if self._depth == 0:
-            self._notes.compiling(False)
+            self._notes.set_compiling(False)

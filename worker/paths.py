@@ -10,7 +10,7 @@ from relume.errors import NotFoundError
 _ID = re.compile(r"[0-9a-f]{16}")
 
 
-def _checked(identity: str) -> str:
+def _check_id(identity: str) -> str:
     if not _ID.fullmatch(identity):
         raise NotFoundError(f"{identity[:40]!r} is not an id; ids are 16 hexadecimal digits")
     return identity
@@ -18,7 +18,7 @@ def _checked(identity: str) -> str:
 
 def scene_path(data_dir: Path, scene_id: str) -> Path:
     """Folder of a scene. Raises NotFoundError where the id is malformed, as all of these do."""
-    return data_dir / "scenes" / _checked(scene_id)
+    return data_dir / "scenes" / _check_id(scene_id)
 
 
 def materials_path(data_dir: Path) -> Path:
@@ -43,14 +43,14 @@ def images_path(data_dir: Path) -> Path:
 
 def bake_path(data_dir: Path, bake_id: str) -> Path:
     """The published store of a bake."""
-    return data_dir / "bakes" / f"{_checked(bake_id)}.zarr"
+    return data_dir / "bakes" / f"{_check_id(bake_id)}.zarr"
 
 
 def staging_path(data_dir: Path, bake_id: str) -> Path:
     """The store of a bake that is not finished."""
-    return data_dir / "bakes" / "staging" / f"{_checked(bake_id)}.zarr"
+    return data_dir / "bakes" / "staging" / f"{_check_id(bake_id)}.zarr"
 
 
-def scene_of_bake(bake: Path, scene_id: str) -> Path:
+def scene_path_of_bake(bake: Path, scene_id: str) -> Path:
     """Folder of the scene that a published store was baked of, in the same data directory."""
     return scene_path(bake.parents[1], scene_id)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from relume.bake import Recipe
 from relume.errors import PlanError
-from worker.status import MOVING
+from worker.status import FREE_CAMERA_METHODS
 
 _STEP = 16  # pixels: widths are multiples of it
 PresetName = Literal["preview", "good", "final"]
@@ -21,7 +21,7 @@ class Preset:
     size: tuple[int, int]
     num_lights: int
 
-    def shaped(self, aspect: float) -> tuple[int, int]:
+    def fit_aspect(self, aspect: float) -> tuple[int, int]:
         """Width and height of about as many pixels. aspect: width ÷ height."""
         width = max(_STEP, _STEP * round(math.sqrt(math.prod(self.size) * aspect) / _STEP))
         return width, max(_STEP, round(width / aspect))
@@ -34,12 +34,12 @@ PRESETS: dict[PresetName, Preset] = {
 }
 
 
-def points_of(method: str, asked: int | None) -> int:
+def resolve_num_points(method: str, requested: int | None) -> int:
     """The `num_points` of a recipe; as many as usual where no number is asked for.
 
     Raises:
         PlanError: a number is asked for, and the method's eyes do not move.
     """
-    if asked is not None and method not in MOVING:
-        raise PlanError(f"{asked} points were asked for; method {method} has none, leave them out")
-    return asked or Recipe.num_points
+    if requested is not None and method not in FREE_CAMERA_METHODS:
+        raise PlanError(f"{requested} points were asked for; method {method} has none, leave them out")
+    return requested or Recipe.num_points

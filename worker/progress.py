@@ -11,25 +11,25 @@ from relume.bake import Plan, Task
 from worker.status import TaskCost
 
 # Between two finished tasks the bar moves on at the rate so far, but never past this part of the next task.
-FORESIGHT = 0.9
+MAX_EXTRAPOLATION = 0.9
 # Once so much of a bake is done, its time left follows from its own rate alone; before, also from what others took.
-EVIDENCE = 0.08
+FULL_TRUST_FRACTION = 0.08
 # Before so much of a bake is done, nobody can say how long the rest takes: others' bakes were of other scenes.
-SAID_FROM = 0.1
+MIN_ESTIMATE_FRACTION = 0.1
 
 
 @dataclass(frozen=True)
-class Expected:
+class ExpectedWork:
     """What finished bakes tell of one that begins.
 
     Attributes:
         seconds: that it will take, None where nothing is known.
-        shares: of each stage in its time, None where that is not known.
+        stage_fractions: of each stage in its time, None where that is not known.
         parallel: tasks that run at once.
     """
 
     seconds: float | None = None
-    shares: Sequence[float] | None = None
+    stage_fractions: Sequence[float] | None = None
     parallel: int = 1
 
 
@@ -44,20 +44,20 @@ class Progress:
     def __init__(
         self,
         plan: Plan,
-        shown: float = 0.0,
-        expected: Expected | None = None,
+        initial: float = 0.0,
+        expected_work: ExpectedWork | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """
         Args:
-            shown: what people have seen already, before an interruption.
+            initial: what people have seen already, before an interruption.
             clock: seconds.
         """
-        self._clock, self._expected = clock, expected or Expected()
+        self._clock, self._expected_work = clock, expected_work or ExpectedWork()
         self._num_rays = max(1, plan.num_rays)
         self._rays, self._stage = 0, -1
         self._done = self._base = self._span = 0.0
-        self._shown = shown
+        self._displayed = initial
         self._total = self._largest = 0
         self._is_measurable = self._is_working = False
         self._parallel = 1
@@ -65,21 +65,21 @@ class Progress:
 
     def begin_stage(self, tasks: Collection[Task], last: bool) -> None:
         """Note the tasks of a stage."""
-        shares = self._expected.shares
+        stage_fractions = self._expected_work.stage_fractions
         self._stage += 1
         weights = [_weight(task) for task in tasks]
         self._total, self._largest = sum(weights), max(weights, default=0)
-        if shares is not None:
-            self._base, self._span = sum(shares[: self._stage]), shares[self._stage]
+        if stage_fractions is not None:
+            self._base, self._span = sum(stage_fractions[: self._stage]), stage_fractions[self._stage]
             self._done = self._base
         elif last:
             self._base, self._span = self._done, 1 - self._done
         else:
             self._span = 0.0
         self._is_measurable = self._span > 0 and self._total > 0
-        self._parallel = max(1, min(self._expected.parallel, len(tasks)))
-        self._num_here, self._task_s, self._stage_began = 0, 0.0, self._clock()
-        if shares is None or not self._gained:
+        self._parallel = max(1, min(self._expected_work.parallel, len(tasks)))
+        self._num_local, self._task_s, self._stage_began = 0, 0.0, self._clock()
+        if stage_fractions is None or not self._gain:
             self._restart()
 
     def begin_work(self) -> None:
@@ -89,26 +89,26 @@ class Progress:
 
     def _restart(self) -> None:
         self._began = self._last = self._stage_began = self._clock()
-        self._rays_here, self._num_here, self._gained, self._task_s = 0, 0, 0.0, 0.0
+        self._local_rays, self._num_local, self._gain, self._task_s = 0, 0, 0.0, 0.0
 
-    def add(self, task: Task, cost: TaskCost, here: bool) -> None:
+    def add(self, task: Task, cost: TaskCost, is_local: bool) -> None:
         """Count a finished task.
 
         Args:
             task: that is done. cost: seconds and rays of it.
-            here: it was done in this run, not in one before an interruption.
+            is_local: it was done in this run, not in one before an interruption.
         """
-        before = self._done
+        previous = self._done
         self._rays += cost.rays
         if self._is_measurable:
             self._done += self._span * _weight(task) / self._total
-        elif self._expected.shares is None:
+        elif self._expected_work.stage_fractions is None:
             self._done = min(0.5, self._rays / self._num_rays)
-        if here:
-            self._rays_here += cost.rays
-            self._gained += self._done - before
+        if is_local:
+            self._local_rays += cost.rays
+            self._gain += self._done - previous
             self._task_s += cost.seconds
-            self._num_here += 1
+            self._num_local += 1
             self._is_working = True
             self._last = self._clock()
 
@@ -118,25 +118,25 @@ class Progress:
         since_s, worked_s = self._clock() - self._last, self._last - self._began
         per_second = self._rate()
         if per_second:
-            step = FORESIGHT * self._span * self._largest / max(1, self._total)
-            self._shown = max(self._shown, min(1.0, self._done + min(step, per_second * since_s)))
-        self._shown = max(self._shown, self._done)
+            step = MAX_EXTRAPOLATION * self._span * self._largest / max(1, self._total)
+            self._displayed = max(self._displayed, min(1.0, self._done + min(step, per_second * since_s)))
+        self._displayed = max(self._displayed, self._done)
         return {
-            "progress": min(1.0, self._shown),
-            "rays_per_second": self._rays_here / max(1e-3, worked_s) if self._rays_here else None,
-            "seconds_left": self._seconds_left(per_second, since_s) if per_second and self._is_said else None,
+            "progress": min(1.0, self._displayed),
+            "rays_per_second": self._local_rays / max(1e-3, worked_s) if self._local_rays else None,
+            "seconds_left": self._remaining_s(per_second, since_s) if per_second and self._has_estimate else None,
         }
 
     @property
-    def _is_said(self) -> bool:
-        return self._done >= SAID_FROM
+    def _has_estimate(self) -> bool:
+        return self._done >= MIN_ESTIMATE_FRACTION
 
-    def _seconds_left(self, per_second: float, since_s: float) -> float:
+    def _remaining_s(self, per_second: float, since_s: float) -> float:
         """At a rate; but at least as many as where all tasks in hand ended just now."""
-        in_hand = self._span * min(1.0, self._parallel * self._largest / max(1, self._total))
-        gained = self._gained + in_hand
-        least = (1 - self._done - in_hand) * (self._clock() - self._began) / gained if gained else 0.0
-        return max(0.0, least, (1 - self._done) / per_second - since_s)
+        in_progress = self._span * min(1.0, self._parallel * self._largest / max(1, self._total))
+        gain = self._gain + in_progress
+        lower_bound = (1 - self._done - in_progress) * (self._clock() - self._began) / gain if gain else 0.0
+        return max(0.0, lower_bound, (1 - self._done) / per_second - since_s)
 
     def _rate(self) -> float | None:
         """Share of the bake that is done in a second; None where nothing tells.
@@ -145,14 +145,14 @@ class Progress:
         """
         if not self._is_measurable:
             return None
-        observed = self._gained / max(1e-3, self._worked_s()) if self._gained else None
-        if not self._expected.seconds or not self._is_working:
-            return observed
-        expected = 1 / self._expected.seconds
-        if observed is None:
-            return expected
-        trust = min(1.0, self._gained / EVIDENCE)
-        return math.exp(trust * math.log(observed) + (1 - trust) * math.log(expected))
+        observed_rate = self._gain / max(1e-3, self._worked_s()) if self._gain else None
+        if not self._expected_work.seconds or not self._is_working:
+            return observed_rate
+        expected_rate = 1 / self._expected_work.seconds
+        if observed_rate is None:
+            return expected_rate
+        trust = min(1.0, self._gain / FULL_TRUST_FRACTION)
+        return math.exp(trust * math.log(observed_rate) + (1 - trust) * math.log(expected_rate))
 
     def _worked_s(self) -> float:
         """Seconds that the finished tasks took, all together.
@@ -161,9 +161,9 @@ class Progress:
         of all for one alone.
         """
         wall_s, parallel = self._last - self._stage_began, self._parallel
-        of_finished = wall_s * self._num_here / max(1, self._num_here + parallel - 1)
-        of_stage = min(wall_s, max(self._task_s / parallel, of_finished))
-        return max(0.0, self._stage_began - self._began) + max(0.0, of_stage)
+        finished_s = wall_s * self._num_local / max(1, self._num_local + parallel - 1)
+        stage_s = min(wall_s, max(self._task_s / parallel, finished_s))
+        return max(0.0, self._stage_began - self._began) + max(0.0, stage_s)
 
 
 def _weight(task: Task) -> int:

@@ -10,24 +10,24 @@ import uuid
 from contextlib import suppress
 from pathlib import Path
 
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 
-def begin_run(staging: Path) -> str:
+def start_run(staging: Path) -> str:
     """Name a beginning, beside the unfinished store that it will be in."""
     run = uuid.uuid4().hex
-    name_run(staging, run)
+    set_run(staging, run)
     return run
 
 
-def name_run(staging: Path, run: str) -> None:
+def set_run(staging: Path, run: str) -> None:
     """Say which beginning an unfinished store is of."""
     staging.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(_path(staging)) as unfinished:
+    with atomic_write(_path(staging)) as unfinished:
         unfinished.write_text(run)
 
 
-def run_of(staging: Path) -> str | None:
+def get_run(staging: Path) -> str | None:
     """The name; None where there is none, or from before there were any."""
     try:
         return _path(staging).read_text()
@@ -35,7 +35,7 @@ def run_of(staging: Path) -> str | None:
         return None
 
 
-def forget_run(staging: Path) -> None:
+def delete_run(staging: Path) -> None:
     """Remove the name, where there is one."""
     with suppress(OSError):
         _path(staging).unlink(missing_ok=True)

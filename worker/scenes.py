@@ -15,16 +15,16 @@ from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
 from relume.errors import DiskFullError, NotFoundError
-from relume.remarks import Remark, remark_of
+from relume.remarks import ImportRemark, warning_of
 from relume.replacing import remove_folder
 from relume.scene.archive import save_scene
 from relume.scene.model import Scene
-from relume.scene.projected import are_projected
+from relume.scene.projected import find_triplanar
 from worker.database.models import CameraRow, SceneRow
 from worker.ledger import Ledger
 from worker.paths import bake_path, scene_path, staging_path
-from worker.runs import forget_run
-from worker.storage import forget, push
+from worker.runs import delete_run
+from worker.storage import delete_remote, push
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class SceneRecord:
     created: float
     views: tuple[str, ...]
     materials: tuple[dict[str, Any], ...]
-    warnings: tuple[Remark, ...]
+    warnings: tuple[ImportRemark, ...]
     num_triangles: int
     variants: dict[str, dict[str, Any]]
     lights: tuple[str, ...] = ()
@@ -62,11 +62,11 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
         The scene's id.
     """
     save_scene(scene, scene_path(data_dir, scene.id))
-    enter_scene(data_dir, ledger, scene.id, summary_of(scene))
+    insert_scene(data_dir, ledger, scene.id, summarize_scene(scene))
     return scene.id
 
 
-def summary_of(scene: Scene) -> dict[str, Any]:
+def summarize_scene(scene: Scene) -> dict[str, Any]:
     """What lists show of a scene, its name too."""
     return {
         "name": scene.name,
@@ -76,25 +76,25 @@ def summary_of(scene: Scene) -> dict[str, Any]:
             {
                 "name": material.name,
                 "terms": list(material.terms),
-                "catcher": material.catcher,
-                "is_projected": is_projected,
+                "catcher": material.shadow_catcher,
+                "is_projected": is_triplanar,
                 "is_glass": material.glass is not None,
             }
-            for material, is_projected in zip(scene.materials, are_projected(scene), strict=True)
+            for material, is_triplanar in zip(scene.materials, find_triplanar(scene), strict=True)
         ],
-        "warnings": [remark.document() for remark in scene.warnings],
+        "warnings": [warning.document() for warning in scene.warnings],
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
     }
 
 
-def enter_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[str, Any]) -> None:
+def insert_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[str, Any]) -> None:
     """List a scene whose files are in their place.
 
     Args:
         data_dir: where scenes are kept. ledger: where they are listed.
-        scene_id: of the scene. summary: of it, see `summary_of`.
+        scene_id: of the scene. summary: of it, see `summarize_scene`.
     """
     push(scene_path(data_dir, scene_id))
     row = SceneRow(id=scene_id, name=summary["name"], created=time.time(), summary=json.dumps(summary))
@@ -103,8 +103,8 @@ def enter_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[
             session.add(row)
     except IntegrityError:
         with ledger.sessions.begin() as session:
-            if (known := session.get(SceneRow, scene_id)) is not None:
-                known.name, known.summary = summary["name"], json.dumps(summary)
+            if (existing := session.get(SceneRow, scene_id)) is not None:
+                existing.name, existing.summary = summary["name"], json.dumps(summary)
 
 
 def list_scenes(ledger: Ledger) -> list[SceneRecord]:
@@ -133,13 +133,13 @@ def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
     """
     get_scene(ledger, scene_id)
     delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
-    while not _strike_scene(ledger, scene_id):  # somebody has asked for a bake of it meanwhile
+    while not _delete_scene_row(ledger, scene_id):  # somebody has asked for a bake of it meanwhile
         delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
-    forget(scene_path(data_dir, scene_id))
+    delete_remote(scene_path(data_dir, scene_id))
     _remove(scene_path(data_dir, scene_id))
 
 
-def _strike_scene(ledger: Ledger, scene_id: str) -> bool:
+def _delete_scene_row(ledger: Ledger, scene_id: str) -> bool:
     """Whether a scene is in the ledger no more; false where there is a bake or a camera of it."""
     try:
         with ledger.sessions.begin() as session:
@@ -158,16 +158,16 @@ def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
         ids: of bakes; those that run are cancelled.
     """
     try:
-        _strike(ledger, ids)
+        _delete_bake_rows(ledger, ids)
     except DiskFullError:  # to delete takes room, too: theirs
         _remove_stores(data_dir, ids)
-        _strike(ledger, ids)
+        _delete_bake_rows(ledger, ids)
     for identity in ids:
-        forget(bake_path(data_dir, identity))
+        delete_remote(bake_path(data_dir, identity))
     _remove_stores(data_dir, ids)
 
 
-def _strike(ledger: Ledger, ids: Sequence[str]) -> None:
+def _delete_bake_rows(ledger: Ledger, ids: Sequence[str]) -> None:
     for identity in ids:
         ledger.cancel(identity)
     ledger.delete_bakes(ids)
@@ -177,7 +177,7 @@ def _remove_stores(data_dir: Path, ids: Sequence[str]) -> None:
     for identity in ids:
         _remove(bake_path(data_dir, identity))
         shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
-        forget_run(staging_path(data_dir, identity))
+        delete_run(staging_path(data_dir, identity))
 
 
 def _remove(store: Path) -> None:
@@ -194,7 +194,7 @@ def _record(row: SceneRow) -> SceneRecord:
         created=row.created,
         views=tuple(summary["views"]),
         materials=tuple(summary["materials"]),
-        warnings=tuple(remark_of(warning) for warning in summary["warnings"]),
+        warnings=tuple(warning_of(warning) for warning in summary["warnings"]),
         num_triangles=summary["num_triangles"],
         variants=summary.get("variants", {}),  # rows of before there were any
         lights=tuple(summary.get("lights", ())),

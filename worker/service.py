@@ -17,35 +17,35 @@ from sqlalchemy.exc import SQLAlchemyError
 from relume.bake import BakeMethod, Plan, Recipe
 from relume.code_version import bake_code
 from relume.errors import NotFoundError, ParameterError, StorageError
-from relume.store import code_of
+from relume.store import read_code
 from worker.backup.restore import refuse_unfinished
 from worker.bake import BakeRunner, check_published
-from worker.board import Hindered, StatusBoard, Subscription
+from worker.board import BlockedBake, StatusBus, Subscription
 from worker.budget import check_budget
 from worker.database import open_database
-from worker.database.faults import Complaint
-from worker.estimate import crowding, load_of_machine, seconds_for
+from worker.database.faults import DatabaseError
+from worker.estimate import crowding, estimate_seconds, machine_load
 from worker.executor import Executors, is_tiny
 from worker.idle import idle_seconds
 from worker.lease import new_owner
 from worker.ledger import Ledger
-from worker.notes import forget_note
+from worker.notes import delete_note
 from worker.paths import bake_path, scene_path
-from worker.progress import Expected
-from worker.runs import forget_run, run_of
+from worker.progress import ExpectedWork
+from worker.runs import delete_run, get_run
 from worker.status import BakeStatus, bake_id
-from worker.storage import configured, is_elsewhere, push
-from worker.storage.parts import forget_parts
-from worker.tasks import Job, idle_timer, scene_of
-from worker.turns import Turns
+from worker.storage import get_storage, is_in_storage, push
+from worker.storage.parts import delete_partial
+from worker.tasks import Job, idle_timer, load_registered_scene
+from worker.turns import FairShare
 
 log = logging.getLogger(__name__)
 
 POLL_S = 1.0
 CLOSE_S = 10.0
-KEPT_S = 7 * 86_400.0  # what a failed or cancelled bake has finished, for whoever asks for it again
+STOPPED_RETENTION_S = 7 * 86_400.0  # what a failed or cancelled bake has finished, for whoever asks for it again
 START_S = 8.0  # until worker processes are at work, where none has been started yet: measured on two cores
-NUM_JUDGED_BY = 8  # finished bakes that an estimate looks at
+NUM_REFERENCE_BAKES = 8  # finished bakes that an estimate looks at
 
 
 class BakeService:
@@ -58,7 +58,7 @@ class BakeService:
         scheduler: str | None = None,
         num_workers: int | None = None,
         methods: Mapping[str, BakeMethod] | None = None,
-        shares: Mapping[str, float] | None = None,
+        client_weights: Mapping[str, float] | None = None,
     ) -> None:
         """
         Args:
@@ -67,9 +67,9 @@ class BakeService:
             scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
             num_workers: processes of the embedded cluster; None: one per core.
             methods: what can be baked, by name; None: relume's registry.
-            shares: of some clients, see `worker.turns.Turns`.
+            client_weights: of some clients, see `worker.turns.Turns`.
         """
-        configured()  # what is wrong with its address is said before anything runs
+        get_storage()  # what is wrong with its address is said before anything runs
         bake_code()  # of what runs now: its files may be exchanged while it does
         self.data_dir = data_dir.resolve()
         self.data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -77,41 +77,41 @@ class BakeService:
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
         self._methods = methods
         self._executors = Executors(scheduler, num_workers)
-        self._hindered = Hindered()
-        self._board = StatusBoard(self.get)
-        self._complaints = {
-            tiny: Complaint(log, f"the queue of {kind} cannot be worked on")
+        self._blocked_bakes = BlockedBake()
+        self._status_bus = StatusBus(self.get)
+        self._database_errors = {
+            tiny: DatabaseError(log, f"the queue of {kind} cannot be worked on")
             for tiny, kind in ((False, "bakes"), (True, "small bakes"))
         }
         self._owner = new_owner()
         self._closing = threading.Event()
         self._is_crowding = threading.Event()
         self._start_s = START_S
-        self._turns = {is_tiny_lane: Turns(shares or {}) for is_tiny_lane in (True, False)}
+        self._fair_shares = {is_tiny_lane: FairShare(client_weights or {}) for is_tiny_lane in (True, False)}
         self._wakes = {True: threading.Event(), False: threading.Event()}
         self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
         """Start running bakes: those in the queue, and those that a process left behind when it died."""
-        self._remove_strays()
+        self._delete_orphans()
         for tiny in (True, False):
             name = "relume-tiny-bakes" if tiny else "relume-bakes"
             self._threads.append(threading.Thread(target=self._run_lane, args=(tiny,), name=name, daemon=True))
             self._threads[-1].start()
 
-        if configured() is not None:
+        if get_storage() is not None:
             self._threads.append(threading.Thread(target=self._store_all, name="relume-storage", daemon=True))
             self._threads[-1].start()
 
     def close(self) -> None:
         """Stop running bakes; an unfinished one continues at the next start."""
         self._closing.set()
-        self._changed()
+        self._notify_change()
         for thread in self._threads:
             thread.join(CLOSE_S)
         self._executors.close()
         idle_timer.end()
-        self._board.close()
+        self._status_bus.close()
         self.ledger.close()
 
     def __enter__(self) -> BakeService:
@@ -131,14 +131,14 @@ class BakeService:
             PlanError: the recipe does not fit the scene; MemoryBudgetError: it does not fit the machine.
             ParameterError: there is no such method.
         """
-        from relume.methods.disk import disk_of
+        from relume.methods.disk import estimate_disk
 
-        identity = self._known_scene(scene_id)
-        with idle_timer.kept_awake():
-            scene = recipe.seen(scene_of(self.data_dir, identity))
+        identity = self._resolve_scene_id(scene_id)
+        with idle_timer.keep_awake():
+            scene = recipe.add_cameras(load_registered_scene(self.data_dir, identity))
             method = self._method(recipe.method)
             plan = method.plan(scene, recipe)
-            disk = disk_of(method, scene, recipe, plan)
+            disk = estimate_disk(method, scene, recipe, plan)
         plan = replace(plan, disk_bytes=disk.store, scratch_bytes=disk.scratch)
         processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
         check_budget(plan, self.data_dir, processes)
@@ -154,41 +154,41 @@ class BakeService:
         if self._is_ready(identity):
             return identity
         self.ledger.submit(scene_id, recipe, self.plan(scene_id, recipe), client)
-        self._changed()
+        self._notify_change()
         return identity
 
     def get(self, bake_id: str) -> BakeStatus:
         """A bake. Raises NotFoundError."""
-        return self._hindered.told(self.ledger.bake(bake_id))
+        return self._blocked_bakes.with_reason(self.ledger.bake(bake_id))
 
     def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
         """All bakes, or those of a scene; newest first."""
-        return [self._hindered.told(status) for status in self.ledger.bakes(scene_id)]
+        return [self._blocked_bakes.with_reason(status) for status in self.ledger.bakes(scene_id)]
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake, whichever process runs it. Raises NotFoundError."""
-        return self._board.subscribe(bake_id)
+        return self._status_bus.subscribe(bake_id)
 
     def cancel(self, bake_id: str) -> bool:
         """Cancel a bake; finished tasks are kept for a resume. False where it is not under way: it stays as it is."""
         self.get(bake_id)
-        is_cancelled = self.ledger.cancel(bake_id)
-        self._changed()
-        return is_cancelled
+        is_canceled = self.ledger.cancel(bake_id)
+        self._notify_change()
+        return is_canceled
 
-    def forget(self, bake_id: str) -> None:
+    def delete(self, bake_id: str) -> None:
         """Delete a bake in whatever state it is, with its store. Raises NotFoundError, StorageError."""
         from worker.scenes import delete_bakes
 
         self.get(bake_id)
         delete_bakes(self.data_dir, self.ledger, [bake_id])
-        self._changed()
+        self._notify_change()
 
     def store_path(self, bake_id: str) -> Path:
         """Where the published store of a bake lies. Raises NotFoundError where the id is malformed."""
         return bake_path(self.data_dir, bake_id)
 
-    def seconds_for(self, plan: Plan) -> float | None:
+    def estimate_seconds(self, plan: Plan) -> float | None:
         """Seconds that a bake will take, by those that took place here; None where there were none.
 
         Processes that have to be started for it, and to load the kernels, are part of it.
@@ -199,24 +199,24 @@ class BakeService:
 
     def _work_s(self, plan: Plan) -> float | None:
         """Seconds from the first task's begin on."""
-        load = load_of_machine()
+        load = machine_load()
         if is_tiny(plan) or not self._is_crowding.is_set():  # else a bake that ends before this one is counted already
             load += self._executors.num_workers
-        finished = self.ledger.finished_bakes(NUM_JUDGED_BY)
-        return seconds_for(plan, finished, self._executors.num_workers, crowding(load))
+        completed = self.ledger.finished_bakes(NUM_REFERENCE_BAKES)
+        return estimate_seconds(plan, completed, self._executors.num_workers, crowding(load))
 
-    def _expected(self, status: BakeStatus, parallel: int) -> Expected:
+    def _expect_work(self, status: BakeStatus, parallel: int) -> ExpectedWork:
         method = self._method(status.recipe.method)
-        seconds = self.ledger.stage_seconds(status.scene, method.name, self._executors.num_workers, NUM_JUDGED_BY)
+        seconds = self.ledger.stage_seconds(status.scene, method.name, self._executors.num_workers, NUM_REFERENCE_BAKES)
         total, stages = sum(seconds.values()), range(len(method.stages))
-        shares = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
-        return Expected(self._work_s(status.plan), shares, parallel)
+        stage_fractions = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
+        return ExpectedWork(self._work_s(status.plan), stage_fractions, parallel)
 
     def workers_resident_bytes(self) -> int:
         """Memory of the worker processes that this service has started."""
         return self._executors.resident_bytes()
 
-    def _known_scene(self, scene_id: str) -> str:
+    def _resolve_scene_id(self, scene_id: str) -> str:
         from worker.scenes import get_scene
 
         return get_scene(self.ledger, scene_id).id
@@ -238,76 +238,76 @@ class BakeService:
             return False
         if state != "ready":
             return False
-        if check_published(self.store_path(identity)) or is_elsewhere(self.store_path(identity)):
+        if check_published(self.store_path(identity)) or is_in_storage(self.store_path(identity)):
             return True
-        self.ledger.forget_tasks(identity)
+        self.ledger.delete_tasks(identity)
         self.ledger.requeue(identity, ("ready",))
         return False
 
-    def _changed(self) -> None:
-        self._board.changed()
+    def _notify_change(self) -> None:
+        self._status_bus.notify_change()
         for wake in self._wakes.values():
             wake.set()
 
     def _run_lane(self, tiny: bool) -> None:
         """Run bakes one after another. Tiny ones have a lane of their own: a preview never waits for a long bake."""
-        at_work_s = time.monotonic()
+        last_active_s = time.monotonic()
         while not self._closing.is_set():
             try:
                 self._wakes[tiny].clear()
                 has_run = self._run_next(tiny)
-                if has_run or not self._hindered:  # a bake that waits for its own lease says nothing of the disk
-                    self._complaints[tiny].well()
+                if has_run or not self._blocked_bakes:  # a bake that waits for its own lease says nothing of the disk
+                    self._database_errors[tiny].report_recovered()
                 if has_run:
-                    at_work_s = time.monotonic()
+                    last_active_s = time.monotonic()
                     continue
-                if not tiny and time.monotonic() - at_work_s > idle_seconds():
+                if not tiny and time.monotonic() - last_active_s > idle_seconds():
                     self._executors.stop_cluster()
                 self._wakes[tiny].wait(POLL_S)
             except Exception as error:  # the database may be away for a while; the lane must outlive that
-                self._complaints[tiny].meet(error)
+                self._database_errors[tiny].report_failure(error)
                 self._closing.wait(POLL_S)
 
     def _run_next(self, tiny: bool) -> bool:
-        turns = self._turns[tiny]
-        for work in turns.order(self.ledger.claimable()):
-            status = self.ledger.bake(work.id)
+        fair_share = self._fair_shares[tiny]
+        for waiting_bake in fair_share.sort(self.ledger.claimable()):
+            status = self.ledger.bake(waiting_bake.id)
             try:
-                if is_tiny(status.plan) == tiny and self.ledger.claim(work.id, self._owner):
-                    self._hindered.over(work.id)
-                    turns.take(work.client)
+                if is_tiny(status.plan) == tiny and self.ledger.claim(waiting_bake.id, self._owner):
+                    self._blocked_bakes.report_resumed(waiting_bake.id)
+                    fair_share.pick_next(waiting_bake.client)
                     self._run(status, tiny)
                     return True
             except Exception as error:
-                self._hindered.meet(self.ledger.bake(work.id), error)
+                self._blocked_bakes.report_blocked(self.ledger.bake(waiting_bake.id), error)
                 raise
         return False
 
     def _run(self, status: BakeStatus, tiny: bool) -> None:
-        self._board.changed()
-        began, is_cold = time.monotonic(), not self._executors.has_cluster
+        self._status_bus.notify_change()
+        start_s, is_cold = time.monotonic(), not self._executors.has_cluster
         try:
             method = self._method(status.recipe.method)
-            expected = self._expected(status, 1 if tiny else self._executors.num_workers)
+            expected_work = self._expect_work(status, 1 if tiny else self._executors.num_workers)
             if not tiny:
-                self.ledger.beat(status.id, self._owner, phase="starting", phase_since=time.time())
-                self._board.changed()
-            executor = self._executors.here() if tiny else self._executors.cluster()
+                self.ledger.heartbeat(status.id, self._owner, phase="starting", phase_since=time.time())
+                self._status_bus.notify_change()
+            executor = self._executors.local() if tiny else self._executors.cluster()
         except SQLAlchemyError:  # its lease runs out, and it is claimed again
             raise
         except Exception as error:
             self.ledger.finish(status.id, self._owner, "failed", str(error))
-            self._board.changed()
+            self._status_bus.notify_change()
             return
         runner = BakeRunner(
             ledger=self.ledger,
             job=Job(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
             owner=self._owner,
             executor=executor,
-            window=(lambda: 1) if tiny else (lambda: 2 * self._executors.cluster_threads()),
-            changed=self._board.changed,
-            stopped=self._closing.is_set,
-            expected=expected,
+            max_in_flight=(lambda: 1) if tiny else (lambda: 2 * self._executors.cluster_threads()),
+            on_change=self._status_bus.notify_change,
+            is_stopped=self._closing.is_set,
+            expected_work=expected_work,
         )
         if tiny:
             runner.run()
@@ -318,39 +318,45 @@ class BakeService:
         finally:
             self._is_crowding.clear()
         if is_cold and runner.working_since is not None:
-            self._start_s = runner.working_since - began
+            self._start_s = runner.working_since - start_s
 
     def _store_all(self) -> None:
         """Store what is here and not in the storage: from before there was one, or from while it was away."""
         try:
             statuses = self.ledger.bakes()
-            scenes = [scene_path(self.data_dir, scene) for scene in dict.fromkeys(one.scene for one in statuses)]
-            ready = [bake_path(self.data_dir, status.id) for status in statuses if status.state == "ready"]
-            for path in (path for path in (*scenes, *ready) if path.exists()):
+            scenes = [scene_path(self.data_dir, scene) for scene in dict.fromkeys(bake.scene for bake in statuses)]
+            ready_paths = [bake_path(self.data_dir, status.id) for status in statuses if status.state == "ready"]
+            for path in (path for path in (*scenes, *ready_paths) if path.exists()):
                 if self._closing.is_set():
                     return
                 push(path)
         except Exception as error:  # bakes go on
-            Complaint(log, "what is in the data directory cannot be put into the object storage").meet(error)
+            DatabaseError(log, "what is in the data directory cannot be put into the object storage").report_failure(
+                error
+            )
 
-    def _remove_strays(self) -> None:
+    def _delete_orphans(self) -> None:
         """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again, and those
         of bakes that were stopped and not asked for again for long."""
-        found = list((self.data_dir / "bakes" / "staging").glob("*.zarr"))
+        folders = list((self.data_dir / "bakes" / "staging").glob("*.zarr"))
         # asked after the folders: of a bake that another process begins meanwhile the row comes first
         states = {status.id: status.state for status in self.ledger.bakes()}
-        for folder in found:
+        for folder in folders:
             identity = folder.name.removesuffix(".zarr")
             state = states.get(identity, "ready")
             is_stopped = state in ("failed", "cancelled")
-            if state == "ready" or (is_stopped and (code_of(folder) != bake_code() or _age_s(folder) > KEPT_S)):
-                if is_stopped and run_of(folder) == self.ledger.run(identity):  # else its tasks are another machine's
-                    self.ledger.forget_tasks(identity)
+            if state == "ready" or (
+                is_stopped and (read_code(folder) != bake_code() or _age_s(folder) > STOPPED_RETENTION_S)
+            ):
+                if is_stopped and get_run(folder) == self.ledger.get_run(
+                    identity
+                ):  # else its tasks are another machine's
+                    self.ledger.delete_tasks(identity)
                     with suppress(StorageError):  # what is left over is deleted with the bake
-                        forget_parts(identity)
+                        delete_partial(identity)
                 shutil.rmtree(folder, ignore_errors=True)
-                forget_note(folder)
-                forget_run(folder)
+                delete_note(folder)
+                delete_run(folder)
 
 
 def _age_s(folder: Path) -> float:

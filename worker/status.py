@@ -9,12 +9,12 @@ from typing import Any, Literal
 
 from relume.bake import Plan, Recipe
 from relume.code_version import bake_code
-from relume.scene.placed_camera import read_placed
+from relume.scene.placed_camera import read_custom_camera
 from relume.store.schema import SCHEMA_VERSION
 
 BakeState = Literal["queued", "running", "ready", "failed", "cancelled"]
 Phase = Literal["starting", "loading", "reading", "building", "compiling", "sampling", "tracing", "publishing"]
-PHASE_WORDS: dict[Phase, str] = {
+PHASE_LABELS: dict[Phase, str] = {
     "starting": "starting worker processes",
     "loading": "loading the kernels",
     "reading": "reading the scene",
@@ -26,7 +26,9 @@ PHASE_WORDS: dict[Phase, str] = {
 }
 FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
 
-MOVING = frozenset({"surface"})  # methods whose eyes move: their pictures are exact where these rest, not at once
+FREE_CAMERA_METHODS = frozenset(
+    {"surface"}
+)  # methods whose eyes move: their pictures are exact where these rest, not at once
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class BakeStatus:
     def rank(self) -> tuple[bool, int, bool]:
         """Sorts a scene's bakes, the best last: one whose pictures are exact at once, the finest, then one that this
         code has made."""
-        return self.recipe.method not in MOVING, self.detail, self.is_current
+        return self.recipe.method not in FREE_CAMERA_METHODS, self.detail, self.is_current
 
     @property
     def detail(self) -> int:
@@ -113,7 +115,7 @@ def recipe_from_json(text: str) -> Recipe:
         (width, height),
         int(document["num_lights"]),
         bool(document["relightable"]),
-        tuple(read_placed(camera) for camera in document.get("cameras", ())),  # recipes of before there were any
+        tuple(read_custom_camera(camera) for camera in document.get("cameras", ())),  # recipes of before there were any
         int(document.get("num_points", Recipe.num_points)),
         document.get("gather_samples"),
         document.get("gather_rays"),

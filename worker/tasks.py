@@ -11,17 +11,19 @@ from pathlib import Path
 from relume.bake import BakeMethod, Recipe, Task
 from relume.code_version import bake_code
 from relume.errors import StoreError
-from relume.resident import give_back, held_bytes
+from relume.resident import live_bytes, trim_heap
 from relume.scene.archive import load_scene
 from relume.scene.model import Scene
 from relume.store import fill
 from worker.idle import IdleTimer, idle_seconds
-from worker.notes import Notebook
+from worker.notes import TaskNotes
 from worker.paths import scene_path, staging_path
 from worker.status import TaskCost
-from worker.storage import fetched
+from worker.storage import fetch_if_missing
 
-OTHER_CODE = "a worker process runs another version of relume than the server; start both again, then bake again"
+CODE_MISMATCH_MESSAGE = (
+    "a worker process runs another version of relume than the server; start both again, then bake again"
+)
 
 
 @dataclass(frozen=True)
@@ -42,34 +44,34 @@ class Job:
 
 
 @lru_cache(maxsize=2)
-def scene_of(data_dir: Path, scene_id: str) -> Scene:
+def load_registered_scene(data_dir: Path, scene_id: str) -> Scene:
     """A registered scene; a process keeps the last two."""
-    return load_scene(fetched(scene_path(data_dir, scene_id)))
+    return load_scene(fetch_if_missing(scene_path(data_dir, scene_id)))
 
 
 _methods: dict[bytes, BakeMethod] = {}
 
 
-def _resident(method: BakeMethod) -> BakeMethod:
+def _intern_method(method: BakeMethod) -> BakeMethod:
     """This process's own copy of a method, which keeps what it built for a scene: each task brings a fresh one."""
     return _methods.setdefault(pickle.dumps(method), method)
 
 
-def _forget() -> None:
+def _release_caches() -> None:
     """Let go of scenes, of what methods built for them, and of what was read of stores."""
-    scene_of.cache_clear()
+    load_registered_scene.cache_clear()
     _methods.clear()
-    fill.reader_of.cache_clear()
-    give_back()
+    fill.open_stage_reader.cache_clear()
+    trim_heap()
 
 
-idle_timer = IdleTimer(idle_seconds, _forget)
+idle_timer = IdleTimer(idle_seconds, _release_caches)
 """Of this process: what it keeps between tasks goes when no task has come for a while."""
 
 
-def kept_bytes() -> int:
+def cached_bytes() -> int:
     """What this process keeps between tasks; Embree's structures, about as much again, are not counted."""
-    return held_bytes(scene_of, _methods, fill.reader_of)
+    return live_bytes(load_registered_scene, _methods, fill.open_stage_reader)
 
 
 def run_task(job: Job, task: Task) -> TaskCost:
@@ -79,16 +81,16 @@ def run_task(job: Job, task: Task) -> TaskCost:
         StoreError: this process runs other code than the one that hands the tasks out; a store has one code's alone.
     """
     if job.code != bake_code():
-        raise StoreError(OTHER_CODE)
-    began = time.perf_counter()
+        raise StoreError(CODE_MISMATCH_MESSAGE)
+    start_s = time.perf_counter()
     staging = staging_path(job.data_dir, job.bake_id)
-    notes = Notebook(staging)
-    with idle_timer.kept_awake(), notes.watching_compiler():
+    notes = TaskNotes(staging)
+    with idle_timer.keep_awake(), notes.watching_compiler():
         notes.note("reading")
-        scene = job.recipe.seen(scene_of(job.data_dir, job.scene_id))
-        method = _resident(job.method)
+        scene = job.recipe.add_cameras(load_registered_scene(job.data_dir, job.scene_id))
+        method = _intern_method(job.method)
         notes.note("building")
         method.prepare(scene)
         notes.note("working")
         written = fill.run_task(method, scene, job.recipe, staging, task)
-    return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - began)
+    return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - start_s)

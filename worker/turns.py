@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Waiting:
+class WaitingBake:
     """Work that is not done.
 
     Attributes:
@@ -20,7 +20,7 @@ class Waiting:
     created: float
 
 
-class Turns:
+class FairShare:
     """Remembers whose turns have been.
 
     Each client has a time of their own, which a turn puts on by 1 / share; the earliest is next (stride scheduling:
@@ -28,21 +28,25 @@ class Turns:
     comes new begins where the earliest of those who wait is: nobody saves turns up.
     """
 
-    def __init__(self, shares: Mapping[str, float]) -> None:
+    def __init__(self, client_weights: Mapping[str, float]) -> None:
         """
         Args:
-            shares: turns of some clients, to one of each other.
+            client_weights: turns of some clients, to one of each other.
         """
-        self._shares = dict(shares)
-        self._times: dict[str, float] = {}
+        self._client_weights = dict(client_weights)
+        self._virtual_times: dict[str, float] = {}
 
-    def order(self, waiting: Sequence[Waiting]) -> list[Waiting]:
+    def sort(self, waiting_bakes: Sequence[WaitingBake]) -> list[WaitingBake]:
         """In the order of their turns, if each took none before the next."""
-        clients = {work.client for work in waiting}
-        earliest = min((self._times[client] for client in clients if client in self._times), default=0.0)
-        self._times = {client: self._times.get(client, earliest) for client in clients}
-        return sorted(waiting, key=lambda work: (not work.is_first, self._times[work.client], work.created))
+        clients = {work.client for work in waiting_bakes}
+        earliest = min(
+            (self._virtual_times[client] for client in clients if client in self._virtual_times), default=0.0
+        )
+        self._virtual_times = {client: self._virtual_times.get(client, earliest) for client in clients}
+        return sorted(
+            waiting_bakes, key=lambda work: (not work.is_first, self._virtual_times[work.client], work.created)
+        )
 
-    def take(self, client: str) -> None:
+    def pick_next(self, client: str) -> None:
         """A client of those that were ordered has a turn."""
-        self._times[client] += 1.0 / self._shares.get(client, 1.0)
+        self._virtual_times[client] += 1.0 / self._client_weights.get(client, 1.0)

@@ -32,20 +32,23 @@ def main() -> int:
         traces = server.log.count("Traceback")
     if asked.samples is not None:
         asked.samples.write_text("".join(json.dumps(asdict(sample)) + "\n" for sample in samples))
-    found = trends(samples)
-    lines = [*(f"{count:7} {what}" for what, count in sorted(users.counts.items())), *(each.line() for each in found)]
+    trend_lines = trends(samples)
+    lines = [
+        *(f"{count:7} {event}" for event, count in sorted(users.counts.items())),
+        *(each.line() for each in trend_lines),
+    ]
     lines += users.failures + ([] if traces == 0 else [f"{traces} defects in the server's log"])
     lines += [] if has_stopped else ["the server did not stop in order"]
     sys.stdout.write("\n".join(lines) + "\n")
-    return 0 if has_stopped and not users.failures and traces == 0 and all(each.is_flat for each in found) else 1
+    return 0 if has_stopped and not users.failures and traces == 0 and all(each.is_flat for each in trend_lines) else 1
 
 
 def _soak(server: Server, seconds: float) -> tuple[Users, list[Sample]]:
-    users, begun_s = Users(server, SEED), time.monotonic()
+    users, start_s = Users(server, SEED), time.monotonic()
     samples: list[Sample] = []
     users.start()
     try:
-        while (at_s := time.monotonic() - begun_s) < seconds and server.is_alive:
+        while (at_s := time.monotonic() - start_s) < seconds and server.is_alive:
             samples.append(server.sample(at_s))
             time.sleep(EVERY_S)
     finally:

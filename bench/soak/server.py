@@ -34,12 +34,12 @@ class Sample:
     """What the server holds at one moment; `at_s` since the soak began.
 
     Attributes:
-        memory: resident bytes of its process. workers: of those that it has started.
+        memory_bytes: resident bytes of its process. workers: of those that it has started.
         handles: open files and sockets. threads: of its process. disk: bytes in the data directory.
     """
 
     at_s: float
-    memory: int
+    memory_bytes: int
     workers: int
     handles: int
     threads: int
@@ -106,13 +106,13 @@ class Server:
             if entry.name.isdigit():
                 with suppress(OSError, IndexError):
                     parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-        found, todo = [], [self._process.pid]
+        children, todo = [], [self._process.pid]
         while todo:
-            of = todo.pop()
-            below = [pid for pid, parent in parents.items() if parent == of]
-            found += below
+            status = todo.pop()
+            below = [pid for pid, parent in parents.items() if parent == status]
+            children += below
             todo += below
-        return found
+        return children
 
     def stop(self) -> bool:
         """End it in order; whether it did in time."""

@@ -36,11 +36,11 @@ class Users:
         self.counts, self.failures = Counter[str](), list[str]()
         self._killed_s = -1e9
         self._stop, self._lock = threading.Event(), threading.Lock()
-        stays, self._passing = (one["name"] for one in server.call("/api/built-ins")[:2])
-        scene = server.call(f"/api/built-ins/{stays}", {})["id"]
+        persistent_scene, self._transient_scene = (entry["name"] for entry in server.call("/api/built-ins")[:2])
+        scene = server.call(f"/api/built-ins/{persistent_scene}", {})["id"]
         self._bake, self._materials = self._baked(scene, 40), list[str]()
         self._threads = [
-            threading.Thread(target=self._again, args=(act, k))
+            threading.Thread(target=self._repeat, args=(act, k))
             for k, act in enumerate(
                 (self._edit, self._edit, self._share, self._make_and_delete, self._render, self._kill)
             )
@@ -57,75 +57,75 @@ class Users:
         for thread in self._threads:
             thread.join()
 
-    def _again(self, act: Callable[[random.Random], None], number: int) -> None:
-        chance = random.Random(self._seed + number)
+    def _repeat(self, act: Callable[[random.Random], None], number: int) -> None:
+        rng = random.Random(self._seed + number)
         while not self._stop.is_set():
-            begun_s = time.monotonic()
+            start_s = time.monotonic()
             try:
-                act(chance)
+                act(rng)
             except Exception as error:
-                self._note(act.__name__, begun_s, f"{type(error).__name__}: {error}")
+                self._note(act.__name__, start_s, f"{type(error).__name__}: {error}")
                 self._stop.wait(0.5)
             else:
                 self._count(act.__name__.lstrip("_"))
 
-    def _count(self, what: str) -> None:
+    def _count(self, event: str) -> None:
         with self._lock:
-            self.counts[what] += 1
+            self.counts[event] += 1
 
-    def _note(self, what: str, begun_s: float, why: str) -> None:
+    def _note(self, action: str, start_s: float, reason: str) -> None:
         """What goes wrong while a process is killed may be because of that; all else may not."""
-        is_of_fault = self._killed_s >= begun_s - 2.0
-        self._count("ended by a killed process" if is_of_fault else "failures")
-        if not is_of_fault and len(self.failures) < 20:
-            self.failures.append(f"{what}: {why[:300]}")
+        is_caused_by_kill = self._killed_s >= start_s - 2.0
+        self._count("ended by a killed process" if is_caused_by_kill else "failures")
+        if not is_caused_by_kill and len(self.failures) < 20:
+            self.failures.append(f"{action}: {reason[:300]}")
 
-    def _edit(self, chance: random.Random) -> None:
+    def _edit(self, rng: random.Random) -> None:
         """A session by oneself: edits, a question, and an end in order or not."""
         with self._session(self._bake) as session:
-            self._drag(session, chance)
+            self._drag(session, rng)
             session.send(json.dumps({"type": "probe", "x": 3, "y": 4}))
             _text(session, "probe")
-            if chance.random() < 0.3:
+            if rng.random() < 0.3:
                 session.socket.close()  # as a lost network does
 
-    def _share(self, chance: random.Random) -> None:
+    def _share(self, rng: random.Random) -> None:
         """Two people in a room."""
-        room = chance.randbytes(16).hex()
+        room = rng.randbytes(16).hex()
         with self._session(self._bake, room) as ann, self._session(self._bake, room) as bob:
             _text(bob, "hello")
-            self._drag(ann, chance)
+            self._drag(ann, rng)
             _text(bob, "shared")
 
-    def _make_and_delete(self, chance: random.Random) -> None:
+    def _make_and_delete(self, rng: random.Random) -> None:
         """A scene comes, is baked and looked at, and goes."""
         call = self._server.call
-        scene = call(f"/api/built-ins/{self._passing}", {})["id"]
-        bake = self._baked(scene, chance.choice((60, 90, 120)), size=chance.choice((64, 128)))
+        scene = call(f"/api/built-ins/{self._transient_scene}", {})["id"]
+        bake = self._baked(scene, rng.choice((60, 90, 120)), size=rng.choice((64, 128)))
         if not self._stop.is_set():
             with self._session(bake) as session:
-                self._drag(session, chance)
+                self._drag(session, rng)
         call(f"/api/scenes/{scene}", method="DELETE")
 
-    def _render(self, chance: random.Random) -> None:
+    def _render(self, rng: random.Random) -> None:
         """A batch, that is deleted when it is done, or before."""
         call = self._server.call
         view = call(f"/api/bakes/{self._bake}")["recipe"]["views"][0]
         batch = {"bake": self._bake, "view": view, "looks": [{}] * 3, "format": "png"}
         identity = call("/api/renders", batch)["id"]
-        is_patient = chance.random() < 0.7
+        is_patient = rng.random() < 0.7
         while is_patient and call(f"/api/renders/{identity}")["state"] not in DONE and not self._stop.is_set():
             time.sleep(0.2)
         call(f"/api/renders/{identity}", method="DELETE")
 
-    def _kill(self, chance: random.Random) -> None:
+    def _kill(self, rng: random.Random) -> None:
         """One of the processes that the server has started dies."""
-        self._stop.wait(chance.uniform(10.0, 30.0))
+        self._stop.wait(rng.uniform(10.0, 30.0))
         children = self._server.children()
         if children and not self._stop.is_set():
             self._killed_s = time.monotonic()
             with suppress(ProcessLookupError):
-                os.kill(chance.choice(children), signal.SIGKILL)
+                os.kill(rng.choice(children), signal.SIGKILL)
 
     def _baked(self, scene: str, lights: int, size: int = 96) -> str:
         call = self._server.call
@@ -146,14 +146,14 @@ class Users:
             yield session
 
     @staticmethod
-    def _drag(session: ClientConnection, chance: random.Random) -> None:
+    def _drag(session: ClientConnection, rng: random.Random) -> None:
         """Edit a colour some times, and wait for the exact picture of the last."""
         hello = _text(session, "hello")
         first, revision = hello["materials"][0], hello["revision"]
         path = f"/materials/{first.replace('~', '~0').replace('/', '~1')}/terms/0/color"
         for _ in range(EDITS):
             revision += 1
-            patch = [{"op": "replace", "path": path, "value": [round(chance.random(), 3) for _ in range(3)]}]
+            patch = [{"op": "replace", "path": path, "value": [round(rng.random(), 3) for _ in range(3)]}]
             session.send(json.dumps({"type": "edit", "revision": revision, "patch": patch}))
         while not ((frame := _frame(session))["exact"] and frame["revision"] >= revision):
             pass
@@ -163,8 +163,8 @@ def _receive(session: ClientConnection) -> dict[str, Any]:
     """The next message, or a frame's header; frames are acknowledged."""
     message = session.recv(timeout=60)
     if isinstance(message, str):
-        told: dict[str, Any] = json.loads(message)
-        return told
+        content: dict[str, Any] = json.loads(message)
+        return content
     (length,) = struct.unpack_from("<I", message)
     header: dict[str, Any] = json.loads(message[4 : 4 + length])
     session.send(json.dumps({"type": "ack", "frame": header["frame"]}))
@@ -172,10 +172,10 @@ def _receive(session: ClientConnection) -> dict[str, Any]:
 
 
 def _text(session: ClientConnection, kind: str) -> dict[str, Any]:
-    while (told := _receive(session))["type"] != kind:
-        if told["type"] == "problem":
-            raise RuntimeError(told["problem"]["detail"])
-    return told
+    while (message := _receive(session))["type"] != kind:
+        if message["type"] == "problem":
+            raise RuntimeError(message["problem"]["detail"])
+    return message
 
 
 def _frame(session: ClientConnection) -> dict[str, Any]:

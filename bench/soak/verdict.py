@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.soak.server import Sample
 
-WARM_SHARE = 0.4
+WARMUP_FRACTION = 0.4
 MIN_SAMPLES = 12
 
 
@@ -47,20 +47,20 @@ def trends(samples: Sequence[Sample]) -> list[Trend]:
     Raises:
         ValueError: there are too few samples to tell.
     """
-    warm = [one for one in samples if one.at_s >= WARM_SHARE * samples[-1].at_s]
+    warm = [sample for sample in samples if sample.at_s >= WARMUP_FRACTION * samples[-1].at_s]
     if len(warm) < MIN_SAMPLES:
         raise ValueError(f"{len(warm)} samples after the beginning are too few; soak for longer")
-    memory = np.array([one.memory for one in warm]) / 1e6
+    memory_mb = np.array([sample.memory_bytes for sample in warm]) / 1e6
     return [
-        _trend("memory MB", warm, memory, 0.05 * float(np.median(memory)) + 20),
-        _trend("handles", warm, np.array([one.handles for one in warm]), 12),
-        _trend("threads", warm, np.array([one.threads for one in warm]), 8),
-        _trend("disk MB", warm, np.array([one.disk for one in warm]) / 1e6, 30),
+        _trend("memory MB", warm, memory_mb, 0.05 * float(np.median(memory_mb)) + 20),
+        _trend("handles", warm, np.array([sample.handles for sample in warm]), 12),
+        _trend("threads", warm, np.array([sample.threads for sample in warm]), 8),
+        _trend("disk MB", warm, np.array([sample.disk for sample in warm]) / 1e6, 30),
     ]
 
 
 def _trend(name: str, samples: Sequence[Sample], values: np.ndarray, allowed: float) -> Trend:
-    hours = np.array([one.at_s for one in samples]) / 3600
+    hours = np.array([sample.at_s for sample in samples]) / 3600
     third = max(1, len(values) // 3)
     (slope, _), covariance = np.polyfit(hours, values, 1, cov=True)
     early, late = float(np.median(values[:third])), float(np.median(values[-third:]))

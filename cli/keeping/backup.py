@@ -11,7 +11,7 @@ from cli.options import Data
 from cli.terminal.printing import Json, print_result, size_text
 
 if TYPE_CHECKING:
-    from worker.backup.shelf import Shelf, Snapshot
+    from worker.backup.shelf import BackupRepository, Snapshot
 
 BackupFolder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of backups, on another disk.")]
 
@@ -30,19 +30,19 @@ def backup(
     from cli.data_folder import open_settings, private_files
     from cli.keeping.transfer_bar import transfer_bar
     from worker.backup.restore import refuse_unfinished
-    from worker.backup.shelf import Shelf
-    from worker.backup.take import back_up
+    from worker.backup.shelf import BackupRepository
+    from worker.backup.take import create_backup
     from worker.database import open_database
 
-    shelf = Shelf(folder)
+    repository = BackupRepository(folder)
     if verify:
-        return _verify(shelf, as_json=as_json)
+        return _verify(repository, as_json=as_json)
     settings = open_settings(data)
     refuse_unfinished(settings.data)
     ledger = open_database(settings.database_url)
     try:
-        with transfer_bar("backing up") as begin, private_files():
-            snapshot = back_up(settings.data.resolve(), ledger, shelf, begin)
+        with transfer_bar("backing up") as start_report, private_files():
+            snapshot = create_backup(settings.data.resolve(), ledger, repository, start_report)
     finally:
         ledger.dispose()
     print_snapshot(snapshot, [*snapshot.left_out], as_json=as_json)
@@ -51,33 +51,39 @@ def backup(
     return 1 if snapshot.left_out else 0
 
 
-def print_snapshot(snapshot: Snapshot, left_out: list[str], *, as_json: bool) -> None:
+def print_snapshot(snapshot: Snapshot, omitted: list[str], *, as_json: bool) -> None:
     """Print the name of a backup, and how much is in it.
 
     Args:
-        snapshot: the backup. left_out: sentences, of what is not in it, or did not come back.
+        snapshot: the backup. omitted: sentences, of what is not in it, or did not come back.
         as_json: whether JSON was asked for.
     """
-    num_bytes = sum(kept.num_bytes for kept in snapshot.all)
-    document = {"name": snapshot.name, "files": len(snapshot.files), "bytes": num_bytes, "left_out": left_out}
+    num_bytes = sum(stored_file.num_bytes for stored_file in snapshot.all)
+    document = {"name": snapshot.name, "files": len(snapshot.files), "bytes": num_bytes, "left_out": omitted}
     details = [f"{len(snapshot.files):,} files, {size_text(num_bytes)}"]
     print_result(document, snapshot.name, as_json=as_json, details=details)
 
 
-def _verify(shelf: Shelf, *, as_json: bool) -> int:
+def _verify(repository: BackupRepository, *, as_json: bool) -> int:
     from cli.keeping.transfer_bar import transfer_bar
 
-    snapshot = shelf.read()
-    with transfer_bar("checking") as begin:
-        damaged = list(shelf.damaged(snapshot, begin(sum(kept.num_bytes for kept in snapshot.all))))
+    snapshot = repository.read()
+    with transfer_bar("checking") as start_report:
+        damaged_files = list(
+            repository.find_damaged(snapshot, start_report(sum(stored_file.num_bytes for stored_file in snapshot.all)))
+        )
     if as_json:
-        document = {"name": snapshot.name, "files": len(snapshot.all), "damaged": [kept.path for kept in damaged]}
+        document = {
+            "name": snapshot.name,
+            "files": len(snapshot.all),
+            "damaged": [stored_file.path for stored_file in damaged_files],
+        }
         print_result(document, "", as_json=True)
-    for kept in damaged:
-        typer.echo(f"damaged: {kept.path}", err=True)
-    typer.echo(f"{snapshot.name}: {len(damaged)} of {len(snapshot.all):,} files are damaged", err=True)
-    for kept in damaged:
-        shelf.set_aside(kept)
-    if damaged:
+    for stored_file in damaged_files:
+        typer.echo(f"damaged: {stored_file.path}", err=True)
+    typer.echo(f"{snapshot.name}: {len(damaged_files)} of {len(snapshot.all):,} files are damaged", err=True)
+    for stored_file in damaged_files:
+        repository.quarantine(stored_file)
+    if damaged_files:
         typer.echo("back up again: what is still in the data folder is copied anew", err=True)
-    return 1 if damaged else 0
+    return 1 if damaged_files else 0

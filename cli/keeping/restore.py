@@ -14,7 +14,7 @@ from cli.terminal.printing import Json
 from cli.tokens import open_access
 
 if TYPE_CHECKING:
-    from server.access.access import Access
+    from server.access.access import AuthServices
 
 
 def restore(
@@ -34,26 +34,28 @@ def restore(
     from cli.data_folder import open_settings, private_files
     from cli.keeping.transfer_bar import transfer_bar
     from worker.backup.restore import restore as restore_into
-    from worker.backup.shelf import Shelf
+    from worker.backup.shelf import BackupRepository
 
     settings = open_settings(data)
-    with transfer_bar("restoring") as begin, private_files():
-        done, damaged = restore_into(Shelf(folder), snapshot, settings.data.resolve(), settings.database_url, begin)
-    print_snapshot(done, [*done.left_out, *damaged], as_json=as_json)
-    for sentence in done.left_out:
+    with transfer_bar("restoring") as start_report, private_files():
+        restored, damaged_files = restore_into(
+            BackupRepository(folder), snapshot, settings.data.resolve(), settings.database_url, start_report
+        )
+    print_snapshot(restored, [*restored.left_out, *damaged_files], as_json=as_json)
+    for sentence in restored.left_out:
         typer.echo(f"was left out: {sentence}", err=True)
-    for sentence in damaged:
+    for sentence in damaged_files:
         typer.echo(f"left out: {sentence}", err=True)
     _report_tokens(open_access(data), revoke_tokens)
-    return 1 if damaged else 0
+    return 1 if damaged_files else 0
 
 
-def _report_tokens(access: Access, is_to_revoke: bool) -> None:
+def _report_tokens(access: AuthServices, revokes_tokens: bool) -> None:
     """Say which tokens open something now: those that were revoked after the backup do again."""
     now = time.time()
     for token in access.tokens.all():
         if not token.is_valid(now):
             continue
-        if is_to_revoke:
+        if revokes_tokens:
             access.tokens.revoke(token.id)
-        typer.echo(f"{'revoked' if is_to_revoke else 'valid'}: token {token.name}, {token.role.word}", err=True)
+        typer.echo(f"{'revoked' if revokes_tokens else 'valid'}: token {token.name}, {token.role.label}", err=True)

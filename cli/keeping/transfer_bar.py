@@ -14,7 +14,7 @@ def transfer_bar(label: str) -> Iterator[Callable[[int], Callable[[int], None]]]
     """Yields what begins a bar of so many bytes, in place of the one before, and returns whom to tell of copies."""
     with progress(label) as tell:
 
-        def begin(num_bytes: int) -> Callable[[int], None]:
+        def start_report(num_bytes: int) -> Callable[[int], None]:
             done = 0
 
             def advance(more: int) -> None:
@@ -24,4 +24,4 @@ def transfer_bar(label: str) -> Iterator[Callable[[int], Callable[[int], None]]]
 
             return advance
 
-        yield begin
+        yield start_report

@@ -10,33 +10,33 @@ from typing import TYPE_CHECKING, NamedTuple
 from relume.errors import NotFoundError
 
 if TYPE_CHECKING:
-    from server.access.access import Access
+    from server.access.access import AuthServices
     from server.settings import Settings
     from worker.service import BakeService
     from worker.status import BakeStatus
 
-LEAST_OF_BAKE = 8  # characters that the id of a bake may be cut to
+MIN_BAKE_ID_LENGTH = 8  # characters that the id of a bake may be cut to
 
 
-class Opened(NamedTuple):
+class OpenFolder(NamedTuple):
     """A data folder: its settings, its bakes, which nothing here runs, and who may do what."""
 
     settings: Settings
     service: BakeService
-    access: Access
+    access: AuthServices
 
 
 @contextmanager
-def opened(data: Path | None) -> Iterator[Opened]:
+def open_data_folder(data: Path | None) -> Iterator[OpenFolder]:
     """Open a data folder that relume has used. Raises ParameterError where it has not."""
     from cli.data_folder import check_used, open_bakes, open_settings
-    from server.access.access import Access
+    from server.access.access import AuthServices
 
     settings = open_settings(data)
     check_used(settings)
     service = open_bakes(settings)
     try:
-        yield Opened(settings, service, Access(service.ledger.sessions, settings))
+        yield OpenFolder(settings, service, AuthServices(service.ledger.sessions, settings))
     finally:
         service.close()
 
@@ -49,13 +49,13 @@ def find_bakes(service: BakeService, name: str) -> list[BakeStatus]:
     """
     from cli.data_folder import find_scene
 
-    called = [bake for bake in service.bakes() if len(name) >= LEAST_OF_BAKE and bake.id.startswith(name)]
-    if len(called) == 1:
-        return called
-    if called:
-        raise NotFoundError(f"{len(called)} bakes begin with {name!r}; give more of the id")
+    matches = [bake for bake in service.bakes() if len(name) >= MIN_BAKE_ID_LENGTH and bake.id.startswith(name)]
+    if len(matches) == 1:
+        return matches
+    if matches:
+        raise NotFoundError(f"{len(matches)} bakes begin with {name!r}; give more of the id")
     scene = find_scene(service.ledger, name)
-    found = service.bakes(scene.id)
-    if not found:
+    bakes = service.bakes(scene.id)
+    if not bakes:
         raise NotFoundError(f"there is no bake of {scene.name!r} yet; run: relume bake {scene.id}")
-    return found
+    return bakes

@@ -24,25 +24,29 @@ def cancel(
 
     What is done stays: the same relume bake goes on with it. Fails where a bake had ended already.
     """
-    from cli.ledger.acting import find_bakes, opened
+    from cli.ledger.acting import find_bakes, open_data_folder
     from cli.terminal.documents import bake_document
-    from cli.tokens import write_down
+    from cli.tokens import audit_change
 
     has_failed = False
-    with opened(data) as there:
-        found = {one.id: one for name in bakes for one in _meant(find_bakes(there.service, name))}
-        for one in found.values():
-            if there.service.cancel(one.id):
-                write_down(there.access, "cancel bake", one.id)
-                print_result(bake_document(there.service.get(one.id), there.service), one.id, as_json=as_json)
-            elif one.state != "cancelled":
+    with open_data_folder(data) as data_folder:
+        selected = {bake.id: bake for name in bakes for bake in _select_active(find_bakes(data_folder.service, name))}
+        for bake in selected.values():
+            if data_folder.service.cancel(bake.id):
+                audit_change(data_folder.access, "cancel bake", bake.id)
+                print_result(
+                    bake_document(data_folder.service.get(bake.id), data_folder.service), bake.id, as_json=as_json
+                )
+            elif bake.state != "cancelled":
                 has_failed = True
-                typer.echo(f"relume: bake {one.id} is {there.service.get(one.id).state}; nothing to cancel", err=True)
+                typer.echo(
+                    f"relume: bake {bake.id} is {data_folder.service.get(bake.id).state}; nothing to cancel", err=True
+                )
             else:
-                note(f"bake {one.id} was cancelled already")
+                note(f"bake {bake.id} was cancelled already")
     return 1 if has_failed else 0
 
 
-def _meant(found: list[BakeStatus]) -> list[BakeStatus]:
+def _select_active(bakes: list[BakeStatus]) -> list[BakeStatus]:
     """Those that go on; where none does, the newest, of which that is said."""
-    return [one for one in found if not one.final] or found[:1]
+    return [bake for bake in bakes if not bake.final] or bakes[:1]

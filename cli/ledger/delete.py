@@ -12,7 +12,7 @@ from cli.options import Data
 from cli.terminal.printing import Json, print_result
 
 if TYPE_CHECKING:
-    from cli.ledger.acting import Opened
+    from cli.ledger.acting import OpenFolder
 
 Kind = Literal["scene", "bake", "look", "environment"]
 
@@ -21,7 +21,7 @@ class Deletable(NamedTuple):
     """One thing that is to be deleted: what names it, in words, and how."""
 
     id: str
-    words: str
+    label: str
     delete: Callable[[], object]
 
 
@@ -37,91 +37,93 @@ def delete(
     A server may go on; sessions that show a bake which is deleted are told, and end. Looks that name an environment
     which is deleted are refused from then on.
     """
-    from cli.ledger.acting import opened
-    from cli.tokens import write_down
+    from cli.ledger.acting import open_data_folder
+    from cli.tokens import audit_change
 
-    with opened(data) as there:
-        things = list({thing.id: thing for thing in (FIND[kind](there, name) for name in names)}.values())
-        _confirm(things, yes)
-        for thing in things:
-            thing.delete()
-            write_down(there.access, f"delete {kind}", thing.id)
-            print_result({"kind": kind, "id": thing.id}, thing.id, as_json=as_json)
+    with open_data_folder(data) as data_folder:
+        deletables = list(
+            {deletable.id: deletable for deletable in (FINDERS[kind](data_folder, name) for name in names)}.values()
+        )
+        _confirm(deletables, yes)
+        for deletable in deletables:
+            deletable.delete()
+            audit_change(data_folder.access, f"delete {kind}", deletable.id)
+            print_result({"kind": kind, "id": deletable.id}, deletable.id, as_json=as_json)
 
 
-def _confirm(things: list[Deletable], yes: bool) -> None:
+def _confirm(deletables: list[Deletable], yes: bool) -> None:
     from relume.errors import PlanError
 
-    words = ", ".join(thing.words for thing in things)
+    labels = ", ".join(deletable.label for deletable in deletables)
     if yes:
         return
     if not sys.stdin.isatty():
-        raise PlanError(f"there is no terminal to ask at; give --yes to delete {words}")
-    typer.confirm(f"Delete {words}?", abort=True, err=True)
+        raise PlanError(f"there is no terminal to ask at; give --yes to delete {labels}")
+    typer.confirm(f"Delete {labels}?", abort=True, err=True)
 
 
-def _scene(there: Opened, name: str) -> Deletable:
+def _scene(data_folder: OpenFolder, name: str) -> Deletable:
     from cli.data_folder import find_scene
     from server.records.comments import CommentStore
     from worker.scenes import delete_scene
 
-    ledger = there.service.ledger
+    ledger = data_folder.service.ledger
     scene = find_scene(ledger, name)
-    bakes = [one.id for one in there.service.bakes(scene.id)]
+    bakes = [bake.id for bake in data_folder.service.bakes(scene.id)]
 
     def remove() -> None:
-        delete_scene(there.service.data_dir, ledger, scene.id)
-        CommentStore(ledger.sessions).forget(scene.id)
-        there.access.quotas.disown("scene", scene.id)
-        there.access.quotas.disown("bake", *bakes)
+        delete_scene(data_folder.service.data_dir, ledger, scene.id)
+        CommentStore(ledger.sessions).delete_scene(scene.id)
+        data_folder.access.quotas.disown("scene", scene.id)
+        data_folder.access.quotas.disown("bake", *bakes)
 
     return Deletable(scene.id, f"scene {scene.id} ({scene.name}) with {len(bakes)} bakes", remove)
 
 
-def _bake(there: Opened, name: str) -> Deletable:
+def _bake(data_folder: OpenFolder, name: str) -> Deletable:
     """By its id alone: of the bakes of a scene none is meant more than another."""
     from cli.ledger.acting import find_bakes
     from cli.terminal.documents import recipe_text
     from relume.errors import NotFoundError
 
-    found = find_bakes(there.service, name)
-    if len(found) > 1:
-        raise NotFoundError(f"{name!r} has {len(found)} bakes; give one of {', '.join(one.id for one in found[:10])}")
+    bakes = find_bakes(data_folder.service, name)
+    if len(bakes) > 1:
+        raise NotFoundError(f"{name!r} has {len(bakes)} bakes; give one of {', '.join(bake.id for bake in bakes[:10])}")
 
     def remove() -> None:
-        there.service.forget(found[0].id)
-        there.access.quotas.disown("bake", found[0].id)
+        data_folder.service.delete(bakes[0].id)
+        data_folder.access.quotas.disown("bake", bakes[0].id)
 
-    return Deletable(found[0].id, f"bake {found[0].id} ({recipe_text(found[0].recipe)})", remove)
+    return Deletable(bakes[0].id, f"bake {bakes[0].id} ({recipe_text(bakes[0].recipe)})", remove)
 
 
-def _look(there: Opened, name: str) -> Deletable:
+def _look(data_folder: OpenFolder, name: str) -> Deletable:
     from cli.naming import pick
     from server.records.looks import LookStore
 
-    store = LookStore(there.service.ledger.sessions)
-    called = pick("look", name, [(look.name, look.name) for look in store.list()], "looks are saved in the editor")
-    etag = store.get(called).etag
-    return Deletable(called, f"look {called!r}", lambda: store.delete(called, etag))
+    store = LookStore(data_folder.service.ledger.sessions)
+    look_name = pick("look", name, [(look.name, look.name) for look in store.list()], "looks are saved in the editor")
+    etag = store.get(look_name).etag
+    return Deletable(look_name, f"look {look_name!r}", lambda: store.delete(look_name, etag))
 
 
-def _environment(there: Opened, name: str) -> Deletable:
+def _environment(data_folder: OpenFolder, name: str) -> Deletable:
     from cli.naming import pick
     from relume.environments.asset_store import STORE, records
     from worker.paths import environments_path
 
-    folder = environments_path(there.settings.data)
-    known = [(record.id, record.name) for record in records(folder)]
-    called = pick("imported environment", name.removeprefix(STORE.prefix), known, "built-in ones stay")
+    folder = environments_path(data_folder.settings.data)
+    candidates = [(record.id, record.name) for record in records(folder)]
+    environment_id = pick("imported environment", name.removeprefix(STORE.prefix), candidates, "built-in ones stay")
 
     def remove() -> None:
-        STORE.remove(folder, called)
-        there.access.quotas.disown("environment", called)
+        STORE.remove(folder, environment_id)
+        data_folder.access.quotas.disown("environment", environment_id)
 
-    return Deletable(called, f"environment {called} ({dict(known)[called]})", remove)
+    return Deletable(environment_id, f"environment {environment_id} ({dict(candidates)[environment_id]})", remove)
 
 
-FIND: dict[Kind, Callable[[Opened, str], Deletable]] = {
+FINDERS: dict[Kind, Callable[[OpenFolder, str], Deletable]] = {
     "scene": _scene,
     "bake": _bake,
     "look": _look,

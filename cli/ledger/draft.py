@@ -19,10 +19,10 @@ def ledger_draft(
     import server.records.tables  # noqa: F401
     from worker.database import open_database
     from worker.database.models import Base
-    from worker.database.upgrading import draft
+    from worker.database.upgrading import draft_revision
 
     with tempfile.TemporaryDirectory() as folder:
         engine = open_database(f"sqlite:///{folder}/relume.db")
         with engine.begin() as connection:
-            typer.echo(draft(connection, Base.metadata, message))
+            typer.echo(draft_revision(connection, Base.metadata, message))
         engine.dispose()

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from cli.options import Data
-from cli.terminal.printing import Json, moment, print_result
+from cli.terminal.printing import Json, iso_time, print_result
 
 if TYPE_CHECKING:
-    from cli.ledger.acting import Opened
+    from cli.ledger.acting import OpenFolder
     from relume.btf.shelf import BtfRecord
     from relume.measured.asset_store import MaterialRecord
 
@@ -21,7 +21,7 @@ Row = tuple[dict[str, Any], str]
 """A thing as JSON, and as a line that begins with what names it."""
 
 
-def list_things(
+def list_items(
     kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to list.", show_default=True)] = "scenes",
     scene: Annotated[str | None, typer.Option("--scene", metavar="SCENE", help="Bakes: of this scene alone.")] = None,
     state: Annotated[
@@ -34,7 +34,7 @@ def list_things(
 
     The newest comes first; what names a thing stands in front of its line.
     """
-    from cli.ledger.acting import opened
+    from cli.ledger.acting import open_data_folder
     from relume.errors import ParameterError
 
     if scene is not None and kind != "bakes":
@@ -44,95 +44,100 @@ def list_things(
     if kind == "built-ins":
         rows = _built_ins()
     elif kind == "bakes":
-        with opened(data) as there:
+        with open_data_folder(data) as there:
             rows = list(_bakes(there, scene, state))
     else:
-        with opened(data) as there:
-            rows = [row for row in LISTS[kind](there) if state in (None, row[0].get("state"))]
+        with open_data_folder(data) as data_folder:
+            rows = [row for row in LISTS[kind](data_folder) if state in (None, row[0].get("state"))]
     for document, line in rows:
         print_result(document, line, as_json=as_json)
 
 
-def _scenes(there: Opened) -> Iterator[Row]:
+def _scenes(data_folder: OpenFolder) -> Iterator[Row]:
     from cli.terminal.documents import scene_document
     from worker.scenes import list_scenes
 
-    bakes = there.service.bakes()
-    for record in list_scenes(there.service.ledger):
-        own = [status for status in bakes if status.scene == record.id]
-        line = f"{record.id}  {record.num_triangles:>10,} triangles  {len(own):>3} bakes  {record.name}"
-        yield scene_document(record, own), line
+    bakes = data_folder.service.bakes()
+    for record in list_scenes(data_folder.service.ledger):
+        scene_bakes = [status for status in bakes if status.scene == record.id]
+        line = f"{record.id}  {record.num_triangles:>10,} triangles  {len(scene_bakes):>3} bakes  {record.name}"
+        yield scene_document(record, scene_bakes), line
 
 
-def _bakes(there: Opened, scene: str | None, state: str | None) -> Iterator[Row]:
+def _bakes(data_folder: OpenFolder, scene: str | None, state: str | None) -> Iterator[Row]:
     from cli.data_folder import find_scene
     from cli.terminal.documents import bake_document, recipe_text
     from worker.scenes import list_scenes
 
-    names = {record.id: record.name for record in list_scenes(there.service.ledger)}
-    only = None if scene is None else find_scene(there.service.ledger, scene).id
-    for status in there.service.bakes(only):
+    names = {record.id: record.name for record in list_scenes(data_folder.service.ledger)}
+    scene_id = None if scene is None else find_scene(data_folder.service.ledger, scene).id
+    for status in data_folder.service.bakes(scene_id):
         if state in (None, status.state):
             name = names.get(status.scene, status.scene)
             line = f"{status.id}  {status.state:9}  {status.progress:>4.0%}  {name}: {recipe_text(status.recipe)}"
-            yield bake_document(status, there.service), line
+            yield bake_document(status, data_folder.service), line
 
 
-def _looks(there: Opened) -> Iterator[Row]:
+def _looks(data_folder: OpenFolder) -> Iterator[Row]:
     from server.records.looks import LookStore
 
-    for look in LookStore(there.service.ledger.sessions).list():
-        modified = moment(look.modified)
-        times = {"created": moment(look.created), "modified": modified}
+    for look in LookStore(data_folder.service.ledger.sessions).list():
+        modified = iso_time(look.modified)
+        times = {"created": iso_time(look.created), "modified": modified}
         document = {"name": look.name, "etag": look.etag, **times, "bytes": look.num_bytes}
         yield document, f"{look.name}  {modified[:16]}"
 
 
-def _environments(there: Opened) -> Iterator[Row]:
+def _environments(data_folder: OpenFolder) -> Iterator[Row]:
     from relume.environments.asset_store import records
     from relume.environments.built_in import BUILT_IN
     from worker.paths import environments_path
 
     for name, (label, _) in BUILT_IN.items():
         yield {"id": name, "map": name, "name": label, "created": None, "warnings": []}, f"{name:20}  {label}"
-    for record in records(environments_path(there.settings.data)):
-        created, warnings = moment(record.created), list(record.warnings)
+    for record in records(environments_path(data_folder.settings.data)):
+        created, warnings = iso_time(record.created), list(record.warnings)
         document = {"id": record.id, "map": record.map, "name": record.name, "created": created, "warnings": warnings}
         yield document, f"{record.map:20}  {record.name}"
 
 
-def _materials(there: Opened) -> Iterator[Row]:
+def _materials(data_folder: OpenFolder) -> Iterator[Row]:
     from relume.btf import shelf
     from relume.measured import asset_store
     from worker.paths import btfs_path, materials_path
 
-    found: list[MaterialRecord | BtfRecord] = [
-        *asset_store.records(materials_path(there.settings.data)),
-        *shelf.records(btfs_path(there.settings.data)),
+    material_records: list[MaterialRecord | BtfRecord] = [
+        *asset_store.records(materials_path(data_folder.settings.data)),
+        *shelf.records(btfs_path(data_folder.settings.data)),
     ]
-    for record in found:
-        created, terms = moment(record.created), record.terms()
+    for record in material_records:
+        created, terms = iso_time(record.created), record.terms()
         document = {"id": record.id, "data": record.data, "name": record.name, "created": created, "terms": terms}
         yield document, f"{record.data:21}  {record.name}"
 
 
-def _images(there: Opened) -> Iterator[Row]:
+def _images(data_folder: OpenFolder) -> Iterator[Row]:
     from relume.images.shelf import records
     from worker.paths import images_path
 
-    for record in records(images_path(there.settings.data)):
-        document = {"id": record.id, "texture": record.texture, "name": record.name, "created": moment(record.created)}
+    for record in records(images_path(data_folder.settings.data)):
+        document = {
+            "id": record.id,
+            "texture": record.texture,
+            "name": record.name,
+            "created": iso_time(record.created),
+        }
         yield document, f"{record.texture:22}  {record.name}"
 
 
-def _renders(there: Opened) -> Iterator[Row]:
+def _renders(data_folder: OpenFolder) -> Iterator[Row]:
     """As the ledger has them; how far a server is within a frame it alone knows."""
     from sqlalchemy import select
 
     from server.records.tables import RenderRow
     from server.wire.renders import RenderRequest
 
-    with there.service.ledger.sessions() as session:
+    with data_folder.service.ledger.sessions() as session:
         rows = list(session.scalars(select(RenderRow).order_by(RenderRow.created.desc())))
     for row in rows:
         request = RenderRequest.model_validate(json.loads(row.request))
@@ -146,7 +151,7 @@ def _renders(there: Opened) -> Iterator[Row]:
             "done": row.done,
             "total": request.num_frames,
             "problem": row.problem,
-            "created": moment(row.created),
+            "created": iso_time(row.created),
         }
         done = f"{row.done} of {request.num_frames} frames"
         yield document, f"{row.id}  {row.state:9}  {done}  {request.name or request.view}, {request.format}"
@@ -155,10 +160,10 @@ def _renders(there: Opened) -> Iterator[Row]:
 def _built_ins() -> list[Row]:
     from relume.scene.built_in import BUILT_IN
 
-    return [({"name": name, "label": one.label}, f"{name:22}  {one.label}") for name, one in BUILT_IN.items()]
+    return [({"name": name, "label": entry.label}, f"{name:22}  {entry.label}") for name, entry in BUILT_IN.items()]
 
 
-LISTS: dict[str, Callable[[Opened], Iterator[Row]]] = {
+LISTS: dict[str, Callable[[OpenFolder], Iterator[Row]]] = {
     "scenes": _scenes,
     "looks": _looks,
     "environments": _environments,

@@ -13,13 +13,16 @@ def ledger_upgrade(as_json: Json = False, data: Data = None) -> None:
     """
     from cli.data_folder import open_settings
     from worker.database.opening import connect
-    from worker.database.upgrading import newest_revision, upgrade
+    from worker.database.upgrading import latest_revision, upgrade
 
     engine = connect(open_settings(data).database_url)
     try:
-        made = upgrade(engine, by_hand=True)
+        revisions = upgrade(engine, is_requested=True)
     finally:
         engine.dispose()
-    document = {"revision": newest_revision(), "made": [revision for revision, _ in made]}
-    lines = [*(f"{revision}: {what}" for revision, what in made), f"the ledger is at revision {newest_revision()}"]
+    document = {"revision": latest_revision(), "made": [revision for revision, _ in revisions]}
+    lines = [
+        *(f"{revision}: {description}" for revision, description in revisions),
+        f"the ledger is at revision {latest_revision()}",
+    ]
     print_result(document, "\n".join(lines), as_json=as_json)

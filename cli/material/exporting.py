@@ -33,9 +33,9 @@ def material_export(
     if not output.parent.is_dir():
         raise ParameterError("--output", str(output), "a file in a folder that exists")
     materials = read_look(look).get("materials")
-    found = materials.get(material) if isinstance(materials, dict) else None
-    if not isinstance(found, dict) or "terms" not in found:
+    material_look = materials.get(material) if isinstance(materials, dict) else None
+    if not isinstance(material_look, dict) or "terms" not in material_look:
         raise ParameterError("MATERIAL", material, "the name of a material whose terms stand in the look")
-    document = complete({"materials": {material: found}}, default_look([Material(material, ())]))
+    document = complete({"materials": {material: material_look}}, default_look([Material(material, ())]))
     write_merl(output, sample_terms(document["materials"][material]["terms"]))
     print_result({"path": str(output), "material": material}, str(output), as_json=as_json)

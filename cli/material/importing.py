@@ -33,19 +33,20 @@ def material_import(
     from cli.data_folder import open_settings
     from cli.material.words import print_material
     from relume.asset_store import check_name
-    from relume.measured.asset_store import keep
+    from relume.measured.asset_store import store_material
     from worker.paths import materials_path
 
     check_readable("FILE", file)
-    folder, called = open_settings(data).data, check_name(name or file.stem)
+    folder, asset_name = open_settings(data).data, check_name(name or file.stem)
     if file.suffix.lower() in _BTFS:
-        _import_btf(folder, file, called, error, as_json=as_json)
+        _import_btf(folder, file, asset_name, error, as_json=as_json)
         return
-    record = keep(materials_path(folder), file, called)
-    known = (("measured_lv + measured_hd", record.lobes_error), ("measured_hf", record.homomorphic_error))
+    record = store_material(materials_path(folder), file, asset_name)
+    model_errors = (("measured_lv + measured_hd", record.lobes_error), ("measured_hf", record.homomorphic_error))
     lines = [
-        f"  {model}: curves alone err by {', '.join(f'{one:.1%}' for one in errors)} (red, green, blue)"
-        for model, errors in known
+        f"  {model}: curves alone err by {', '.join(f'{channel_error:.1%}' for channel_error in errors)} (red, green, "
+        f"blue)"
+        for model, errors in model_errors
     ]
     print_material(record, lines, as_json=as_json)
 
@@ -58,6 +59,6 @@ def _import_btf(folder: Path, file: Path, name: str, bound: float, *, as_json: b
 
     record = until_interrupted(
         file.name,
-        lambda progress, cancelled: import_btf(btfs_path(folder), file, name, bound, progress, cancelled),
+        lambda progress, is_canceled: import_btf(btfs_path(folder), file, name, bound, progress, is_canceled),
     )
     print_btf(record, as_json=as_json)

@@ -39,16 +39,16 @@ def material_make_btf(
     from cli.interrupts import until_interrupted
     from cli.material.words import print_btf
     from relume.asset_store import check_name
-    from relume.synthetic.make import GEOMETRIES, MESH, Made, make_btf
+    from relume.synthetic.make import GEOMETRIES, MESH, SyntheticBtf, synthesize_btf
     from worker.paths import btfs_path
 
     file = None if geometry in GEOMETRIES or not Path(geometry).suffix else Path(geometry)
-    wanted = Made(geometry if file is None else MESH, size, grid, error, file, period)
-    wanted.check()
-    called = check_name(name or f"{geometry.capitalize() if file is None else file.stem} (synthetic)")
+    request = SyntheticBtf(geometry if file is None else MESH, size, grid, error, file, period)
+    request.check()
+    asset_name = check_name(name or f"{geometry.capitalize() if file is None else file.stem} (synthetic)")
     folder = btfs_path(open_settings(data).data)
     record = until_interrupted(
         f"{geometry}, {size}×{size} texels",
-        lambda progress, stopped: make_btf(folder, wanted, called, progress, stopped),
+        lambda progress, stopped: synthesize_btf(folder, request, asset_name, progress, stopped),
     )
     print_btf(record, as_json=as_json)

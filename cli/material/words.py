@@ -26,5 +26,5 @@ def print_material(record: BtfRecord | MaterialRecord, lines: list[str], *, as_j
 
 def print_btf(record: BtfRecord, *, as_json: bool) -> None:
     """Print a BTF's name in looks, its terms, and how well it is kept."""
-    kept = f"  {record.clusters} clusters × {record.components} components, 1:{record.ratio:.0f}, "
-    print_material(record, [f"{kept}{record.error[-1]:.1%} relative RMS"], as_json=as_json)
+    summary = f"  {record.clusters} clusters × {record.components} components, 1:{record.ratio:.0f}, "
+    print_material(record, [f"{summary}{record.error[-1]:.1%} relative RMS"], as_json=as_json)

@@ -43,13 +43,13 @@ def check_output(path: Path) -> None:
         raise ParameterError("--output", str(path), "a file in a folder that exists")
 
 
-def check_shown(path: Path, look: Any) -> None:
+def check_display_view(path: Path, look: Any) -> None:
     """Raise ParameterError before hours of work where a look has a view that no config here has."""
-    from relume.imageio.ocio.current import needed
+    from relume.imageio.ocio.current import require_config
     from relume.imageio.ocio.view import OcioView
 
     if path.suffix.lower() != ".exr" and isinstance(look.display.tone_map, OcioView):
-        needed().check_view(look.display.tone_map)
+        require_config().check_view(look.display.tone_map)
 
 
 def save(path: Path, image: NDArray[Any], look: Any) -> None:

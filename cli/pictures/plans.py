@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from cli.pictures.files import FORMATS, check_output, check_shown
+from cli.pictures.files import FORMATS, check_display_view, check_output
 from relume.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 LOOK = "{look}"
 VIDEO = ".mp4"
 NO_FOLDERS = (*FORMATS, ".mov", ".avi", ".webm", ".mkv", ".gif", ".jpg", ".jpeg", ".tif", ".tiff")
-Turns = Literal["eye", "object", "environment"]
+TurntableSubject = Literal["eye", "object", "environment"]
 
 
-class Turn(NamedTuple):
+class TurntablePlan(NamedTuple):
     """A turntable: frames once around, what turns, and frames a second of a video."""
 
     frames: int
-    turns: Turns = "eye"
+    subject: TurntableSubject = "eye"
     fps: int = 25
 
 
-class Planned(NamedTuple):
+class PlannedFile(NamedTuple):
     """One file, or folder of frames.
 
     Attributes:
@@ -39,24 +39,24 @@ class Planned(NamedTuple):
     path: Path
 
 
-def turn_of(frames: int | None, turns: Turns | None, fps: int | None) -> Turn | None:
+def make_turntable_plan(frames: int | None, subject: TurntableSubject | None, fps: int | None) -> TurntablePlan | None:
     """The turntable that is asked for. Raises ParameterError where there is none, and something is asked of it."""
     from server.wire.renders import MAX_FRAMES
 
     if frames is None:
-        for option, given in (("--turns", turns), ("--fps", fps)):
-            if given is not None:
-                raise ParameterError(option, given, "--turntable N with it: nothing turns without")
+        for option, value in (("--turns", subject), ("--fps", fps)):
+            if value is not None:
+                raise ParameterError(option, value, "--turntable N with it: nothing turns without")
         return None
     if not 1 <= frames <= MAX_FRAMES:
         raise ParameterError("--turntable", frames, f"1 to {MAX_FRAMES:,} frames")
-    return Turn(frames, turns or "eye", fps or 25)
+    return TurntablePlan(frames, subject or "eye", fps or 25)
 
 
-def check_target(output: Path, turn: Turn | None, *, resumes: bool) -> None:
+def check_target(output: Path, turntable_plan: TurntablePlan | None, *, resumes: bool) -> None:
     """Raise ParameterError where what is asked for could not be written there."""
     suffix = output.suffix.lower()
-    if turn is None:
+    if turntable_plan is None:
         if suffix == VIDEO:
             raise ParameterError("--output", str(output), "a picture's name; a video needs --turntable N")
         check_output(output)
@@ -80,36 +80,38 @@ def frames_folder(output: Path) -> Path:
     return output.with_name(output.name + ".frames") if output.suffix.lower() == VIDEO else output
 
 
-def plan_files(looks: Sequence[NamedLook], output: Path, turn: Turn | None) -> list[Planned]:
+def plan_files(looks: Sequence[NamedLook], output: Path, turntable_plan: TurntablePlan | None) -> list[PlannedFile]:
     """Which look goes where.
 
     Args:
         looks: all of them. output: as it was given; {look} in it stands for the name of each.
-        turn: a turntable, which is of one look.
+        turntable_plan: a turntable, which is of one look.
     Raises:
         ParameterError: several looks would be written to one file.
     """
-    if len(looks) > 1 and turn is not None:
+    if len(looks) > 1 and turntable_plan is not None:
         raise ParameterError("--look", f"{len(looks)} looks", "one with --turntable")
     if len(looks) > 1 and LOOK not in output.name:
         raise ParameterError("--output", str(output), f"a file name with {LOOK} in it, for the {len(looks)} looks")
-    planned = [Planned(look.name, look.document, _path_of(look.name, output)) for look in looks]
-    for number, one in enumerate(planned):
-        if one.path in (other.path for other in planned[:number]):
-            raise ParameterError("--look", one.look, f"looks of different names: two would be written to {one.path}")
-    return planned
+    planned_files = [PlannedFile(look.name, look.document, _output_path(look.name, output)) for look in looks]
+    for number, planned_file in enumerate(planned_files):
+        if planned_file.path in (earlier.path for earlier in planned_files[:number]):
+            raise ParameterError(
+                "--look", planned_file.look, f"looks of different names: two would be written to {planned_file.path}"
+            )
+    return planned_files
 
 
-def complete_plan(planned: Planned, default: dict[str, Any]) -> Look:
+def complete_plan(planned_file: PlannedFile, default: dict[str, Any]) -> Look:
     """The complete look of a file. Raises ParameterError naming the look."""
     from cli.data_folder import complete_look
 
-    look = complete_look(planned.document, default, f"look {planned.look!r}")
-    check_shown(planned.path, look)
+    look = complete_look(planned_file.document, default, f"look {planned_file.look!r}")
+    check_display_view(planned_file.path, look)
     return look
 
 
-def _path_of(look: str, output: Path) -> Path:
+def _output_path(look: str, output: Path) -> Path:
     if LOOK not in output.name:
         return output
     from server.files.downloads import safe_stem

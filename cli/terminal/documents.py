@@ -6,8 +6,8 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from cli.terminal.printing import moment, size_text
-from worker.status import MOVING
+from cli.terminal.printing import iso_time, size_text
+from worker.status import FREE_CAMERA_METHODS
 
 if TYPE_CHECKING:
     from relume.bake import Plan, Recipe
@@ -21,13 +21,13 @@ def scene_document(record: SceneRecord, bakes: Sequence[BakeStatus]) -> dict[str
     return {
         "id": record.id,
         "name": record.name,
-        "created": moment(record.created),
+        "created": iso_time(record.created),
         "views": [{"name": view, "is_placed": False} for view in record.views],
         "materials": list(record.materials),
         "lights": list(record.lights),
         "variants": [{"name": name, "look": look} for name, look in record.variants.items()],
         "warnings": list(record.warnings),
-        "remarks": [remark.document() for remark in record.warnings],
+        "remarks": [warning.document() for warning in record.warnings],
         "triangles": record.num_triangles,
         "bakes": [status.id for status in bakes],
     }
@@ -40,7 +40,7 @@ def bake_document(status: BakeStatus, service: BakeService) -> dict[str, Any]:
         "id": status.id,
         "scene": status.scene,
         "user": status.client,
-        "created": moment(status.created),
+        "created": iso_time(status.created),
         "state": status.state,
         "progress": status.progress,
         "phase": status.phase,
@@ -64,7 +64,7 @@ def recipe_document(recipe: Recipe) -> dict[str, Any]:
         "views": list(recipe.views),
         "size": list(recipe.size),
         "lights": recipe.num_lights,
-        "points": recipe.num_points if recipe.method in MOVING else None,
+        "points": recipe.num_points if recipe.method in FREE_CAMERA_METHODS else None,
         "gather_samples": recipe.gather_samples,
         "gather_rays": recipe.gather_rays,
         "relightable": recipe.relightable,
@@ -79,7 +79,7 @@ def plan_document(plan: Plan, service: BakeService) -> dict[str, Any]:
         "rays": plan.num_rays,
         "store_bytes": plan.store_bytes,
         "peak_bytes": plan.peak_bytes,
-        "seconds": service.seconds_for(plan),
+        "seconds": service.estimate_seconds(plan),
     }
 
 
@@ -91,7 +91,7 @@ def recipe_text(recipe: Recipe) -> str:
 
 def plan_lines(plan: Plan, service: BakeService) -> list[str]:
     """A plan for people."""
-    seconds = service.seconds_for(plan)
+    seconds = service.estimate_seconds(plan)
     return [
         f"  {plan.num_view_samples:,} view samples, {plan.num_rays / 1e6:,.1f} M rays",
         f"  at most {size_text(plan.store_bytes)} on the disk, {size_text(plan.peak_bytes)} of memory",

@@ -38,7 +38,7 @@ def note(line: str) -> None:
         typer.echo(line, err=True)
 
 
-def moment(posix_s: float) -> str:
+def iso_time(posix_s: float) -> str:
     """A time as REST writes it: ISO 8601, UTC."""
     return datetime.fromtimestamp(posix_s, UTC).isoformat()
 

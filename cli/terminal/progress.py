@@ -12,49 +12,49 @@ import typer
 
 from cli.terminal.printing import is_quiet
 
-LINE_EACH, LINE_EVERY_S, LEAST_S = 0.1, 30.0, 2.0
+LINE_STEP, MAX_INTERVAL_S, MIN_INTERVAL_S = 0.1, 30.0, 2.0
 """A line for each tenth that is done, and each half minute; none sooner than two seconds after the one before."""
 
 
-class Tell(Protocol):
+class ReportProgress(Protocol):
     """Takes the share that is done, 0 to 1, and what is being done, in words."""
 
     def __call__(self, share: float, detail: str = "") -> None: ...
 
 
-def part_of(tell: Tell, index: int, total: int, detail: str) -> Callable[[float], None]:
+def report_part(report: ReportProgress, index: int, total: int, detail: str) -> Callable[[float], None]:
     """Whom to tell of one part of work.
 
     Args:
-        tell: of all of it. index, total: which part of how many. detail: what the part is, in words.
+        report: of all of it. index, total: which part of how many. detail: what the part is, in words.
     """
-    return lambda share: tell((index + share) / total, detail)
+    return lambda share: report((index + share) / total, detail)
 
 
 class ProgressLines:
     """Progress where nobody looks at a terminal: in the log of a night's job."""
 
-    def __init__(self, label: str, say: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, label: str, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
         """
         Args:
-            label: of the work. say: takes a line. clock: seconds.
+            label: of the work. write: takes a line. clock: seconds.
         """
-        self._label, self._say, self._clock = label, say, clock
-        self._last_s, self._parts = clock(), 0
+        self._label, self._write, self._clock = label, write, clock
+        self._last_s, self._step = clock(), 0
 
     def __call__(self, share: float, detail: str = "") -> None:
         """Say how far it is, where that is due."""
-        since_s, parts = self._clock() - self._last_s, math.floor(share / LINE_EACH + 1e-9)
-        self._parts = min(self._parts, parts)  # work may begin anew
-        if since_s < LEAST_S or (parts == self._parts and since_s < LINE_EVERY_S):
+        since_s, step = self._clock() - self._last_s, math.floor(share / LINE_STEP + 1e-9)
+        self._step = min(self._step, step)  # work may begin anew
+        if since_s < MIN_INTERVAL_S or (step == self._step and since_s < MAX_INTERVAL_S):
             return
-        self._say(f"{self._label}: {share:.0%}" + (f", {detail}" if detail else ""))
+        self._write(f"{self._label}: {share:.0%}" + (f", {detail}" if detail else ""))
         self._last_s += since_s
-        self._parts = parts
+        self._step = step
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Tell]:
+def progress(label: str) -> Iterator[ReportProgress]:
     """Show progress on stderr; yields whom to tell of it."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn

@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from relume.scene.model import Scene
     from worker.service import BakeService
 
-_SPP_A_PASS, _FEWEST_PASSES = 64, 4
+_SPP_PER_PASS, _MIN_PASSES = 64, 4
 _AGAINST = {"all": "all light paths", "method": "the light paths of its method"}
 
 
 @dataclass(frozen=True)
-class Subject:
+class ComparisonSubject:
     """What is traced.
 
     Attributes:
-        scene, view, look, size: as of `relume.reference.reference_truth`.
-        reflects: whether the method whose paths are told apart has light between surfaces.
+        scene, view, look, size: as of `relume.reference.render_reference`.
+        has_indirect: whether the method whose paths are told apart has light between surfaces.
         frame: that is compared, (height, width, 3); None where none is.
     """
 
@@ -34,23 +34,23 @@ class Subject:
     view: str
     look: Look
     size: tuple[int, int]
-    reflects: bool
+    has_indirect: bool
     frame: Any = None
 
 
 @dataclass(frozen=True)
-class Traced:
+class ReferencePasses:
     """Passes of brute force by whose paths they are, "all" or "method"; and what is left out, in sentences."""
 
     estimates: dict[str, Estimate]
-    left_out: tuple[str, ...]
-    untraced: tuple[str, ...]
+    omitted_paths: tuple[str, ...]
+    unsupported_paths: tuple[str, ...]
 
 
-def find_subject(
+def find_reference_subject(
     data: Path | None, name: str, look: Path | None, view: str | None, camera: Path | None, size: str | None,
     method: str | None, *, needs_bake: bool,
-) -> Subject:  # fmt: skip
+) -> ComparisonSubject:  # fmt: skip
     """A scene as it is asked for. Raises NotFoundError, ParameterError, OSError.
 
     Args:
@@ -62,7 +62,7 @@ def find_subject(
     from relume.look import default_look
     from relume.scene.placed_camera import with_cameras
     from worker.presets import PRESETS
-    from worker.tasks import scene_of
+    from worker.tasks import load_registered_scene
 
     partial, pixels = read_look(look), parse_size(size) if size else PRESETS["good"].size
     with _service(data) as service:
@@ -71,46 +71,50 @@ def find_subject(
             method = find_bake(service, record, None)[0].recipe.method
     if view is not None and view not in record.views:
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(record.views)[:400]}")
-    scene, seen_from = scene_of(service.data_dir, record.id), view or record.views[0]
+    scene, view_name = load_registered_scene(service.data_dir, record.id), view or record.views[0]
     if camera is not None:
-        placed = read_camera(camera)
-        scene, seen_from = with_cameras(scene, [placed.camera]), placed.name
+        custom_camera = read_camera(camera)
+        scene, view_name = with_cameras(scene, [custom_camera.camera]), custom_camera.name
     document = complete_look(partial, default_look(scene.materials, scene.lights))
-    return Subject(scene, seen_from, document, pixels, reflects=method not in (None, "direct"))
+    return ComparisonSubject(scene, view_name, document, pixels, has_indirect=method not in (None, "direct"))
 
 
-def find_baked(data: Path | None, name: str, look: Path | None, view: str | None) -> Subject:
+def find_bake_comparison(data: Path | None, name: str, look: Path | None, view: str | None) -> ComparisonSubject:
     """The finest bake of a scene, and its frame of a look. Raises NotFoundError, ParameterError, OSError.
 
     Args:
         data, name, look, view: as given on the command line.
     """
     from cli.data_folder import complete_look, find_bake, find_scene
-    from relume.memory import Memory
-    from relume.methods.moving_views import MovingViews
+    from relume.memory import Cache
+    from relume.methods.moving_views import BakedFreeCamera
     from relume.methods.registry import open_bake
-    from relume.methods.stills import Stills
-    from relume.picture.transfer import Axis
+    from relume.methods.stills import StaticViewBuilder
+    from relume.picture.transfer import EditAxis
     from relume.render.image import render_image
     from relume.scene.placed_camera import with_cameras
-    from worker.storage import open_kept
-    from worker.tasks import scene_of
+    from worker.storage import open_cached
+    from worker.tasks import load_registered_scene
 
     partial = read_look(look)
     with _service(data) as service:
         record = find_scene(service.ledger, name)
-        bake, seen_from = find_bake(service, record, view)
-        transfer = open_kept(service.store_path(bake.id), lambda store: open_bake(store, Memory(4 << 30)))
-        scene = scene_of(service.data_dir, record.id)
-        document = complete_look(partial, transfer.default_look).on_the_map()
-        stills = Stills(transfer.lit, scene) if isinstance(transfer, MovingViews) else None
-        frame = render_image(transfer, seen_from, document, stills=stills)
-    scene = with_cameras(scene, [transfer.views[seen_from].camera])
+        bake, view_name = find_bake(service, record, view)
+        transfer = open_cached(service.store_path(bake.id), lambda store: open_bake(store, Cache(4 << 30)))
+        scene = load_registered_scene(service.data_dir, record.id)
+        document = complete_look(partial, transfer.default_look).without_compositing()
+        static_views = (
+            StaticViewBuilder(transfer.light_transport, scene) if isinstance(transfer, BakedFreeCamera) else None
+        )
+        frame = render_image(transfer, view_name, document, static_views=static_views)
+    scene = with_cameras(scene, [transfer.views[view_name].camera])
     size = frame.shape[1], frame.shape[0]
-    return Subject(scene, seen_from, document, size, Axis.BOUNCES in transfer.axes, frame)
+    return ComparisonSubject(scene, view_name, document, size, EditAxis.BOUNCES in transfer.axes, frame)
 
 
-def traced(subject: Subject, spp: int, paths: str, progress: Callable[[float], object]) -> Traced:
+def compare_passes(
+    subject: ComparisonSubject, spp: int, paths: str, progress: Callable[[float], object]
+) -> ReferencePasses:
     """Trace a subject: in one pass, or where a frame is compared in as many as tell noise from error.
 
     Args:
@@ -118,84 +122,84 @@ def traced(subject: Subject, spp: int, paths: str, progress: Callable[[float], o
         paths: "all" or "method"; where a frame is compared both are traced.
         progress: called with the share done.
     """
-    from relume.reference import reference_truth
+    from relume.reference import render_reference
     from relume.reference.truth import Estimate
 
-    compares = subject.frame is not None
-    num = max(_FEWEST_PASSES, spp // _SPP_A_PASS) if compares else 1
-    asked = ("all", "method") if compares else (paths,)
-    estimates = {name: Estimate.nothing(*subject.size[::-1]) for name in asked}
-    for k in range(num):
-        truth = reference_truth(
-            subject.scene, subject.view, subject.look, subject.size, -(-spp // num),
-            lambda share, k=k: progress((k + share) / num),  # type: ignore[misc]
-            pass_index=k, reflects=subject.reflects, is_whole="all" in asked,
+    has_frame = subject.frame is not None
+    num_passes = max(_MIN_PASSES, spp // _SPP_PER_PASS) if has_frame else 1
+    path_sets = ("all", "method") if has_frame else (paths,)
+    estimates = {name: Estimate.empty(*subject.size[::-1]) for name in path_sets}
+    for k in range(num_passes):
+        reference_image = render_reference(
+            subject.scene, subject.view, subject.look, subject.size, -(-spp // num_passes),
+            lambda share, k=k: progress((k + share) / num_passes),  # type: ignore[misc]
+            pass_index=k, reflects=subject.has_indirect, is_whole="all" in path_sets,
         )  # fmt: skip
-        estimates = {name: estimate.add(truth.pictures[name]) for name, estimate in estimates.items()}
-    return Traced(estimates, truth.left_out, truth.untraced)
+        estimates = {name: estimate.add(reference_image.pictures[name]) for name, estimate in estimates.items()}
+    return ReferencePasses(estimates, reference_image.omitted_paths, reference_image.unsupported_paths)
 
 
-def sentences(subject: Subject, truth: Traced, paths: str) -> Iterator[str]:
+def report_lines(subject: ComparisonSubject, passes: ReferencePasses, paths: str) -> Iterator[str]:
     """What was traced, what is left out, and how far the frame is from it, a line each.
 
     Args:
-        subject: with the frame, where one is compared. truth: passes of it.
+        subject: with the frame, where one is compared. passes: passes of it.
         paths: whose are asked for, where none is.
     """
     from relume.reference.truth import compare
 
     if subject.frame is not None:
-        for name, estimate in truth.estimates.items():
-            yield f"against {_AGAINST[name]}: {_found(compare(subject.frame, estimate)[0])}"
+        for name, estimate in passes.estimates.items():
+            yield f"against {_AGAINST[name]}: {_error_text(compare(subject.frame, estimate)[0])}"
     if subject.frame is not None or paths == "method":
-        yield from (f"left out by the method: {what}" for what in truth.left_out)
-    yield from (f"left out by brute force, too: {what}" for what in truth.untraced)
+        yield from (f"left out by the method: {sentence}" for sentence in passes.omitted_paths)
+    yield from (f"left out by brute force, too: {sentence}" for sentence in passes.unsupported_paths)
 
 
-def document(subject: Subject, truth: Traced, paths: str) -> dict[str, Any]:
-    """What `sentences` says as JSON, by the names that REST has in a comparison.
+def document(subject: ComparisonSubject, passes: ReferencePasses, paths: str) -> dict[str, Any]:
+    """What `report_lines` says as JSON, by the names that REST has in a comparison.
 
     Args:
-        subject: with the frame, where one is compared. truth: passes of it.
+        subject: with the frame, where one is compared. passes: passes of it.
         paths: whose are asked for, where none is.
     """
     from dataclasses import asdict
 
     from relume.reference.truth import compare
 
-    estimates = {} if subject.frame is None else truth.estimates
-    found = {name: asdict(compare(subject.frame, estimate)[0]) for name, estimate in estimates.items()}
-    is_told = subject.frame is not None or paths == "method"
+    estimates = {} if subject.frame is None else passes.estimates
+    errors = {name: asdict(compare(subject.frame, estimate)[0]) for name, estimate in estimates.items()}
+    reports_method = subject.frame is not None or paths == "method"
     return {
         "view": subject.view,
         "size": list(subject.size),
-        "left_out": list(truth.left_out) if is_told else [],
-        "untraced": list(truth.untraced),
-        "found": found.get("all"),
-        "found_of_method": found.get("method"),
+        "left_out": list(passes.omitted_paths) if reports_method else [],
+        "untraced": list(passes.unsupported_paths),
+        "found": errors.get("all"),
+        "found_of_method": errors.get("method"),
     }
 
 
-def _found(found: Comparison) -> str:
-    noise = f"noise of brute force {percent(found.noise)}"
-    if found.error is None or found.standard_error is None:
-        return f"no error beyond the noise, below {percent(found.limit)} (relative RMSE); {noise}"
-    return f"errs by {percent(found.error, found.standard_error)} (relative RMSE); {noise}"
+def _error_text(comparison: Comparison) -> str:
+    noise = f"noise of brute force {percent(comparison.noise)}"
+    if comparison.error is None or comparison.standard_error is None:
+        return f"no error beyond the noise, below {percent(comparison.limit)} (relative RMSE); {noise}"
+    return f"errs by {percent(comparison.error, comparison.standard_error)} (relative RMSE); {noise}"
 
 
-def percent(share: float, error: float | None = None) -> str:
+def percent(fraction: float, error: float | None = None) -> str:
     """A share, with as many digits as its standard error lets it have.
 
     Args:
-        share: of one. error: its standard error; None: two digits.
+        fraction: of one. error: its standard error; None: two digits.
     """
     from math import floor, log10
 
-    size = 100 * (share if error is None else error)
+    size = 100 * (fraction if error is None else error)
     digits = max(0, (1 if error is None else 0) - floor(log10(size))) if size > 0 else 2
     digits = min(digits, 4)
-    more = "" if error is None else f" ± {100 * error:.{digits}f}"
-    return f"{100 * share:.{digits}f}{more} %"
+    error_text = "" if error is None else f" ± {100 * error:.{digits}f}"
+    return f"{100 * fraction:.{digits}f}{error_text} %"
 
 
 @contextmanager

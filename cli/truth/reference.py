@@ -36,26 +36,26 @@ def reference(
 
     Every texel of the light counts, visibility is traced, and so are paths between surfaces; nothing is baked.
     """
-    from cli.pictures.files import check_output, check_shown, save
+    from cli.pictures.files import check_display_view, check_output, save
     from cli.terminal.progress import progress
-    from cli.truth.passes import document, find_baked, find_subject, sentences, traced
+    from cli.truth.passes import compare_passes, document, find_bake_comparison, find_reference_subject, report_lines
     from relume.errors import ParameterError
 
     check_output(output)
     if compare and (camera, size, method) != (None, None, None):
         raise ParameterError("--compare", "with --camera, --size or --method", "none of these: a bake has its own")
     if compare:
-        subject = find_baked(data, scene, look, view)
+        subject = find_bake_comparison(data, scene, look, view)
     else:
-        subject = find_subject(data, scene, look, view, camera, size, method, needs_bake=paths == "method")
-    check_shown(output, subject.look)
-    whose = paths if method is None else "method"
-    with progress("reference") as tell:
-        truth = traced(subject, spp, whose, tell)
-    save(output, truth.estimates[whose].mean, subject.look)
+        subject = find_reference_subject(data, scene, look, view, camera, size, method, needs_bake=paths == "method")
+    check_display_view(output, subject.look)
+    path_set = paths if method is None else "method"
+    with progress("reference") as report:
+        passes = compare_passes(subject, spp, path_set, report)
+    save(output, passes.estimates[path_set].mean, subject.look)
     if as_json:
-        print_result({"path": str(output), "spp": spp, **document(subject, truth, whose)}, "", as_json=True)
+        print_result({"path": str(output), "spp": spp, **document(subject, passes, path_set)}, "", as_json=True)
         return
     (note if compare else typer.echo)(str(output))
-    for line in sentences(subject, truth, whose):
+    for line in report_lines(subject, passes, path_set):
         typer.echo(line, err=not compare)

@@ -531,7 +531,7 @@ export interface InOutBody {
   is_mirror: boolean;
 }
 
-/** How the functions of the in-basis follow from each other; see `relume.basis.zernike.Ladder`. */
+/** How the functions of the in-basis follow from each other; see `relume.basis.zernike.Recurrence`. */
 export interface LadderBody {
   order: number[];
   norm: number[];

@@ -14,30 +14,30 @@ class LongDirectoryError(Exception):
     """The list of entries is longer than it may be."""
 
 
-class _Bounded:
+class _BoundedFile:
     """A file of which no more is read at once than a list of entries may take, until it is open."""
 
-    def __init__(self, file: BinaryIO, most_bytes: int) -> None:
-        self._file, self._most_bytes = file, most_bytes
+    def __init__(self, file: BinaryIO, max_directory_bytes: int) -> None:
+        self._file, self._max_directory_bytes = file, max_directory_bytes
         self.is_open = False
         self.seek, self.tell, self.seekable, self.close = file.seek, file.tell, file.seekable, file.close
 
     def read(self, size: int | None = -1, /) -> bytes:
         """See `io.RawIOBase`. Raises LongDirectoryError."""
-        if not self.is_open and size is not None and size > self._most_bytes:
+        if not self.is_open and size is not None and size > self._max_directory_bytes:
             raise LongDirectoryError
         return self._file.read(-1 if size is None else size)
 
 
-def open_bounded(file: BinaryIO, most_bytes: int) -> zipfile.ZipFile:
+def open_bounded(file: BinaryIO, max_directory_bytes: int) -> zipfile.ZipFile:
     """The archive in a file that stays open.
 
     Args:
-        file: seekable. most_bytes: that the list of its entries may take.
+        file: seekable. max_directory_bytes: that the list of its entries may take.
     Raises:
         LongDirectoryError: it takes more. And whatever `zipfile` raises for damaged data.
     """
-    bounded = _Bounded(file, most_bytes)
+    bounded = _BoundedFile(file, max_directory_bytes)
     archive = zipfile.ZipFile(cast(BinaryIO, bounded))
     bounded.is_open = True
     return archive

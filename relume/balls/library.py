@@ -15,34 +15,34 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.balls.ball import THUMBNAIL_SIZE, ball_pixels
+from relume.balls.ball import THUMBNAIL_SIZE, preview_pixels
 from relume.brdf.document import complete_term
 from relume.imageio.files import png_bytes
 from relume.look.library import Preset, presets
 
 ATLAS = Path(__file__).with_name("balls.webp")
-_BESIDE = 32  # balls in a row
+_NUM_COLUMNS = 32  # balls in a row
 _QUALITY = 90
 
 
-def library_ball(identity: str) -> bytes | None:
+def library_preview_png(identity: str) -> bytes | None:
     """The ball of a library material as a PNG; None where the library has no such material."""
     index = _indices().get(identity)
-    return None if index is None else png_bytes(_square(index))
+    return None if index is None else png_bytes(_tile(index))
 
 
 def render(preset: Preset) -> NDArray[np.uint8]:
     """The ball as the atlas is to show it. (THUMBNAIL_SIZE, THUMBNAIL_SIZE, 3)"""
-    return ball_pixels([complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)])
+    return preview_pixels([complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)])
 
 
-def write(path: Path, balls: Sequence[NDArray[np.uint8]]) -> None:
+def write(path: Path, previews: Sequence[NDArray[np.uint8]]) -> None:
     """Put balls into one picture, row after row."""
-    size, rows = THUMBNAIL_SIZE, -(-len(balls) // _BESIDE)
-    atlas = np.zeros((rows * size, _BESIDE * size, 3), np.uint8)
-    for index, ball in enumerate(balls):
-        row, column = divmod(index, _BESIDE)
-        atlas[row * size : (row + 1) * size, column * size : (column + 1) * size] = ball
+    size, rows = THUMBNAIL_SIZE, -(-len(previews) // _NUM_COLUMNS)
+    atlas = np.zeros((rows * size, _NUM_COLUMNS * size, 3), np.uint8)
+    for index, preview in enumerate(previews):
+        row, column = divmod(index, _NUM_COLUMNS)
+        atlas[row * size : (row + 1) * size, column * size : (column + 1) * size] = preview
     Image.fromarray(atlas).save(path, "WEBP", quality=_QUALITY, method=6)
 
 
@@ -57,19 +57,19 @@ def _atlas() -> NDArray[np.uint8]:
         return np.asarray(image.convert("RGB"))
 
 
-def _square(index: int) -> NDArray[np.uint8]:
-    row, column = divmod(index, _BESIDE)
+def _tile(index: int) -> NDArray[np.uint8]:
+    row, column = divmod(index, _NUM_COLUMNS)
     size = THUMBNAIL_SIZE
     return _atlas()[row * size : (row + 1) * size, column * size : (column + 1) * size]
 
 
 def main() -> None:
     """Render all of them."""
-    found, balls = presets(), []
-    for count, preset in enumerate(found, 1):
-        balls.append(render(preset))
-        sys.stderr.write(f"\r{count} of {len(found)}")
-    write(ATLAS, balls)
+    library_presets, previews = presets(), []
+    for count, preset in enumerate(library_presets, 1):
+        previews.append(render(preset))
+        sys.stderr.write(f"\r{count} of {len(library_presets)}")
+    write(ATLAS, previews)
     sys.stderr.write("\n")
 
 

@@ -8,7 +8,7 @@ import numba as nb
 import numpy as np
 
 _ONE, _ZERO = np.float32(1), np.float32(0)
-_LEAST, _TURNS = np.float32(1e-30), np.float32(0.5 / math.pi)
+_EPSILON, _FRACTION_PER_RADIAN = np.float32(1e-30), np.float32(0.5 / math.pi)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -27,10 +27,10 @@ def acos_clamped(x):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def azimuth_turns(x, y):  # type: ignore[no-untyped-def]
+def azimuth_fraction(x, y):  # type: ignore[no-untyped-def]
     """Share of a turn from the x axis, in [0, 1] where 1 is 0; error below 1e-7 (Abramowitz and Stegun 4.4.49)."""
     across, along = abs(y), abs(x)
-    t = min(across, along) / max(max(across, along), _LEAST)
+    t = min(across, along) / max(max(across, along), _EPSILON)
     t2 = t * t
     p = np.float32(0.0028662257)
     p = p * t2 - np.float32(0.0161657367)
@@ -40,14 +40,14 @@ def azimuth_turns(x, y):  # type: ignore[no-untyped-def]
     p = p * t2 - np.float32(0.1420889944)
     p = p * t2 + np.float32(0.1999355085)
     p = p * t2 - np.float32(0.3333314528)
-    turn = t * (_ONE + t2 * p) * _TURNS
-    turn = np.float32(0.25) - turn if across > along else turn
-    turn = np.float32(0.5) - turn if x < 0 else turn
-    return _ONE - turn if y < 0 and turn > 0 else turn
+    fraction = t * (_ONE + t2 * p) * _FRACTION_PER_RADIAN
+    fraction = np.float32(0.25) - fraction if across > along else fraction
+    fraction = np.float32(0.5) - fraction if x < 0 else fraction
+    return _ONE - fraction if y < 0 and fraction > 0 else fraction
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def log2_above_one(x):  # type: ignore[no-untyped-def]
+def fast_log2(x):  # type: ignore[no-untyped-def]
     """Logarithm to base 2 of a float32 that is 1 or more; error below 1e-6, exact for powers of 2.
 
     Of a mantissa 1 + t it is t (1 + (t − 1) q(t)), q by least squares.

@@ -36,21 +36,21 @@ def _quadrature(num_bands: int) -> tuple[F64, F64, NDArray[np.intp]]:
     return nodes, weights, np.searchsorted(panels, edges[:-1])
 
 
-def band_averages(function: Callable[[F64], F64], num_bands: int, *, about_pole: bool = False) -> F64:
+def band_averages(function: Callable[[F64], F64], num_bands: int, *, solid_angle_weighted: bool = False) -> F64:
     """Mean of a function over each band; point samples would make highlights pop (appendix B, Ben-Artzi 2006).
 
     Args:
         function: γ in radians (n,) -> f(γ) (n,).
         num_bands: J.
-        about_pole: weigh angles by the directions they have, as good as γ within a band: a lobe narrower than the first
-            band keeps its light, and is as wide as the band.
+        solid_angle_weighted: weigh angles by the directions they have, as good as γ within a band: a lobe narrower than
+            the first band keeps its light, and is as wide as the band.
     Returns:
         (J,) float64
     """
     nodes, weights, first_panel = _quadrature(num_bands)
     values = function(nodes.ravel()).reshape(nodes.shape)
-    if about_pole:
-        middles = (np.arange(num_bands) + 0.5) * (MAX_ANGLE / num_bands)
+    if solid_angle_weighted:
+        centers = (np.arange(num_bands) + 0.5) * (MAX_ANGLE / num_bands)
         weights = weights * nodes
-        return np.asarray(np.add.reduceat(np.einsum("pn,pn->p", values, weights), first_panel) / middles)
+        return np.asarray(np.add.reduceat(np.einsum("pn,pn->p", values, weights), first_panel) / centers)
     return np.asarray(np.add.reduceat(np.einsum("pn,pn->p", values, weights), first_panel))

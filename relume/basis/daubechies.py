@@ -23,7 +23,7 @@ _MODE = "periodization"
 _COARSEST = 4
 
 
-def _levels(num_bands: int) -> int:
+def _num_levels(num_bands: int) -> int:
     if num_bands < _COARSEST or num_bands & (num_bands - 1):
         raise ShapeMismatchError(f"{num_bands} bands cannot be halved evenly; give a power of two, at least 4")
     return num_bands.bit_length() - _COARSEST.bit_length()
@@ -31,20 +31,20 @@ def _levels(num_bands: int) -> int:
 
 def analysis(bands: F64) -> F64:
     """Coefficients of band values, along the last axis. (..., J) -> (..., J) float64"""
-    levels = _levels(bands.shape[-1])
-    if levels == 0:
+    num_levels = _num_levels(bands.shape[-1])
+    if num_levels == 0:
         return np.array(bands)
-    return np.concatenate(pywt.wavedec(bands, _WAVELET, mode=_MODE, level=levels, axis=-1), axis=-1)
+    return np.concatenate(pywt.wavedec(bands, _WAVELET, mode=_MODE, level=num_levels, axis=-1), axis=-1)
 
 
 def synthesis(coefficients: F64) -> F64:
     """Band values of coefficients, along the last axis; the inverse of `analysis`. (..., J) -> (..., J) float64"""
-    levels = _levels(coefficients.shape[-1])
-    if levels == 0:
+    num_levels = _num_levels(coefficients.shape[-1])
+    if num_levels == 0:
         return np.array(coefficients)
-    cuts = [_COARSEST << level for level in range(levels)]
-    parts = np.split(coefficients, cuts, axis=-1)
-    return np.asarray(pywt.waverec(parts, _WAVELET, mode=_MODE, axis=-1))
+    cuts = [_COARSEST << level for level in range(num_levels)]
+    subbands = np.split(coefficients, cuts, axis=-1)
+    return np.asarray(pywt.waverec(subbands, _WAVELET, mode=_MODE, axis=-1))
 
 
 @lru_cache(maxsize=16)

@@ -15,7 +15,7 @@ def padded_length(length: int) -> int:
     return 1 << max(0, length - 1).bit_length()
 
 
-def levels(length: int) -> NDArray[np.int64]:
+def coefficient_levels(length: int) -> NDArray[np.int64]:
     """Level of each coefficient of a power of two, that of the mean counted as level 0. (length,)"""
     return np.frexp(np.maximum(np.arange(length), 1))[1].astype(np.int64) - 1
 

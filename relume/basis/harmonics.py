@@ -31,6 +31,6 @@ def harmonics(directions: F64) -> F64:
     for degree in range(ORDER):
         for order in range(-degree, degree + 1):
             value = sph_harm_y(degree, abs(order), theta, phi)
-            part = value.imag if order < 0 else value.real
-            columns.append(part * (np.sqrt(2) if order else 1))
+            component = value.imag if order < 0 else value.real
+            columns.append(component * (np.sqrt(2) if order else 1))
     return np.stack(columns, axis=1)

@@ -17,11 +17,11 @@ class Clusters(NamedTuple):
     """Clusters of rows (n, R).
 
     Attributes:
-        of: which of K each row is in. (n,)
+        cluster_index: which of K each row is in. (n,)
         mean: (K, R) float32. components: orthonormal, the strongest first; nothing where there are no more. (K, C, R)
     """
 
-    of: NDArray[np.intp]
+    cluster_index: NDArray[np.intp]
     mean: F32
     components: F32
 
@@ -33,84 +33,89 @@ def cluster(rows: F32, num_clusters: int, num_components: int, rng: np.random.Ge
         rows: (n, R) float32. num_clusters: at most. num_components: C of each.
         rng: chooses the first means.
     """
-    centres = _spread(rows, num_clusters, rng)
-    num = len(centres)
-    of = np.argmin(_apart(rows, centres), axis=1)
+    centers = _choose_distant_rows(rows, num_clusters, rng)
+    num = len(centers)
+    cluster_index = np.argmin(_relative_squared_distances(rows, centers), axis=1)
     if num == 1:
-        return _components(rows, of, num, num_components)
+        return _components(rows, cluster_index, num, num_components)
     for _ in range(_ROUNDS):
-        of = np.argmin(_apart(rows, _means(rows, of, num)), axis=1)
-    found = _components(rows, of, num, num_components)
+        cluster_index = np.argmin(_relative_squared_distances(rows, _means(rows, cluster_index, num)), axis=1)
+    clusters = _components(rows, cluster_index, num, num_components)
     for _ in range(_ROUNDS):
-        nearest = np.argmin(distances(rows, found), axis=1)
-        if (nearest == of).all():
+        nearest = np.argmin(distances(rows, clusters), axis=1)
+        if (nearest == cluster_index).all():
             break
-        of = nearest
-        found = _components(rows, of, num, num_components)
-    return found
+        cluster_index = nearest
+        clusters = _components(rows, cluster_index, num, num_components)
+    return clusters
 
 
-def _spread(rows: F32, num: int, rng: np.random.Generator) -> F32:
+def _choose_distant_rows(rows: F32, num: int, rng: np.random.Generator) -> F32:
     """Choose rows that are unlike each other (k-means++)."""
-    chosen = [int(rng.integers(len(rows)))]
-    distance = ((rows - rows[chosen[0]]) ** 2).sum(axis=1)
-    while len(chosen) < num and distance.max() > 0:
-        chosen.append(int(rng.choice(len(rows), p=distance / distance.sum(dtype=np.float64))))
-        distance = np.minimum(distance, ((rows - rows[chosen[-1]]) ** 2).sum(axis=1))
-    return rows[chosen]
+    indices = [int(rng.integers(len(rows)))]
+    distance = ((rows - rows[indices[0]]) ** 2).sum(axis=1)
+    while len(indices) < num and distance.max() > 0:
+        indices.append(int(rng.choice(len(rows), p=distance / distance.sum(dtype=np.float64))))
+        distance = np.minimum(distance, ((rows - rows[indices[-1]]) ** 2).sum(axis=1))
+    return rows[indices]
 
 
-def _means(rows: F32, of: NDArray[np.intp], num_clusters: int) -> F32:
+def _means(rows: F32, cluster_index: NDArray[np.intp], num_clusters: int) -> F32:
     """Mean of each cluster, of all rows where it is empty. (K, R)"""
-    every = rows.mean(axis=0)
-    return np.stack([rows[of == k].mean(axis=0) if (of == k).any() else every for k in range(num_clusters)])
+    overall_mean = rows.mean(axis=0)
+    return np.stack(
+        [
+            rows[cluster_index == k].mean(axis=0) if (cluster_index == k).any() else overall_mean
+            for k in range(num_clusters)
+        ]
+    )
 
 
-def _components(rows: F32, of: NDArray[np.intp], num_clusters: int, num: int) -> Clusters:
+def _components(rows: F32, cluster_index: NDArray[np.intp], num_clusters: int, num: int) -> Clusters:
     """Mean and components of each cluster; one that is empty has those of all rows."""
-    mean = _means(rows, of, num_clusters)
+    mean = _means(rows, cluster_index, num_clusters)
     components = np.zeros((num_clusters, num, rows.shape[1]), np.float32)
     for k in range(num_clusters):
-        mine = rows[of == k] if (of == k).any() else rows
-        found = strongest(mine - mean[k], num)
-        components[k, : len(found)] = found
-    return Clusters(of, mean, components)
+        members = rows[cluster_index == k] if (cluster_index == k).any() else rows
+        leading = leading_components(members - mean[k], num)
+        components[k, : len(leading)] = leading
+    return Clusters(cluster_index, mean, components)
 
 
-def strongest(rows: F32, num: int) -> F32:
+def leading_components(rows: F32, num: int) -> F32:
     """Find where rows (n, R) reach farthest, orthonormal. (≤ num, R)"""
     if len(rows) < rows.shape[1]:  # then the vectors of their other side are fewer
         exact = rows.astype(np.float64)  # what is found is divided by its length, which may be little
-        found = _largest(exact @ exact.T, num) @ exact
-        return np.ascontiguousarray(found / np.linalg.norm(found, axis=1, keepdims=True), np.float32)
-    return np.ascontiguousarray(_largest((rows.T @ rows).astype(np.float64), num), np.float32)
+        eigenvectors = _leading_eigenvectors(exact @ exact.T, num) @ exact
+        return np.ascontiguousarray(eigenvectors / np.linalg.norm(eigenvectors, axis=1, keepdims=True), np.float32)
+    return np.ascontiguousarray(_leading_eigenvectors((rows.T @ rows).astype(np.float64), num), np.float32)
 
 
-def _largest(symmetric: F64, num: int) -> F64:
+def _leading_eigenvectors(symmetric: F64, num: int) -> F64:
     """Find the eigenvectors of the largest eigenvalues, those of next to nothing left out. (≤ num, n)"""
     values, vectors = np.linalg.eigh(symmetric)
-    is_kept = values[::-1][:num] > 1e-9 * max(float(values.max(initial=0)), 1e-30)
-    return np.asarray(vectors[:, ::-1][:, :num].T[is_kept])
+    is_significant = values[::-1][:num] > 1e-9 * max(float(values.max(initial=0)), 1e-30)
+    return np.asarray(vectors[:, ::-1][:, :num].T[is_significant])
 
 
-def _apart(rows: F32, centres: F32) -> F32:
+def _relative_squared_distances(rows: F32, centers: F32) -> F32:
     """Squares of distances, but for what is the same for all centres. (n, K)"""
-    return np.asarray((centres**2).sum(axis=1) - 2 * rows @ centres.T)
+    return np.asarray((centers**2).sum(axis=1) - 2 * rows @ centers.T)
 
 
-def distances(rows: F32, found: Clusters) -> F32:
+def distances(rows: F32, clusters: Clusters) -> F32:
     """What means and components of each cluster miss of rows, squared. (n, K)"""
-    out = (rows**2).sum(axis=1)[:, None] + _apart(rows, found.mean)
-    for k, (mean, components) in enumerate(zip(found.mean, found.components, strict=True)):
+    out = (rows**2).sum(axis=1)[:, None] + _relative_squared_distances(rows, clusters.mean)
+    for k, (mean, components) in enumerate(zip(clusters.mean, clusters.components, strict=True)):
         out[:, k] -= ((rows @ components.T - components @ mean) ** 2).sum(axis=1)
     return np.asarray(out, np.float32)
 
 
-def missed(rows: F32, found: Clusters) -> F64:
+def residual_energy(rows: F32, clusters: Clusters) -> F64:
     """What clusters miss of all rows, squared, by how many components are used, from none on. (C + 1,)"""
-    left = np.zeros(1 + found.components.shape[1])
-    for k, (mean, components) in enumerate(zip(found.mean, found.components, strict=True)):
-        away = rows[found.of == k] - mean
-        told = np.square(away @ components.T, dtype=np.float64).sum(axis=0)
-        left += np.square(away, dtype=np.float64).sum() - np.concatenate([[0], np.cumsum(told)])
-    return np.maximum(left, 0)
+    residual = np.zeros(1 + clusters.components.shape[1])
+    for k, (mean, components) in enumerate(zip(clusters.mean, clusters.components, strict=True)):
+        deviations = rows[clusters.cluster_index == k] - mean
+        explained = np.square(deviations @ components.T, dtype=np.float64).sum(axis=0)
+        residual += np.square(deviations, dtype=np.float64).sum() - np.concatenate([[0], np.cumsum(explained)])
+    return np.maximum(residual, 0)

@@ -22,7 +22,7 @@ F64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Components:
+class PrincipalComponents:
     """A mean and orthonormal vectors, the most important first.
 
     Attributes:
@@ -32,9 +32,9 @@ class Components:
     mean: F64
     vectors: F64
 
-    def first(self, num: int) -> Components:
+    def first(self, num: int) -> PrincipalComponents:
         """The same basis with only its first, most important vectors."""
-        return Components(self.mean, self.vectors[:num])
+        return PrincipalComponents(self.mean, self.vectors[:num])
 
     def analysis(self, curves: F64) -> F64:
         """c of curves, by least squares (15). (..., J) -> (..., k)"""
@@ -45,11 +45,11 @@ class Components:
         return np.asarray(self.mean + coefficients @ self.vectors)
 
 
-def decompose(curves: F64) -> Components:
+def decompose(curves: F64) -> PrincipalComponents:
     """All principal components of curves (n, J), one for each value of a parameter (12 to 14)."""
     mean = curves.mean(axis=0)
     _, _, vectors = np.linalg.svd(curves - mean, full_matrices=False)
-    return Components(mean, vectors)
+    return PrincipalComponents(mean, vectors)
 
 
 def joint(bands: Sequence[F64]) -> F64:
@@ -57,12 +57,12 @@ def joint(bands: Sequence[F64]) -> F64:
     return reduce(lambda product, curve: np.multiply.outer(product, curve).ravel(), bands, np.ones(1))
 
 
-def relative_rms(found: F64, exact: F64) -> float:
+def relative_rms(approximation: F64, exact: F64) -> float:
     """√mean (found − exact)² ÷ √mean exact², over bands and values of the parameter."""
-    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+    return float(np.linalg.norm(approximation - exact) / np.linalg.norm(exact))
 
 
-def worst_relative_rms(found: F64, exact: F64) -> float:
+def worst_relative_rms(approximation: F64, exact: F64) -> float:
     """The same for each curve, over bands, of which the largest: what bounds the picture at every value."""
-    difference, length = np.linalg.norm(found - exact, axis=-1), np.linalg.norm(exact, axis=-1)
+    difference, length = np.linalg.norm(approximation - exact, axis=-1), np.linalg.norm(exact, axis=-1)
     return float(np.divide(difference, length, out=np.zeros_like(length), where=length > 0).max())

@@ -25,20 +25,20 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 DEGREE = 7
-SENT_DEGREE = 6  # of those by which surfaces send light to each other
-QUICK_DEGREE = 4  # of those in which light is followed while a hand moves it
+OUTGOING_DEGREE = 6  # of those by which surfaces send light to each other
+FAST_DEGREE = 4  # of those in which light is followed while a hand moves it
 NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
 DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
 """Degree of each function. (K,)"""
-FALL = 1 / (2 * 8.0**2)
+WINDOW_DECAY = 1 / (2 * 8.0**2)
 """1 / 2d², d = 8, of windows e^(−n (n + 2) / 2d²). Functions cut off at a degree ring beside what is bright; a window
 takes a part of that away for a little blur (docs/adr/0063-highlights.md, docs/adr/0047-cells-send-by-direction.md)."""
-AT_ONCE = 128  # rays that `add_light` takes; all columns of them stay in the first cache
-WI, LIGHT, _X, _RE, _IM, _BEFORE, _LAST, NUM_COLUMNS = 0, *(AT_ONCE * k for k in (2, 5, 6, 7, 8, 9)), 10
+BATCH_RAYS = 128  # rays that `add_light` takes; all columns of them stay in the first cache
+WI, LIGHT, _X, _RE, _IM, _BEFORE, _LAST, NUM_COLUMNS = 0, *(BATCH_RAYS * k for k in (2, 5, 6, 7, 8, 9)), 10
 """Where the columns of `add_light` begin, and how many there are."""
 
 
-class Ladder(NamedTuple):
+class Recurrence(NamedTuple):
     """How functions follow from each other; one rung for each degree n and order m ≥ 0, orders outermost.
 
     Attributes:
@@ -62,7 +62,7 @@ def num_functions(degree: int) -> int:
 
 
 @lru_cache(maxsize=DEGREE + 1)
-def ladder(degree: int = DEGREE) -> Ladder:
+def recurrence(degree: int = DEGREE) -> Recurrence:
     """The rungs of all functions up to a degree, at most `DEGREE`."""
     rows: list[tuple[float, ...]] = []
     for m in range(degree + 1):
@@ -73,11 +73,11 @@ def ladder(degree: int = DEGREE) -> Ladder:
     table = np.array(rows)
     order, cosine, sine = (np.ascontiguousarray(table[:, k], np.int32) for k in (0, 2, 3))
     norm, a, b, c = (np.ascontiguousarray(table[:, k], np.float32) for k in (1, 4, 5, 6))
-    return Ladder(order=order, norm=norm, cosine=cosine, sine=sine, a=a, b=b, c=c)
+    return Recurrence(order=order, norm=norm, cosine=cosine, sine=sine, a=a, b=b, c=c)
 
 
 def _recurrence(s: int, m: int) -> tuple[float, float, float]:
-    """Find the factors a, b, c of `Ladder` for P_s^(0,m)."""
+    """Find the factors a, b, c of `Recurrence` for P_s^(0,m)."""
     if s == 0:
         return 0.0, 0.0, 0.0
     if s == 1:
@@ -87,7 +87,7 @@ def _recurrence(s: int, m: int) -> tuple[float, float, float]:
     return (t - 1) * t * (t - 2) / divisor, -(t - 1) * m * m / divisor, 2 * (s - 1) * (s + m - 1) * t / divisor
 
 
-def in_basis(wi: F64) -> F64:
+def project(wi: F64) -> F64:
     """Evaluate all functions.
 
     Args:
@@ -95,72 +95,72 @@ def in_basis(wi: F64) -> F64:
     Returns:
         (..., K) float64, zero below the horizon
     """
-    rungs, power = ladder(), np.ones(wi.shape[:-1], np.complex128)
-    place = wi[..., 0] + 1j * wi[..., 1]
-    x = 2 * np.abs(place) ** 2 - 1
+    table, power = recurrence(), np.ones(wi.shape[:-1], np.complex128)
+    disk_point = wi[..., 0] + 1j * wi[..., 1]
+    x = 2 * np.abs(disk_point) ** 2 - 1
     out = np.zeros((*wi.shape[:-1], NUM_FUNCTIONS))
     before = last = np.ones_like(x)
-    for rung, m in enumerate(rungs.order):
-        if rungs.a[rung] == 0:
-            power = place**m
+    for row, m in enumerate(table.order):
+        if table.a[row] == 0:
+            power = disk_point**m
             before, last = np.zeros_like(x), np.ones_like(x)
         else:
-            before, last = last, (rungs.a[rung] * x + rungs.b[rung]) * last - rungs.c[rung] * before
-        value = rungs.norm[rung] * last * power
-        out[..., rungs.sine[rung]] = value.imag
-        out[..., rungs.cosine[rung]] = value.real
+            before, last = last, (table.a[row] * x + table.b[row]) * last - table.c[row] * before
+        value = table.norm[row] * last * power
+        out[..., table.sine[row]] = value.imag
+        out[..., table.cosine[row]] = value.real
     return out * (wi[..., 2:] > 0)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def add_light(rungs, num, columns, out):  # type: ignore[no-untyped-def]
+def accumulate(table, num, columns, out):  # type: ignore[no-untyped-def]
     """Add the light of rays to a point's light vector, t_k += Σ w h_k(ωi).
 
     Columns lie in one flat array at constant places: of several arrays nobody could tell that they are not the same
     memory, and loops would be of one ray at a time.
 
     Args:
-        rungs: the `ladder`. num: how many rays there are, at most `AT_ONCE`.
+        table: the `recurrence`. num: how many rays there are, at most `AT_ONCE`.
         columns: from `WI` on x and y of their local directions, from `LIGHT` on their light in each channel; the others
             are written. (NUM_COLUMNS · AT_ONCE,) float32
         out: added to. (3, K) float32
     """
     for n in range(num):
-        x, y = columns[WI + n], columns[WI + AT_ONCE + n]
+        x, y = columns[WI + n], columns[WI + BATCH_RAYS + n]
         columns[_X + n] = np.float32(2) * (x * x + y * y) - np.float32(1)
         columns[_RE + n], columns[_IM + n] = np.float32(1), np.float32(0)
-    for rung in range(rungs.order.shape[0]):
-        a, b, c, m = rungs.a[rung], rungs.b[rung], rungs.c[rung], rungs.order[rung]
+    for row in range(table.order.shape[0]):
+        a, b, c, m = table.a[row], table.b[row], table.c[row], table.order[row]
         if a == 0:  # the first of its order
             for n in range(num):
                 columns[_BEFORE + n], columns[_LAST + n] = np.float32(0), np.float32(1)
             if m > 0:
                 for n in range(num):
-                    x, y, re, im = columns[WI + n], columns[WI + AT_ONCE + n], columns[_RE + n], columns[_IM + n]
+                    x, y, re, im = columns[WI + n], columns[WI + BATCH_RAYS + n], columns[_RE + n], columns[_IM + n]
                     columns[_RE + n], columns[_IM + n] = re * x - im * y, re * y + im * x
         else:
             for n in range(num):
                 last = columns[_LAST + n]
                 columns[_LAST + n] = (a * columns[_X + n] + b) * last - c * columns[_BEFORE + n]
                 columns[_BEFORE + n] = last
-        _add(num, columns, _RE, rungs.norm[rung], rungs.cosine[rung], out)
+        _add(num, columns, _RE, table.norm[row], table.cosine[row], out)
         if m > 0:
-            _add(num, columns, _IM, rungs.norm[rung], rungs.sine[rung], out)
+            _add(num, columns, _IM, table.norm[row], table.sine[row], out)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def functions_of(rungs, num, wi, scratch, out):  # type: ignore[no-untyped-def]
+def evaluate_basis(table, num, wi, scratch, out):  # type: ignore[no-untyped-def]
     """Evaluate all functions for some rays.
 
     Args:
-        rungs: the `ladder`. num: how many rays there are. wi: their local directions. (≥ 2, ≥ num) float32
+        table: the `recurrence`. num: how many rays there are. wi: their local directions. (≥ 2, ≥ num) float32
         scratch: (≥ 5, ≥ num) float32, written. out: written. (K, ≥ num) float32
     """
     x, re, im, before, last = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    _begin(num, wi, x)
-    for rung in range(rungs.order.shape[0]):
-        _climb(rungs, rung, num, wi, x, re, im, before, last)
-        norm, cosine, sine = rungs.norm[rung], rungs.cosine[rung], rungs.sine[rung]
+    _start_recurrence(num, wi, x)
+    for row in range(table.order.shape[0]):
+        _advance_recurrence(table, row, num, wi, x, re, im, before, last)
+        norm, cosine, sine = table.norm[row], table.cosine[row], table.sine[row]
         for n in range(num):
             out[sine, n] = norm * last[n] * im[n]
         for n in range(num):
@@ -168,47 +168,47 @@ def functions_of(rungs, num, wi, scratch, out):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def functions_along(rungs, x, y, out):  # type: ignore[no-untyped-def]
+def evaluate_basis_along(table, x, y, out):  # type: ignore[no-untyped-def]
     """Evaluate all functions in one direction; rows of one ray would be written and read at every rung.
 
     Args:
-        rungs: the `ladder`. x, y: of the direction, local, unit. out: written. (K,) float32
+        table: the `recurrence`. x, y: of the direction, local, unit. out: written. (K,) float32
     """
     argument = np.float32(2) * (x * x + y * y) - np.float32(1)
     re, im = np.float32(1), np.float32(0)
     before, last = np.float32(0), np.float32(1)
-    for rung in range(rungs.order.shape[0]):
-        a = rungs.a[rung]
+    for row in range(table.order.shape[0]):
+        a = table.a[row]
         if a == 0:
-            if rungs.order[rung] > 0:
+            if table.order[row] > 0:
                 re, im = re * x - im * y, re * y + im * x
             before, last = np.float32(0), np.float32(1)
         else:
-            before, last = last, (a * argument + rungs.b[rung]) * last - rungs.c[rung] * before
-        value = rungs.norm[rung] * last
-        out[rungs.sine[rung]] = value * im
-        out[rungs.cosine[rung]] = value * re
+            before, last = last, (a * argument + table.b[row]) * last - table.c[row] * before
+        value = table.norm[row] * last
+        out[table.sine[row]] = value * im
+        out[table.cosine[row]] = value * re
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _begin(num, wi, x):  # type: ignore[no-untyped-def]
+def _start_recurrence(num, wi, x):  # type: ignore[no-untyped-def]
     for n in range(num):
         x[n] = np.float32(2) * (wi[0, n] * wi[0, n] + wi[1, n] * wi[1, n]) - np.float32(1)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _climb(rungs, rung, num, wi, x, re, im, before, last):  # type: ignore[no-untyped-def]
+def _advance_recurrence(table, row, num, wi, x, re, im, before, last):  # type: ignore[no-untyped-def]
     """Go from the rung before to this one."""
-    a, b, c = rungs.a[rung], rungs.b[rung], rungs.c[rung]
+    a, b, c = table.a[row], table.b[row], table.c[row]
     if a == 0:
-        _next_power(rungs.order[rung], num, wi, re, im)
+        _next_power(table.order[row], num, wi, re, im)
         for n in range(num):
             before[n], last[n] = np.float32(0), np.float32(1)
     else:
         for n in range(num):
-            old = last[n]
-            last[n] = (a * x[n] + b) * old - c * before[n]
-            before[n] = old
+            previous = last[n]
+            last[n] = (a * x[n] + b) * previous - c * before[n]
+            before[n] = previous
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -224,14 +224,14 @@ def _next_power(m, num, wi, re, im):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _add(num, columns, part, norm, k, out):  # type: ignore[no-untyped-def]
+def _add(num, columns, power_offset, norm, k, out):  # type: ignore[no-untyped-def]
     """Add what rays bring of function k. part: where the column of its real or imaginary power begins."""
     red = green = blue = np.float32(0)
     for n in range(num):
-        value = columns[_LAST + n] * columns[part + n]
+        value = columns[_LAST + n] * columns[power_offset + n]
         red += value * columns[LIGHT + n]
-        green += value * columns[LIGHT + AT_ONCE + n]
-        blue += value * columns[LIGHT + 2 * AT_ONCE + n]
+        green += value * columns[LIGHT + BATCH_RAYS + n]
+        blue += value * columns[LIGHT + 2 * BATCH_RAYS + n]
     red, green, blue = norm * red, norm * green, norm * blue
     out[0, k] += red
     out[1, k] += green

@@ -33,7 +33,7 @@ TILT_Y = np.int64(Angle.TILT_Y)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def power_below_one(x, exponent):  # type: ignore[no-untyped-def]
+def fast_pow(x, exponent):  # type: ignore[no-untyped-def]
     """x ** exponent for x in (0, 1] and exponent in [0, 1], relative error below 2e-6.
 
     Written with arithmetic only: calls of exp and log would keep the compiler from vectorising the loops around them.
@@ -96,11 +96,11 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     across = hx * hx + hy * hy
     cos2_phi_h = hx * hx / across if across > np.float32(1e-12) else np.float32(0.5)
     power = cos2_phi_h if kind == ALPHA else _ONE - cos2_phi_h
-    return acos_clamped(power_below_one(cos_theta_h, power))
+    return acos_clamped(fast_pow(cos_theta_h, power))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
+def compute_angles(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """γ · scale of many directions wi and one wo.
 
     Args:
@@ -143,7 +143,7 @@ def angles_into(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-un
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def alpha_and_beta_into(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ignore[no-untyped-def]
+def compute_alpha_beta(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ignore[no-untyped-def]
     """γα and γβ times scales, of many directions wi and one wo, by one power: cos γα · cos γβ = cos θh.
 
     Args:
@@ -153,10 +153,10 @@ def alpha_and_beta_into(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ig
     along, across = scale[0], scale[1]
     for k in range(ix.shape[0]):
         hx, hy, hz = ix[k] + ox, iy[k] + oy, iz[k] + oz
-        beside = hx * hx + hy * hy
-        inverse = _ONE / math.sqrt(beside + hz * hz + np.float32(1e-12))
+        tangential_squared = hx * hx + hy * hy
+        inverse = _ONE / math.sqrt(tangential_squared + hz * hz + np.float32(1e-12))
         cos_theta_h = min(max(hz * inverse, np.float32(1e-6)), _ONE)
-        cos2_phi_h = hx * hx / beside if beside > np.float32(1e-12) else np.float32(0.5)
-        cosine = power_below_one(cos_theta_h, cos2_phi_h)
+        cos2_phi_h = hx * hx / tangential_squared if tangential_squared > np.float32(1e-12) else np.float32(0.5)
+        cosine = fast_pow(cos_theta_h, cos2_phi_h)
         alpha[k] = along * acos_clamped(cosine)
         beta[k] = across * acos_clamped(min(cos_theta_h / cosine, _ONE))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeGuard, cast
 
 from relume.asset_store import AssetStore
 from relume.brdf.registry import TERMS
-from relume.checks import Pointer, fail
+from relume.checks import Pointer, invalid_value
 from relume.errors import SceneError
 
 TEXTURES = ("diffuse", "specular")
@@ -34,31 +34,33 @@ IMAGES = AssetStore("image", "image:", "image.json", SceneError, max_entries=1_0
 """Where such images are kept, by `relume.images.shelf`."""
 
 
-def is_image(texture: str | bool | None) -> TypeGuard[str]:
+def is_user_image(texture: str | bool | None) -> TypeGuard[str]:
     """Whether a term's `texture` or `roughness_map` names an image rather than one of the material's own."""
     return isinstance(texture, str) and texture.startswith(IMAGES.prefix)
 
 
-def channel_of(document: Mapping[str, Any]) -> str | None:
+def texture_channel(document: Mapping[str, Any]) -> str | None:
     """The channel of a term's texture: that which it names, or that which its model takes where it names an image.
 
     Args:
         document: a term, with its `model` and `texture`.
     """
     texture = document.get("texture")
-    return TERMS[document["model"]].texture if is_image(texture) else texture
+    return TERMS[document["model"]].texture if is_user_image(texture) else texture
 
 
-def group_of(document: Mapping[str, Any]) -> int:
+def texture_slot(document: Mapping[str, Any]) -> int:
     """Number of the sum that a term is part of: 0 without a texture, 1 + place in `TEXTURES` with one. document: it"""
-    channel = channel_of(document)
+    channel = texture_channel(document)
     return 0 if channel is None else 1 + TEXTURES.index(channel)
 
 
-def images_of(documents: Sequence[Mapping[str, Any]]) -> Images:
+def user_images(documents: Sequence[Mapping[str, Any]]) -> Images:
     """What the terms of a material name in the place of each of `TEXTURES`. documents: its terms"""
-    found: dict[int, str] = {group_of(one): one["texture"] for one in documents if is_image(one.get("texture"))}
-    return found.get(1), found.get(2)
+    images_by_slot: dict[int, str] = {
+        texture_slot(document): document["texture"] for document in documents if is_user_image(document.get("texture"))
+    }
+    return images_by_slot.get(1), images_by_slot.get(2)
 
 
 def roughness_image(documents: Sequence[Mapping[str, Any]]) -> str | None:
@@ -67,18 +69,18 @@ def roughness_image(documents: Sequence[Mapping[str, Any]]) -> str | None:
     Args:
         documents: its terms.
     """
-    return next((name for one in documents if is_image(name := one.get("roughness_map"))), None)
+    return next((name for document in documents if is_user_image(name := document.get("roughness_map"))), None)
 
 
-def check_map(pointer: Pointer, follows: Any) -> bool | str:
+def check_map(pointer: Pointer, roughness_map: Any) -> bool | str:
     """A term's `roughness_map`. Raises ParameterError unless it is yes, no, or an image that is here.
 
     Args:
-        pointer: where it stands in its look. follows: what stands there.
+        pointer: where it stands in its look. roughness_map: what stands there.
     """
-    if isinstance(follows, bool) or (isinstance(follows, str) and IMAGES.is_known(follows)):
-        return follows
-    raise fail(pointer, follows, "true, false, or an image that was sent to /api/images and is here")
+    if isinstance(roughness_map, bool) or (isinstance(roughness_map, str) and IMAGES.exists(roughness_map)):
+        return roughness_map
+    raise invalid_value(pointer, roughness_map, "true, false, or an image that was sent to /api/images and is here")
 
 
 def check_image(pointer: Pointer, image: Any) -> str:
@@ -87,9 +89,9 @@ def check_image(pointer: Pointer, image: Any) -> str:
     Args:
         pointer: where it stands in its look. image: what stands there.
     """
-    if isinstance(image, str) and IMAGES.is_known(image):
+    if isinstance(image, str) and IMAGES.exists(image):
         return image
-    raise fail(pointer, image, "an image that was sent to /api/images and is here")
+    raise invalid_value(pointer, image, "an image that was sent to /api/images and is here")
 
 
 def check_texture(pointer: Pointer, texture: Any) -> str | None:
@@ -98,10 +100,10 @@ def check_texture(pointer: Pointer, texture: Any) -> str | None:
     Args:
         pointer: where it stands in its look. texture: what stands there.
     """
-    if texture is None or texture in TEXTURES or (isinstance(texture, str) and IMAGES.is_known(texture)):
+    if texture is None or texture in TEXTURES or (isinstance(texture, str) and IMAGES.exists(texture)):
         return cast(str | None, texture)
     channels = " or ".join(map(repr, TEXTURES))
-    raise fail(pointer, texture, f"null, {channels}, or an image that was sent to /api/images and is here")
+    raise invalid_value(pointer, texture, f"null, {channels}, or an image that was sent to /api/images and is here")
 
 
 def check_shared(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
@@ -110,22 +112,22 @@ def check_shared(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> No
     Args:
         pointer: where the list stands in its look. documents: complete terms of one material.
     """
-    _check_one_map(pointer, documents)
+    _check_single_map(pointer, documents)
     textures: dict[int, str | None] = {}
     for k, document in enumerate(documents):
         texture = document["texture"]
-        first = textures.setdefault(group_of(document), texture)
+        first = textures.setdefault(texture_slot(document), texture)
         if texture != first:
-            channel = channel_of(document)
+            channel = texture_channel(document)
             allowed = f"{first!r}, as the other {channel} terms of this material have; change them together"
-            raise fail((*pointer, k, "texture"), texture, allowed)
+            raise invalid_value((*pointer, k, "texture"), texture, allowed)
 
 
-def _check_one_map(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
+def _check_single_map(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
     """Samples of a material have one level of roughness each: its terms follow one map, or none."""
     image = roughness_image(documents)
     for k, document in enumerate(documents):
-        follows = document.get("roughness_map", False)
-        if image is not None and follows not in (False, image):
+        roughness_map = document.get("roughness_map", False)
+        if image is not None and roughness_map not in (False, image):
             allowed = f"false, or {image!r}, as other terms of this material have; change them together"
-            raise fail((*pointer, k, "roughness_map"), follows, allowed)
+            raise invalid_value((*pointer, k, "roughness_map"), roughness_map, allowed)

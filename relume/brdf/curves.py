@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator, PPoly
 
 from relume.basis.bands import MAX_ANGLE, band_averages, band_edges
-from relume.brdf.edited import at_angles, is_relative, relative_edit
+from relume.brdf.edited import curve_edit, evaluate_edit, is_relative
 from relume.brdf.registry import TERMS
 from relume.brdf.term import F64, Curve, Params
 
@@ -34,22 +34,26 @@ def channel_params(term_document: Mapping[str, Any], curve: Curve) -> list[dict[
 
 
 @lru_cache(maxsize=1024)
-def _generated(model: str, curve_name: str, params: tuple[tuple[str, float], ...]) -> F64:
+def _generate_bands(model: str, curve_name: str, params: tuple[tuple[str, float], ...]) -> F64:
     curve = TERMS[model].curve(curve_name)
     settings: Params = dict(params)
-    about_pole = curve.angle.has_highlights
-    bands = band_averages(lambda gamma: curve.generator(gamma, settings), curve.num_bands, about_pole=about_pole)
+    solid_angle_weighted = curve.angle.has_highlights
+    bands = band_averages(
+        lambda gamma: curve.generator(gamma, settings), curve.num_bands, solid_angle_weighted=solid_angle_weighted
+    )
     np.maximum(bands, 0.0, out=bands)  # quadrature may undershoot where a curve vanishes
     bands.flags.writeable = False
     return bands
 
 
 @lru_cache(maxsize=64)
-def _given_bands(factor: Callable[[F64], F64], num_bands: int, about_pole: bool) -> F64:
+def _data_bands(factor: Callable[[F64], F64], num_bands: int, solid_angle_weighted: bool) -> F64:
     """Band averages of a curve that data give. (3, J)"""
 
     def average(channel: int) -> F64:
-        return band_averages(lambda gamma: np.asarray(factor(gamma)[channel]), num_bands, about_pole=about_pole)
+        return band_averages(
+            lambda gamma: np.asarray(factor(gamma)[channel]), num_bands, solid_angle_weighted=solid_angle_weighted
+        )
 
     return np.stack([average(channel) for channel in range(3)])
 
@@ -57,9 +61,11 @@ def _given_bands(factor: Callable[[F64], F64], num_bands: int, about_pole: bool)
 def generated_bands(term_document: Mapping[str, Any], curve: Curve) -> F64:
     """What the parameters or data alone would give: band averages. (3, J) float64, not negative."""
     if curve.factor is not None:
-        return _given_bands(curve.factor, curve.num_bands, curve.angle.has_highlights).copy()
+        return _data_bands(curve.factor, curve.num_bands, curve.angle.has_highlights).copy()
     model = term_document["model"]
-    return np.stack([_generated(model, curve.name, tuple(p.items())) for p in channel_params(term_document, curve)])
+    return np.stack(
+        [_generate_bands(model, curve.name, tuple(p.items())) for p in channel_params(term_document, curve)]
+    )
 
 
 def drawn_curves(term_document: Mapping[str, Any], curve: Curve) -> list[dict[str, Any]]:
@@ -79,15 +85,15 @@ def _drawn_bands(drawn: Mapping[str, Any], num_bands: int) -> F64:
     return np.broadcast_to(np.asarray(drawn["bands"], dtype=np.float64).reshape(-1, num_bands), (3, num_bands))
 
 
-def _points(drawn: Mapping[str, Any]) -> tuple[F64, PchipInterpolator]:
+def _control_points(drawn: Mapping[str, Any]) -> tuple[F64, PchipInterpolator]:
     points = np.asarray(drawn["points"], dtype=np.float64)
     gamma = np.radians(points[:, 0])
     return gamma, PchipInterpolator(gamma, points[:, 1])
 
 
-def _point_averages(drawn: Mapping[str, Any], curve: Curve) -> F64:
+def _spline_averages(drawn: Mapping[str, Any], curve: Curve) -> F64:
     """Exact band averages of a drawn curve, by its antiderivative; weighed as those of generated curves."""
-    gamma, spline = _points(drawn)
+    gamma, spline = _control_points(drawn)
     edges = band_edges(curve.num_bands)
     power = 2 if curve.angle.has_highlights else 1
     integral = (_times_angle(spline) if power == 2 else spline).antiderivative()
@@ -105,10 +111,10 @@ def _times_angle(spline: PPoly) -> PPoly:
     return PPoly(coefficients, spline.x)
 
 
-def _ground_bands(drawn: Mapping[str, Any], curve: Curve, generated: F64) -> F64:
+def _base_bands(drawn: Mapping[str, Any], curve: Curve, generated: F64) -> F64:
     """What an object's relative edits stand on: its points, its bands, or what is generated. (3, J)"""
     if "points" in drawn:
-        return np.broadcast_to(_point_averages(drawn, curve), generated.shape)
+        return np.broadcast_to(_spline_averages(drawn, curve), generated.shape)
     return _drawn_bands(drawn, generated.shape[1]) if "bands" in drawn else generated
 
 
@@ -123,9 +129,9 @@ def curve_bands(term_document: Mapping[str, Any], curve: Curve) -> F64:
     """
     bands = generated_bands(term_document, curve)
     for drawn in drawn_curves(term_document, curve):
-        values = np.maximum(_ground_bands(drawn, curve, bands), 0.0)
+        values = np.maximum(_base_bands(drawn, curve, bands), 0.0)
         if is_relative(drawn):
-            factor, offset = relative_edit(drawn, values)
+            factor, offset = curve_edit(drawn, values)
             values = factor * values + offset
         for channel in _channels(drawn):
             bands[channel] = values[channel]
@@ -145,17 +151,20 @@ def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: F64) -> 
     if curve.factor is not None:
         values = np.array(curve.factor(gamma))
     else:
-        of_channels = channel_params(term_document, curve)
-        first = curve.generator(gamma, of_channels[0])
-        others = (first if params == of_channels[0] else curve.generator(gamma, params) for params in of_channels[1:])
-        values = np.stack([first, *others])
+        params_per_channel = channel_params(term_document, curve)
+        first = curve.generator(gamma, params_per_channel[0])
+        remaining = (
+            first if params == params_per_channel[0] else curve.generator(gamma, params)
+            for params in params_per_channel[1:]
+        )
+        values = np.stack([first, *remaining])
     for drawn in drawn_curves(term_document, curve):
-        exact = _ground_values(drawn, values, gamma, curve.num_bands)
+        exact = _base_values(drawn, values, gamma, curve.num_bands)
         if is_relative(drawn):
-            ground = np.maximum(_ground_bands(drawn, curve, generated_bands(term_document, curve)), 0.0)
+            base = np.maximum(_base_bands(drawn, curve, generated_bands(term_document, curve)), 0.0)
             # what multiplies the finished pixel is never averaged over bands, so their steps would be seen
             factor, offset = (
-                at_angles(rows, gamma, MAX_ANGLE, smooth=curve.outgoing) for rows in relative_edit(drawn, ground)
+                evaluate_edit(rows, gamma, MAX_ANGLE, smooth=curve.depends_on_view) for rows in curve_edit(drawn, base)
             )
             exact = factor * exact + offset
         for channel in _channels(drawn):
@@ -163,11 +172,11 @@ def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: F64) -> 
     return np.maximum(values, 0.0)
 
 
-def _ground_values(drawn: Mapping[str, Any], generated: F64, gamma: F64, num_bands: int) -> F64:
-    """`_ground_bands` at exact angles. (3, ...)"""
+def _base_values(drawn: Mapping[str, Any], generated: F64, gamma: F64, num_bands: int) -> F64:
+    """`_base_bands` at exact angles. (3, ...)"""
     if "points" in drawn:
-        ends, spline = _points(drawn)
+        ends, spline = _control_points(drawn)
         return np.broadcast_to(spline(np.clip(gamma, ends[0], ends[-1])), generated.shape)
     if "bands" in drawn:
-        return at_angles(_drawn_bands(drawn, num_bands), gamma, MAX_ANGLE, smooth=False)
+        return evaluate_edit(_drawn_bands(drawn, num_bands), gamma, MAX_ANGLE, smooth=False)
     return generated

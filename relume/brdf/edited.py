@@ -24,7 +24,7 @@ def is_relative(drawn: Mapping[str, Any]) -> bool:
     return any(name in drawn for name in RELATIVE)
 
 
-def relative_edit(drawn: Mapping[str, Any], before: F64) -> tuple[F64, F64]:
+def curve_edit(drawn: Mapping[str, Any], before: F64) -> tuple[F64, F64]:
     """What multiplies each band of a curve, and what is then added.
 
     Args:
@@ -32,14 +32,14 @@ def relative_edit(drawn: Mapping[str, Any], before: F64) -> tuple[F64, F64]:
     Returns:
         factor, offset: (3, J) each, not negative; exactly one and zero in bands that are not edited
     """
-    factor, offset = (_rows(drawn, name, before, plain) for name, plain in (("factors", 1.0), ("offsets", 0.0)))
+    factor, offset = (_rows(drawn, name, before, neutral) for name, neutral in (("factors", 1.0), ("offsets", 0.0)))
     if "handles" not in drawn:
         return factor, offset
-    gain, lift = _pulls(np.asarray(drawn["handles"], np.float64), factor * before + offset)
+    gain, lift = _handle_edits(np.asarray(drawn["handles"], np.float64), factor * before + offset)
     return gain * factor, gain * offset + lift
 
 
-def at_angles(rows: F64, gamma: F64, max_angle: float, *, smooth: bool) -> F64:
+def evaluate_edit(rows: F64, gamma: F64, max_angle: float, *, smooth: bool) -> F64:
     """Numbers of bands at exact angles: those of the band, so that averages hold; `smooth`, linear between middles.
 
     Args:
@@ -51,50 +51,50 @@ def at_angles(rows: F64, gamma: F64, max_angle: float, *, smooth: bool) -> F64:
         (3, ...) float64
     """
     num_bands = rows.shape[1]
-    place = gamma * (num_bands / max_angle)
+    band_position = gamma * (num_bands / max_angle)
     if smooth:
-        return np.stack([np.interp(place - 0.5, np.arange(num_bands), row) for row in rows])
-    return rows[:, np.minimum(place.astype(np.intp), num_bands - 1)]
+        return np.stack([np.interp(band_position - 0.5, np.arange(num_bands), row) for row in rows])
+    return rows[:, np.minimum(band_position.astype(np.intp), num_bands - 1)]
 
 
-def _rows(drawn: Mapping[str, Any], name: str, like: F64, plain: float) -> F64:
+def _rows(drawn: Mapping[str, Any], name: str, like: F64, neutral: float) -> F64:
     """(3, J), from one J for all channels, three lists of J, or 3·J flat."""
     if name not in drawn:
-        return np.full(like.shape, plain)
+        return np.full(like.shape, neutral)
     return np.broadcast_to(np.asarray(drawn[name], np.float64).reshape(-1, like.shape[1]), like.shape)
 
 
-def _pulls(handles: F64, before: F64) -> tuple[F64, F64]:
+def _handle_edits(handles: F64, before: F64) -> tuple[F64, F64]:
     """Factor and offset of each band by its two neighbouring handles. (3, J) each"""
     num_bands = before.shape[1]
     # the outer half of the first and the last band belongs to its middle: there is nothing finer
-    place = np.clip(handles[:, 0] * (num_bands / 90.0) - 0.5, 0.0, num_bands - 1.0)
+    handle_position = np.clip(handles[:, 0] * (num_bands / 90.0) - 0.5, 0.0, num_bands - 1.0)
     band = np.arange(num_bands)
-    left = np.clip(np.searchsorted(place, band, side="right") - 1, 0, len(place) - 2)
-    gap = place[left + 1] - place[left]
-    share = np.clip((band - place[left]) / np.where(gap > 0, gap, 1.0), 0.0, 1.0)
-    towards_right = share * share * (3.0 - 2.0 * share)
+    left = np.clip(np.searchsorted(handle_position, band, side="right") - 1, 0, len(handle_position) - 2)
+    gap = handle_position[left + 1] - handle_position[left]
+    fraction = np.clip((band - handle_position[left]) / np.where(gap > 0, gap, 1.0), 0.0, 1.0)
+    towards_right = fraction * fraction * (3.0 - 2.0 * fraction)
     factor, offset = np.ones_like(before), np.zeros_like(before)
-    for near, weight in ((left, 1.0 - towards_right), (left + 1, towards_right)):
-        gain, lift = _pull(handles[near, 1], handles[near, 2], before)
+    for handle_index, weight in ((left, 1.0 - towards_right), (left + 1, towards_right)):
+        gain, lift = _handle_edit(handles[handle_index, 1], handles[handle_index, 2], before)
         factor += weight * gain
         offset += weight * lift
     return factor, offset
 
 
-def _pull(was: F64, becomes: F64, before: F64) -> tuple[F64, F64]:
+def _handle_edit(from_value: F64, to_value: F64, before: F64) -> tuple[F64, F64]:
     """How one handle moves values: change = gain · before + lift. (3, J) each
 
     What is lower than the handle moves in proportion, what is higher as far as the handle, so that nothing moves
     farther than the hand, neither in amount nor in proportion. A handle that more than doubles what was there adds the
     rest to the low ones too: nothing can be multiplied out of a curve that is zero.
     """
-    move = becomes - was
-    rise = np.maximum(move, 0.0)
-    reach = np.maximum(was, rise)
+    change = to_value - from_value
+    rise = np.maximum(change, 0.0)
+    reach = np.maximum(from_value, rise)
     reach = np.where(reach > 0, reach, 1.0)
-    is_low = before <= was
+    is_low = before <= from_value
     high = np.where(is_low, 1.0, before)
-    gain = np.where(is_low, move / reach, np.minimum(move, 0.0) / high)
-    lift = np.where(is_low, rise * np.maximum(rise - was, 0.0) / reach, rise)
+    gain = np.where(is_low, change / reach, np.minimum(change, 0.0) / high)
+    lift = np.where(is_low, rise * np.maximum(rise - from_value, 0.0) / reach, rise)
     return gain, lift

@@ -12,7 +12,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import F64, Angle
 
 
-def _normalise(v: F64) -> F64:
+def _normalize(v: F64) -> F64:
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     # opposite directions have no half vector; the value does not matter, such pairs lie on the horizon
     return np.asarray(v / np.where(length > 0, length, 1.0))
@@ -33,7 +33,7 @@ def angles_numpy(angle: Angle, wi: F64, wo: F64, axes: tuple[float, float, float
         (...) float64
     """
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
-    half = _normalise(wi + wo)
+    half = _normalize(wi + wo)
     cos_theta_h = np.clip(half[..., 2], 0.0, 1.0)
     match angle:
         case Angle.THETA_I:
@@ -66,11 +66,11 @@ def eval_brdf(term_document: Mapping[str, Any], wi: F64, wo: F64) -> F64:
     Returns:
         1/sr, no cosine. (..., 3) float64; zero below the horizon. Textures are not part of it.
     """
-    term = TERMS[term_document["model"]].settled(term_document)
+    term = TERMS[term_document["model"]].normalized(term_document)
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
     value = np.moveaxis(term.quotients(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0)), 0, -1)
     value = value * np.asarray(term_document.get("color", (1.0, 1.0, 1.0)), np.float64)
-    for curve in term.curves_in(term_document):
+    for curve in term.active_curves(term_document):
         gamma = angles_numpy(curve.angle, wi, wo, curve.axes)
         value = value * np.moveaxis(curve_values(term_document, curve, gamma), 0, -1)
     return np.asarray(value)

@@ -20,7 +20,7 @@ from relume.brdf.term import Curve
 F64 = NDArray[np.float64]
 
 
-class Levels(NamedTuple):
+class RoughnessLevels(NamedTuple):
     """How rough a material's samples are, as its map says.
 
     Attributes:
@@ -32,19 +32,19 @@ class Levels(NamedTuple):
     level: NDArray[np.uint8]
 
 
-PLAIN = Levels((), np.empty(0, np.uint8))
+NO_LEVELS = RoughnessLevels((), np.empty(0, np.uint8))
 
 
-def follows_map(document: Mapping[str, Any]) -> bool:
+def uses_roughness_map(document: Mapping[str, Any]) -> bool:
     """Whether a term's width is scaled where its material has a map of roughness."""
     return bool(document.get("roughness_map")) and TERMS[document["model"]].width is not None
 
 
-def at_ratio(document: Mapping[str, Any], ratio: float) -> dict[str, Any]:
+def scaled_roughness(document: Mapping[str, Any], ratio: float) -> dict[str, Any]:
     """The document of a term where its material is `ratio` times as rough, within the range of its parameter; the same
     where it follows no map."""
     term = TERMS[document["model"]]
-    if term.width is None or not follows_map(document):
+    if term.width is None or not uses_roughness_map(document):
         return dict(document)
     name, power = term.width
     declared = term.parameter(name)
@@ -53,7 +53,7 @@ def at_ratio(document: Mapping[str, Any], ratio: float) -> dict[str, Any]:
     return {**document, "params": {**(document.get("params") or {}), name: scaled}}
 
 
-def level_bands(document: Mapping[str, Any], curve: Curve, levels: Levels) -> F64:
+def level_bands(document: Mapping[str, Any], curve: Curve, levels: RoughnessLevels) -> F64:
     """Bands of a curve at levels of roughness.
 
     Args:
@@ -61,12 +61,12 @@ def level_bands(document: Mapping[str, Any], curve: Curve, levels: Levels) -> F6
     Returns:
         (L, 3, J) where the curve differs with the width, else (3, J)
     """
-    if not _differs(document, curve, levels):
+    if not _depends_on_roughness(document, curve, levels):
         return curve_bands(document, curve)
-    return np.stack([curve_bands(at_ratio(document, ratio), curve) for ratio in levels.ratios])
+    return np.stack([curve_bands(scaled_roughness(document, ratio), curve) for ratio in levels.ratios])
 
 
-def level_values(document: Mapping[str, Any], curve: Curve, gamma: F64, levels: Levels) -> F64:
+def level_values(document: Mapping[str, Any], curve: Curve, gamma: F64, levels: RoughnessLevels) -> F64:
     """A curve at exact angles, each at a level of roughness; see `relume.brdf.curves.curve_values`.
 
     Args:
@@ -74,16 +74,18 @@ def level_values(document: Mapping[str, Any], curve: Curve, gamma: F64, levels: 
     Returns:
         (3, n) float64
     """
-    if not _differs(document, curve, levels):
+    if not _depends_on_roughness(document, curve, levels):
         return curve_values(document, curve, gamma)
     values = np.empty((3, len(gamma)))
     bounds = np.searchsorted(levels.level, np.arange(len(levels.ratios) + 1))
     for ratio, first, last in zip(levels.ratios, bounds[:-1], bounds[1:], strict=True):
         if first < last:
-            values[:, first:last] = curve_values(at_ratio(document, ratio), curve, gamma[first:last])
+            values[:, first:last] = curve_values(scaled_roughness(document, ratio), curve, gamma[first:last])
     return values
 
 
-def _differs(document: Mapping[str, Any], curve: Curve, levels: Levels) -> bool:
+def _depends_on_roughness(document: Mapping[str, Any], curve: Curve, levels: RoughnessLevels) -> bool:
     width = TERMS[document["model"]].width
-    return len(levels.ratios) > 0 and width is not None and follows_map(document) and width[0] in curve.parameters
+    return (
+        len(levels.ratios) > 0 and width is not None and uses_roughness_map(document) and width[0] in curve.parameters
+    )

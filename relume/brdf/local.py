@@ -35,7 +35,7 @@ def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-
     return cos_theta_h, cos_theta_d
 
 
-class LateUfunc:
+class LazyUfunc:
     """A ufunc that is compiled, or loaded from the cache, when it is first called: few processes need every term."""
 
     def __init__(self, function: Callable[..., Any], signatures: Sequence[Any]) -> None:
@@ -46,23 +46,23 @@ class LateUfunc:
 
     def __call__(self, *args: Any) -> Any:
         """Apply the ufunc, which the first call compiles or loads."""
-        return (self._ufunc or self._made())(*args)
+        return (self._ufunc or self._compile())(*args)
 
-    def _made(self) -> Callable[..., Any]:
+    def _compile(self) -> Callable[..., Any]:
         with self._lock:
             if self._ufunc is None:
-                make = nb.vectorize(self._signatures, nopython=True, cache=True)  # type: ignore[no-untyped-call]
-                self._ufunc = make(self._function)
+                vectorize = nb.vectorize(self._signatures, nopython=True, cache=True)  # type: ignore[no-untyped-call]
+                self._ufunc = vectorize(self._function)
             return self._ufunc
 
 
-def quotient_ufunc_with(num_fixed: int) -> Callable[[Callable[..., Any]], LateUfunc]:
+def quotient_ufunc_with(num_fixed: int) -> Callable[[Callable[..., Any]], LazyUfunc]:
     """Decorator for a quotient that has fixed parameters before the six components of wi and wo.
 
     float32 directions give float32.
     """
     signatures = [kind(*[kind] * (num_fixed + 6)) for kind in (nb.float32, nb.float64)]
-    return lambda function: LateUfunc(function, signatures)
+    return lambda function: LazyUfunc(function, signatures)
 
 
 # decorator that makes the ufunc of `Term.quotient`
@@ -70,7 +70,7 @@ quotient_ufunc = quotient_ufunc_with(0)
 
 
 @quotient_ufunc
-def one_above(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
+def hemisphere_indicator(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
     """One above the horizon: the quotient where the curves say it all.
 
     Args:

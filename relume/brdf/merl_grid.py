@@ -9,7 +9,7 @@ import numpy as np
 
 from relume.brdf.evaluate import eval_brdf
 from relume.errors import MaterialError
-from relume.measured.asset_store import source_of
+from relume.measured.asset_store import source_path
 from relume.measured.merl import (
     CHANNEL_SCALE,
     F64,
@@ -21,8 +21,8 @@ from relume.measured.merl import (
     read_merl,
 )
 
-_SOME = 61  # every so manyth node is looked at for anisotropy
-_SAME = 1e-6
+_STRIDE = 61  # every so manyth node is looked at for anisotropy
+_TOLERANCE = 1e-6
 
 
 def sample_terms(terms: Sequence[Mapping[str, Any]]) -> F64:
@@ -37,16 +37,16 @@ def sample_terms(terms: Sequence[Mapping[str, Any]]) -> F64:
         NotFoundError: a measured material is not here.
     """
     wi, wo = grid_directions()
-    seen = (wi[..., 2] > 0) & (wo[..., 2] > 0)
+    is_valid = (wi[..., 2] > 0) & (wo[..., 2] > 0)
     for data in {term["data"] for term in terms if "data" in term}:
-        seen &= is_measured(read_merl(source_of(data)))
-    _check_isotropic(terms, wi[seen][::_SOME], wo[seen][::_SOME])
+        is_valid &= is_measured(read_merl(source_path(data)))
+    _check_isotropic(terms, wi[is_valid][::_STRIDE], wo[is_valid][::_STRIDE])
     planes = np.full((3, *SHAPE), NOT_MEASURED)
     for h in range(SHAPE[0]):  # slab by slab: each term makes a dozen arrays of this size
         values = _total(terms, wi[h], wo[h])
         if float(values.max(initial=0.0)) > MAX_VALUE:
             raise MaterialError(f"the material is above {MAX_VALUE:g} per steradian somewhere; lower its curves")
-        planes[:, h] = np.where(seen[h], np.moveaxis(values / CHANNEL_SCALE, -1, 0), NOT_MEASURED)
+        planes[:, h] = np.where(is_valid[h], np.moveaxis(values / CHANNEL_SCALE, -1, 0), NOT_MEASURED)
     return planes
 
 
@@ -59,6 +59,6 @@ def _total(terms: Sequence[Mapping[str, Any]], wi: F64, wo: F64) -> F64:
 
 def _check_isotropic(terms: Sequence[Mapping[str, Any]], wi: F64, wo: F64) -> None:
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    here, turned = _total(terms, wi, wo), _total(terms, wi @ quarter, wo @ quarter)
-    if np.abs(turned - here).max(initial=0.0) > _SAME * np.abs(here).max(initial=0.0):
+    original, rotated = _total(terms, wi, wo), _total(terms, wi @ quarter, wo @ quarter)
+    if np.abs(rotated - original).max(initial=0.0) > _TOLERANCE * np.abs(original).max(initial=0.0):
         raise MaterialError("the material is anisotropic, a MERL file is not; make it the same along and across")

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_values, drawn_curves
-from relume.brdf.levels import follows_map
+from relume.brdf.levels import uses_roughness_map
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Angle
 
@@ -26,21 +26,21 @@ MODEL, TEXTURE = "ggx", "specular"  # its facets are normalised; terms of other 
 SHARP, SOFT = 0.04, 0.06  # roughness up to which all is mirrored, and from which nothing is
 
 
-def mirrors_below(model: str) -> float | None:
+def specular_threshold(model: str) -> float | None:
     """The roughness below which terms of a model are mirrors, in part at least; None where none is."""
     return SOFT if model == MODEL else None
 
 
-def mirrored_share(document: Mapping[str, Any]) -> F64:
+def specular_albedo(document: Mapping[str, Any]) -> F64:
     """How much of a term is a mirror: the rest is its lobe. (3,) within [0, 1]
 
     Args:
         document: a term, complete or not.
     """
-    if document["model"] != MODEL or document.get("texture") not in (TEXTURE, None) or follows_map(document):
+    if document["model"] != MODEL or document.get("texture") not in (TEXTURE, None) or uses_roughness_map(document):
         return np.zeros(3)
-    facets = next(curve for curve in TERMS[MODEL].curves if curve.angle is Angle.THETA_H)
-    if drawn_curves(document, facets):
+    ndf_curve = next(curve for curve in TERMS[MODEL].curves if curve.angle is Angle.THETA_H)
+    if drawn_curves(document, ndf_curve):
         return np.zeros(3)
     default = TERMS[MODEL].parameter("roughness").default
     roughness = (document.get("params") or {}).get("roughness", default)
@@ -49,10 +49,12 @@ def mirrored_share(document: Mapping[str, Any]) -> F64:
 
 def is_mirror(documents: Sequence[Mapping[str, Any]]) -> bool:
     """Whether any term of a material is a mirror."""
-    return any(mirrored_share(document).any() for document in documents)
+    return any(specular_albedo(document).any() for document in documents)
 
 
-def mirrored(documents: Sequence[Mapping[str, Any]], cos_theta_i: NDArray[np.floating], tint: NDArray[Any]) -> F64:
+def specular_terms(
+    documents: Sequence[Mapping[str, Any]], cos_theta_i: NDArray[np.floating], tint: NDArray[Any]
+) -> F64:
     """What a material's mirrors send on of what comes from where the eye is mirrored to.
 
     Args:
@@ -63,15 +65,17 @@ def mirrored(documents: Sequence[Mapping[str, Any]], cos_theta_i: NDArray[np.flo
     """
     theta, total = np.arccos(np.clip(cos_theta_i, 0, 1).astype(np.float64)), np.zeros((len(cos_theta_i), 3))
     for document in documents:
-        share = mirrored_share(document)
-        if share.any():
+        fraction = specular_albedo(document)
+        if fraction.any():
             curves = [curve for curve in TERMS[document["model"]].curves if curve.angle is not Angle.THETA_H]
             values = np.prod([curve_values(document, curve, theta) for curve in curves], axis=0).T
-            total += share * np.asarray(document["color"]) * values * (1 if document.get("texture") is None else tint)
+            total += (
+                fraction * np.asarray(document["color"]) * values * (1 if document.get("texture") is None else tint)
+            )
     return total
 
 
-def mirrored_part(document: Mapping[str, Any]) -> dict[str, Any]:
+def split_specular(document: Mapping[str, Any]) -> dict[str, Any]:
     """A term as far as it is a mirror: what is left of it is its lobe. document: a term of a complete look"""
-    color = mirrored_share(document) * np.asarray(document["color"], np.float64)
+    color = specular_albedo(document) * np.asarray(document["color"], np.float64)
     return {**document, "color": color.tolist()}

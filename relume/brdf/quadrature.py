@@ -50,18 +50,18 @@ class Quadrature:
             1/sr, no cosine. (channels, ...) float64, one channel where all three are alike.
         """
         declared = TERMS[term_document["model"]]
-        term, fixed = declared.settled(term_document), declared.fixed_values(term_document)
+        term, fixed = declared.normalized(term_document), declared.fixed_values(term_document)
         quotient = _quotient(self, declared.model, fixed)
         given = json.dumps([term_document.get("params"), term_document.get("curves")], sort_keys=True)
-        shown = term.curves_in(term_document)
-        curves = [_curve(declared.model, fixed, curve.name, given) for curve in shown]
-        is_grey = len(quotient) == 1 and all((curve == curve[0]).all() for curve in curves)
-        num_channels = 1 if is_grey else 3
+        active_curves = term.active_curves(term_document)
+        curves = [_curve(declared.model, fixed, curve.name, given) for curve in active_curves]
+        is_gray = len(quotient) == 1 and all((curve == curve[0]).all() for curve in curves)
+        num_channels = 1 if is_gray else 3
         out = np.repeat(quotient, num_channels // len(quotient), axis=0)
-        for curve, values in zip(shown, curves, strict=True):
-            places = _places(self, curve.angle, curve.axes)
+        for curve, values in zip(active_curves, curves, strict=True):
+            positions = _angle_positions(self, curve.angle, curve.axes)
             for channel in range(num_channels):
-                _multiply(places, values[channel], out[channel])
+                _multiply(positions, values[channel], out[channel])
         return out.reshape(num_channels, *self.shape)
 
 
@@ -74,13 +74,13 @@ def _angles() -> F64:
 @lru_cache(maxsize=32)
 def _curve(model: str, fixed: Fixed, name: str, given: str) -> F64:
     """A curve of a term at `_angles`: what is asked at one pair of directions after another. (3, `_STEPS` + 1)"""
-    term, (params, drawn) = TERMS[model].settled_by(fixed), json.loads(given)
+    term, (params, drawn) = TERMS[model].normalized_by(fixed), json.loads(given)
     document = {"model": model, **dict(fixed), "params": params, "curves": drawn}
     return np.ascontiguousarray(curve_values(document, term.curve(name), _angles()))
 
 
 @lru_cache(maxsize=32)
-def _places(pairs: Quadrature, angle: Angle, axes: tuple[float, float, float]) -> F32:
+def _angle_positions(pairs: Quadrature, angle: Angle, axes: tuple[float, float, float]) -> F32:
     """Where the angles of pairs lie among `_angles`. (pairs,)"""
     gamma = angles_numpy(angle, pairs.wi, pairs.wo, axes).ravel()
     return np.interp(gamma, _angles(), np.arange(_STEPS + 1)).astype(np.float32)
@@ -89,15 +89,15 @@ def _places(pairs: Quadrature, angle: Angle, axes: tuple[float, float, float]) -
 @lru_cache(maxsize=32)
 def _quotient(pairs: Quadrature, model: str, fixed: Fixed) -> F64:
     """The quotient of a term at pairs. (1 or 3, pairs)"""
-    found = TERMS[model].settled_by(fixed).quotients(*np.moveaxis(pairs.wi, -1, 0), *np.moveaxis(pairs.wo, -1, 0))
-    return np.ascontiguousarray(found, np.float64).reshape(len(found), -1)
+    values = TERMS[model].normalized_by(fixed).quotients(*np.moveaxis(pairs.wi, -1, 0), *np.moveaxis(pairs.wo, -1, 0))
+    return np.ascontiguousarray(values, np.float64).reshape(len(values), -1)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
-def _multiply(places, values, out):  # type: ignore[no-untyped-def]
+def _multiply(positions, values, out):  # type: ignore[no-untyped-def]
     """Multiply each pair by a curve, linear between its values."""
     for n in range(out.shape[0]):
-        x = places[n]
+        x = positions[n]
         first = min(np.int64(x), values.shape[0] - 2)
-        near = values[first]
-        out[n] *= near + np.float64(x - np.float32(first)) * (values[first + 1] - near)
+        value = values[first]
+        out[n] *= value + np.float64(x - np.float32(first)) * (values[first + 1] - value)

@@ -41,7 +41,7 @@ def _describe_curve(curve: Curve) -> dict[str, Any]:
         "angle": curve.angle.name.lower(),
         "parameters": list(curve.parameters),
         "bands": curve.num_bands,
-        "outgoing": curve.outgoing,
+        "outgoing": curve.depends_on_view,
     }
 
 

@@ -12,32 +12,32 @@ from relume.brdf.term import F64, Angle, Curve, Parameter, Term
 _FROM_A_PLANE = (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
 
 
-def moved_curves(term: Term, parameter: str) -> tuple[Curve, ...]:
+def curves_of_parameter(term: Term, parameter: str) -> tuple[Curve, ...]:
     """The curves inside the transport that a parameter alone moves; those of the outgoing angle multiply finished
     samples, and what is fixed moves more than curves."""
     if parameter in term.fixed:
         return ()
-    return tuple(curve for curve in term.curves if parameter in curve.parameters and not curve.outgoing)
+    return tuple(curve for curve in term.curves if parameter in curve.parameters and not curve.depends_on_view)
 
 
-def slider_values(parameter: Parameter, num: int, *, between: bool = False) -> F64:
+def slider_values(parameter: Parameter, num: int, *, at_midpoints: bool = False) -> F64:
     """Values at even steps of a parameter's slider.
 
     Args:
         parameter: whose slider, with its range and scale.
         num: how many values.
-        between: whether to take the middles of `num` steps instead of the ends of `num` − 1 steps.
+        at_midpoints: whether to take the middles of `num` steps instead of the ends of `num` − 1 steps.
     Returns:
         (num,) float64
     """
-    at = (np.arange(num) + 0.5) / num if between else np.linspace(0, 1, num)
+    positions = (np.arange(num) + 0.5) / num if at_midpoints else np.linspace(0, 1, num)
     low, high = parameter.minimum, parameter.maximum
     if parameter.scale == "log":
-        return np.asarray(low * (high / low) ** at)
-    return np.asarray(low + (high - low) * at)
+        return np.asarray(low * (high / low) ** positions)
+    return np.asarray(low + (high - low) * positions)
 
 
-def bands_at(term: Term, curve: Curve, params: Mapping[str, float]) -> F64:
+def curve_at_value(term: Term, curve: Curve, params: Mapping[str, float]) -> F64:
     """Band averages of one curve for given parameters.
 
     Args:
@@ -48,9 +48,12 @@ def bands_at(term: Term, curve: Curve, params: Mapping[str, float]) -> F64:
         (J,) float64
     """
     settings = {name: params.get(name, term.parameter(name).default) for name in curve.parameters}
-    about_pole = curve.angle.has_highlights
+    solid_angle_weighted = curve.angle.has_highlights
     return np.maximum(
-        band_averages(lambda gamma: curve.generator(gamma, settings), curve.num_bands, about_pole=about_pole), 0
+        band_averages(
+            lambda gamma: curve.generator(gamma, settings), curve.num_bands, solid_angle_weighted=solid_angle_weighted
+        ),
+        0,
     )
 
 

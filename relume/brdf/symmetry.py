@@ -15,11 +15,11 @@ from relume.brdf.term import Angle, Curve
 
 F64 = NDArray[np.float64]
 
-_SAME = 1e-6  # relative difference that rounding may make
-_MIRRORED = {"x": np.diag([-1.0, 1.0, 1.0]), "y": np.diag([1.0, -1.0, 1.0])}
+_TOLERANCE = 1e-6  # relative difference that rounding may make
+_REFLECTIONS = {"x": np.diag([-1.0, 1.0, 1.0]), "y": np.diag([1.0, -1.0, 1.0])}
 
 
-def about_normal(phi: float) -> F64:
+def rotational_symmetry(phi: float) -> F64:
     """Find the matrix that turns local directions about their normal, radians. (3, 3)"""
     cosine, sine = np.cos(phi), np.sin(phi)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -28,20 +28,20 @@ def about_normal(phi: float) -> F64:
 def is_isotropic(term_document: Mapping[str, Any]) -> bool:
     """Tell whether a term looks the same when both directions turn about the normal, or are mirrored."""
     declared = TERMS[term_document["model"]]
-    if all(map(_is_round, declared.settled(term_document).curves)):
-        return _has_round_quotient(declared.model, declared.fixed_values(term_document))
-    return _stays(lambda wi, wo: eval_brdf(term_document, wi, wo), _ALL_AROUND)
+    if all(map(_is_isotropic_curve, declared.normalized(term_document).curves)):
+        return _has_isotropic_quotient(declared.model, declared.fixed_values(term_document))
+    return _is_invariant(lambda wi, wo: eval_brdf(term_document, wi, wo), _ISOTROPY_MAPS)
 
 
-def is_mirrored(term_document: Mapping[str, Any]) -> bool:
+def has_reflection_symmetry(term_document: Mapping[str, Any]) -> bool:
     """Tell whether a term looks the same on both sides of its tangent, and of what lies across that."""
-    return _stays(lambda wi, wo: eval_brdf(term_document, wi, wo), tuple(_MIRRORED.values()))
+    return _is_invariant(lambda wi, wo: eval_brdf(term_document, wi, wo), tuple(_REFLECTIONS.values()))
 
 
-_ALL_AROUND = (about_normal(1.2345), _MIRRORED["y"])  # an angle that no other symmetry has
+_ISOTROPY_MAPS = (rotational_symmetry(1.2345), _REFLECTIONS["y"])  # an angle that no other symmetry has
 
 
-def _is_round(curve: Curve) -> bool:
+def _is_isotropic_curve(curve: Curve) -> bool:
     """Whether a curve's angle stays the same when both directions turn about the normal, or are mirrored."""
     if curve.angle is Angle.LOBE:
         return curve.axes[0] == curve.axes[1]
@@ -49,23 +49,23 @@ def _is_round(curve: Curve) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _has_round_quotient(model: str, fixed: tuple[tuple[str, float | str], ...]) -> bool:
+def _has_isotropic_quotient(model: str, fixed: tuple[tuple[str, float | str], ...]) -> bool:
     """Tell whether a term whose curves are round is so itself: no edit of a curve changes that."""
-    term = TERMS[model].settled_by(fixed)
+    term = TERMS[model].normalized_by(fixed)
 
     def quotient(wi: F64, wo: F64) -> F64:
         return np.moveaxis(term.quotients(*np.moveaxis(wi, -1, 0), *np.moveaxis(wo, -1, 0)), 0, -1)
 
-    return _stays(quotient, _ALL_AROUND)
+    return _is_invariant(quotient, _ISOTROPY_MAPS)
 
 
-def _stays(evaluate: Callable[[F64, F64], F64], maps: Sequence[F64]) -> bool:
+def _is_invariant(evaluate: Callable[[F64, F64], F64], maps: Sequence[F64]) -> bool:
     """Tell whether a function of both directions is the same after each of some maps of them, at a few of them."""
     rng = np.random.default_rng(1)
     wi, wo = (np.abs(rng.normal(size=(256, 3))) for _ in range(2))
     wi[:128, 0] *= -1
     wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
-    plain = evaluate(wi, wo)
-    scale = np.abs(plain).max() + 1e-30
-    others = (evaluate(wi @ one.T, wo @ one.T) for one in maps)
-    return all(np.abs(other - plain).max() <= _SAME * scale for other in others)
+    reference = evaluate(wi, wo)
+    scale = np.abs(reference).max() + 1e-30
+    transformed = (evaluate(wi @ matrix.T, wo @ matrix.T) for matrix in maps)
+    return all(np.abs(values - reference).max() <= _TOLERANCE * scale for values in transformed)

@@ -87,16 +87,16 @@ class Curve:
     factor: Callable[[F64], F64] | None = None
 
     @property
-    def outgoing(self) -> bool:
+    def depends_on_view(self) -> bool:
         """Whether it depends on wo alone and so multiplies the finished sample instead of entering the transport."""
         return self.angle is Angle.THETA_O
 
 
-def _one(gamma: F64, params: Params) -> F64:
+def _constant(gamma: F64, params: Params) -> F64:
     return np.ones_like(gamma)
 
 
-VIEW = Curve("theta_o", "view angle θo", Angle.THETA_O, _one, (), 64)
+VIEW = Curve("theta_o", "view angle θo", Angle.THETA_O, _constant, (), 64)
 """What any term may depend on besides (Ben-Artzi 2006, section 4.4): one at every angle until it is drawn."""
 
 
@@ -112,13 +112,14 @@ class Term:
         source: the equation it is built from.
         texture: the texture channel it takes by default, "diffuse" or "specular".
         fixed: parameters that shape the quotient or an angle, whatever curves read them: changing one freezes anew.
-        settle: `fixed_values` -> the fields of this declaration that they change; as declared they hold for the
+        normalize: `fixed_values` -> the fields of this declaration that they change; as declared they hold for the
             defaults.
         num_channels: of the quotient, 1 or 3.
         is_lambertian: whether the quotient is one value above the horizon.
         is_steep: whether the quotient, times cos θi, varies with the light where no curve tells that anything does.
         data: where documents must name something measured that is kept there; it is fixed at freeze too.
-        texels: where each place of a surface has a BRDF of its own, of which the quotient is the mean; from `settle`.
+        texels: where each place of a surface has a BRDF of its own, of which the quotient is the mean; from
+            `normalize`.
         width: the parameter that maps of roughness scale, and the power of a roughness that it grows with.
     """
 
@@ -131,7 +132,7 @@ class Term:
     texture: str
     help: str
     fixed: tuple[str, ...] = ()
-    settle: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
+    normalize: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
     num_channels: int = 1
     is_lambertian: bool = False
     is_steep: bool = False
@@ -140,10 +141,10 @@ class Term:
     width: tuple[str, float] | None = None
 
     def __post_init__(self) -> None:
-        if self.curves and not any(curve.outgoing for curve in self.curves):
+        if self.curves and not any(curve.depends_on_view for curve in self.curves):
             object.__setattr__(self, "curves", (*self.curves, VIEW))
 
-    def curves_in(self, document: Mapping[str, Any]) -> tuple[Curve, ...]:
+    def active_curves(self, document: Mapping[str, Any]) -> tuple[Curve, ...]:
         """The curves that make a difference in a term document: not `VIEW` where it is not drawn.
 
         Args:
@@ -158,7 +159,7 @@ class Term:
         return self.data is not None
 
     @property
-    def scatters_evenly(self) -> bool:
+    def scatters_diffusely(self) -> bool:
         """Whether it scatters light about evenly: those do whose colour is the diffuse one by default."""
         return self.texture == "diffuse"
 
@@ -168,13 +169,13 @@ class Term:
         values = tuple((name, float(given.get(name, self.parameter(name).default))) for name in self.fixed)
         return (*values, ("data", str(document["data"]))) if self.needs_data else values
 
-    def settled(self, document: Mapping[str, Any]) -> Term:
+    def normalized(self, document: Mapping[str, Any]) -> Term:
         """This term with its fixed parameters put in: quotient and angles have none left."""
-        return self.settled_by(self.fixed_values(document))
+        return self.normalized_by(self.fixed_values(document))
 
-    def settled_by(self, fixed: tuple[tuple[str, float | str], ...]) -> Term:
+    def normalized_by(self, fixed: tuple[tuple[str, float | str], ...]) -> Term:
         """The same from the `fixed_values` of a document."""
-        return self if self.settle is None else replace(self, **self.settle(dict(fixed)))
+        return self if self.normalize is None else replace(self, **self.normalize(dict(fixed)))
 
     def quotients(self, *directions: NDArray[np.floating] | float) -> NDArray[Any]:
         """The quotient with its channels first, (1, ...) or (3, ...); directions as it takes them."""

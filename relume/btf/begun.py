@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 _FORMAT = 2
 Arrays = Mapping[str, NDArray[Any]]
 
 
-class Begun:
+class PartialCompression:
     """Parts of a compression, by name.
 
     Args:
@@ -36,18 +36,18 @@ class Begun:
             return
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        with replacing(path) as unfinished:
+        with atomic_write(path) as unfinished:
             unfinished.write_text(text)
 
-    def take(self, name: str) -> Arrays | None:
+    def load(self, name: str) -> Arrays | None:
         """The arrays of a part; None where it is not there, or damaged."""
         try:
-            with (self._folder / f"{name}.npz").open("rb") as file, np.load(file, allow_pickle=False) as found:
-                return {key: found[key] for key in found.files}
+            with (self._folder / f"{name}.npz").open("rb") as file, np.load(file, allow_pickle=False) as archive:
+                return {key: archive[key] for key in archive.files}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return None
 
-    def put(self, name: str, arrays: Arrays) -> None:
+    def save(self, name: str, arrays: Arrays) -> None:
         """Keep a part."""
-        with replacing(self._folder / f"{name}.npz") as unfinished, unfinished.open("wb") as file:
+        with atomic_write(self._folder / f"{name}.npz") as unfinished, unfinished.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)

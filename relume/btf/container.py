@@ -24,8 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.btf.compress import MOST_TEXELS
-from relume.btf.rings import MOST_DIRECTIONS
+from relume.btf.compress import MAX_TEXELS
+from relume.btf.rings import MAX_DIRECTIONS
 from relume.errors import MaterialError
 
 F64 = NDArray[np.float64]
@@ -35,7 +35,7 @@ FIRST_BYTE = b"!"
 """Of all containers of the Bonn measurements; a zip has another."""
 _SIGNATURE = b"!DFMF08FCR"
 _TEXTS = 3 * 80
-_MOST_COMPONENTS = 1024
+_MAX_COMPONENTS = 1024
 _FLOATS = {2: "<f2", 4: "<f4", 8: "<f8"}
 _CHANNELS = 3
 
@@ -47,7 +47,7 @@ class Channel(NamedTuple):
     texels: Matrix
 
 
-class Container(NamedTuple):
+class BonnContainer(NamedTuple):
     """What a file holds.
 
     Attributes:
@@ -73,50 +73,51 @@ class _Reader:
 
     def __init__(self, path: Path) -> None:
         self._bytes = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.zeros(0, np.uint8)
-        self._at = 0
+        self._offset = 0
 
     @property
-    def left(self) -> int:
+    def remaining_bytes(self) -> int:
         """Bytes."""
-        return len(self._bytes) - self._at
+        return len(self._bytes) - self._offset
 
     @property
-    def at(self) -> int:
+    def offset(self) -> int:
         """Bytes before what comes next."""
-        return self._at
+        return self._offset
 
     def skip(self, count: int) -> NDArray[np.uint8]:
         """The next bytes, on the disk."""
-        if count > self.left:
-            raise damaged(f"{count:,} bytes are to follow, {self.left:,} do")
-        self._at += count
-        return self._bytes[self._at - count : self._at]
+        if count > self.remaining_bytes:
+            raise damaged_error(f"{count:,} bytes are to follow, {self.remaining_bytes:,} do")
+        self._offset += count
+        return self._bytes[self._offset - count : self._offset]
 
-    def numbers(self, kind: str, *shape: int) -> Matrix:
+    def read_numbers(self, kind: str, *shape: int) -> Matrix:
         """The next numbers, on the disk."""
         dtype, count = np.dtype(kind), 1
         for extent in shape:
             count *= extent
-        found = self.skip(count * dtype.itemsize)
-        return np.ndarray(shape, dtype, found)
+        data = self.skip(count * dtype.itemsize)
+        return np.ndarray(shape, dtype, data)
 
-    def count(self, what: str, most: int, least: int = 1) -> int:
+    def read_count(self, label: str, maximum: int, minimum: int = 1) -> int:
         """The next number of things, bounded."""
-        found = int(self.numbers("<u4", 1)[0])
-        if not least <= found <= most:
+        value = int(self.read_numbers("<u4", 1)[0])
+        if not minimum <= value <= maximum:
             raise MaterialError(
-                f"the .btf file says that it has {found:,} {what}; {least:,} to {most:,} can be read: choose a smaller "
+                f"the .btf file says that it has {value:,} {label}; {minimum:,} to {maximum:,} can be read: choose a "
+                f"smaller "
                 "version of it, or download it again"
             )
-        return found
+        return value
 
 
-def damaged(what: str) -> MaterialError:
+def damaged_error(detail: str) -> MaterialError:
     """What is wrong with a file that is not whole."""
-    return MaterialError(f"the .btf file is cut off or damaged: {what}; download it again")
+    return MaterialError(f"the .btf file is cut off or damaged: {detail}; download it again")
 
 
-def read_container(path: Path) -> Container:
+def read_container(path: Path) -> BonnContainer:
     """Read what a file says of itself, and find its matrices.
 
     Args:
@@ -126,27 +127,27 @@ def read_container(path: Path) -> Container:
     """
     file = _Reader(path)
     _check_kind(file)
-    has_cosine = _described(file)
+    has_cosine = _read_description(file)
     views, lights = _directions(file)
-    width, height = (file.count(what, MOST_TEXELS) for what in ("texels a row", "rows of texels"))
-    if width * height > MOST_TEXELS:
+    width, height = (file.read_count(label, MAX_TEXELS) for label in ("texels a row", "rows of texels"))
+    if width * height > MAX_TEXELS:
         raise MaterialError(
-            f"the BTF has {width}×{height} texels; at most {MOST_TEXELS:,} can be kept, choose a smaller version of it"
+            f"the BTF has {width}×{height} texels; at most {MAX_TEXELS:,} can be kept, choose a smaller version of it"
         )
-    file.numbers("<f4", file.count("rotations", MOST_TEXELS, 0), 9)
-    file.count("components", _MOST_COMPONENTS)
-    model = int(file.numbers("<i4", 1)[0])
-    file.numbers("<f4", 12)
+    file.read_numbers("<f4", file.read_count("rotations", MAX_TEXELS, 0), 9)
+    file.read_count("components", _MAX_COMPONENTS)
+    model = int(file.read_numbers("<i4", 1)[0])
+    file.read_numbers("<f4", 12)
     pairs = len(views) * len(lights)
     channels = tuple(_channel(file, pairs, width * height) for _ in range(_CHANNELS))
-    if file.left:
-        raise damaged(f"{file.left:,} bytes follow where it should end")
-    return Container(has_cosine, views, lights, (height, width), model, channels)
+    if file.remaining_bytes:
+        raise damaged_error(f"{file.remaining_bytes:,} bytes follow where it should end")
+    return BonnContainer(has_cosine, views, lights, (height, width), model, channels)
 
 
 def _check_kind(file: _Reader) -> None:
     """Pass the signature."""
-    kind = bytes(file.skip(min(len(_SIGNATURE), file.left)))
+    kind = bytes(file.skip(min(len(_SIGNATURE), file.remaining_bytes)))
     if kind != _SIGNATURE:
         raise MaterialError(
             "the .btf file is no decorrelated full matrix factorization (DFMF), as those of UBO2014 are, but "
@@ -155,21 +156,21 @@ def _check_kind(file: _Reader) -> None:
         )
 
 
-def _described(file: _Reader) -> bool:
+def _read_description(file: _Reader) -> bool:
     """Pass what people wrote. Whether the light's cosine is in the values."""
-    begin = file.at
-    size, version = (int(number) for number in file.numbers("<u4", 2))
+    start = file.offset
+    size, version = (int(number) for number in file.read_numbers("<u4", 2))
     file.skip(_TEXTS)
-    file.numbers("<f4", 4)
-    has_cosine = version > 1 and file.count("marks of the cosine", 2**32 - 1, 0) != 0
+    file.read_numbers("<f4", 4)
+    has_cosine = version > 1 and file.read_count("marks of the cosine", 2**32 - 1, 0) != 0
     if version > 2:
-        file.skip(file.count("bytes of XML", file.left, 0))
+        file.skip(file.read_count("bytes of XML", file.remaining_bytes, 0))
     if version > 3:
-        file.count("colour channels", _CHANNELS, _CHANNELS)
+        file.read_count("colour channels", _CHANNELS, _CHANNELS)
         for _ in range(_CHANNELS):
-            file.skip(file.count("bytes of a channel's name", file.left, 0))
-    if file.at - begin != size:
-        raise damaged(f"its description has {file.at - begin:,} bytes, not {size:,}")
+            file.skip(file.read_count("bytes of a channel's name", file.remaining_bytes, 0))
+    if file.offset - start != size:
+        raise damaged_error(f"its description has {file.offset - start:,} bytes, not {size:,}")
     return has_cosine
 
 
@@ -177,23 +178,23 @@ def _directions(file: _Reader) -> tuple[F64, F64]:
     """Views and lights: θ and φ."""
     views: list[Matrix] = []
     lights: Matrix | None = None
-    for _ in range(file.count("view directions", MOST_DIRECTIONS)):
-        views.append(file.numbers("<f4", 2))
-        found = file.numbers("<f4", file.count("light directions", MOST_DIRECTIONS), 2)
-        if lights is not None and not np.array_equal(lights, found, equal_nan=True):
+    for _ in range(file.read_count("view directions", MAX_DIRECTIONS)):
+        views.append(file.read_numbers("<f4", 2))
+        view_lights = file.read_numbers("<f4", file.read_count("light directions", MAX_DIRECTIONS), 2)
+        if lights is not None and not np.array_equal(lights, view_lights, equal_nan=True):
             raise MaterialError("light directions of the BTF differ from view to view; resample it")
-        lights = found
+        lights = view_lights
     return np.array(views, np.float64), np.array(lights, np.float64)
 
 
 def _channel(file: _Reader, pairs: int, texels: int) -> Channel:
-    kind = _FLOATS.get(int(file.numbers("u1", 1)[0]))
+    kind = _FLOATS.get(int(file.read_numbers("u1", 1)[0]))
     if kind is None:
-        raise damaged("its numbers have neither two, four nor eight bytes")
-    components = file.count("components", _MOST_COMPONENTS)
-    rows, columns = (int(number) for number in file.numbers("<u4", 2))
+        raise damaged_error("its numbers have neither two, four nor eight bytes")
+    components = file.read_count("components", _MAX_COMPONENTS)
+    rows, columns = (int(number) for number in file.read_numbers("<u4", 2))
     if (rows, columns) not in ((pairs, texels), (texels, pairs)):
-        raise damaged(f"{rows:,} × {columns:,} values, not {pairs:,} pairs of directions × {texels:,} texels")
-    file.numbers(kind, components)  # singular values, which the second matrix contains
-    left, right = file.numbers(kind, rows, components), file.numbers(kind, columns, components)
+        raise damaged_error(f"{rows:,} × {columns:,} values, not {pairs:,} pairs of directions × {texels:,} texels")
+    file.read_numbers(kind, components)  # singular values, which the second matrix contains
+    left, right = file.read_numbers(kind, rows, components), file.read_numbers(kind, columns, components)
     return Channel(left, right) if rows == pairs else Channel(right, left)

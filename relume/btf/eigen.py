@@ -15,25 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.btf.packing import cluster_bits, packed_bytes
-from relume.btf.rings import Rings
+from relume.btf.rings import DirectionGrid
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 I8 = NDArray[np.int8]
 
 
-LARGEST = 127  # of what is kept in a byte
-MOST_HEIGHT = 4.0
+INT8_MAX = 127  # of what is kept in a byte
+MAX_HEIGHT = 4.0
 """Of a relief, in sides of its texture: a ray would pass many periods of a higher one."""
 U8 = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
-class EigenBtf:
+class LocalPcaBtf:
     """What is kept of a BTF of V view and L light directions, in K clusters with C components for each view.
 
     Attributes:
-        rings: of both directions.
+        grid: of both directions.
         levels: first texel, height, width of the texels and of their means over 2 × 2, over 4 × 4, and so on.
             (levels, 3) int32
         cluster: of each texel of each level. (V, texels) uint8
@@ -48,7 +48,7 @@ class EigenBtf:
         error: of the texels, relative RMS, by how many components are used, from none on. (C + 1,)
     """
 
-    rings: Rings
+    grid: DirectionGrid
     levels: NDArray[np.int32]
     cluster: NDArray[np.uint8]
     weight: I8
@@ -74,52 +74,52 @@ class EigenBtf:
     def num_bytes(self) -> int:
         """What is kept, the coarser levels left out, which files of measurements do not have either."""
         bits = np.append(self.bits, np.uint8(cluster_bits(self.mean.shape[1])))
-        of_texels = packed_bytes(self.size[0] * self.size[1], bits)
+        texel_bytes = packed_bytes(self.size[0] * self.size[1], bits)
         tables = self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
-        return self.rings.num_directions * of_texels + tables + self.height.nbytes
+        return self.grid.num_directions * texel_bytes + tables + self.height.nbytes
 
     @property
     def measured_bytes(self) -> int:
         """The same uncompressed: a byte for each channel of each image, as measurements are published."""
-        directions = self.rings.num_directions
+        directions = self.grid.num_directions
         return self.size[0] * self.size[1] * directions * directions * 3
 
-    def with_components(self, num: int) -> EigenBtf:
+    def with_components(self, num: int) -> LocalPcaBtf:
         """Use the first of them alone."""
-        kept = max(0, min(num, self.num_components))
+        num_components = max(0, min(num, self.num_components))
         return replace(
             self,
-            weight=np.ascontiguousarray(self.weight[..., :kept]),
-            bits=self.bits[:kept],
-            eigen=self.eigen[:, :, :kept],
-            step=self.step[..., :kept],
-            error=self.error[: kept + 1],
+            weight=np.ascontiguousarray(self.weight[..., :num_components]),
+            bits=self.bits[:num_components],
+            eigen=self.eigen[:, :, :num_components],
+            step=self.step[..., :num_components],
+            error=self.error[: num_components + 1],
         )
 
     def tables(self) -> F32:
         """Means and components for sums over light: (V, K, 1 + C, 3, L) float32."""
         components = self.eigen.astype(np.float32) * self.step[..., None, None]
-        both = np.concatenate([self.mean[:, :, None].astype(np.float32), components], axis=2)
-        return np.ascontiguousarray(both.swapaxes(-1, -2))
+        mean_and_components = np.concatenate([self.mean[:, :, None].astype(np.float32), components], axis=2)
+        return np.ascontiguousarray(mean_and_components.swapaxes(-1, -2))
 
-    def sum_from(self, view: int, texels: NDArray[np.int64], shares: F64) -> F64:
+    def evaluate(self, view: int, texels: NDArray[np.int64], texel_weights: F64) -> F64:
         """Texels seen from one side, summed: the BRDF times cosine. (L, 3)
 
         Args:
-            view: the side. texels: their numbers. (n,). shares: of each. (n,)
+            view: the side. texels: their numbers. (n,). texel_weights: of each. (n,)
         """
-        of, total = self.cluster[view, texels], np.zeros(self.mean.shape[2:])
-        for k in np.unique(of):
-            some, share = texels[of == k], shares[of == k]
-            weight = share @ self.weight[view, some].astype(np.float64) * self.step[view, k]
-            total += share.sum() * self.mean[view, k].astype(np.float64)
+        cluster_index, total = self.cluster[view, texels], np.zeros(self.mean.shape[2:])
+        for k in np.unique(cluster_index):
+            cluster_texels, cluster_weights = texels[cluster_index == k], texel_weights[cluster_index == k]
+            weight = cluster_weights @ self.weight[view, cluster_texels].astype(np.float64) * self.step[view, k]
+            total += cluster_weights.sum() * self.mean[view, k].astype(np.float64)
             total += np.einsum("j,jlc->lc", weight, self.eigen[view, k].astype(np.float64))
         return total
 
-    def texel(self, number: int) -> F64:
+    def texel_brdf(self, texel_index: int) -> F64:
         """The BRDF times cosine of a texel. (V, L, 3)"""
-        every = np.arange(self.rings.num_directions)
-        k = self.cluster[:, number]
-        weight = self.weight[:, number].astype(np.float64) * self.step[every, k]
-        told = np.einsum("vj,vjlc->vlc", weight, self.eigen[every, k].astype(np.float64))
-        return np.asarray(self.mean[every, k].astype(np.float64) + told)
+        all_views = np.arange(self.grid.num_directions)
+        k = self.cluster[:, texel_index]
+        weight = self.weight[:, texel_index].astype(np.float64) * self.step[all_views, k]
+        deviation = np.einsum("vj,vjlc->vlc", weight, self.eigen[all_views, k].astype(np.float64))
+        return np.asarray(self.mean[all_views, k].astype(np.float64) + deviation)

@@ -7,23 +7,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.btf.container import damaged, read_container
-from relume.btf.found import found_rings
+from relume.btf.container import damaged_error, read_container
+from relume.btf.found import infer_rings
 from relume.btf.rings import directions
-from relume.btf.values import MOST_VALUE
+from relume.btf.values import MAX_VALUE
 from relume.errors import MaterialError
 
 F32 = NDArray[np.float32]
 
-_LEAST = np.float32(1e-5)  # that was added before logarithms were taken
-_OFF = 1e-3  # radians that light may come from where no eye is
+_LOG_OFFSET = np.float32(1e-5)  # that was added before logarithms were taken
+_MAX_DEVIATION = 1e-3  # radians that light may come from where no eye is
 _YUV = np.array([[1, 0, 1.13983], [1, -0.39465, -0.5806], [1, 2.03211, 0]], np.float32)  # to RGB
 _RGB, _OF_YUV, _LOG_Y, _LOG_Y_RATIOS, _LOG_RGB = 0, 1, 9, 11, 12
 _MODELS = (_RGB, _OF_YUV, _LOG_Y, _LOG_Y_RATIOS, _LOG_RGB)
 
 
-class FactoredBtf:
-    """The values of a .btf file; implements `relume.btf.compress.Images`.
+class MatrixBtf:
+    """The values of a .btf file; implements `relume.btf.compress.ViewArrays`.
 
     Args:
         path: of the file.
@@ -39,14 +39,17 @@ class FactoredBtf:
                 "write it with one of them, or its images into a zip"
             )
         self.size = file.size
-        self.rings, self._views = found_rings(*np.degrees(file.views).T)
-        lit, self._lights = found_rings(*np.degrees(file.lights).T)
-        seen_from, lit_from = directions(self.rings), directions(lit)
-        if lit_from.shape != seen_from.shape or np.abs(lit_from - seen_from).max() > _OFF:
+        self.grid, self._views = infer_rings(*np.degrees(file.views).T)
+        light_grid, self._lights = infer_rings(*np.degrees(file.lights).T)
+        view_directions, light_directions = directions(self.grid), directions(light_grid)
+        if (
+            light_directions.shape != view_directions.shape
+            or np.abs(light_directions - view_directions).max() > _MAX_DEVIATION
+        ):
             raise MaterialError("light and view directions of the BTF are not the same; resample it so that they are")
         self._cosine = np.cos(file.lights[self._lights, 0]).astype(np.float32)
 
-    def seen_from(self, view: int) -> F32:
+    def get_view(self, view: int) -> F32:
         """Every texel's values from one direction; what a product has below zero is zero. (lights, texels, 3) float32
 
         Raises:
@@ -59,10 +62,10 @@ class FactoredBtf:
                 out[:, :, channel] = factors.pairs[pairs].astype(np.float32) @ factors.texels.astype(np.float32).T
             out = _rgb(self._file.model, out)
         if not np.isfinite(out).all():
-            raise damaged("some of its values are no numbers, or too large")
+            raise damaged_error("some of its values are no numbers, or too large")
         if not self._file.has_cosine:
             out *= self._cosine[:, None, None]
-        return np.clip(out, 0, MOST_VALUE, out=out)
+        return np.clip(out, 0, MAX_VALUE, out=out)
 
 
 def _rgb(model: int, values: F32) -> F32:
@@ -70,9 +73,9 @@ def _rgb(model: int, values: F32) -> F32:
     if model == _RGB:
         return values
     if model == _LOG_RGB:
-        return np.asarray(np.exp(values) - _LEAST)
+        return np.asarray(np.exp(values) - _LOG_OFFSET)
     if model in (_LOG_Y, _LOG_Y_RATIOS):
-        values[..., 0] = np.exp(values[..., 0]) - _LEAST
+        values[..., 0] = np.exp(values[..., 0]) - _LOG_OFFSET
     if model == _LOG_Y_RATIOS:
-        values[..., 1:] *= values[..., :1] + _LEAST
+        values[..., 1:] *= values[..., :1] + _LOG_OFFSET
     return np.asarray(values @ _YUV.T)

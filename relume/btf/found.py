@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.btf.rings import MOST_DIRECTIONS, Rings, directions, polar, rings_of
+from relume.btf.rings import MAX_DIRECTIONS, DirectionGrid, directions, make_direction_grid, polar
 from relume.errors import MaterialError
 
 F64 = NDArray[np.float64]
 
-_APART = 0.5  # degrees of θ from one ring to the next, at least
-_OFF = 1.5  # degrees that directions may be from where the ring has them: names have whole degrees
-_NOWHERE = 1e-3  # of a step: rings that begin so near φ = 0 begin there
+_MIN_RING_DISTANCE = 0.5  # degrees of θ from one ring to the next, at least
+_MAX_DEVIATION = 1.5  # degrees that directions may be from where the ring has them: names have whole degrees
+_MIN_SHIFT = 1e-3  # of a step: rings that begin so near φ = 0 begin there
 
 
-def found_rings(theta: F64, phi: F64) -> tuple[Rings, NDArray[np.intp]]:
+def infer_rings(theta: F64, phi: F64) -> tuple[DirectionGrid, NDArray[np.intp]]:
     """Put directions onto rings about the normal; each ring may begin at a φ of its own.
 
     Args:
@@ -25,28 +25,32 @@ def found_rings(theta: F64, phi: F64) -> tuple[Rings, NDArray[np.intp]]:
     Raises:
         MaterialError: they are not above the horizon, too many, or not evenly on rings.
     """
-    if len(theta) > MOST_DIRECTIONS:
+    if len(theta) > MAX_DIRECTIONS:
         raise MaterialError(
-            f"the BTF has {len(theta):,} directions; at most {MOST_DIRECTIONS} can be kept, leave some out"
+            f"the BTF has {len(theta):,} directions; at most {MAX_DIRECTIONS} can be kept, leave some out"
         )
-    wrong = np.flatnonzero(~((theta >= 0) & (theta < 90) & np.isfinite(phi)))
-    if len(wrong):
-        raise nowhere(theta[wrong[0]], phi[wrong[0]])
-    rising = np.argsort(theta, kind="stable")
-    of_rings = np.split(rising, np.flatnonzero(np.diff(theta[rising]) > _APART) + 1)
-    shift = [_shift(phi[ring]) for ring in of_rings]
-    mean = [float(theta[ring].mean()) for ring in of_rings]
-    if len(of_rings[0]) == 1 and mean[0] <= _APART:
+    invalid = np.flatnonzero(~((theta >= 0) & (theta < 90) & np.isfinite(phi)))
+    if len(invalid):
+        raise missing_direction(theta[invalid[0]], phi[invalid[0]])
+    by_theta = np.argsort(theta, kind="stable")
+    ring_members = np.split(by_theta, np.flatnonzero(np.diff(theta[by_theta]) > _MIN_RING_DISTANCE) + 1)
+    shift = [_ring_shift(phi[ring]) for ring in ring_members]
+    mean = [float(theta[ring].mean()) for ring in ring_members]
+    if len(ring_members[0]) == 1 and mean[0] <= _MIN_RING_DISTANCE:
         mean[0] = 0.0
-    rings = rings_of([(at, len(ring)) for at, ring in zip(mean, of_rings, strict=True)], shift)
-    order = np.concatenate([_placed(ring, phi, turned) for ring, turned in zip(of_rings, shift, strict=True)])
-    away = np.abs(polar(np.radians(theta[order]), np.radians(phi[order])) - directions(rings)).max()
-    if len(np.unique(order)) != len(theta) or away > np.radians(_OFF):
+    grid = make_direction_grid(
+        [(ring_theta, len(ring)) for ring_theta, ring in zip(mean, ring_members, strict=True)], shift
+    )
+    order = np.concatenate(
+        [_order_ring(ring, phi, ring_shift) for ring, ring_shift in zip(ring_members, shift, strict=True)]
+    )
+    max_deviation = np.abs(polar(np.radians(theta[order]), np.radians(phi[order])) - directions(grid)).max()
+    if len(np.unique(order)) != len(theta) or max_deviation > np.radians(_MAX_DEVIATION):
         raise MaterialError("the directions of the BTF are not evenly on rings about the normal; resample it to such")
-    return rings, order
+    return grid, order
 
 
-def nowhere(theta: float, phi: float) -> MaterialError:
+def missing_direction(theta: float, phi: float) -> MaterialError:
     """What is wrong with a direction, in degrees, that is not above the horizon."""
     return MaterialError(
         f"a direction of the BTF lies at θ = {theta:.4g}°, φ = {phi:.4g}°: at or below the horizon, or nowhere; leave "
@@ -54,17 +58,17 @@ def nowhere(theta: float, phi: float) -> MaterialError:
     )
 
 
-def _shift(phi: F64) -> float:
+def _ring_shift(phi: F64) -> float:
     """Where a ring begins, in steps: the mean of where each of its directions says. [0, 1)"""
     if len(phi) == 1:
         return 0.0
-    turn = float(np.angle(np.exp(1j * np.radians(phi) * len(phi)).mean()) / (2 * np.pi) % 1.0)
-    return 0.0 if min(turn, 1 - turn) < _NOWHERE else turn
+    offset = float(np.angle(np.exp(1j * np.radians(phi) * len(phi)).mean()) / (2 * np.pi) % 1.0)
+    return 0.0 if min(offset, 1 - offset) < _MIN_SHIFT else offset
 
 
-def _placed(ring: NDArray[np.intp], phi: F64, shift: float) -> NDArray[np.intp]:
+def _order_ring(ring: NDArray[np.intp], phi: F64, shift: float) -> NDArray[np.intp]:
     """The directions of a ring, given as `ring`, from its beginning on; some twice where they are not evenly on it."""
-    place = np.rint(phi[ring] * len(ring) / 360 - shift).astype(np.int64) % len(ring)
+    position = np.rint(phi[ring] * len(ring) / 360 - shift).astype(np.int64) % len(ring)
     order = np.full(len(ring), ring[0])
-    order[place] = ring
+    order[position] = ring
     return order

@@ -6,12 +6,12 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from relume.btf.begun import Begun
-from relume.btf.compress import Images, compress
+from relume.btf.begun import PartialCompression
+from relume.btf.compress import ViewArrays, compress
 from relume.btf.container import FIRST_BYTE
-from relume.btf.eigen import EigenBtf
-from relume.btf.factored import FactoredBtf
-from relume.btf.shelf import STORE, BtfRecord, keep
+from relume.btf.eigen import LocalPcaBtf
+from relume.btf.factored import MatrixBtf
+from relume.btf.shelf import STORE, BtfRecord, store_btf
 from relume.btf.zips import ZippedBtf
 from relume.errors import MaterialError
 
@@ -22,39 +22,39 @@ def import_btf(
     name: str,
     bound: float,
     progress: Callable[[float], object],
-    cancelled: Callable[[], bool],
-    making: Path | None = None,
-    images: Images | None = None,
+    is_canceled: Callable[[], bool],
+    partial_folder: Path | None = None,
+    images: ViewArrays | None = None,
 ) -> BtfRecord:
     """Import a zip of images or a .btf container; the same again is the same BTF.
 
     Args:
         folder: of the asset store. file: what is in it says which of them it is. name: what people call it.
-        bound: relative RMS that may be missed. progress: called with the share done. cancelled: asked now and then.
-        making: folder of what was found so far; by default in `folder`, by the file's content.
+        bound: relative RMS that may be missed. progress: called with the share done. is_canceled: asked now and then.
+        partial_folder: folder of what was found so far; by default in `folder`, by the file's content.
         images: of the file, where somebody else reads it.
     Raises:
-        MaterialError: it is no such file, or the store is full. CancelledError: `cancelled` said so; what was found
+        MaterialError: it is no such file, or the store is full. CancelledError: `is_canceled` said so; what was found
             stays.
     """
-    images = images or images_of(file)
-    making = making or folder / "making" / STORE.identity_of(file)
-    begun = Begun(making, {"bound": bound})
+    images = images or open_images(file)
+    partial_folder = partial_folder or folder / "making" / STORE.content_id(file)
+    partial_compression = PartialCompression(partial_folder, {"bound": bound})
 
-    def make() -> EigenBtf:
+    def compress_images() -> LocalPcaBtf:
         try:
-            return compress(images, bound, progress, cancelled, begun)
+            return compress(images, bound, progress, is_canceled, partial_compression)
         except MaterialError:  # the file's own fault: nothing could go on from here
-            shutil.rmtree(making, ignore_errors=True)
+            shutil.rmtree(partial_folder, ignore_errors=True)
             raise
 
-    record = keep(folder, file, name, None, make)
-    shutil.rmtree(making, ignore_errors=True)
+    record = store_btf(folder, file, name, None, compress_images)
+    shutil.rmtree(partial_folder, ignore_errors=True)
     return record
 
 
-def images_of(file: Path) -> ZippedBtf | FactoredBtf:
+def open_images(file: Path) -> ZippedBtf | MatrixBtf:
     """The images of a zip or of a .btf container. Raises MaterialError."""
-    with file.open("rb") as begun:
-        is_container = begun.read(1) == FIRST_BYTE
-    return FactoredBtf(file) if is_container else ZippedBtf(file)
+    with file.open("rb") as stream:
+        is_container = stream.read(1) == FIRST_BYTE
+    return MatrixBtf(file) if is_container else ZippedBtf(file)

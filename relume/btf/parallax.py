@@ -18,92 +18,92 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.btf.rings import Rings, directions
+from relume.btf.rings import DirectionGrid, directions
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_A_TEXEL = np.float32(2)  # steps, along a ray
-_MOST_STEPS = 256
+_STEPS_PER_TEXEL = np.float32(2)  # steps, along a ray
+_MAX_STEPS = 256
 
 
-def slants(rings: Rings) -> F32:
+def compute_shears(grid: DirectionGrid) -> F32:
     """s of every direction: how far its rays go sideways for each unit that they rise. (V, 2) float32"""
-    w = directions(rings)
+    w = directions(grid)
     return np.asarray(w[:, :2] / w[:, 2:], np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def slant_of(rings, x, y, z):  # type: ignore[no-untyped-def]
+def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
     """s of a direction; beyond the last ring it is the last ring's.
 
     Args:
-        rings: the `Rings`. x, y, z: the direction, unit, above the horizon.
+        grid: the `DirectionGrid`. x, y, z: the direction, unit, above the horizon.
     """
     across = math.sqrt(x * x + y * y)
-    most = np.float32(math.tan(rings.theta[rings.theta.shape[0] - 1]))
-    steep: Any = max(z, np.float32(1e-6), across / most)
-    return x / steep, y / steep
+    max_slope = np.float32(math.tan(grid.theta[grid.theta.shape[0] - 1]))
+    denominator: Any = max(z, np.float32(1e-6), across / max_slope)
+    return x / denominator, y / denominator
 
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
-def _at(height, u, v):  # type: ignore[no-untyped-def]
+def _interpolate_height(height, u, v):  # type: ignore[no-untyped-def]
     """Interpolate heights between texels, which repeat without end."""
     rows, columns = height.shape
     x, y = u * np.float32(columns) - np.float32(0.5), v * np.float32(rows) - np.float32(0.5)
     left, upper = math.floor(x), math.floor(y)
     fx, fy = np.float32(x - left), np.float32(y - upper)
     column, row = np.int64(left) % columns, np.int64(upper) % rows
-    beside, below = (column + 1) % columns, (row + 1) % rows
-    above = (np.float32(1) - fx) * height[row, column] + fx * height[row, beside]
+    next_column, next_row = (column + 1) % columns, (row + 1) % rows
+    above = (np.float32(1) - fx) * height[row, column] + fx * height[row, next_column]
     return (np.float32(1) - fy) * above + fy * (
-        (np.float32(1) - fx) * height[below, column] + fx * height[below, beside]
+        (np.float32(1) - fx) * height[next_row, column] + fx * height[next_row, next_column]
     )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def height_seen(height, lowest, highest, u, v, slant):  # type: ignore[no-untyped-def]
+def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore[no-untyped-def]
     """Find how high the relief is where a ray meets it first, in steps of half a texel, linear on the last.
 
     Args:
         height: of the relief, sides of the texture. (height, width) float32. lowest, highest: of them.
-        u, v: where the ray crosses the plane, in repeats. slant: s of it.
+        u, v: where the ray crosses the plane, in repeats. shear: s of it.
     """
     rows, columns = height.shape
-    sideways = max(abs(slant[0]) * np.float32(columns), abs(slant[1]) * np.float32(rows)) * (highest - lowest)
-    steps: Any = min(max(np.int64(math.ceil(_A_TEXEL * sideways)), 1), _MOST_STEPS)
-    step, before = (lowest - highest) / np.float32(steps), highest
-    over = highest - _at(height, u + highest * slant[0], v - highest * slant[1])
+    sideways = max(abs(shear[0]) * np.float32(columns), abs(shear[1]) * np.float32(rows)) * (highest - lowest)
+    steps: Any = min(max(np.int64(math.ceil(_STEPS_PER_TEXEL * sideways)), 1), _MAX_STEPS)
+    step, previous_z = (lowest - highest) / np.float32(steps), highest
+    clearance = highest - _interpolate_height(height, u + highest * shear[0], v - highest * shear[1])
     for k in range(steps):
         z = highest + step * np.float32(k + 1)
-        now = z - _at(height, u + z * slant[0], v - z * slant[1])
-        if now <= 0:
-            return before + step * over / max(over - now, np.float32(1e-9))
-        over, before = now, z
+        next_clearance = z - _interpolate_height(height, u + z * shear[0], v - z * shear[1])
+        if next_clearance <= 0:
+            return previous_z + step * clearance / max(clearance - next_clearance, np.float32(1e-9))
+        clearance, previous_z = next_clearance, z
     return lowest
 
 
-def height_seen_numpy(height: F32, place: F64, slant: F64) -> float:
-    """Do as `height_seen`, in plain NumPy: its oracle.
+def parallax_intersection_numpy(height: F32, uv: F64, shear: F64) -> float:
+    """Do as `parallax_intersection`, in plain NumPy: its oracle.
 
     Args:
-        height: of the relief. (height, width). place: u and v, in repeats. (2,). slant: s of the ray. (2,)
+        height: of the relief. (height, width). uv: u and v, in repeats. (2,). shear: s of the ray. (2,)
     """
     size = np.array(height.shape[::-1])
     low, high = float(height.min()), float(height.max())
-    steps = int(np.clip(np.ceil(2 * np.max(np.abs(slant) * size) * (high - low)), 1, _MOST_STEPS))
+    steps = int(np.clip(np.ceil(2 * np.max(np.abs(shear) * size) * (high - low)), 1, _MAX_STEPS))
     z = np.linspace(high, low, steps + 1)
-    at = (place + z[:, None] * slant * [1, -1]) * size - 0.5
-    first = np.floor(at).astype(int)
-    part = at - first
-    relief = np.zeros(len(z))
+    texel_positions = (uv + z[:, None] * shear * [1, -1]) * size - 0.5
+    first = np.floor(texel_positions).astype(int)
+    fraction = texel_positions - first
+    surface_height = np.zeros(len(z))
     for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        near = np.abs(1 - right - part[:, 0]) * np.abs(1 - down - part[:, 1])
-        relief += near * height[(first[:, 1] + down) % size[1], (first[:, 0] + right) % size[0]]
-    over = z - relief
-    met = np.flatnonzero(over[1:] <= 0)
-    if not len(met):
+        weight = np.abs(1 - right - fraction[:, 0]) * np.abs(1 - down - fraction[:, 1])
+        surface_height += weight * height[(first[:, 1] + down) % size[1], (first[:, 0] + right) % size[0]]
+    clearance = z - surface_height
+    hits = np.flatnonzero(clearance[1:] <= 0)
+    if not len(hits):
         return low
-    k = met[0]
-    return float(z[k] + (z[k + 1] - z[k]) * over[k] / max(over[k] - over[k + 1], 1e-9))
+    k = hits[0]
+    return float(z[k] + (z[k + 1] - z[k]) * clearance[k] / max(clearance[k] - clearance[k + 1], 1e-9))

@@ -9,21 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.btf.compress import MOST_TEXELS
-from relume.btf.values import MOST_VALUE
+from relume.btf.compress import MAX_TEXELS
+from relume.btf.values import MAX_VALUE
 from relume.color import srgb_decode
 from relume.errors import MaterialError, SceneError
 from relume.imageio.linear import EXR_MAGIC, read_pixels
-from relume.imageio.shrink import shrink
+from relume.imageio.shrink import downsample
 
 F32 = NDArray[np.float32]
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".exr")
-_MOST_PIXELS = 2048 * 2048
+_MAX_PIXELS = 2048 * 2048
 _FORMATS = ("JPEG", "PNG")
-_DEEP = ("I", "F")  # modes that begin so have 16 or 32 bits, which would be cut off at a byte
-_BOMB = Image.DecompressionBombError, Image.DecompressionBombWarning
-_UNREADABLE = OSError, ValueError, SyntaxError, RuntimeError, NotImplementedError
+_DEEP_MODES = ("I", "F")  # modes that begin so have 16 or 32 bits, which would be cut off at a byte
+_BOMB_ERRORS = Image.DecompressionBombError, Image.DecompressionBombWarning
+_READ_ERRORS = OSError, ValueError, SyntaxError, RuntimeError, NotImplementedError
 
 
 def read_photograph(data: bytes, name: str) -> F32:
@@ -32,22 +32,22 @@ def read_photograph(data: bytes, name: str) -> F32:
     Args:
         data: of the file. name: what it is, in messages.
     Returns:
-        (height, width, 3) float32, finite, from 0 to `relume.btf.values.MOST_VALUE`.
+        (height, width, 3) float32, finite, from 0 to `relume.btf.values.MAX_VALUE`.
     Raises:
         MaterialError: damaged, too large, of more than a byte where it is no OpenEXR, or some values are no numbers.
     """
     return _linear(data, name) if data.startswith(EXR_MAGIC) else _srgb(data, name)
 
 
-def reduced(image: F32, most: int) -> F32:
+def limit_texels(image: F32, max_texels: int) -> F32:
     """The image of at most so many texels, each the mean of as many pixels along both sides as a whole number says.
 
     Args:
-        image: linear. (height, width, 3). most: see `relume.btf.compress.most_texels`.
+        image: linear. (height, width, 3). max_texels: see `relume.btf.compress.max_texels`.
     """
     height, width = image.shape[:2]
-    times = math.ceil(math.sqrt(height * width / most))
-    return shrink(image, (max(width // times, 1), max(height // times, 1)))
+    factor = math.ceil(math.sqrt(height * width / max_texels))
+    return downsample(image, (max(width // factor, 1), max(height // factor, 1)))
 
 
 def _linear(data: bytes, name: str) -> F32:
@@ -57,33 +57,33 @@ def _linear(data: bytes, name: str) -> F32:
         raise MaterialError(str(error)) from error
     if not np.isfinite(image).all():
         raise MaterialError(f"{name} has values that are no numbers; repair it, and pack it again")
-    return np.clip(image, 0, MOST_VALUE)
+    return np.clip(image, 0, MAX_VALUE)
 
 
 def _srgb(data: bytes, name: str) -> F32:
     try:
         with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
             _check_size(image.width, image.height, name)
-            if image.mode.startswith(_DEEP):
+            if image.mode.startswith(_DEEP_MODES):
                 raise MaterialError(
                     f"{name} has more than a byte a channel; write it with one, as sRGB, or as OpenEXR, linear"
                 )
             pixels = np.asarray(image.convert("RGB"))
     except MaterialError:
         raise
-    except _BOMB as error:
-        raise _too_large(name) from error
-    except _UNREADABLE as error:
+    except _BOMB_ERRORS as error:
+        raise _size_error(name) from error
+    except _READ_ERRORS as error:
         raise MaterialError(f"{name} cannot be read as an image; write it as JPEG, PNG or OpenEXR") from error
     return np.asarray(srgb_decode(pixels.astype(np.float32) / np.float32(255)), np.float32)
 
 
 def _check_size(width: int, height: int, name: str) -> None:
-    if width * height > _MOST_PIXELS:
-        raise _too_large(name)
+    if width * height > _MAX_PIXELS:
+        raise _size_error(name)
 
 
-def _too_large(name: str) -> MaterialError:
+def _size_error(name: str) -> MaterialError:
     return MaterialError(
-        f"{name} has more than {_MOST_PIXELS:,} pixels; scale the images down, {MOST_TEXELS:,} texels are kept"
+        f"{name} has more than {_MAX_PIXELS:,} pixels; scale the images down, {MAX_TEXELS:,} texels are kept"
     )

@@ -16,7 +16,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.arcs import acos_clamped, azimuth_turns
+from relume.basis.arcs import acos_clamped, azimuth_fraction
 from relume.errors import MaterialError
 from relume.uncounted import UNCOUNTED
 
@@ -25,11 +25,11 @@ F64 = NDArray[np.float64]
 
 UBO_81 = ((0.0, 1), (15.0, 6), (30.0, 12), (45.0, 18), (60.0, 20), (75.0, 24))
 """Degrees of θ and directions of each ring of the Bonn measurements, φ from 0 on (Sattler 2003)."""
-MOST_DIRECTIONS = 400
-_NO_LESS = 4  # directions of rings but the first: fewer leave no room for a mean
+MAX_DIRECTIONS = 400
+_MIN_RING_DIRECTIONS = 4  # directions of rings but the first: fewer leave no room for a mean
 
 
-class Rings(NamedTuple):
+class DirectionGrid(NamedTuple):
     """Rings of directions, numbered from the pole outwards, on each by rising φ.
 
     Attributes:
@@ -48,39 +48,42 @@ class Rings(NamedTuple):
         return int(self.first[-1])
 
 
-def rings_of(described: Sequence[tuple[float, int]], shift: Sequence[float] = ()) -> Rings:
+def make_direction_grid(theta_and_counts: Sequence[tuple[float, int]], shift: Sequence[float] = ()) -> DirectionGrid:
     """Rings from their θ in degrees and how many directions each has.
 
     Args:
-        described: θ and number of each. shift: as in `Rings`; 0 for all where there is none.
+        theta_and_counts: θ and number of each. shift: as in `DirectionGrid`; 0 for all where there is none.
     Raises:
         MaterialError: they do not begin with the pole, do not rise, or are too many.
     """
-    theta, count = np.array([row[0] for row in described]), np.array([row[1] for row in described], np.int64)
-    turned = np.array(shift or np.zeros(len(theta)), np.float32)
-    if turned.shape != theta.shape or not ((turned >= 0) & (turned < 1)).all():
+    theta, count = (
+        np.array([row[0] for row in theta_and_counts]),
+        np.array([row[1] for row in theta_and_counts], np.int64),
+    )
+    shifts = np.array(shift or np.zeros(len(theta)), np.float32)
+    if shifts.shape != theta.shape or not ((shifts >= 0) & (shifts < 1)).all():
         raise MaterialError("the rings of the BTF's directions are each turned by a share of a step, from 0 to below 1")
     rises = len(theta) >= 2 and theta[0] == 0 and bool((np.diff(theta) > 0).all()) and theta[-1] < 90
-    if not rises or count[0] != 1 or (count[1:] < _NO_LESS).any() or count.sum() > MOST_DIRECTIONS:
+    if not rises or count[0] != 1 or (count[1:] < _MIN_RING_DIRECTIONS).any() or count.sum() > MAX_DIRECTIONS:
         raise MaterialError(
             "the directions of the BTF are no rings about the normal: one at the pole, then at least "
-            f"{_NO_LESS} on each ring above the horizon, at most {MOST_DIRECTIONS} in all"
+            f"{_MIN_RING_DIRECTIONS} on each ring above the horizon, at most {MAX_DIRECTIONS} in all"
         )
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-    return Rings(np.radians(theta).astype(np.float32), first, turned)
+    return DirectionGrid(np.radians(theta).astype(np.float32), first, shifts)
 
 
 @lru_cache(maxsize=1)
-def ubo_rings() -> Rings:
+def ubo_grid() -> DirectionGrid:
     """Those of `UBO_81`."""
-    return rings_of(UBO_81)
+    return make_direction_grid(UBO_81)
 
 
-def directions(rings: Rings) -> F64:
+def directions(grid: DirectionGrid) -> F64:
     """All of them, unit, local frame, z = normal. (n, 3)"""
-    count = np.diff(rings.first)
-    theta = np.repeat(rings.theta.astype(np.float64), count)
-    phi = np.concatenate([2 * np.pi * (np.arange(n) + start) / n for n, start in zip(count, rings.shift, strict=True)])
+    count = np.diff(grid.first)
+    theta = np.repeat(grid.theta.astype(np.float64), count)
+    phi = np.concatenate([2 * np.pi * (np.arange(n) + start) / n for n, start in zip(count, grid.shift, strict=True)])
     return polar(theta, phi)
 
 
@@ -90,61 +93,64 @@ def polar(theta: F64, phi: F64) -> F64:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def taps_at(rings, theta, turn, index, weight):  # type: ignore[no-untyped-def]
+def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # type: ignore[no-untyped-def]
     """Do as `taps` of angles.
 
     Args:
-        rings, index, weight: as there. theta: radians, up to π/2. turn: φ, a share of a turn.
+        grid, index, weight: as there. theta: radians, up to π/2. azimuth_fraction: φ, a share of a turn.
     """
     lower = 0
-    while lower < rings.theta.shape[0] - 2 and theta >= rings.theta[lower + 1]:
+    while lower < grid.theta.shape[0] - 2 and theta >= grid.theta[lower + 1]:
         lower += 1
-    share: Any = (theta - rings.theta[lower]) / (rings.theta[lower + 1] - rings.theta[lower])
-    share = np.float32(min(max(share, np.float32(0)), np.float32(1)))
+    theta_fraction: Any = (theta - grid.theta[lower]) / (grid.theta[lower + 1] - grid.theta[lower])
+    theta_fraction = np.float32(min(max(theta_fraction, np.float32(0)), np.float32(1)))
     for k in range(2):
-        first, count = rings.first[lower + k], rings.first[lower + k + 1] - rings.first[lower + k]
-        place = np.float32(turn * count - rings.shift[lower + k])
-        if place < 0:
-            place += np.float32(count)
-        near: Any = min(np.int64(place), count - 1)
-        part = np.float32(place - near)
-        of_ring = share if k == 1 else np.float32(1) - share
-        index[2 * k], index[2 * k + 1] = first + near, first + (near + 1 if near + 1 < count else 0)
-        weight[2 * k], weight[2 * k + 1] = of_ring * (np.float32(1) - part), of_ring * part
+        first, count = grid.first[lower + k], grid.first[lower + k + 1] - grid.first[lower + k]
+        position = np.float32(azimuth_fraction * count - grid.shift[lower + k])
+        if position < 0:
+            position += np.float32(count)
+        lower_index: Any = min(np.int64(position), count - 1)
+        phi_fraction = np.float32(position - lower_index)
+        ring_weight = theta_fraction if k == 1 else np.float32(1) - theta_fraction
+        index[2 * k], index[2 * k + 1] = (
+            first + lower_index,
+            first + (lower_index + 1 if lower_index + 1 < count else 0),
+        )
+        weight[2 * k], weight[2 * k + 1] = ring_weight * (np.float32(1) - phi_fraction), ring_weight * phi_fraction
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def taps(rings, x, y, z, index, weight):  # type: ignore[no-untyped-def]
+def interpolation_weights(grid, x, y, z, index, weight):  # type: ignore[no-untyped-def]
     """Find the four directions about one, and their weights.
 
     Args:
-        rings: the `Rings`. x, y, z: the direction, unit, above the horizon.
+        grid: the `DirectionGrid`. x, y, z: the direction, unit, above the horizon.
         index: written. (4,) int32. weight: written. (4,) float32
     Returns:
         What is left of the cosine beyond the last ring: z over the last ring's, at most one.
     """
-    taps_at(rings, acos_clamped(z), azimuth_turns(x, y), index, weight)
-    return np.float32(min(max(z, np.float32(0)) / math.cos(rings.theta[rings.theta.shape[0] - 1]), np.float32(1)))
+    interpolation_weights_at(grid, acos_clamped(z), azimuth_fraction(x, y), index, weight)
+    return np.float32(min(max(z, np.float32(0)) / math.cos(grid.theta[grid.theta.shape[0] - 1]), np.float32(1)))
 
 
-def taps_numpy(rings: Rings, w: F64) -> tuple[NDArray[np.int64], F64, F64]:
+def interpolation_weights_numpy(grid: DirectionGrid, w: F64) -> tuple[NDArray[np.int64], F64, F64]:
     """Do as `taps` for directions (n, 3), in plain NumPy: its oracle.
 
     Returns:
         Directions (n, 4), weights (n, 4), what is left of the cosine (n,).
     """
     theta = np.arccos(np.clip(w[:, 2], 0, 1))
-    all_theta, first = rings.theta.astype(np.float64), rings.first.astype(np.int64)
+    all_theta, first = grid.theta.astype(np.float64), grid.first.astype(np.int64)
     lower = np.clip(np.searchsorted(all_theta, theta, side="right") - 1, 0, len(all_theta) - 2)
-    share = np.clip((theta - all_theta[lower]) / (all_theta[lower + 1] - all_theta[lower]), 0, 1)
-    turn = np.arctan2(w[:, 1], w[:, 0]) / (2 * np.pi) % 1.0
+    theta_fraction = np.clip((theta - all_theta[lower]) / (all_theta[lower + 1] - all_theta[lower]), 0, 1)
+    azimuth_fraction = np.arctan2(w[:, 1], w[:, 0]) / (2 * np.pi) % 1.0
     index, weight = [], []
-    for ring, of_ring in ((lower, 1 - share), (lower + 1, share)):
+    for ring, ring_weight in ((lower, 1 - theta_fraction), (lower + 1, theta_fraction)):
         count = first[ring + 1] - first[ring]
-        place = (turn * count - rings.shift[ring]) % count
-        near = np.minimum(place.astype(np.int64), count - 1)
-        part = place - near
-        index += [first[ring] + near, first[ring] + (near + 1) % count]
-        weight += [of_ring * (1 - part), of_ring * part]
-    left = np.minimum(np.maximum(w[:, 2], 0) / np.cos(all_theta[-1]), 1)
-    return np.stack(index, axis=1), np.stack(weight, axis=1), left
+        position = (azimuth_fraction * count - grid.shift[ring]) % count
+        lower_index = np.minimum(position.astype(np.int64), count - 1)
+        phi_fraction = position - lower_index
+        index += [first[ring] + lower_index, first[ring] + (lower_index + 1) % count]
+        weight += [ring_weight * (1 - phi_fraction), ring_weight * phi_fraction]
+    cosine_ratio = np.minimum(np.maximum(w[:, 2], 0) / np.cos(all_theta[-1]), 1)
+    return np.stack(index, axis=1), np.stack(weight, axis=1), cosine_ratio

@@ -1,6 +1,6 @@
 """BTFs that were imported or made; `relume.asset_store` keeps them.
 
-    <folder>/<id>/mean.npy, eigen.npy, …        arrays of `relume.btf.eigen.EigenBtf`
+    <folder>/<id>/mean.npy, eigen.npy, …        arrays of `relume.btf.eigen.LocalPcaBtf`
                   packed.npy                    clusters and weights, in as few bits as they need (`relume.btf.packing`)
                   btf.json                      name, what it is, how well it is kept
 
@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.asset_store import AssetStore
-from relume.btf.compress import MOST_CLUSTERS, MOST_COMPONENTS, MOST_TEXELS
-from relume.btf.eigen import I8, MOST_HEIGHT, U8, EigenBtf
-from relume.btf.packing import cluster_bits, largest, packed, packed_bytes, unpacked
-from relume.btf.rings import rings_of
+from relume.btf.compress import MAX_CLUSTERS, MAX_COMPONENTS, MAX_TEXELS
+from relume.btf.eigen import I8, MAX_HEIGHT, U8, LocalPcaBtf
+from relume.btf.packing import cluster_bits, max_code, pack, packed_bytes, unpack
+from relume.btf.rings import make_direction_grid
 from relume.errors import MaterialError
-from relume.memory import stored
+from relume.memory import asset_cached
 
 STORE = AssetStore("BTF", "btf:", "btf.json", MaterialError, max_entries=100)
-_PACKED = "packed.npy"
+_PACKED_FILE = "packed.npy"
 _ARRAYS = {
     "levels": np.int32, "mean": np.float16, "eigen": np.int8,
     "step": np.float32, "average": np.float32,
@@ -67,38 +67,40 @@ class BtfRecord:
         return [{"model": "measured_btf", "data": self.data, "texture": None}]
 
 
-def keep(folder: Path, source: Path, name: str, synthetic: str | None, make: Callable[[], EigenBtf]) -> BtfRecord:
+def store_btf(
+    folder: Path, source: Path, name: str, synthetic: str | None, compute: Callable[[], LocalPcaBtf]
+) -> BtfRecord:
     """Keep a BTF under the hash of what it came from; the same twice is the same BTF, its newest name wins.
 
     Args:
         folder: of the asset store. source: the file that was imported, or says what was made.
         name: what people call it. synthetic: which geometry it was rendered from; None where it was measured.
-        make: reads or renders, and compresses; not called where it is here already.
+        compute: reads or renders, and compresses; not called where it is here already.
     Raises:
-        MaterialError: the store is full. And what `make` raises; then nothing is kept.
+        MaterialError: the store is full. And what `compute` raises; then nothing is kept.
     """
 
-    def fill(made: Path) -> dict[str, Any]:
-        found = make()
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        btf = compute()
         for array in _ARRAYS:
-            np.save(made / f"{array}.npy", getattr(found, array))
-        of_clusters = np.array([cluster_bits(found.mean.shape[1])], np.uint8)
-        rows = np.concatenate([(found.cluster - largest(of_clusters)).astype(np.int8)[..., None], found.weight], axis=2)
-        np.save(made / _PACKED, np.stack([packed(row, np.append(of_clusters, found.bits)) for row in rows]))
+            np.save(staged_folder / f"{array}.npy", getattr(btf, array))
+        cluster_width = np.array([cluster_bits(btf.mean.shape[1])], np.uint8)
+        rows = np.concatenate([(btf.cluster - max_code(cluster_width)).astype(np.int8)[..., None], btf.weight], axis=2)
+        np.save(staged_folder / _PACKED_FILE, np.stack([pack(row, np.append(cluster_width, btf.bits)) for row in rows]))
         return {
             "synthetic": synthetic,
             "rings": [
                 [float(np.degrees(theta)), int(count)]
-                for theta, count in zip(found.rings.theta, np.diff(found.rings.first), strict=True)
+                for theta, count in zip(btf.grid.theta, np.diff(btf.grid.first), strict=True)
             ],
-            "shift": found.rings.shift.tolist(),
-            "bits": found.bits.tolist(),
-            "cluster_bits": int(of_clusters[0]),
-            "error": list(found.error),
-            "ratio": found.measured_bytes / found.num_bytes,
+            "shift": btf.grid.shift.tolist(),
+            "bits": btf.bits.tolist(),
+            "cluster_bits": int(cluster_width[0]),
+            "error": list(btf.error),
+            "ratio": btf.measured_bytes / btf.num_bytes,
         }
 
-    return get_record(folder, STORE.keep(folder, source, name, fill))
+    return get_record(folder, STORE.store(folder, source, name, fill))
 
 
 def records(folder: Path) -> list[BtfRecord]:
@@ -109,43 +111,43 @@ def records(folder: Path) -> list[BtfRecord]:
 def get_record(folder: Path, identity: str) -> BtfRecord:
     """One of them. Raises NotFoundError; MaterialError where its files are damaged."""
     path = STORE.path(folder, identity)
-    document, found = STORE.read(path), _load(path)
+    document, btf = STORE.load_record(path), _load(path)
     synthetic, ratio = document.get("synthetic"), document.get("ratio")
     if not (synthetic is None or isinstance(synthetic, str)) or not isinstance(ratio, float):
-        raise STORE.damaged(path)
+        raise STORE.damaged_error(path)
     return BtfRecord(
-        identity, document["name"], document["created"], synthetic, found.size, found.rings.num_directions,
-        found.mean.shape[1], found.num_components, found.error, ratio,
+        identity, document["name"], document["created"], synthetic, btf.size, btf.grid.num_directions,
+        btf.mean.shape[1], btf.num_components, btf.error, ratio,
     )  # fmt: skip
 
 
-def btf(data: str) -> EigenBtf:
+def load_btf(data: str) -> LocalPcaBtf:
     """What a look's `data` names.
 
     Raises:
         NotFoundError: it is not here. MaterialError: its files are damaged.
     """
-    return _load(STORE.found(data))
+    return _load(STORE.resolve(data))
 
 
-@stored("BTF file")
-def _load(path: Path) -> EigenBtf:
-    document = STORE.read(path)
+@asset_cached("BTF file")
+def _load(path: Path) -> LocalPcaBtf:
+    document = STORE.load_record(path)
     try:
-        shift = [float(one) for one in document.get("shift", [])]  # all rings began at φ = 0 before there was one
-        rings = rings_of([(float(theta), int(count)) for theta, count in document["rings"]], shift)
-        error = tuple(float(one) for one in document["error"])
+        shift = [float(value) for value in document.get("shift", [])]  # all rings began at φ = 0 before there was one
+        grid = make_direction_grid([(float(theta), int(count)) for theta, count in document["rings"]], shift)
+        error = tuple(float(value) for value in document["error"])
         arrays = {name: _array(path, name) for name in _ARRAYS if name != "height" or (path / "height.npy").exists()}
         arrays.setdefault("height", np.zeros((1, 1), np.float32))  # before there was one
         bits, cluster, weight = _texels(path, document, arrays["levels"])
     except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
-        raise STORE.damaged(path) from problem
+        raise STORE.damaged_error(path) from problem
     if not all(arrays[name].dtype == dtype for name, dtype in _ARRAYS.items()):
-        raise STORE.damaged(path)
-    found = EigenBtf(rings=rings, error=error, bits=bits, cluster=cluster, weight=weight, **arrays)
-    if not _is_sound(found):
-        raise STORE.damaged(path)
-    return found
+        raise STORE.damaged_error(path)
+    btf = LocalPcaBtf(grid=grid, error=error, bits=bits, cluster=cluster, weight=weight, **arrays)
+    if not _is_consistent(btf):
+        raise STORE.damaged_error(path)
+    return btf
 
 
 def _texels(path: Path, document: Mapping[str, Any], levels: NDArray[np.int32]) -> tuple[U8, U8, I8]:
@@ -155,70 +157,74 @@ def _texels(path: Path, document: Mapping[str, Any], levels: NDArray[np.int32]) 
         if weight.dtype != np.int8 or weight.ndim != 3:
             raise ValueError("weights")
         return np.full(weight.shape[2], 8, np.uint8), _clusters(path), weight
-    bits = np.array([int(one) for one in document["bits"]])
-    if len(bits) > MOST_COMPONENTS or not ((bits >= 2) & (bits <= 8)).all():
+    bits = np.array([int(value) for value in document["bits"]])
+    if len(bits) > MAX_COMPONENTS or not ((bits >= 2) & (bits <= 8)).all():
         raise ValueError("bits")
-    of_bits = bits.astype(np.uint8)
+    component_bits = bits.astype(np.uint8)
     if "cluster_bits" not in document:  # so had clusters
         cluster = _clusters(path)
-        return of_bits, cluster, _unpacked(path, of_bits, cluster.shape[1])
+        return component_bits, cluster, _read_packed_rows(path, component_bits, cluster.shape[1])
     width = int(document["cluster_bits"])
-    if not 1 <= width <= cluster_bits(MOST_CLUSTERS) or levels.ndim != 2 or levels.shape[1:] != (3,):
+    if not 1 <= width <= cluster_bits(MAX_CLUSTERS) or levels.ndim != 2 or levels.shape[1:] != (3,):
         raise ValueError("clusters")
-    of_clusters = np.array([width], np.uint8)
+    cluster_width = np.array([width], np.uint8)
     num = int(levels[:, 1:].astype(np.int64).prod(axis=1).sum())
-    rows = _unpacked(path, np.append(of_clusters, of_bits), num)
-    return of_bits, (rows[..., 0] + largest(of_clusters)).astype(np.uint8), np.ascontiguousarray(rows[..., 1:])
+    rows = _read_packed_rows(path, np.append(cluster_width, component_bits), num)
+    return (
+        component_bits,
+        (rows[..., 0] + max_code(cluster_width)).astype(np.uint8),
+        np.ascontiguousarray(rows[..., 1:]),
+    )
 
 
 def _clusters(path: Path) -> U8:
-    found = _array(path, "cluster")
-    if found.dtype != np.uint8 or found.ndim != 2:
+    cluster = _array(path, "cluster")
+    if cluster.dtype != np.uint8 or cluster.ndim != 2:
         raise ValueError("clusters")
-    return found
+    return cluster
 
 
-def _unpacked(path: Path, bits: U8, num: int) -> I8:
+def _read_packed_rows(path: Path, bits: U8, num: int) -> I8:
     """Rows of so many texels from each side. (V, num, columns)"""
     rows = _array(path, "packed")
     if rows.dtype != np.uint8 or rows.ndim != 2 or rows.shape[1] != packed_bytes(num, bits):
         raise ValueError("packed")
-    return np.stack([unpacked(row, bits, num) for row in rows])
+    return np.stack([unpack(row, bits, num) for row in rows])
 
 
 def _array(path: Path, name: str) -> np.ndarray[Any, Any]:
     """One of them; the large one stays on the disk until tables are made of it, which lists do not need."""
-    found: np.ndarray[Any, Any] = np.load(
+    array: np.ndarray[Any, Any] = np.load(
         path / f"{name}.npy", mmap_mode="r" if name == "eigen" else None, allow_pickle=False
     )
-    return found.view(np.ndarray)
+    return array.view(np.ndarray)
 
 
-def _is_sound(found: EigenBtf) -> bool:
+def _is_consistent(btf: LocalPcaBtf) -> bool:
     """Whether its arrays fit each other: kernels read them without looking."""
-    directions = found.rings.num_directions
-    components, clusters = len(found.error) - 1, found.mean.shape[1] if found.mean.ndim == 4 else 0
-    if not (1 <= clusters <= MOST_CLUSTERS and 0 <= components <= MOST_COMPONENTS):
+    directions = btf.grid.num_directions
+    components, clusters = len(btf.error) - 1, btf.mean.shape[1] if btf.mean.ndim == 4 else 0
+    if not (1 <= clusters <= MAX_CLUSTERS and 0 <= components <= MAX_COMPONENTS):
         return False
-    if found.levels.ndim != 2 or found.levels.shape[1] != 3 or not 1 <= len(found.levels) <= 32:
+    if btf.levels.ndim != 2 or btf.levels.shape[1] != 3 or not 1 <= len(btf.levels) <= 32:
         return False
-    first, height, width = found.levels.T.astype(np.int64)
+    first, height, width = btf.levels.T.astype(np.int64)
     texels = int((height * width).sum())
     ends = np.concatenate([[0], np.cumsum(height * width)[:-1]])
     return bool(
         (height > 0).all()
         and (width > 0).all()
-        and height[0] * width[0] <= MOST_TEXELS
+        and height[0] * width[0] <= MAX_TEXELS
         and (first == ends).all()
-        and found.cluster.shape == (directions, texels)
-        and int(found.cluster.max()) < clusters
-        and found.weight.shape == (directions, texels, components)
-        and found.bits.shape == (components,)
-        and found.mean.shape == (directions, clusters, directions, 3)
-        and found.eigen.shape == (directions, clusters, components, directions, 3)
-        and found.step.shape == (directions, clusters, components)
-        and found.average.shape == (directions, directions, 3)
-        and found.height.shape in ((1, 1), found.size)
-        and all(np.isfinite(array).all() for array in (found.mean, found.step, found.average, found.height))
-        and float(np.abs(found.height).max()) <= MOST_HEIGHT
+        and btf.cluster.shape == (directions, texels)
+        and int(btf.cluster.max()) < clusters
+        and btf.weight.shape == (directions, texels, components)
+        and btf.bits.shape == (components,)
+        and btf.mean.shape == (directions, clusters, directions, 3)
+        and btf.eigen.shape == (directions, clusters, components, directions, 3)
+        and btf.step.shape == (directions, clusters, components)
+        and btf.average.shape == (directions, directions, 3)
+        and btf.height.shape in ((1, 1), btf.size)
+        and all(np.isfinite(array).all() for array in (btf.mean, btf.step, btf.average, btf.height))
+        and float(np.abs(btf.height).max()) <= MAX_HEIGHT
     )

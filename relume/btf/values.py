@@ -12,31 +12,31 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.btf.rings import Rings
+from relume.btf.rings import DirectionGrid
 from relume.errors import CancelledError, MaterialError
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 F16 = NDArray[np.float16]
 F32 = NDArray[np.float32]
 
-MOST_VALUE = 60_000.0
+MAX_VALUE = 60_000.0
 """That half precision holds; what is brighter is a mirror of the lamp."""
 
 
-class Values:
-    """Values as they are filled in, then read; implements `relume.btf.compress.Images`.
+class ValueFile:
+    """Values as they are filled in, then read; implements `relume.btf.compress.ViewArrays`.
 
     Args:
-        folder: where they are, or will be. rings: of the directions. size: height and width in texels.
+        folder: where they are, or will be. grid: of the directions. size: height and width in texels.
     """
 
-    def __init__(self, folder: Path, rings: Rings, size: tuple[int, int]) -> None:
-        self.rings, self.size, self._folder = rings, size, folder
+    def __init__(self, folder: Path, grid: DirectionGrid, size: tuple[int, int]) -> None:
+        self.grid, self.size, self._folder = grid, size, folder
         folder.mkdir(parents=True, exist_ok=True)
-        self._shape = (rings.num_directions, rings.num_directions, size[0] * size[1], 3)
+        self._shape = (grid.num_directions, grid.num_directions, size[0] * size[1], 3)
         path = folder / "values.npy"
         if not path.exists():
-            with replacing(path) as unfinished:
+            with atomic_write(path) as unfinished:
                 np.lib.format.open_memmap(unfinished, "w+", np.float16, self._shape).flush()
             (folder / "done").write_text("0")
         values = np.load(path, mmap_mode="r+", allow_pickle=False)
@@ -51,25 +51,25 @@ class Values:
         return min(int(text), self._shape[0]) if text.isascii() and text.isdigit() else 0
 
     def fill(
-        self, images: Callable[[int], F32], progress: Callable[[float], object], cancelled: Callable[[], bool]
+        self, images: Callable[[int], F32], progress: Callable[[float], object], is_canceled: Callable[[], bool]
     ) -> None:
         """Write the views that are not there yet.
 
         Args:
             images: values seen from a view, (lights, texels, 3). progress: called with the share done.
-            cancelled: asked before each view.
+            is_canceled: asked before each view.
         Raises:
-            CancelledError: `cancelled` said so; what is there stays.
+            CancelledError: `is_canceled` said so; what is there stays.
         """
         for view in range(self.num_done, self._shape[0]):
-            if cancelled():
+            if is_canceled():
                 raise CancelledError("it was cancelled; the same again goes on from there")
             progress(view / self._shape[0])
-            self._values[view] = np.minimum(images(view), MOST_VALUE)
+            self._values[view] = np.minimum(images(view), MAX_VALUE)
             self._values.flush()  # type: ignore[attr-defined]
-            with replacing(self._folder / "done") as unfinished:
+            with atomic_write(self._folder / "done") as unfinished:
                 unfinished.write_text(str(view + 1))
 
-    def seen_from(self, view: int) -> F32:
+    def get_view(self, view: int) -> F32:
         """Every texel's values from one direction. (lights, texels, 3) float32"""
         return np.asarray(self._values[view], np.float32)

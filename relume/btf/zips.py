@@ -13,32 +13,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.archives.bounded import LongDirectoryError, open_bounded
-from relume.btf.compress import most_texels
-from relume.btf.found import found_rings, nowhere
-from relume.btf.photographs import SUFFIXES, read_photograph, reduced
-from relume.btf.rings import MOST_DIRECTIONS
+from relume.btf.compress import max_texels
+from relume.btf.found import infer_rings, missing_direction
+from relume.btf.photographs import SUFFIXES, limit_texels, read_photograph
+from relume.btf.rings import MAX_DIRECTIONS
 from relume.errors import MaterialError
 
 F32 = NDArray[np.float32]
 
 _NAME = re.compile(r"tl(\d{1,3})[ _]?pl(\d{1,3})[ _]?tv(\d{1,3})[ _]?pv(\d{1,3})", re.IGNORECASE)
-_MOST_ENTRIES = MOST_DIRECTIONS**2 + 1000
-_MOST_DIRECTORY_BYTES = 200 * _MOST_ENTRIES
-_MOST_IMAGE_BYTES = 16 << 20
-_SHOWN = 100  # characters of a name
+_MAX_ENTRIES = MAX_DIRECTIONS**2 + 1000
+_MAX_DIRECTORY_BYTES = 200 * _MAX_ENTRIES
+_MAX_IMAGE_BYTES = 16 << 20
+_MAX_NAME_LENGTH = 100  # characters of a name
 _ZIP = b"PK"
-_WRONG = (
+_NOT_A_BTF = (
     "the file is not a zip of images that are named by their directions, such as 'tl030 pl060 tv045 pv270.jpg', "
     "and no .btf container either"
 )
-_TOO_MANY = f"the zip has more than {_MOST_ENTRIES:,} files; pack the images alone"
+_TOO_MANY = f"the zip has more than {_MAX_ENTRIES:,} files; pack the images alone"
 _DAMAGED = "the zip is cut off or damaged; pack it again, and send all of it"
 
 Direction = tuple[int, int]
 
 
 class ZippedBtf:
-    """The images of a zip; implements `relume.btf.compress.Images` but for keeping what it has read.
+    """The images of a zip; implements `relume.btf.compress.ViewArrays` but for keeping what it has read.
 
     Args:
         path: of the file.
@@ -47,15 +47,15 @@ class ZippedBtf:
     """
 
     def __init__(self, path: Path) -> None:
-        self._zip = _opened(path)
-        self._by_pair = _named(self._zip.infolist())
+        self._zip = _open_zip(path)
+        self._by_pair = _index_by_directions(self._zip.infolist())
         given = sorted({direction for pair in self._by_pair for direction in pair})
-        self.rings, order = found_rings(*np.array(given, np.float64).T)
+        self.grid, order = infer_rings(*np.array(given, np.float64).T)
         self._order = [given[number] for number in order]
         self._check_complete()
         first = self._photograph(self._order[0], self._order[0])
-        self._most = most_texels(len(given))
-        self._pixels, self.size = first.shape, reduced(first, self._most).shape[:2]
+        self._max_texels = max_texels(len(given))
+        self._pixels, self.size = first.shape, limit_texels(first, self._max_texels).shape[:2]
 
     def _check_complete(self) -> None:
         pairs = ((view, light) for view in self._order for light in self._order)
@@ -67,35 +67,39 @@ class ZippedBtf:
                 "into the zip, which needs one from each direction in light from each"
             )
 
-    def seen_from(self, view: int) -> F32:
+    def get_view(self, view: int) -> F32:
         """Every texel's values from one direction. (lights, texels, 3) float32"""
-        seen = self._order[view]
-        return np.stack([self._read(seen, light).reshape(-1, 3) for light in self._order])
+        view_direction = self._order[view]
+        return np.stack([self._read(view_direction, light).reshape(-1, 3) for light in self._order])
 
     def _read(self, view: Direction, light: Direction) -> F32:
         """One image, of as many texels as are kept, linear. (height, width, 3)"""
         image = self._photograph(view, light)
         if image.shape != self._pixels:
             sizes = (f"{shape[1]}×{shape[0]}" for shape in (image.shape, self._pixels))
-            named = _shown(self._by_pair[view, light].filename)
-            raise MaterialError("the image {} has {} pixels, the first one {}; scale all alike".format(named, *sizes))
-        return reduced(image, self._most)
+            filename = _printable(self._by_pair[view, light].filename)
+            raise MaterialError(
+                "the image {} has {} pixels, the first one {}; scale all alike".format(filename, *sizes)
+            )
+        return limit_texels(image, self._max_texels)
 
     def _photograph(self, view: Direction, light: Direction) -> F32:
         entry = self._by_pair[view, light]
         try:
             data = self._zip.read(entry)
         except Exception as error:  # zipfile and zlib raise many kinds for damaged data
-            raise MaterialError(f"the image {_shown(entry.filename)} is damaged in the zip; pack it again") from error
-        return read_photograph(data, f"the image {_shown(entry.filename)}")
+            raise MaterialError(
+                f"the image {_printable(entry.filename)} is damaged in the zip; pack it again"
+            ) from error
+        return read_photograph(data, f"the image {_printable(entry.filename)}")
 
 
-def _opened(path: Path) -> zipfile.ZipFile:
+def _open_zip(path: Path) -> zipfile.ZipFile:
     with path.open("rb") as file:
         if file.read(len(_ZIP)) != _ZIP:
-            raise MaterialError(_WRONG)
+            raise MaterialError(_NOT_A_BTF)
     try:
-        with path.open("rb") as file, open_bounded(file, _MOST_DIRECTORY_BYTES):
+        with path.open("rb") as file, open_bounded(file, _MAX_DIRECTORY_BYTES):
             pass
         return zipfile.ZipFile(path)
     except LongDirectoryError:
@@ -104,43 +108,47 @@ def _opened(path: Path) -> zipfile.ZipFile:
         raise MaterialError(_DAMAGED) from error
 
 
-def _named(entries: list[zipfile.ZipInfo]) -> dict[tuple[Direction, Direction], zipfile.ZipInfo]:
+def _index_by_directions(entries: list[zipfile.ZipInfo]) -> dict[tuple[Direction, Direction], zipfile.ZipInfo]:
     """Images by their view and light."""
-    if len(entries) > _MOST_ENTRIES:
+    if len(entries) > _MAX_ENTRIES:
         raise MaterialError(_TOO_MANY)
-    found: dict[tuple[Direction, Direction], zipfile.ZipInfo] = {}
+    by_pair: dict[tuple[Direction, Direction], zipfile.ZipInfo] = {}
     for entry in entries:
         match = _NAME.search(entry.filename.rsplit("/", 1)[-1])
         if match is None or not entry.filename.lower().endswith(SUFFIXES):
             continue
-        _check_packed(entry)
+        _check_entry(entry)
         light_theta, light_phi, view_theta, view_phi = (int(group) for group in match.groups())
         pair = (_direction(view_theta, view_phi), _direction(light_theta, light_phi))
-        if pair in found:
-            raise MaterialError(f"two images have the directions of {_shown(entry.filename)}; leave one of them out")
-        found[pair] = entry
-    if not found:
-        raise MaterialError(_WRONG)
-    return found
+        if pair in by_pair:
+            raise MaterialError(
+                f"two images have the directions of {_printable(entry.filename)}; leave one of them out"
+            )
+        by_pair[pair] = entry
+    if not by_pair:
+        raise MaterialError(_NOT_A_BTF)
+    return by_pair
 
 
-def _check_packed(entry: zipfile.ZipInfo) -> None:
-    if entry.file_size > _MOST_IMAGE_BYTES:
-        most = _MOST_IMAGE_BYTES >> 20
-        raise MaterialError(f"the image {_shown(entry.filename)} is larger than {most} MB; scale the images down")
+def _check_entry(entry: zipfile.ZipInfo) -> None:
+    if entry.file_size > _MAX_IMAGE_BYTES:
+        max_megabytes = _MAX_IMAGE_BYTES >> 20
+        raise MaterialError(
+            f"the image {_printable(entry.filename)} is larger than {max_megabytes} MB; scale the images down"
+        )
     if entry.flag_bits & 1:
         raise MaterialError("the zip is encrypted; pack it without a password")
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise MaterialError("the zip is packed in an unusual way; pack it with deflate")
 
 
-def _shown(name: str) -> str:
+def _printable(name: str) -> str:
     """The end of a file's name, for messages."""
-    return "".join(one if one.isprintable() else "?" for one in name[-_SHOWN:])
+    return "".join(character if character.isprintable() else "?" for character in name[-_MAX_NAME_LENGTH:])
 
 
 def _direction(theta: int, phi: int) -> Direction:
     """A direction of a name; at the pole φ says nothing."""
     if theta >= 90 or phi > 360:
-        raise nowhere(theta, phi)
+        raise missing_direction(theta, phi)
     return theta, 0 if theta == 0 else phi % 360

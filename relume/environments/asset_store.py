@@ -19,8 +19,8 @@ from relume.asset_store import AssetStore
 from relume.environments.model import Environment
 from relume.environments.reading import read_environment
 from relume.errors import SceneError
-from relume.memory import stored
-from relume.remarks import Remark, remark_of
+from relume.memory import asset_cached
+from relume.remarks import ImportRemark, warning_of
 
 STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
 MAX_WIDTH = 2048  # a texel of 0.18°: finer than what a bake divides light into, and weighed in seconds
@@ -38,7 +38,7 @@ class EnvironmentRecord:
     id: str
     name: str
     created: float
-    warnings: tuple[Remark, ...]
+    warnings: tuple[ImportRemark, ...]
 
     @property
     def map(self) -> str:
@@ -46,7 +46,7 @@ class EnvironmentRecord:
         return STORE.prefix + self.id
 
 
-def keep(folder: Path, source: Path, name: str) -> EnvironmentRecord:
+def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecord:
     """Import an equirectangular .hdr or .exr file; the same content twice is the same, its newest name wins.
 
     Args:
@@ -60,12 +60,12 @@ def keep(folder: Path, source: Path, name: str) -> EnvironmentRecord:
 
     environment = read_environment(source, name, MAX_WIDTH)
 
-    def fill(made: Path) -> dict[str, Any]:
-        np.save(made / _RADIANCE, environment.radiance)
-        write_thumbnail(made / _THUMBNAIL, environment.radiance)
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        np.save(staged_folder / _RADIANCE, environment.radiance)
+        write_thumbnail(staged_folder / _THUMBNAIL, environment.radiance)
         return {"warnings": [remark.document() for remark in environment.warnings]}
 
-    return get_record(folder, STORE.keep(folder, source, name, fill))
+    return get_record(folder, STORE.store(folder, source, name, fill))
 
 
 def records(folder: Path) -> list[EnvironmentRecord]:
@@ -76,11 +76,11 @@ def records(folder: Path) -> list[EnvironmentRecord]:
 def get_record(folder: Path, identity: str) -> EnvironmentRecord:
     """One environment. Raises NotFoundError; SceneError where its files are damaged."""
     path = STORE.path(folder, identity)
-    document = STORE.read(path)
+    document = STORE.load_record(path)
     warnings = document.get("warnings")
     if not isinstance(warnings, list):
-        raise STORE.damaged(path)
-    return EnvironmentRecord(identity, document["name"], document["created"], tuple(map(remark_of, warnings)))
+        raise STORE.damaged_error(path)
+    return EnvironmentRecord(identity, document["name"], document["created"], tuple(map(warning_of, warnings)))
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:
@@ -88,19 +88,19 @@ def thumbnail_path(folder: Path, identity: str) -> Path:
     return STORE.path(folder, identity) / _THUMBNAIL
 
 
-def imported(name: str) -> Environment:
+def load_imported(name: str) -> Environment:
     """What a look's `map` names; its texels stay on the disk and are read where they are needed.
 
     Raises:
         NotFoundError: it is not here. SceneError: its files are damaged.
     """
-    return _load(STORE.found(name))
+    return _load(STORE.resolve(name))
 
 
-@stored("environment file")
+@asset_cached("environment file")
 def _load(path: Path) -> Environment:
-    radiance = STORE.array(path, _RADIANCE)
+    radiance = STORE.open_array(path, _RADIANCE)
     height = len(radiance) if radiance.ndim else 0
     if height == 0 or radiance.shape != (height, 2 * height, 3) or radiance.dtype != np.float32:
-        raise STORE.damaged(path)
-    return Environment(STORE.read(path)["name"], radiance)
+        raise STORE.damaged_error(path)
+    return Environment(STORE.load_record(path)["name"], radiance)

@@ -18,7 +18,7 @@ BUILT_IN: dict[str, tuple[str, Callable[[], Environment]]] = {
 
 
 @lru_cache(maxsize=len(BUILT_IN))
-def built_in(name: str) -> Environment:
+def load_built_in(name: str) -> Environment:
     """The environment of that name in `BUILT_IN`, made once in a process. Raises KeyError for another name."""
     environment = BUILT_IN[name][1]()
     environment.radiance.flags.writeable = False

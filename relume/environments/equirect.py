@@ -39,14 +39,14 @@ def direction_to_uv(w: NDArray[np.floating]) -> tuple[F64, F64]:
     return u, 0.5 - np.arcsin(np.clip(direction[..., 1], -1, 1)) / np.pi
 
 
-def shrunk(radiance: F32, width: int) -> F32:
+def halve_to_width(radiance: F32, width: int) -> F32:
     """An equirectangular map halved, by means of 2 × 2 texels, until it is at most so wide or has an odd side."""
     while radiance.shape[1] > width and radiance.shape[0] % 2 == radiance.shape[1] % 2 == 0:
         radiance = 0.25 * (radiance[::2, ::2] + radiance[1::2, ::2] + radiance[::2, 1::2] + radiance[1::2, 1::2])
     return radiance
 
 
-def turned(direction: F64, degrees: float) -> F64:
+def rotate_about_y(direction: F64, degrees: float) -> F64:
     """Directions turned about +Y, counter-clockwise seen from above. (n, 3)"""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.asarray(direction @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]))

@@ -13,7 +13,7 @@ from relume.imageio.primaries import to_rec_709
 
 F64 = NDArray[np.float64]
 
-_LONGEST_LINE, _LONGEST = 2_048, 65_536
+_MAX_LINE_BYTES, _MAX_HEADER_BYTES = 2_048, 65_536
 _RESOLUTION = re.compile(rb"-Y\s+(\d{1,9})\s+\+X\s+(\d{1,9})\s*\Z")
 _PRIMARIES = b"PRIMARIES="
 
@@ -41,24 +41,24 @@ def read_header(data: bytes, name: str) -> RadianceHeader:
     Raises:
         SceneError: there is none, or rows are in another order than from the top.
     """
-    lines = data[:_LONGEST].split(b"\n")
+    lines = data[:_MAX_HEADER_BYTES].split(b"\n")
     try:
         end = lines.index(b"")
         resolution = lines[end + 1]
     except (ValueError, IndexError):
         raise SceneError(f"environment {name!r} has no Radiance header; export it again") from None
-    found = _RESOLUTION.match(resolution)
-    if found is None or max(len(line) for line in lines[:end]) > _LONGEST_LINE:
+    match = _RESOLUTION.match(resolution)
+    if match is None or max(len(line) for line in lines[:end]) > _MAX_LINE_BYTES:
         raise SceneError(f"environment {name!r} has an odd Radiance header; save it top row first")
-    told = [line.removeprefix(_PRIMARIES).split() for line in lines[:end] if line.startswith(_PRIMARIES)]
-    matrix, is_odd = _matrix_of(told[-1]) if told else (None, False)
-    return RadianceHeader(int(found[2]), int(found[1]), matrix, is_odd)
+    primaries = [line.removeprefix(_PRIMARIES).split() for line in lines[:end] if line.startswith(_PRIMARIES)]
+    matrix, is_odd = _conversion_matrix(primaries[-1]) if primaries else (None, False)
+    return RadianceHeader(int(match[2]), int(match[1]), matrix, is_odd)
 
 
-def _matrix_of(told: list[bytes]) -> tuple[F64 | None, bool]:
+def _conversion_matrix(primaries: list[bytes]) -> tuple[F64 | None, bool]:
     """What converts colours, and whether nothing can be told: many programs write nonsense, and mean Rec. 709."""
     try:
-        values = [float(number) for number in told]
+        values = [float(number) for number in primaries]
         return (to_rec_709(values), False) if any(values) else (None, False)  # zeros: not known
     except ValueError:
         return None, True

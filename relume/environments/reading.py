@@ -12,25 +12,25 @@ from relume.environments.radiance_header import read_header
 from relume.errors import SceneError
 from relume.imageio.linear import EXR_MAGIC, check_claim, read_strips
 from relume.imageio.primaries import convert
-from relume.imageio.shrink import shrink
-from relume.remarks import Remark, simplified, wrong
+from relume.imageio.shrink import downsample
+from relume.remarks import ImportRemark, approximated, unsupported
 
 F32 = NDArray[np.float32]
 
 MAX_WIDTH, MAX_HEIGHT = 16_384, 8_192
-OF_SCENES = 4096  # texels of 0.09°, some hundred bytes each while a bake divides them into light
+SCENE_MAX_WIDTH = 4096  # texels of 0.09°, some hundred bytes each while a bake divides them into light
 MAX_FILE_BYTES = 400_000_000
 MAX_RADIANCE = 1e6
-_ROWS_AT_ONCE = 64
+_STRIP_ROWS = 64
 
 
-def read_environment(source: str | Path | bytes, name: str, most_width: int = OF_SCENES) -> Environment:
+def read_environment(source: str | Path | bytes, name: str, max_width: int = SCENE_MAX_WIDTH) -> Environment:
     """Read an equirectangular .hdr or .exr image.
 
     Args:
         source: a path or the file's bytes.
         name: what people call it.
-        most_width: it is kept at most so many texels wide, each the mean of those that it stands for.
+        max_width: it is kept at most so many texels wide, each the mean of those that it stands for.
 
     Returns:
         The environment, in linear Rec. 709 whatever the primaries that it tells, with one warning for each thing
@@ -43,30 +43,30 @@ def read_environment(source: str | Path | bytes, name: str, most_width: int = OF
     data = _read_bytes(source, name)
     if not data:
         raise SceneError(f"environment {name!r} is empty: 0 bytes; export or download it again")
-    reading = _Reading(name, most_width)
+    reader = _MapReader(name, max_width)
     if data.startswith(b"#?"):
-        reading.radiance(data)
+        reader.radiance(data)
     elif data.startswith(EXR_MAGIC):
-        reading.strips(data, ".exr")
+        reader.strips(data, ".exr")
     else:
         raise SceneError(f"environment {name!r} is neither Radiance .hdr nor OpenEXR; convert it to one of them")
-    return _reduced(reading.environment(), reading.width, most_width)
+    return _limit_width(reader.environment(), reader.width, max_width)
 
 
-class _Reading:
+class _MapReader:
     """A map on its way: strip after strip is repaired, and reduced as many times as a whole number says.
 
     Attributes:
         width: of the map in the file.
     """
 
-    def __init__(self, name: str, most_width: int) -> None:
-        self._name, self._most_width = name, most_width
-        self._parts: list[F32] = []
-        self._said: list[Remark] = []
+    def __init__(self, name: str, max_width: int) -> None:
+        self._name, self._max_width = name, max_width
+        self._strip_pixels: list[F32] = []
+        self._warnings: list[ImportRemark] = []
         self._num_broken = self._num_negative = self._num_texels = 0
         self._is_bright = False
-        self.width, self._times = 0, 1
+        self.width, self._reduction = 0, 1
 
     def radiance(self, data: bytes) -> None:
         """Read a Radiance file."""
@@ -75,8 +75,8 @@ class _Reading:
         check_claim(header.width * header.height * 12, data, f"environment {self._name!r}")
         self.strips(data, ".hdr", header.to_rec_709)
         if header.has_odd_primaries:
-            told = f"environment {self._name!r} tells primaries that are no colours; it is read as linear Rec. 709"
-            self._said.append(simplified(told))
+            warning = f"environment {self._name!r} tells primaries that are no colours; it is read as linear Rec. 709"
+            self._warnings.append(approximated(warning))
 
     def strips(self, data: bytes, suffix: str, matrix: NDArray[np.float64] | None = None) -> None:
         """Read all strips. matrix: what converts their colours, where the reader does not know it"""
@@ -84,17 +84,19 @@ class _Reading:
             if matrix is not None:
                 convert(strip, matrix)
             height, width, _ = strip.shape
-            self._parts.append(shrink(self._repaired(strip), (width // self._times, height // self._times)))
+            self._strip_pixels.append(
+                downsample(self._repair(strip), (width // self._reduction, height // self._reduction))
+            )
 
     def _rows(self, width: int, height: int) -> int:
         _check_size(self._name, width, height)
-        self.width, times = width, max(1, width // self._most_width)
-        if times == 1 or height % times:
+        self.width, reduction = width, max(1, width // self._max_width)
+        if reduction == 1 or height % reduction:
             return height
-        self._times = times
-        return min(height, times * max(1, _ROWS_AT_ONCE // times))
+        self._reduction = reduction
+        return min(height, reduction * max(1, _STRIP_ROWS // reduction))
 
-    def _repaired(self, pixels: F32) -> F32:
+    def _repair(self, pixels: F32) -> F32:
         broken = np.logical_not(np.isfinite(pixels).all(axis=-1, keepdims=True))
         self._num_texels += broken.size
         if broken.any():
@@ -107,19 +109,21 @@ class _Reading:
 
     def environment(self) -> Environment:
         """What was read, and what is to be said of it."""
-        what, said = f"environment {self._name!r}", list(self._said)
+        label, warnings = f"environment {self._name!r}", list(self._warnings)
         if self._num_broken == self._num_texels:
-            raise SceneError(f"no texel of {what} is a finite number; render or export it again")
+            raise SceneError(f"no texel of {label} is a finite number; render or export it again")
         if self._num_broken:
-            said.append(wrong(f"{self._num_broken:,} texels of {what} are not finite; they are black now"))
+            warnings.append(unsupported(f"{self._num_broken:,} texels of {label} are not finite; they are black now"))
         if self._num_negative:
-            said.append(simplified(f"{self._num_negative:,} texels of {what} are negative; they are 0 there now"))
+            warnings.append(
+                approximated(f"{self._num_negative:,} texels of {label} are negative; they are 0 there now")
+            )
         if self._is_bright:
-            said.append(simplified(f"{what} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that"))
-        pixels = self._parts[0] if len(self._parts) == 1 else np.concatenate(self._parts)
+            warnings.append(approximated(f"{label} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that"))
+        pixels = self._strip_pixels[0] if len(self._strip_pixels) == 1 else np.concatenate(self._strip_pixels)
         if not pixels.any():
-            raise SceneError(f"{what} is black everywhere; choose one with light in it")
-        return Environment(self._name, pixels, tuple(said))
+            raise SceneError(f"{label} is black everywhere; choose one with light in it")
+        return Environment(self._name, pixels, tuple(warnings))
 
 
 def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
@@ -147,10 +151,12 @@ def _check_size(name: str, width: int, height: int) -> None:
         raise SceneError(f"environment {name!r} is {width}×{height}; an equirectangular map is twice as wide as high")
 
 
-def _reduced(environment: Environment, width: int, most_width: int) -> Environment:
+def _limit_width(environment: Environment, width: int, max_width: int) -> Environment:
     """At most so wide. width: in the file, of which whole parts are reduced already"""
-    if width <= most_width:
+    if width <= max_width:
         return environment
-    size = most_width, most_width // 2
-    told = f"environment {environment.name!r} is {width}×{width // 2}; it is kept as {size[0]}×{size[1]}"
-    return Environment(environment.name, shrink(environment.radiance, size), (*environment.warnings, simplified(told)))
+    size = max_width, max_width // 2
+    warning = f"environment {environment.name!r} is {width}×{width // 2}; it is kept as {size[0]}×{size[1]}"
+    return Environment(
+        environment.name, downsample(environment.radiance, size), (*environment.warnings, approximated(warning))
+    )

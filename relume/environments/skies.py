@@ -39,12 +39,14 @@ def overcast() -> Environment:
     return _with_ground("overcast", y, above, ground_light=0.8)
 
 
-def _sky(name: str, elevation: float, zenith: F64, horizon: F64, sun: tuple[float, ...], share: float) -> Environment:
+def _sky(
+    name: str, elevation: float, zenith: F64, horizon: F64, sun_color: tuple[float, ...], sun_to_sky_ratio: float
+) -> Environment:
     """A clear sky: the law of Kittler, its colours, a sun and a ground.
 
     Args:
         elevation: of the sun, degrees. zenith, horizon: colours. (3,) each
-        sun: its colour. share: its irradiance, facing it, in units of that of the sky on the ground.
+        sun_color: its colour. sun_to_sky_ratio: its irradiance, facing it, in units of that of the sky on the ground.
     """
     w = texel_directions(HEIGHT, WIDTH).astype(np.float64)
     a, e = np.radians(SUN_AZIMUTH), np.radians(elevation)
@@ -53,13 +55,13 @@ def _sky(name: str, elevation: float, zenith: F64, horizon: F64, sun: tuple[floa
     sine = np.clip(y, 0.02, 1)  # the law has a pole at the horizon itself
     gamma = np.arccos(np.clip(cosine, -1, 1))
     law = (0.91 + 10 * np.exp(-3 * gamma) + 0.45 * cosine**2) * (1 - np.exp(-0.32 / sine))
-    colour = horizon + (zenith - horizon) * sine**0.5
-    above = law * (colour + (np.array(sun) - colour) * np.exp(-3 * gamma))
+    color = horizon + (zenith - horizon) * sine**0.5
+    above = law * (color + (np.array(sun_color) - color) * np.exp(-3 * gamma))
     irradiance = _integral(_luminance(above) * np.clip(y, 0, 1))
     glow = np.exp((cosine - 1) / SUN_SPREAD) * (y > 0)
-    glow *= share * irradiance / _integral(glow)
-    ground_light = (1 + share * np.sin(e)) * irradiance / np.pi
-    return _with_ground(name, y, above + glow * np.array(sun), ground_light)
+    glow *= sun_to_sky_ratio * irradiance / _integral(glow)
+    ground_light = (1 + sun_to_sky_ratio * np.sin(e)) * irradiance / np.pi
+    return _with_ground(name, y, above + glow * np.array(sun_color), ground_light)
 
 
 def _with_ground(name: str, y: F64, above: F64, ground_light: float) -> Environment:

@@ -25,8 +25,8 @@ def studio() -> Environment:
     radiance += strip[..., None] * np.array([10.0, 11.5, 14.0])
     fill = _panel(w, azimuth=12.0, elevation=12.0, half_width=24.0, half_height=20.0, softness=14.0)
     radiance += fill[..., None] * np.array([0.70, 0.62, 0.53])
-    lamp = _panel(w, azimuth=158.0, elevation=37.0, half_width=1.8, half_height=1.8, softness=0.5)
-    radiance += lamp[..., None] * np.array([1600.0, 1220.0, 830.0])
+    small_light = _panel(w, azimuth=158.0, elevation=37.0, half_width=1.8, half_height=1.8, softness=0.5)
+    radiance += small_light[..., None] * np.array([1600.0, 1220.0, 830.0])
     return Environment("studio", radiance.astype(np.float32))
 
 
@@ -66,13 +66,13 @@ def _panel(
     up: float = 0.0,
 ) -> F64:
     """1 inside a rectangle on the tangent plane at a direction, 0 outside, smooth between; sizes in degrees there."""
-    centre = _direction(azimuth, elevation)
-    across = np.cross([0.0, 1.0, 0.0], centre)
+    center = _direction(azimuth, elevation)
+    across = np.cross([0.0, 1.0, 0.0], center)
     across /= np.linalg.norm(across)
-    forward = w @ centre
+    forward = w @ center
     distance = np.where(forward > 1e-3, forward, np.inf)
     x = np.degrees(w @ across / distance) - right
-    y = np.degrees(w @ np.cross(centre, across) / distance) - up
+    y = np.degrees(w @ np.cross(center, across) / distance) - up
     inside = np.minimum(half_width - np.abs(x), half_height - np.abs(y)) / softness
     t = np.clip(0.5 + inside / 2, 0, 1) * (forward > 1e-3)
     return np.asarray(t * t * (3 - 2 * t))

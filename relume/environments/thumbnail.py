@@ -10,12 +10,12 @@ from PIL import Image
 
 from relume.color import luminance
 from relume.imageio.files import png_bytes, to_bytes
-from relume.imageio.shrink import shrink
+from relume.imageio.shrink import downsample
 from relume.imageio.tonemap import tone_map
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 WIDTH, HEIGHT = 192, 96
-_GREY = 0.18  # what the geometric mean becomes: a sun does not darken the rest
+_GRAY = 0.18  # what the geometric mean becomes: a sun does not darken the rest
 
 
 def thumbnail(radiance: NDArray[np.float32]) -> bytes:
@@ -25,14 +25,14 @@ def thumbnail(radiance: NDArray[np.float32]) -> bytes:
         radiance: equirectangular. (height, width, 3) float32
     """
     height, width, _ = radiance.shape
-    small = shrink(radiance, (min(WIDTH, width), min(HEIGHT, height)))
+    small = downsample(radiance, (min(WIDTH, width), min(HEIGHT, height)))
     light = luminance(small)
     mean = float(np.exp(np.mean(np.log(light[light > 0], dtype=np.float64))))
-    shown = Image.fromarray(to_bytes(tone_map(small, float(np.log2(_GREY / mean)), "agx")))
-    return png_bytes(np.asarray(shown.resize((WIDTH, HEIGHT), Image.Resampling.BILINEAR)))
+    display = Image.fromarray(to_bytes(tone_map(small, float(np.log2(_GRAY / mean)), "agx")))
+    return png_bytes(np.asarray(display.resize((WIDTH, HEIGHT), Image.Resampling.BILINEAR)))
 
 
 def write_thumbnail(path: Path, radiance: NDArray[np.float32]) -> None:
     """Write the thumbnail as a PNG file, which appears whole or not at all."""
-    with replacing(path) as unfinished:
+    with atomic_write(path) as unfinished:
         unfinished.write_bytes(thumbnail(radiance))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.exr.layers import Layer
-from relume.exr.space import OURS, Space
+from relume.exr.space import REC_709_SPACE, ExportColorSpace
 from relume.look import Look
 from relume.scene.model import Camera
 
@@ -23,7 +23,7 @@ _FLIP_Z = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Origin:
+class Provenance:
     """Where a picture comes from.
 
     Attributes:
@@ -36,8 +36,13 @@ class Origin:
     bake: str
 
 
-def attributes_of(
-    origin: Origin, camera: Camera, size: tuple[int, int], look: Look, layers: Sequence[Layer], space: Space = OURS
+def build_attributes(
+    origin: Provenance,
+    camera: Camera,
+    size: tuple[int, int],
+    look: Look,
+    layers: Sequence[Layer],
+    space: ExportColorSpace = REC_709_SPACE,
 ) -> dict[str, str | float | F64]:
     """Attributes of an OpenEXR file; those with a colon are ours, and but for plain text they hold JSON.
 
@@ -50,7 +55,7 @@ def attributes_of(
         space: that its values are in.
     """
     environment = look.environment.map
-    seen_from = {"view": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
+    camera_document = {"view": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
     return {
         "Software": f"relume {version('relume')}",
         "chromaticities": np.array(space.chromaticities),
@@ -58,15 +63,17 @@ def attributes_of(
         "worldToCamera": world_to_camera(camera),
         "worldToNDC": world_to_ndc(camera, size),
         "screenWindowWidth": 2 * float(np.tan(camera.yfov / 2)) * size[0] / size[1],
-        "relume:camera": _json(seen_from),
+        "relume:camera": _json(camera_document),
         "relume:look": _json(look.model_dump(mode="json", exclude_unset=True)),  # only grounds may name `catcher`
         "relume:environment": "of the scene" if environment is None else environment,
-        **({} if space is OURS else {"relume:colorSpace": _json(space.name)}),
-        "relume:units": UNITS.format(space="linear Rec. 709" if space is OURS else "linear as chromaticities say"),
+        **({} if space is REC_709_SPACE else {"relume:colorSpace": _json(space.name)}),
+        "relume:units": UNITS.format(
+            space="linear Rec. 709" if space is REC_709_SPACE else "linear as chromaticities say"
+        ),
         "relume:scene": origin.scene,
         "relume:sceneName": _json(origin.scene_name),
         "relume:bake": origin.bake,
-        "relume:layers": _json({layer.name: layer.of for layer in layers}),
+        "relume:layers": _json({layer.name: layer.source for layer in layers}),
     }
 
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from relume.look import Look
-from relume.look.model import Show
+from relume.look.model import PathFilter
 
 ENVIRONMENT, BACKGROUND = "environment", "background"
-_LONGEST = 29  # with ".R" the 31 characters that every reader of OpenEXR takes
-_KINDS: tuple[Show, ...] = ("direct", "first_bounce", "further_bounces")
+_MAX_NAME_LENGTH = 29  # with ".R" the 31 characters that every reader of OpenEXR takes
+_PATH_KINDS: tuple[PathFilter, ...] = ("direct", "first_bounce", "further_bounces")
 Layering = bool | Literal["light_groups"]
 """Which layers: none, those of lights and those of paths, or those of both at once."""
 
@@ -26,124 +26,140 @@ class Layer:
 
     Attributes:
         name: of the layer in the file: letters, digits and underscores, at most 29 of them.
-        of: what it shows, as the look calls it.
+        source: what it shows, as the look calls it.
         look: of which it is the picture.
     """
 
     name: str
-    of: str
+    source: str
     look: Look
 
 
-def layers_for(layering: Layering, look: Look, *, reflects: bool) -> list[Layer]:
+def make_layers(layering: Layering, look: Look, *, has_indirect: bool) -> list[Layer]:
     """The layers that are asked for; none where a ground only catches shadows: what it shows is a ratio, which does not
     add up.
 
     Args:
-        layering: which. look: of which they are parts. reflects: whether light between surfaces was baked.
+        layering: which. look: of which they are parts. has_indirect: whether light between surfaces was baked.
     """
     if not layering or any(material.catcher for material in look.materials.values()):
         return []
-    return (light_groups_of if layering == "light_groups" else layers_of)(look, reflects=reflects)
+    return (light_group_layers if layering == "light_groups" else light_and_path_layers)(
+        look, has_indirect=has_indirect
+    )
 
 
-def layers_of(look: Look, *, reflects: bool) -> list[Layer]:
+def light_and_path_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
     """One layer for each light that gives any, then one for each kind of light path; none of a group of one.
 
     Args:
-        look, reflects: as of `layers_for`.
+        look, has_indirect: as of `make_layers`.
     """
-    lights = _lights_of(look)
-    parts = [_Part("light", of, "", lit) for of, lit in lights] if len(lights) > 1 else []
-    if parts:
-        parts += _background_of(look)
-    paths = _paths_of(look) if reflects else []
-    parts += [_Part("path", show, "", _by_paths(look, show)) for show in paths] if len(paths) > 1 else []
-    return _named(parts)
+    light_looks = _single_light_looks(look)
+    unnamed_layers = (
+        [_UnnamedLayer("light", source, "", light_look) for source, light_look in light_looks]
+        if len(light_looks) > 1
+        else []
+    )
+    if unnamed_layers:
+        unnamed_layers += _background_layers(look)
+    path_kinds = _path_kinds(look) if has_indirect else []
+    unnamed_layers += (
+        [_UnnamedLayer("path", path_kind, "", _only_path_kind(look, path_kind)) for path_kind in path_kinds]
+        if len(path_kinds) > 1
+        else []
+    )
+    return _name_layers(unnamed_layers)
 
 
-def light_groups_of(look: Look, *, reflects: bool) -> list[Layer]:
+def light_group_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
     """One layer for each light and each of direct and reflected light; all of them together are the picture.
 
     Args:
-        look, reflects: as of `layers_for`.
+        look, has_indirect: as of `make_layers`.
     """
-    paths = look.transport.followed(reflects=reflects)
-    shown: dict[Show, bool] = {"direct": paths.direct, "reflected": paths.reflect}
-    classes = [show for show, is_shown in shown.items() if is_shown]
+    paths = look.transport.supported_by(has_indirect=has_indirect)
+    included: dict[PathFilter, bool] = {"direct": paths.direct, "reflected": paths.has_indirect}
+    classes = [path_kind for path_kind, is_included in included.items() if is_included]
     whole = look.transport.show == "all"
-    parts = [
-        _Part("light", of, f"_{show}", _by_paths(lit, show) if whole else lit)
-        for of, lit in _lights_of(look)
-        for show in classes
+    unnamed_layers = [
+        _UnnamedLayer("light", source, f"_{path_kind}", _only_path_kind(light_look, path_kind) if whole else light_look)
+        for source, light_look in _single_light_looks(look)
+        for path_kind in classes
     ]
-    return _named([*parts, *_background_of(look)])
+    return _name_layers([*unnamed_layers, *_background_layers(look)])
 
 
 @dataclass(frozen=True)
-class _Part:
-    """A layer without its name: `group`, `of` and `ending` are what it is made of."""
+class _UnnamedLayer:
+    """A layer without its name: `group`, `source` and `ending` are what it is made of."""
 
     group: str
-    of: str
+    source: str
     ending: str
     look: Look
 
 
-def _lights_of(look: Look) -> list[tuple[str, Look]]:
+def _single_light_looks(look: Look) -> list[tuple[str, Look]]:
     """Each light that gives any, and the look that it alone lights, before black where the background has a colour."""
     names = [name for name, light in look.lights.items() if any(light.gain)]
-    lit: list[tuple[str, Look]] = [(ENVIRONMENT, _lit_by(look, None))] if any(look.environment.gain) else []
-    lit += [(name, _lit_by(look, name)) for name in names]
-    return [(of, _before_black(alone)) for of, alone in lit] if look.background.kind == "color" else lit
+    light_looks: list[tuple[str, Look]] = (
+        [(ENVIRONMENT, _lit_only_by(look, None))] if any(look.environment.gain) else []
+    )
+    light_looks += [(name, _lit_only_by(look, name)) for name in names]
+    return (
+        [(source, _with_black_background(light_look)) for source, light_look in light_looks]
+        if look.background.kind == "color"
+        else light_looks
+    )
 
 
-def _background_of(look: Look) -> list[_Part]:
+def _background_layers(look: Look) -> list[_UnnamedLayer]:
     """A background of one colour, which is no light's."""
-    return [_Part("light", BACKGROUND, "", _lit_by(look, ""))] if look.background.kind == "color" else []
+    return [_UnnamedLayer("light", BACKGROUND, "", _lit_only_by(look, ""))] if look.background.kind == "color" else []
 
 
-def _lit_by(look: Look, source: str | None) -> Look:
+def _lit_only_by(look: Look, source: str | None) -> Look:
     """The look with one of its lights alone; None: its environment."""
     lights = {name: light.model_copy(update={"on": light.on and name == source}) for name, light in look.lights.items()}
     environment = look.environment if source is None else look.environment.model_copy(update={"scale": 0.0})
     return look.model_copy(update={"lights": lights, "environment": environment})
 
 
-def _before_black(look: Look) -> Look:
+def _with_black_background(look: Look) -> Look:
     return look.model_copy(update={"background": look.background.model_copy(update={"color": (0.0, 0.0, 0.0)})})
 
 
-def _by_paths(look: Look, show: Show) -> Look:
-    return look.model_copy(update={"transport": look.transport.model_copy(update={"show": show})})
+def _only_path_kind(look: Look, path_kind: PathFilter) -> Look:
+    return look.model_copy(update={"transport": look.transport.model_copy(update={"show": path_kind})})
 
 
-def _paths_of(look: Look) -> list[Show]:
+def _path_kinds(look: Look) -> list[PathFilter]:
     """The kinds of light paths that a look shows."""
-    kinds = _KINDS[: 1 + min(look.transport.bounces, 2)]
+    kinds = _PATH_KINDS[: 1 + min(look.transport.bounces, 2)]
     return {"all": list(kinds), "reflected": list(kinds[1:])}.get(look.transport.show, [look.transport.show])
 
 
-def _named(parts: list[_Part]) -> list[Layer]:
+def _name_layers(unnamed_layers: list[_UnnamedLayer]) -> list[Layer]:
     """Layers whose names no program mistakes for each other's, however the lights are called."""
     layers: list[Layer] = []
-    taken: set[str] = set()
-    for part in parts:
-        begin = f"{part.group}_{_plain(part.of)}"
-        name, count = _ended(begin, part.ending), 1
-        while name.casefold() in taken:
+    used_names: set[str] = set()
+    for unnamed_layer in unnamed_layers:
+        prefix = f"{unnamed_layer.group}_{_ascii_name(unnamed_layer.source)}"
+        name, count = _with_ending(prefix, unnamed_layer.ending), 1
+        while name.casefold() in used_names:
             count += 1
-            name = _ended(begin, f"_{count}{part.ending}")
-        taken.add(name.casefold())
-        layers.append(Layer(name, part.of, part.look))
+            name = _with_ending(prefix, f"_{count}{unnamed_layer.ending}")
+        used_names.add(name.casefold())
+        layers.append(Layer(name, unnamed_layer.source, unnamed_layer.look))
     return layers
 
 
-def _ended(begin: str, ending: str) -> str:
-    return begin[: _LONGEST - len(ending)].rstrip("_") + ending
+def _with_ending(prefix: str, ending: str) -> str:
+    return prefix[: _MAX_NAME_LENGTH - len(ending)].rstrip("_") + ending
 
 
-def _plain(name: str) -> str:
+def _ascii_name(name: str) -> str:
     """The letters and digits of ASCII that are in a name, other characters as single underscores."""
     ascii_only = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9]+", "_", ascii_only).strip("_") or "unnamed"

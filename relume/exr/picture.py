@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.exr.layers import Layer
-from relume.exr.space import OURS, Space
-from relume.imageio.exr import LARGEST_HALF, Attributes, Precision, channels_of, write_exr
+from relume.exr.space import REC_709_SPACE, ExportColorSpace
+from relume.imageio.exr import MAX_HALF, Attributes, Precision, image_channels, write_exr
 from relume.look import Look
 
 Progress = Callable[[float], None]
@@ -27,7 +27,7 @@ def export_exr(
     attributes: Attributes,
     precision: Precision = "half",
     progress: Progress = lambda share: None,
-    space: Space = OURS,
+    space: ExportColorSpace = REC_709_SPACE,
 ) -> None:
     """Render a look and its layers, one after another, and write them; no more than one is in memory at a time.
 
@@ -35,29 +35,29 @@ def export_exr(
         path: of the file, which appears whole or not at all; parts are kept beside it until then.
         render: makes the picture of a look, (height, width, 3 or 4), and is told whom to tell its progress.
         look: of the picture itself. layers: named looks, whose pictures are layers of the file.
-        attributes: of the file, as `attributes_of` makes them.
+        attributes: of the file, as `build_attributes` makes them.
         precision: of the values.
         progress: called with the share done, in [0, 1].
         space: that the values are written in, as `attributes` says.
     Raises:
         RelumeError: the file cannot be written. What `render` raises; then there is no file.
     """
-    pictures = [("", look), *((layer.name, layer.look) for layer in layers)]
+    renders = [("", look), *((layer.name, layer.look) for layer in layers)]
     with tempfile.TemporaryDirectory(prefix=".layers-", dir=path.parent) as folder:
         channels: list[tuple[str, NDArray[np.floating]]] = []
-        for k, (name, of) in enumerate(pictures):
+        for k, (name, layer_look) in enumerate(renders):
 
-            def share_of_all(share: float, k: int = k) -> None:
-                progress((k + share) / len(pictures))
+            def report_progress(fraction: float, k: int = k) -> None:
+                progress((k + fraction) / len(renders))
 
-            image = space.converted(render(of, share_of_all))
+            image = space.convert_image(render(layer_look, report_progress))
             image = image[..., :3] if name else image  # coverage is the picture's
-            channels += channels_of(_on_disk(Path(folder) / f"{k}.npy", image, precision), name)
+            channels += image_channels(_save_as_memmap(Path(folder) / f"{k}.npy", image, precision), name)
         write_exr(path, channels, attributes, precision)
 
 
-def _on_disk(path: Path, image: NDArray[np.float32], precision: Precision) -> NDArray[np.floating]:
+def _save_as_memmap(path: Path, image: NDArray[np.float32], precision: Precision) -> NDArray[np.floating]:
     """The same picture, in the values that are written, as a file that is read where it is needed."""
-    kept = np.minimum(image, LARGEST_HALF).astype(np.float16) if precision == "half" else image
-    np.save(path, kept, allow_pickle=False)
+    pixels = np.minimum(image, MAX_HALF).astype(np.float16) if precision == "half" else image
+    np.save(path, pixels, allow_pickle=False)
     return np.load(path, mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError
-from relume.imageio.ocio.current import current
-from relume.imageio.primaries import KNOWN, REC_709, Chromaticities, chromaticities_of, known_as
+from relume.imageio.ocio.current import get_config
+from relume.imageio.primaries import INTEROP_SPACES, REC_709, Chromaticities, chromaticities_from_matrix, interop_id
 
 F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Space:
+class ExportColorSpace:
     """A linear colour space.
 
     Attributes:
@@ -32,7 +32,7 @@ class Space:
     chromaticities: Chromaticities
     convert: Callable[[F32], None] | None
 
-    def converted(self, image: F32) -> F32:
+    def convert_image(self, image: F32) -> F32:
         """A picture in it. (height, width, 3 or 4), coverage as it is"""
         if self.convert is None:
             return image
@@ -41,25 +41,25 @@ class Space:
         return np.concatenate([light.reshape(*image.shape[:2], 3), image[..., 3:]], axis=-1)
 
 
-OURS = Space("Rec. 709", "lin_rec709_scene", REC_709, None)
+REC_709_SPACE = ExportColorSpace("Rec. 709", "lin_rec709_scene", REC_709, None)
 
 
-def space_called(name: str | None) -> Space:
+def find_space(name: str | None) -> ExportColorSpace:
     """The colour space that a request names; None: ours.
 
     Raises:
         ParameterError: there is no config, or it has no linear space that is called so, or no file can say what it is.
     """
     if name is None:
-        return OURS
-    config = current()
+        return REC_709_SPACE
+    config = get_config()
     if config is None:
         raise ParameterError("color_space", name, "none: there is no OpenColorIO config here (RELUME_OCIO)")
-    found = config.space_of(name)
+    canonical_name = config.canonical_space(name)
     try:
-        matrix = config.primaries(found)
-        interop = known_as(matrix)
-        chromaticities = chromaticities_of(matrix) if interop is None else KNOWN[interop]
+        matrix = config.primaries(canonical_name)
+        interop = interop_id(matrix)
+        chromaticities = chromaticities_from_matrix(matrix) if interop is None else INTEROP_SPACES[interop]
     except (ValueError, np.linalg.LinAlgError) as error:
         raise ParameterError("color_space", name, f"another: {error}") from None
-    return Space(found, interop, chromaticities, partial(config.convert, space=found))
+    return ExportColorSpace(canonical_name, interop, chromaticities, partial(config.convert, space=canonical_name))

@@ -17,20 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.fresnel import fresnel
-from relume.eye.ways import Ways
+from relume.eye.ways import RayPaths
 from relume.scene.model import Glass, Material
-from relume.trace.geometry import Geometry
+from relume.trace.geometry import SceneBuffers
 from relume.trace.primary import Hits
 from relume.trace.surface import surface_at
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-MAX_GLASS = 8  # surfaces that a ray meets; two are a pane, four a bottle
-MOST_SHOWN = 2  # of glass, one behind the other, that are seen themselves: each costs a sample of every pixel
+MAX_GLASS_HITS = 8  # surfaces that a ray meets; two are a pane, four a bottle
+MAX_VISIBLE_GLASS = 2  # of glass, one behind the other, that are seen themselves: each costs a sample of every pixel
 
 
-class Panes(NamedTuple):
+class GlassSurfaces(NamedTuple):
     """The glass of every material, whether it is of glass or not. (materials,) and (materials, 3)"""
 
     is_glass: NDArray[np.bool_]
@@ -45,10 +45,10 @@ def has_glass(materials: Sequence[Material]) -> bool:
     return any(material.glass is not None for material in materials)
 
 
-def panes_of(materials: Sequence[Material]) -> Panes:
+def glass_surfaces(materials: Sequence[Material]) -> GlassSurfaces:
     """Read the glass of materials."""
     glasses = [material.glass or Glass() for material in materials]
-    return Panes(
+    return GlassSurfaces(
         np.array([material.glass is not None for material in materials]),
         np.array([glass.ior for glass in glasses]),
         np.array([glass.thickness > 0 for glass in glasses]),
@@ -57,45 +57,47 @@ def panes_of(materials: Sequence[Material]) -> Panes:
     )
 
 
-def through_glass(
-    geometry: Geometry, panes: Panes, ways: Ways, hits: Hits, rows: NDArray[np.intp]
-) -> tuple[NDArray[np.bool_], Ways]:
+def refract(
+    geometry: SceneBuffers, glass: GlassSurfaces, paths: RayPaths, hits: Hits, rows: NDArray[np.intp]
+) -> tuple[NDArray[np.bool_], RayPaths]:
     """Send rays that met glass on.
 
     Args:
-        geometry: the triangles. panes: the glass of materials.
-        ways: of the rays. hits: what they met. rows: those that met glass. (k,)
+        geometry: the triangles. glass: the glass of materials.
+        paths: of the rays. hits: what they met. rows: those that met glass. (k,)
     Returns:
         Whether each met the outer side of a solid, or a pane, (k,), and how they go on.
     """
-    own = hits.rows(rows)
-    material, directions = geometry.face_material[own.face], ways.directions[rows].astype(np.float64)
-    points = surface_at(geometry, own, ways.directions[rows]).points  # moved off to the side that is seen
-    outwards, normal = geometry.face_normals[own.face].astype(np.float64), points.normal.astype(np.float64)
-    along = np.einsum("nc,nc->n", outwards, directions)
-    is_solid = panes.is_solid[material]
-    is_outer = (along < 0) | ~is_solid
+    glass_hits = hits.rows(rows)
+    material, directions = geometry.face_material[glass_hits.face], paths.directions[rows].astype(np.float64)
+    points = surface_at(geometry, glass_hits, paths.directions[rows]).points  # moved off to the side that is seen
+    face_normal, normal = geometry.face_normals[glass_hits.face].astype(np.float64), points.normal.astype(np.float64)
+    facing = np.einsum("nc,nc->n", face_normal, directions)
+    is_solid = glass.is_solid[material]
+    is_outer = (facing < 0) | ~is_solid
     cos_theta_i = np.clip(-np.einsum("nc,nc->n", normal, directions), 0, 1)
-    eta = np.where(is_outer, 1 / panes.ior[material], panes.ior[material])
-    reflected, cos_theta_t = dielectric(cos_theta_i, eta)
-    is_kept_in = reflected >= 1
-    inside = np.where(is_outer | ~is_solid, 0, own.distance).astype(np.float64)
-    dimmed = np.where(is_kept_in[:, None], 1, (1 - reflected)[:, None] * panes.tint[material])
-    dimmed *= np.exp(-inside[:, None] * panes.absorbed[material])
-    bent = eta[:, None] * directions + (eta * cos_theta_i - cos_theta_t)[:, None] * normal
-    mirrored = directions + 2 * cos_theta_i[:, None] * normal
-    turned = np.where(is_kept_in[:, None], mirrored, np.where(is_solid[:, None], bent, directions))
-    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    beyond = np.where(is_kept_in, 0, 2 * geometry.epsilon * np.sign(along))[:, None] * outwards
-    return is_outer, Ways(
-        ways.ray[rows],
-        (points.position + beyond).astype(np.float32),
-        turned.astype(np.float32),
-        (ways.through[rows] * dimmed).astype(np.float32),
-        ways.length[rows] + own.distance,
-        ways.num_passed + 1,
-        None if ways.chain is None else ways.chain.rows(rows),
-        ways.via[rows],
+    eta = np.where(is_outer, 1 / glass.ior[material], glass.ior[material])
+    reflectance, cos_theta_t = dielectric(cos_theta_i, eta)
+    is_total_reflection = reflectance >= 1
+    inner_length = np.where(is_outer | ~is_solid, 0, glass_hits.distance).astype(np.float64)
+    transmittance = np.where(is_total_reflection[:, None], 1, (1 - reflectance)[:, None] * glass.tint[material])
+    transmittance *= np.exp(-inner_length[:, None] * glass.absorbed[material])
+    refracted = eta[:, None] * directions + (eta * cos_theta_i - cos_theta_t)[:, None] * normal
+    mirror_directions = directions + 2 * cos_theta_i[:, None] * normal
+    new_directions = np.where(
+        is_total_reflection[:, None], mirror_directions, np.where(is_solid[:, None], refracted, directions)
+    )
+    new_directions /= np.linalg.norm(new_directions, axis=1, keepdims=True)
+    offset = np.where(is_total_reflection, 0, 2 * geometry.epsilon * np.sign(facing))[:, None] * face_normal
+    return is_outer, RayPaths(
+        paths.ray[rows],
+        (points.position + offset).astype(np.float32),
+        new_directions.astype(np.float32),
+        (paths.transmittance[rows] * transmittance).astype(np.float32),
+        paths.length[rows] + glass_hits.distance,
+        paths.num_glass + 1,
+        None if paths.chain is None else paths.chain.rows(rows),
+        paths.path_key[rows],
     )
 
 

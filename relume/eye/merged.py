@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.eye.layers import Layer
-from relume.eye.pixel_edges import COS_TURN, is_off_plane
-from relume.trace.geometry import Geometry
+from relume.eye.layers import TransparencyLayer
+from relume.eye.pixel_edges import COS_NORMAL_EDGE, is_depth_edge
+from relume.trace.geometry import SceneBuffers
 from relume.trace.normals import normals_at
 
 F32 = NDArray[np.float32]
@@ -21,25 +21,28 @@ PATTERNS = (
     (np.array([(0, 1), (1, 3), (2, 0), (3, 2)]) + 0.5) / 4,
     (np.array([(0, 0), (1, 1)]) + 0.5) / 2,
 )
-POSITIONS_A_PIXEL = len(PATTERNS[0])
+POSITIONS_PER_PIXEL = len(PATTERNS[0])
 
 
-class Chosen(NamedTuple):
+class MergedRays(NamedTuple):
     """Rays that samples are made of.
 
     Attributes:
         pixel: that each is of. (n,) int64. weight: share of it. (n,) float32
-        seen: what each meets.
+        layer: what each meets.
     """
 
     pixel: NDArray[np.int64]
     weight: F32
-    seen: Layer
+    layer: TransparencyLayer
 
 
-def merged(
-    geometry: Geometry, layer: Layer, pixels: NDArray[np.int64], positions: NDArray[np.float64] = PATTERNS[0]
-) -> Chosen:
+def merge_rays(
+    geometry: SceneBuffers,
+    layer: TransparencyLayer,
+    pixels: NDArray[np.int64],
+    positions: NDArray[np.float64] = PATTERNS[0],
+) -> MergedRays:
     """Group the rays of a layer by what they see, of the rays of each of some pixels.
 
     Of each group the ray next to its middle is kept, for the share of the pixel that the group has of its rays.
@@ -49,60 +52,66 @@ def merged(
         positions: of the rays in each pixel. (n, 2)
     """
     num = len(positions)
-    shape, seen = (len(pixels), num), layer.shown
-    row, is_direct = seen.ray, layer.chain is None
+    shape, visible = (len(pixels), num), layer.visible
+    row, is_direct = visible.ray, layer.chain is None
     key, normal, is_hit = np.full(shape, -2), np.zeros((*shape, 3), np.float32), np.zeros(shape, np.bool_)
-    distance, rays, through = np.ones(shape, np.float32), np.ones((*shape, 3), np.float32), np.ones((*shape, 3))
-    key.flat[row], distance.flat[row], is_hit.flat[row] = seen.key, seen.hits.distance, seen.hits.face >= 0
+    distance, ray_directions, transmittance = (
+        np.ones(shape, np.float32),
+        np.ones((*shape, 3), np.float32),
+        np.ones((*shape, 3)),
+    )
+    key.flat[row], distance.flat[row], is_hit.flat[row] = visible.key, visible.hits.distance, visible.hits.face >= 0
     for out, values in (
-        (normal, normals_at(geometry, seen.hits, seen.directions)),
-        (rays, seen.directions),
-        (through, seen.through),
+        (normal, normals_at(geometry, visible.hits, visible.directions)),
+        (ray_directions, visible.directions),
+        (transmittance, visible.transmittance),
     ):
         out.reshape(-1, 3)[row] = values
     group = np.where(key == -2, -2, -1)
     for candidate in range(num):
         # rays of the same mesh, turned alike and near the plane of the first that has no group yet
-        one = slice(candidate, candidate + 1)
+        column = slice(candidate, candidate + 1)
         if is_direct:
-            is_alike = ~is_off_plane(normal[:, one], distance[:, one], rays[:, one], distance, rays)
+            is_alike = ~is_depth_edge(
+                normal[:, column], distance[:, column], ray_directions[:, column], distance, ray_directions
+            )
         else:  # no eye in common; of the background each sees a part of its own, the rim of a sun perhaps
-            is_alike = np.einsum("pkc,pc->pk", rays, rays[:, candidate]) > COS_TURN
+            is_alike = np.einsum("pkc,pc->pk", ray_directions, ray_directions[:, candidate]) > COS_NORMAL_EDGE
             is_alike &= is_hit | (np.arange(num) == candidate)
-        is_alike &= np.einsum("pkc,pc->pk", normal, normal[:, candidate]) > COS_TURN
-        same = (group == -1) & (key == key[:, one]) & (is_alike | (is_direct & ~is_hit))
-        same &= (group[:, candidate] == -1)[:, None]
-        group[same] = candidate
+        is_alike &= np.einsum("pkc,pc->pk", normal, normal[:, candidate]) > COS_NORMAL_EDGE
+        is_same_group = (group == -1) & (key == key[:, column]) & (is_alike | (is_direct & ~is_hit))
+        is_same_group &= (group[:, candidate] == -1)[:, None]
+        group[is_same_group] = candidate
     pixel, first = np.nonzero(group == np.arange(num))
-    is_in = group[pixel] == first[:, None]
-    size = is_in.sum(axis=1)
-    kept = pixel * num + _most_central(is_in, size, positions)
-    mean = np.einsum("gk,gkc->gc", is_in, through[pixel]) / size[:, None]
-    of_group = seen.rows(np.searchsorted(row, kept))._replace(through=mean.astype(np.float32))
-    return Chosen(pixels[pixel], (size / num).astype(np.float32), of_group)
+    is_member = group[pixel] == first[:, None]
+    size = is_member.sum(axis=1)
+    representative = pixel * num + _central_position(is_member, size, positions)
+    mean = np.einsum("gk,gkc->gc", is_member, transmittance[pixel]) / size[:, None]
+    group_layer = visible.rows(np.searchsorted(row, representative))._replace(transmittance=mean.astype(np.float32))
+    return MergedRays(pixels[pixel], (size / num).astype(np.float32), group_layer)
 
 
-def alone(layer: Layer, pixels: NDArray[np.int64]) -> Chosen:
+def unmerged(layer: TransparencyLayer, pixels: NDArray[np.int64]) -> MergedRays:
     """The rays of a layer through the middles of pixels that are no edges. pixels: of all rays. (p,)"""
-    seen = layer.shown
-    return Chosen(pixels[seen.ray], np.ones(len(seen.ray), np.float32), seen)
+    visible = layer.visible
+    return MergedRays(pixels[visible.ray], np.ones(len(visible.ray), np.float32), visible)
 
 
-def joined(parts: Sequence[Chosen], most_mirrors: int) -> Chosen:
+def concatenate_rays(ray_groups: Sequence[MergedRays], max_mirrors: int) -> MergedRays:
     """All of several. most_mirrors: that any ray has met."""
-    pixel, weight, seen = zip(*parts, strict=True)
-    return Chosen(np.concatenate(pixel), np.concatenate(weight), Layer.joined(seen, most_mirrors))
+    pixel, weight, layers = zip(*ray_groups, strict=True)
+    return MergedRays(np.concatenate(pixel), np.concatenate(weight), TransparencyLayer.concatenate(layers, max_mirrors))
 
 
-def _most_central(
-    is_in: NDArray[np.bool_], size: NDArray[np.int64], positions: NDArray[np.float64]
+def _central_position(
+    is_member: NDArray[np.bool_], size: NDArray[np.int64], positions: NDArray[np.float64]
 ) -> NDArray[np.int64]:
     """Choose of each group the position next to their mean: any other would shift what it shows to one side.
 
     Args:
-        is_in: which positions are of a group. (groups, n). size: how many those are. (groups,)
+        is_member: which positions are of a group. (groups, n). size: how many those are. (groups,)
         positions: of all. (n, 2)
     """
-    mean = is_in @ positions / size[:, None]
-    away = np.sum((positions - mean[:, None]) ** 2, axis=-1)
-    return np.asarray(np.where(is_in, away, np.inf).argmin(axis=1), np.int64)
+    mean = is_member @ positions / size[:, None]
+    squared_distance = np.sum((positions - mean[:, None]) ** 2, axis=-1)
+    return np.asarray(np.where(is_member, squared_distance, np.inf).argmin(axis=1), np.int64)

@@ -8,51 +8,57 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.eye.layers import Layer, layers_of
-from relume.eye.merged import Chosen, alone, joined, merged
-from relume.eye.mirrors import MOST_MIRRORS
-from relume.eye.pixel_edges import bright_edges_of, brightness_of, edges_of, is_partly_there, is_turning
-from relume.eye.windows import AT_ONCE, Window, windows_of
-from relume.parallel import each_in_order
+from relume.eye.layers import TransparencyLayer, trace_layers
+from relume.eye.merged import MergedRays, concatenate_rays, merge_rays, unmerged
+from relume.eye.mirrors import MAX_MIRROR_BOUNCES
+from relume.eye.pixel_edges import (
+    find_edge_pixels,
+    is_normal_edge,
+    is_partial_coverage,
+    is_radiance_edge,
+    radiance_edge_threshold,
+)
+from relume.eye.windows import MAX_CONCURRENT_TILES, ImageTile, image_tiles
+from relume.parallel import map_ordered
 from relume.scene.model import Camera, Scene
-from relume.trace.cutout_filter import EVERYWHERE
-from relume.trace.geometry import Geometry
+from relume.trace.cutout_filter import STOP_AT_OPAQUE
+from relume.trace.geometry import SceneBuffers
 from relume.trace.primary import camera_directions
 
 F32 = NDArray[np.float32]
 
-_GOLDEN = (5**0.5 - 1) / 2
-_MIDDLE = np.full((1, 2), 0.5)
+_GOLDEN_RATIO_CONJUGATE = (5**0.5 - 1) / 2
+_PIXEL_CENTER = np.full((1, 2), 0.5)
 
 
 @dataclass(frozen=True)
-class Edges:
+class EdgePixels:
     """Of a picture.
 
     Attributes:
         is_edge: whether a pixel wants more rays than the one through its middle. (pixels,)
-        num_alone: what the others show together. num_rays: that found it.
+        num_single_samples: what the others show together. num_rays: that found it.
     """
 
     is_edge: NDArray[np.bool_]
-    num_alone: int
+    num_single_samples: int
     num_rays: int
 
 
 @dataclass(frozen=True)
-class Eye:
+class CameraSetup:
     """A camera before a scene.
 
     Attributes:
         scene: what is seen. geometry: its triangles. camera: the eye. size: width and height of its picture, pixels.
-        follows_mirrors: whether there are rays of what is seen in mirrors.
+        traces_mirrors: whether there are rays of what is seen in mirrors.
     """
 
     scene: Scene
-    geometry: Geometry
+    geometry: SceneBuffers
     camera: Camera
     size: tuple[int, int]
-    follows_mirrors: bool = True
+    traces_mirrors: bool = True
 
     @property
     def pixel_angle(self) -> float:
@@ -64,78 +70,95 @@ class Eye:
         return self.camera.to_world[:3, 3].astype(np.float32)
 
     @cached_property
-    def _bright(self) -> float:
-        return brightness_of(self.scene.environment.radiance)
+    def _edge_threshold(self) -> float:
+        return radiance_edge_threshold(self.scene.environment.radiance)
 
-    def _directions(self, pixel: NDArray[np.int64], positions: NDArray[np.float64] = _MIDDLE) -> F32:
+    def _directions(self, pixel: NDArray[np.int64], positions: NDArray[np.float64] = _PIXEL_CENTER) -> F32:
         """Of rays through some positions (n, 2) of pixels (p,), those of a pixel in a row. (p · n, 3)"""
         y, x = np.divmod(pixel, self.size[0])
         at_x, at_y = ((a[:, None] + positions[:, k]).astype(np.float32).ravel() for k, a in enumerate((x, y)))
         return camera_directions(self.camera, self.size, at_x, at_y)
 
-    def _layers(self, directions: F32, chance: F32 | np.float32 = EVERYWHERE) -> list[Layer]:
-        return layers_of(
-            self.geometry, self.scene.materials, self._origin, directions, chance, self.pixel_angle,
-            follows_mirrors=self.follows_mirrors,
+    def _trace_layers(
+        self, directions: F32, alpha_sample: F32 | np.float32 = STOP_AT_OPAQUE
+    ) -> list[TransparencyLayer]:
+        return trace_layers(
+            self.geometry, self.scene.materials, self._origin, directions, alpha_sample, self.pixel_angle,
+            traces_mirrors=self.traces_mirrors,
         )  # fmt: skip
 
-    def edges(self, *, smooths: bool) -> Edges:
+    def find_edges(self, *, smooths: bool) -> EdgePixels:
         """Look at all pixels. smooths: else none is an edge."""
         num_pixels = self.size[0] * self.size[1]
-        is_edge, shown = np.zeros(num_pixels, np.bool_), np.zeros(num_pixels, np.uint8)
+        is_edge, num_visible = np.zeros(num_pixels, np.bool_), np.zeros(num_pixels, np.uint8)
         cosine = np.ones(num_pixels, np.float32)
 
-        def looked_at(window: Window) -> int:
-            wider, pixel = window.widened(self.size), window.pixels(self.size)
-            directions = self._directions(wider.pixels(self.size))
-            layers = self._layers(directions)
-            of_layers = sum(np.bincount(layer.ray[layer.is_shown], minlength=len(directions)) for layer in layers)
-            shown[pixel] = window.cut_from(wider, np.asarray(of_layers))
+        def inspect_tile(tile: ImageTile) -> int:
+            padded, pixel = tile.padded(self.size), tile.pixels(self.size)
+            directions = self._directions(padded.pixels(self.size))
+            layers = self._trace_layers(directions)
+            visible_counts = sum(
+                np.bincount(layer.ray[layer.is_visible], minlength=len(directions)) for layer in layers
+            )
+            num_visible[pixel] = tile.crop_from(padded, np.asarray(visible_counts))
             if smooths:
-                found, turn = self._edges_in(wider, layers, directions)
-                is_edge[pixel], cosine[pixel] = window.cut_from(wider, found), window.cut_from(wider, turn)
+                tile_edges, tile_cosine = self._find_tile_edges(padded, layers, directions)
+                is_edge[pixel], cosine[pixel] = tile.crop_from(padded, tile_edges), tile.crop_from(padded, tile_cosine)
             return sum(len(layer.ray) for layer in layers)
 
-        num_rays = sum(each_in_order(looked_at, windows_of(self.size), AT_ONCE))
-        is_edge |= is_turning(cosine)
-        return Edges(is_edge, int(shown[~is_edge].sum(dtype=np.int64)), num_rays)
+        num_rays = sum(map_ordered(inspect_tile, image_tiles(self.size), MAX_CONCURRENT_TILES))
+        is_edge |= is_normal_edge(cosine)
+        return EdgePixels(is_edge, int(num_visible[~is_edge].sum(dtype=np.int64)), num_rays)
 
-    def _edges_in(self, window: Window, layers: list[Layer], directions: F32) -> tuple[NDArray[np.bool_], F32]:
+    def _find_tile_edges(
+        self, tile: ImageTile, layers: list[TransparencyLayer], directions: F32
+    ) -> tuple[NDArray[np.bool_], F32]:
         """Find edges but for those that turn, and the cosines of these, by rays through the middles of pixels."""
-        size = window.width, window.height
+        size = tile.width, tile.height
         is_edge, cosine = np.zeros(len(directions), np.bool_), np.ones(len(directions), np.float32)
         for layer in layers:
-            differs, turn = edges_of(self.geometry, layer, size)
-            is_edge |= differs
-            cosine = np.minimum(cosine, turn)
+            is_layer_edge, layer_cosine = find_edge_pixels(self.geometry, layer, size)
+            is_edge |= is_layer_edge
+            cosine = np.minimum(cosine, layer_cosine)
             if layer.chain is not None:
-                is_edge |= bright_edges_of(layer, self.scene.environment.radiance, self._bright, size)
-        holes = self.geometry.embree.holes
-        if holes is not None and holes.blends:
-            is_edge |= is_partly_there(self.geometry, self._origin, directions)
+                is_edge |= is_radiance_edge(layer, self.scene.environment.radiance, self._edge_threshold, size)
+        alpha_test = self.geometry.embree.alpha_test
+        if alpha_test is not None and alpha_test.blends:
+            is_edge |= is_partial_coverage(self.geometry, self._origin, directions)
         return is_edge, cosine
 
-    def chosen(
-        self, window: Window, is_edge: NDArray[np.bool_], positions: NDArray[np.float64]
-    ) -> tuple[Chosen, int, int]:
+    def trace_tile(
+        self, tile: ImageTile, is_edge: NDArray[np.bool_], positions: NDArray[np.float64]
+    ) -> tuple[MergedRays, int, int]:
         """What samples are made of in a window.
 
         Args:
-            window: of the picture. is_edge: of all its pixels. positions: of the rays of one that is an edge. (n, 2)
+            tile: of the picture. is_edge: of all its pixels. positions: of the rays of one that is an edge. (n, 2)
         Returns:
             Rays; how many of them are of edges; how many were traced.
         """
-        pixel = window.pixels(self.size)
-        plain, edges = pixel[~is_edge[pixel]], pixel[is_edge[pixel]]
-        coarse = self._layers(self._directions(plain))
-        fine = self._layers(self._directions(edges, positions), _shared_chances(edges, len(positions)))
-        parts = [merged(self.geometry, layer, edges, positions) for layer in fine]
-        num_fine, num_rays = sum(len(part.pixel) for part in parts), sum(len(layer.ray) for layer in coarse + fine)
-        return joined([*(alone(layer, plain) for layer in coarse), *parts], MOST_MIRRORS), num_fine, num_rays
+        pixel = tile.pixels(self.size)
+        interior, edges = pixel[~is_edge[pixel]], pixel[is_edge[pixel]]
+        interior_layers = self._trace_layers(self._directions(interior))
+        edge_layers = self._trace_layers(
+            self._directions(edges, positions), _stratified_alpha_samples(edges, len(positions))
+        )
+        merged_layers = [merge_rays(self.geometry, layer, edges, positions) for layer in edge_layers]
+        num_edge_samples, num_rays = (
+            sum(len(rays.pixel) for rays in merged_layers),
+            sum(len(layer.ray) for layer in interior_layers + edge_layers),
+        )
+        return (
+            concatenate_rays(
+                [*(unmerged(layer, interior) for layer in interior_layers), *merged_layers], MAX_MIRROR_BOUNCES
+            ),
+            num_edge_samples,
+            num_rays,
+        )
 
 
-def _shared_chances(pixel: NDArray[np.int64], num: int) -> F32:
+def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:
     """Chances of as many rays of each of p pixels, evenly apart: a surface that blends has its share. (p · num,)"""
-    places = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # not in the order of the rows that the positions lie in
-    offset = (pixel[:, None] * _GOLDEN) % 1  # eighths alone would be seen as steps
-    return np.asarray((places[places < num] + offset) / num + 1e-6, np.float32).ravel()
+    order = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # not in the order of the rows that the positions lie in
+    offset = (pixel[:, None] * _GOLDEN_RATIO_CONJUGATE) % 1  # eighths alone would be seen as steps
+    return np.asarray((order[order < num] + offset) / num + 1e-6, np.float32).ravel()

@@ -24,37 +24,37 @@ from numpy.typing import NDArray
 from relume.brdf.fresnel import schlick
 from relume.color import luminance
 from relume.eye.sorted_rows import Column
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.parallel import for_ranges
-from relume.points import ALIKE
+from relume.points import FIXED_ALPHA_SAMPLE
 from relume.scene.model import Material
-from relume.trace.coherent import targets_of, trace_coherent
-from relume.trace.cutout_filter import EVERYWHERE, OF_CHANNEL, UP_TO_GROUP
-from relume.trace.cutouts import MOST_TINTS, PASSES, is_tinted
-from relume.trace.geometry import Geometry
-from relume.trace.on_faces import places_on
-from relume.trace.primary import trace_from
+from relume.trace.coherent import make_light_targets, trace_visibility_masks
+from relume.trace.cutout_filter import ONE_CHANNEL, PASS_TINT_GROUPS, STOP_AT_OPAQUE
+from relume.trace.cutouts import GLASS_RULE, MAX_TINTS, is_tinted
+from relume.trace.geometry import SceneBuffers
+from relume.trace.on_faces import positions_on_faces
+from relume.trace.primary import trace_rays
 
 F32 = NDArray[np.float32]
 
 NUM_CHANNELS = 3
-_LIGHTS = 200  # for which visibility is traced
-_FOLLOWED = 16  # ways through a group of tints, spread evenly over the light that comes along them
+_NUM_LIGHTS = 200  # for which visibility is traced
+_NUM_PATHS = 16  # ways through a group of tints, spread evenly over the light that comes along them
 _MAX_SIDES = 16  # of glass on that way
-_POINTS_A_RANGE = 4096
-POINTS_A_BLOCK = 16 * _POINTS_A_RANGE
-_LEAST_SHARE = 0.01  # of the light that is above a sample's horizon; less through tinted glass is gray
+_POINTS_PER_RANGE = 4096
+POINTS_PER_BLOCK = 16 * _POINTS_PER_RANGE
+_MIN_LIGHT_FRACTION = 0.01  # of the light that is above a sample's horizon; less through tinted glass is gray
 
 
 def num_tints(materials: Sequence[Material]) -> int:
     """Bound the groups of tints, 0 where no shadow has a color."""
-    return min(MOST_TINTS, sum(is_tinted(material.glass) for material in materials if material.glass is not None))
+    return min(MAX_TINTS, sum(is_tinted(material.glass) for material in materials if material.glass is not None))
 
 
-def rays_to_tinted(materials: Sequence[Material]) -> int:
+def max_tint_rays(materials: Sequence[Material]) -> int:
     """Bound the rays that are traced for each sample."""
     num = num_tints(materials)
-    return (1 + num) * _LIGHTS + num * _FOLLOWED * _MAX_SIDES if num else 0
+    return (1 + num) * _NUM_LIGHTS + num * _NUM_PATHS * _MAX_SIDES if num else 0
 
 
 class TintedLight:
@@ -65,92 +65,103 @@ class TintedLight:
         radiance: equirectangular, top row first. (height, width, 3) float32
     """
 
-    def __init__(self, geometry: Geometry, radiance: F32) -> None:
-        anywhere = float(radiance.mean(dtype=np.float64)) or 1.0  # as lamps and surfaces may be in any direction
-        lights = subdivide(radiance + np.float32(anywhere), _LIGHTS)
+    def __init__(self, geometry: SceneBuffers, radiance: F32) -> None:
+        mean_radiance = float(radiance.mean(dtype=np.float64)) or 1.0  # as lamps and surfaces may be in any direction
+        lights = tessellate_environment(radiance + np.float32(mean_radiance), _NUM_LIGHTS)
         self._geometry, self._directions = geometry, lights.direction
-        self._targets, self._weight = targets_of(lights.direction, lights.irradiance), luminance(lights.irradiance)
-        holes = geometry.embree.holes
-        assert holes is not None
-        self.num_groups = int(holes.groups.max(initial=0))
-        rule = holes.cutouts.of_material
-        self._is_glass = (rule >= 0) & (holes.cutouts.rules[rule, 0] == PASSES)
-        is_tinted_glass = self._is_glass & (holes.groups[rule] > 0)  # the share of others is in what rays see
-        self._tint = np.where(is_tinted_glass[:, None], holes.cutouts.rules[rule, 1:4], np.float32(1))
-        self._f0 = np.where(is_tinted_glass, holes.cutouts.rules[rule, 4], np.float32(0))
+        self._targets, self._weight = (
+            make_light_targets(lights.direction, lights.irradiance),
+            luminance(lights.irradiance),
+        )
+        alpha_test = geometry.embree.alpha_test
+        assert alpha_test is not None
+        self.num_groups = int(alpha_test.groups.max(initial=0))
+        material_rule = alpha_test.alpha_masks.of_material
+        self._is_glass = (material_rule >= 0) & (alpha_test.alpha_masks.rules[material_rule, 0] == GLASS_RULE)
+        is_tinted_glass = self._is_glass & (
+            alpha_test.groups[material_rule] > 0
+        )  # the share of others is in what rays see
+        self._tint = np.where(is_tinted_glass[:, None], alpha_test.alpha_masks.rules[material_rule, 1:4], np.float32(1))
+        self._f0 = np.where(is_tinted_glass, alpha_test.alpha_masks.rules[material_rule, 4], np.float32(0))
 
     def tints(self, position: F32, normal: F32) -> tuple[F32, int]:
         """Find the mean tint of the light that each group lets through to points.
 
         Args:
             position, normal: of n points, neighbors mostly next to each other. (n, 3) each. What is found for them does
-                not change where others are left out by blocks of `POINTS_A_BLOCK`.
+                not change where others are left out by blocks of `POINTS_PER_BLOCK`.
         Returns:
             What glass passes of each channel on the way, of light that comes through this group and through none of a
             higher number; NaN where it is too little. (n, groups, 3). How many rays that took.
         """
-        seen = [
-            trace_coherent(self._geometry.embree, position, normal, self._targets, UP_TO_GROUP[group : group + 1])
+        visibility = [
+            trace_visibility_masks(
+                self._geometry.embree, position, normal, self._targets, PASS_TINT_GROUPS[group : group + 1]
+            )
             for group in range(self.num_groups + 1)
         ]
-        found = np.full((len(position), self.num_groups, NUM_CHANNELS), np.nan, np.float32)
-        num_rays = [sum(each.rays.traced for each in seen)]
+        tints = np.full((len(position), self.num_groups, NUM_CHANNELS), np.nan, np.float32)
+        num_rays = [sum(masks.rays.num_traced for masks in visibility)]
 
-        def judge(start: int, stop: int) -> None:
+        def measure(start: int, stop: int) -> None:
             cosine = normal[start:stop] @ self._directions.T
-            least = _LEAST_SHARE * ((cosine > 0) @ self._weight)
+            min_light = _MIN_LIGHT_FRACTION * ((cosine > 0) @ self._weight)
             for group in range(self.num_groups):
-                passed = seen[group + 1].visible[start:stop] & ~seen[group].visible[start:stop]
-                bits = np.unpackbits(passed, axis=1, count=len(self._weight), bitorder="little")
-                lit = np.flatnonzero(bits @ self._weight > least)
+                bits_of_group = visibility[group + 1].visible[start:stop] & ~visibility[group].visible[start:stop]
+                bits = np.unpackbits(bits_of_group, axis=1, count=len(self._weight), bitorder="little")
+                lit = np.flatnonzero(bits @ self._weight > min_light)
                 weight = bits[lit] * np.maximum(cosine[lit], np.float32(1e-6)) * self._weight
-                found[start + lit, group], num_traced = self._mean_tint(position[start + lit], weight)
+                tints[start + lit, group], num_traced = self._mean_tint(position[start + lit], weight)
                 num_rays.append(num_traced)
 
-        for_ranges(judge, len(position), _POINTS_A_RANGE)
-        return found, sum(num_rays)
+        for_ranges(measure, len(position), _POINTS_PER_RANGE)
+        return tints, sum(num_rays)
 
     def _mean_tint(self, position: F32, weight: F32) -> tuple[F32, int]:
         """Find the mean tint on the ways from points to lights. weight: of each light. (n, lights)"""
         sums = np.cumsum(weight, axis=1, dtype=np.float64)
-        steps = sums[:, -1:] * ((np.arange(_FOLLOWED) + 0.5) / _FOLLOWED)
+        steps = sums[:, -1:] * ((np.arange(_NUM_PATHS) + 0.5) / _NUM_PATHS)
         light = np.stack([(sums <= step[:, None]).sum(axis=1) for step in steps.T], axis=1)
-        passed, num_rays = self._passed(np.repeat(position, _FOLLOWED, axis=0), self._directions[light.ravel()])
-        return passed.reshape(-1, _FOLLOWED, NUM_CHANNELS).mean(axis=1), num_rays
+        transmittance, num_rays = self._path_transmittance(
+            np.repeat(position, _NUM_PATHS, axis=0), self._directions[light.ravel()]
+        )
+        return transmittance.reshape(-1, _NUM_PATHS, NUM_CHANNELS).mean(axis=1), num_rays
 
-    def _passed(self, position: F32, directions: F32) -> tuple[F32, int]:
+    def _path_transmittance(self, position: F32, directions: F32) -> tuple[F32, int]:
         """Multiply what all sides of tinted glass on the way of rays let pass. Returns (n, 3), how many were traced."""
-        geometry, passed = self._geometry, np.ones((len(position), NUM_CHANNELS), np.float32)
+        geometry, transmittance = self._geometry, np.ones((len(position), NUM_CHANNELS), np.float32)
         ray, origin, num_rays = np.arange(len(position)), np.array(position, np.float32), 0
         for _ in range(_MAX_SIDES):
-            hits = trace_from(geometry.embree, origin, directions[ray], EVERYWHERE)
+            hits = trace_rays(geometry.embree, origin, directions[ray], STOP_AT_OPAQUE)
             num_rays += len(ray)
-            goes_on = (hits.face >= 0) & self._is_glass[geometry.face_material[hits.face]]
-            ray, face = ray[goes_on], hits.face[goes_on]
+            is_glass_hit = (hits.face >= 0) & self._is_glass[geometry.face_material[hits.face]]
+            ray, face = ray[is_glass_hit], hits.face[is_glass_hit]
             if len(ray) == 0:
                 break
             material, normal = geometry.face_material[face], geometry.face_normals[face]
-            along = np.einsum("nc,nc->n", normal, directions[ray])
-            passed[ray] *= (1 - schlick(np.abs(along), self._f0[material]))[:, None] * self._tint[material]
-            origin = places_on(geometry, face, hits.uv[goes_on], np.copysign(np.float32(1), along)[:, None] * normal)
-        return passed, num_rays
+            facing = np.einsum("nc,nc->n", normal, directions[ray])
+            transmittance[ray] *= (1 - schlick(np.abs(facing), self._f0[material]))[:, None] * self._tint[material]
+            origin = positions_on_faces(
+                geometry, face, hits.uv[is_glass_hit], np.copysign(np.float32(1), facing)[:, None] * normal
+            )
+        return transmittance, num_rays
 
 
-class Form(NamedTuple):
+class SplitWeights(NamedTuple):
     """How some samples show light.
 
     Attributes:
-        chance: of their rays, see `relume.points.Points`. (m,) float32
-        num: how many share what one sample was. (m,)
-        shown: what each shows of the channels, times `num`. (m, 3) float32
+        alpha_sample: of their rays, see `relume.points.Points`. (m,) float32
+        num_parts: how many share what one sample was. (m,)
+        channel_weights: what each shows of the channels, times `num_parts`. (m, 3) float32
     """
 
-    chance: F32
-    num: NDArray[np.int64]
-    shown: F32
+    alpha_sample: F32
+    num_parts: NDArray[np.int64]
+    channel_weights: F32
 
 
-class Split:
+class TintSplit:
     """Samples of which some are several.
 
     Args:
@@ -162,32 +173,46 @@ class Split:
 
     def __init__(self, tints: F32, bounds: NDArray[np.integer], *, by_channel: bool) -> None:
         self._tints, self._by_channel = tints, by_channel
-        rows, kinds = list[NDArray[np.uint32]](), list[NDArray[np.int8]]()
+        rows, part_indices = list[NDArray[np.uint32]](), list[NDArray[np.int8]]()
         for start, stop in pairwise(bounds.tolist()):
-            for kind in range(NUM_CHANNELS if by_channel else 1 + tints.shape[1]):
-                chosen = np.arange(start, stop, dtype=np.uint32)
-                if kind:
+            for part_index in range(NUM_CHANNELS if by_channel else 1 + tints.shape[1]):
+                sample_rows = np.arange(start, stop, dtype=np.uint32)
+                if part_index:
                     lit = _is_lit(tints[start:stop])
-                    chosen = chosen[np.asarray(lit.any(axis=1)) if by_channel else lit[:, kind - 1]]
-                rows.append(chosen)
-                kinds.append(np.full(len(chosen), kind, np.int8))
-        self.row, self._kind = np.concatenate(rows), np.concatenate(kinds)
+                    sample_rows = sample_rows[np.asarray(lit.any(axis=1)) if by_channel else lit[:, part_index - 1]]
+                rows.append(sample_rows)
+                part_indices.append(np.full(len(sample_rows), part_index, np.int8))
+        self.row, self._kind = np.concatenate(rows), np.concatenate(part_indices)
 
-    def form(self, rows: slice) -> Form:
+    def weights(self, rows: slice) -> SplitWeights:
         """How some samples that follow each other show light."""
-        kind, tints = self._kind[rows].astype(np.int64), self._tints[self.row[rows]]
+        part_index, tints = self._kind[rows].astype(np.int64), self._tints[self.row[rows]]
         lit = _is_lit(tints)
         is_split = np.asarray(lit.any(axis=1))
         if self._by_channel:
-            shown = np.where(is_split[:, None], NUM_CHANNELS * np.eye(NUM_CHANNELS, dtype=np.float32)[kind], 1)
-            count = np.where(is_split, NUM_CHANNELS, 1)
-            return Form(np.where(is_split, OF_CHANNEL[kind], ALIKE), count, shown.astype(np.float32))
-        count, shown, beyond = 1 + lit.sum(axis=1), np.zeros((len(kind), NUM_CHANNELS)), np.zeros((len(kind), 1))
+            channel_weights = np.where(
+                is_split[:, None], NUM_CHANNELS * np.eye(NUM_CHANNELS, dtype=np.float32)[part_index], 1
+            )
+            num_parts = np.where(is_split, NUM_CHANNELS, 1)
+            return SplitWeights(
+                np.where(is_split, ONE_CHANNEL[part_index], FIXED_ALPHA_SAMPLE),
+                num_parts,
+                channel_weights.astype(np.float32),
+            )
+        num_parts, channel_weights, next_tint = (
+            1 + lit.sum(axis=1),
+            np.zeros((len(part_index), NUM_CHANNELS)),
+            np.zeros((len(part_index), 1)),
+        )
         for group in range(tints.shape[1], 0, -1):
-            own = np.where(lit[:, group - 1, None], tints[:, group - 1], beyond)
-            shown, beyond = np.where(kind[:, None] == group, own - beyond, shown), own
-        shown = np.where(kind[:, None] == 0, 1 - beyond, shown) * count[:, None]
-        return Form(np.where(is_split, UP_TO_GROUP[kind], ALIKE), count, shown.astype(np.float32))
+            tint = np.where(lit[:, group - 1, None], tints[:, group - 1], next_tint)
+            channel_weights, next_tint = np.where(part_index[:, None] == group, tint - next_tint, channel_weights), tint
+        channel_weights = np.where(part_index[:, None] == 0, 1 - next_tint, channel_weights) * num_parts[:, None]
+        return SplitWeights(
+            np.where(is_split, PASS_TINT_GROUPS[part_index], FIXED_ALPHA_SAMPLE),
+            num_parts,
+            channel_weights.astype(np.float32),
+        )
 
 
 def _is_lit(tints: F32) -> NDArray[np.bool_]:
@@ -203,19 +228,21 @@ class SplitColumn:
         split: how.
     """
 
-    def __init__(self, name: str, whole: Column, split: Split) -> None:
+    def __init__(self, name: str, whole: Column, split: TintSplit) -> None:
         self._name, self._whole, self._split = name, whole, split
         self.dtype, self.shape = whole.dtype, (len(split.row), *whole.shape[1:])
 
     def __getitem__(self, rows: slice) -> NDArray[Any]:
         """Some rows that follow each other."""
-        whole = self._whole.take(self._split.row[rows])
+        values = self._whole.take(self._split.row[rows])
         if self._name not in ("weight", "through", "chance"):
-            return whole
-        form = self._split.form(rows)
+            return values
+        weights = self._split.weights(rows)
         if self._name == "chance":
-            return form.chance
-        return np.asarray(whole / form.num if self._name == "weight" else whole * form.shown, self.dtype)
+            return weights.alpha_sample
+        return np.asarray(
+            values / weights.num_parts if self._name == "weight" else values * weights.channel_weights, self.dtype
+        )
 
     def __array__(self, dtype: Any = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)

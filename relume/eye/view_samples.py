@@ -20,33 +20,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.equirect import lookup
-from relume.eye.layers import most_shown
-from relume.eye.merged import PATTERNS, POSITIONS_A_PIXEL, Chosen
-from relume.eye.seen import Edges, Eye
-from relume.eye.sorted_rows import Column, SortedRows
-from relume.eye.tinted import POINTS_A_BLOCK, Split, SplitColumn, TintedLight, num_tints
-from relume.eye.ways import Chain
-from relume.eye.windows import AT_ONCE, Window, morton, windows_of
-from relume.parallel import each_in_order
-from relume.points import Points
+from relume.eye.layers import max_samples
+from relume.eye.merged import PATTERNS, POSITIONS_PER_PIXEL, MergedRays
+from relume.eye.seen import CameraSetup, EdgePixels
+from relume.eye.sorted_rows import Column, ExternalSort
+from relume.eye.tinted import POINTS_PER_BLOCK, SplitColumn, TintedLight, TintSplit, num_tints
+from relume.eye.ways import SpecularChain
+from relume.eye.windows import MAX_CONCURRENT_TILES, ImageTile, image_tiles, morton
+from relume.parallel import map_ordered
+from relume.points import SurfacePoints
 from relume.scene.model import Material, Scene
-from relume.scene.roughness import level_of, levels_of
-from relume.trace.geometry import Geometry
-from relume.trace.surface import Surface, surface_at
+from relume.scene.roughness import levels_of_material, select_level
+from relume.trace.geometry import SceneBuffers
+from relume.trace.surface import SurfaceInteraction, surface_at
 
 F32 = NDArray[np.float32]
 
 BACKGROUND = 65_535
-_SAMPLES_A_SIDE = 2048  # of a pixel's samples, by the root of the number of pixels; a tuft of blades takes 1,600
-_LEVELS = 256
+_SAMPLES_PER_SIDE = 2048  # of a pixel's samples, by the root of the number of pixels; a tuft of blades takes 1,600
+_NUM_LEVELS = 256
 
 
-_POINTS = ("position", "normal", "tangent")
-_SURFACE = ("diffuse", "specular", "uv", "roughness", "normal_length", "emission", "surface_normal")
-_CHAIN = ("mirror", "mirror_cosine", "mirror_tint")
-_OWN = ("pixel", "weight", "material", "level", "through", "eye", "is_mirrored", "chance")
-_COLUMNS = (*_OWN, *_POINTS, *_SURFACE, *_CHAIN)
-_NEEDED = ("material", "level", "position", "normal")  # to tell which samples light comes to through tinted glass
+_POINT_COLUMNS = ("position", "normal", "tangent")
+_SURFACE_COLUMNS = ("diffuse", "specular", "uv", "roughness", "normal_length", "emission", "surface_normal")
+_CHAIN_COLUMNS = ("mirror", "mirror_cosine", "mirror_tint")
+_SAMPLE_COLUMNS = ("pixel", "weight", "material", "level", "through", "eye", "is_mirrored", "chance")
+_COLUMNS = (*_SAMPLE_COLUMNS, *_POINT_COLUMNS, *_SURFACE_COLUMNS, *_CHAIN_COLUMNS)
+_REQUIRED_COLUMNS = (
+    "material",
+    "level",
+    "position",
+    "normal",
+)  # to tell which samples light comes to through tinted glass
 
 
 @dataclass(frozen=True)
@@ -74,35 +79,35 @@ class ViewSamples:
     pixel: NDArray[np.uint32]
     weight: F32
     material: NDArray[np.uint16]
-    surface: Surface
+    surface: SurfaceInteraction
     num_rays: int
     level: NDArray[np.uint8]
     through: F32
     eye: F32
-    chain: Chain
+    chain: SpecularChain
     is_mirrored: NDArray[np.bool_]
     chance: F32
 
     @classmethod
-    def of(cls, columns: Mapping[str, Any], num_rays: int) -> ViewSamples:
+    def from_columns(cls, columns: Mapping[str, Any], num_rays: int) -> ViewSamples:
         """Those of columns as `sampled` names them, which are read. num_rays: that were traced."""
-        read = {name: np.asarray(columns[name]) for name in _COLUMNS}
-        seed = np.arange(len(read["pixel"]), dtype=np.uint32)
-        points = Points(seed=seed, **{name: read[name] for name in _POINTS})
+        arrays = {name: np.asarray(columns[name]) for name in _COLUMNS}
+        seed = np.arange(len(arrays["pixel"]), dtype=np.uint32)
+        points = SurfacePoints(seed=seed, **{name: arrays[name] for name in _POINT_COLUMNS})
         return cls(
-            surface=Surface(points, **{name: read[name] for name in _SURFACE}),
-            chain=Chain(*(read[name] for name in _CHAIN)),
+            surface=SurfaceInteraction(points, **{name: arrays[name] for name in _SURFACE_COLUMNS}),
+            chain=SpecularChain(*(arrays[name] for name in _CHAIN_COLUMNS)),
             num_rays=num_rays,
-            **{name: read[name] for name in _OWN},
+            **{name: arrays[name] for name in _SAMPLE_COLUMNS},
         )
 
     @property
-    def gains(self) -> F32:
+    def throughput(self) -> F32:
         """What the radiance of each sample is multiplied by for its pixel, mirrors apart. (n, 3) float32"""
         return self.weight[:, None] * self.through
 
 
-def thresholds(pixel: NDArray[np.int64], width: int) -> F32:
+def dither_thresholds(pixel: NDArray[np.int64], width: int) -> F32:
     """Numbers between 0 and 1 that differ much from pixel to pixel (interleaved gradient noise, Jimenez 2014).
 
     Args:
@@ -116,11 +121,11 @@ def thresholds(pixel: NDArray[np.int64], width: int) -> F32:
 
 def sample_view(
     scene: Scene,
-    geometry: Geometry,
+    geometry: SceneBuffers,
     view: str,
     size: tuple[int, int],
     *,
-    follows_mirrors: bool = True,
+    traces_mirrors: bool = True,
     smooths_edges: bool = True,
     by_channel: bool = False,
 ) -> ViewSamples:
@@ -129,22 +134,26 @@ def sample_view(
     Args:
         scene: what is seen. geometry: its triangles.
         view: name of the camera. size: width and height in pixels.
-        follows_mirrors: whether what is seen in mirrors has samples.
+        traces_mirrors: whether what is seen in mirrors has samples.
         smooths_edges: whether pixels across edges have several; else each shows what is seen through its middle.
         by_channel: whether samples that see light through tinted glass are split by channel, not by tint.
     """
-    eye = eye_of(scene, geometry, view, size, follows_mirrors=follows_mirrors)
-    return ViewSamples.of(*sampled(eye, io.BytesIO, smooths_edges=smooths_edges, by_channel=by_channel))
+    setup = camera_setup(scene, geometry, view, size, traces_mirrors=traces_mirrors)
+    return ViewSamples.from_columns(
+        *sample_pixels(setup, io.BytesIO, smooths_edges=smooths_edges, by_channel=by_channel)
+    )
 
 
-def eye_of(scene: Scene, geometry: Geometry, view: str, size: tuple[int, int], *, follows_mirrors: bool = True) -> Eye:
+def camera_setup(
+    scene: Scene, geometry: SceneBuffers, view: str, size: tuple[int, int], *, traces_mirrors: bool = True
+) -> CameraSetup:
     """The eye of a view. See `sample_view`."""
     camera = next(camera for camera in scene.cameras if camera.name == view)
-    return Eye(scene, geometry, camera, size, follows_mirrors)
+    return CameraSetup(scene, geometry, camera, size, traces_mirrors)
 
 
-def sampled(
-    eye: Eye,
+def sample_pixels(
+    camera_setup: CameraSetup,
     scratch: Callable[[], IO[bytes]],
     names: Sequence[str] = _COLUMNS,
     *,
@@ -154,57 +163,65 @@ def sampled(
     """Find the view samples of an eye, of which no more than a window's are in memory.
 
     Args:
-        eye: that sees them. scratch: opens a file that is gone when it is closed.
+        camera_setup: that sees them. scratch: opens a file that is gone when it is closed.
         names: of the columns that are wanted. smooths_edges, by_channel: see `sample_view`.
     Returns:
         The columns of `ViewSamples`, of its surface, points and chain, by name; how many rays were traced.
     """
-    edges, size, materials = eye.edges(smooths=smooths_edges), eye.size, eye.scene.materials
-    num_rays, most = edges.num_rays, most_samples(materials, size[0] * size[1])
+    edges, size, materials = (
+        camera_setup.find_edges(smooths=smooths_edges),
+        camera_setup.size,
+        camera_setup.scene.materials,
+    )
+    num_rays, sample_limit = edges.num_rays, view_sample_limit(materials, size[0] * size[1])
     for positions in PATTERNS:
-        rows, num_traced = _rows(eye, edges, positions, most, scratch, {*names, *_NEEDED})
+        rows, num_traced = _sample_tiles(
+            camera_setup, edges, positions, sample_limit, scratch, {*names, *_REQUIRED_COLUMNS}
+        )
         num_rays += num_traced
         if rows is not None:
             break
     assert rows is not None  # for two samples of each pixel there is room
     columns = rows.columns()
     if num_tints(materials):
-        split, num_traced = _split(eye, columns, most, by_channel=by_channel)
+        split, num_traced = _split_tinted(camera_setup, columns, sample_limit, by_channel=by_channel)
         columns, num_rays = {**columns, **split}, num_rays + num_traced
     return {name: columns[name] for name in names}, num_rays
 
 
-def _rows(
-    eye: Eye,
-    edges: Edges,
+def _sample_tiles(
+    camera_setup: CameraSetup,
+    edges: EdgePixels,
     positions: NDArray[np.float64],
-    most: int,
+    sample_limit: int,
     scratch: Callable[[], IO[bytes]],
     names: Collection[str],
-) -> tuple[SortedRows | None, int]:
+) -> tuple[ExternalSort | None, int]:
     """Find samples window by window.
 
     Args:
-        eye: that sees them. edges: of its picture. positions: of the rays in each pixel across edges. (n, 2)
-        most: samples that there is room for. scratch, names: see `sampled`.
+        camera_setup: that sees them. edges: of its picture. positions: of the rays in each pixel across edges. (n, 2)
+        sample_limit: samples that there is room for. scratch, names: see `sampled`.
     Returns:
         None where they are more than there is room for; how many rays were traced.
     """
-    rows, num_samples, num_rays = SortedRows(scratch), edges.num_alone, 0
+    rows, num_samples, num_rays = ExternalSort(scratch), edges.num_single_samples, 0
 
-    def found(window: Window) -> tuple[dict[str, NDArray[Any]], int, int]:
-        chosen, num_fine, num_traced = eye.chosen(window, edges.is_edge, positions)
-        return _sorted_samples(eye, chosen), num_fine, num_traced
+    def process_tile(tile: ImageTile) -> tuple[dict[str, NDArray[Any]], int, int]:
+        rays, num_edge_samples, num_traced = camera_setup.trace_tile(tile, edges.is_edge, positions)
+        return _sorted_samples(camera_setup, rays), num_edge_samples, num_traced
 
-    for columns, num_fine, num_traced in each_in_order(found, windows_of(eye.size), AT_ONCE):
-        num_samples, num_rays = num_samples + num_fine, num_rays + num_traced
-        if num_samples > most:
+    for columns, num_edge_samples, num_traced in map_ordered(
+        process_tile, image_tiles(camera_setup.size), MAX_CONCURRENT_TILES
+    ):
+        num_samples, num_rays = num_samples + num_edge_samples, num_rays + num_traced
+        if num_samples > sample_limit:
             return None, num_rays
-        rows.add(_key(columns["material"], columns["level"]), {name: columns[name] for name in names})
+        rows.add(_sort_key(columns["material"], columns["level"]), {name: columns[name] for name in names})
     return rows, num_rays
 
 
-def most_samples(materials: Sequence[Material], num_pixels: int) -> int:
+def view_sample_limit(materials: Sequence[Material], num_pixels: int) -> int:
     """Bound the samples of a view: each position of a pixel sees something else, glass before it, more in mirrors.
 
     Edges are lines: twice as many pixels a side are twice as many edges among four times as many pixels. So a large
@@ -213,71 +230,71 @@ def most_samples(materials: Sequence[Material], num_pixels: int) -> int:
     Args:
         materials: of the scene. num_pixels: of the picture.
     """
-    a_pixel = min(max(_SAMPLES_A_SIDE / math.sqrt(num_pixels), len(PATTERNS[-1])), POSITIONS_A_PIXEL)
-    return math.ceil(a_pixel * num_pixels) * most_shown(materials)
+    samples_per_pixel = min(max(_SAMPLES_PER_SIDE / math.sqrt(num_pixels), len(PATTERNS[-1])), POSITIONS_PER_PIXEL)
+    return math.ceil(samples_per_pixel * num_pixels) * max_samples(materials)
 
 
-def _key(material: NDArray[np.uint16], level: NDArray[np.uint8]) -> NDArray[np.int32]:
+def _sort_key(material: NDArray[np.uint16], level: NDArray[np.uint8]) -> NDArray[np.int32]:
     """What samples are sorted by, before their places in the picture. (n,)"""
-    return material.astype(np.int32) * _LEVELS + level
+    return material.astype(np.int32) * _NUM_LEVELS + level
 
 
-def _levels(scene: Scene, material: NDArray[np.uint16], roughness: F32, threshold: F32) -> NDArray[np.uint8]:
+def _roughness_levels(scene: Scene, material: NDArray[np.uint16], roughness: F32, threshold: F32) -> NDArray[np.uint8]:
     """The level of roughness of each sample, by its material. (n,)"""
     level = np.zeros(len(material), np.uint8)
-    for index, of_scene in enumerate(scene.materials):
-        if ratios := levels_of(of_scene):
+    for index, scene_material in enumerate(scene.materials):
+        if ratios := levels_of_material(scene_material):
             rows = np.flatnonzero(material == index)
-            level[rows] = level_of(ratios, roughness[rows], threshold[rows])
+            level[rows] = select_level(ratios, roughness[rows], threshold[rows])
     return level
 
 
-def _sorted_samples(eye: Eye, chosen: Chosen) -> dict[str, NDArray[Any]]:
+def _sorted_samples(camera_setup: CameraSetup, rays: MergedRays) -> dict[str, NDArray[Any]]:
     """Make samples of rays. Returns columns by name, sorted as `ViewSamples` are."""
-    scene, geometry, width = eye.scene, eye.geometry, eye.size[0]
-    hit = chosen.seen.hits.face >= 0
-    face = np.maximum(chosen.seen.hits.face, 0)
-    material = np.where(hit, geometry.face_material[face], BACKGROUND).astype(np.uint16)
-    order = np.lexsort((morton(chosen.pixel, width), material))
-    seen = chosen.seen.rows(order)
-    full = surface_at(geometry, seen.hits, seen.directions, scene.materials, eye.pixel_angle)
-    level = _levels(scene, material[order], full.roughness, thresholds(chosen.pixel[order], width))
+    scene, geometry, width = camera_setup.scene, camera_setup.geometry, camera_setup.size[0]
+    is_hit = rays.layer.hits.face >= 0
+    face = np.maximum(rays.layer.hits.face, 0)
+    material = np.where(is_hit, geometry.face_material[face], BACKGROUND).astype(np.uint16)
+    order = np.lexsort((morton(rays.pixel, width), material))
+    layer = rays.layer.rows(order)
+    surface = surface_at(geometry, layer.hits, layer.directions, scene.materials, camera_setup.pixel_angle)
+    level = _roughness_levels(scene, material[order], surface.roughness, dither_thresholds(rays.pixel[order], width))
     if level.any():
         by_level = np.lexsort((level, material[order]))
-        order, full, seen, level = order[by_level], full.rows(by_level), seen.rows(by_level), level[by_level]
-    outside = ~hit[order]
-    full.diffuse[outside] = lookup(scene.environment.radiance, seen.directions[outside])
-    assert seen.chain is not None
+        order, surface, layer, level = order[by_level], surface.rows(by_level), layer.rows(by_level), level[by_level]
+    is_background = ~is_hit[order]
+    surface.diffuse[is_background] = lookup(scene.environment.radiance, layer.directions[is_background])
+    assert layer.chain is not None
     return {
-        "pixel": chosen.pixel[order].astype(np.uint32), "weight": chosen.weight[order], "material": material[order],
-        "level": level, "through": seen.through, "eye": seen.eyes, "is_mirrored": seen.is_mirrored,
+        "pixel": rays.pixel[order].astype(np.uint32), "weight": rays.weight[order], "material": material[order],
+        "level": level, "through": layer.transmittance, "eye": layer.origins, "is_mirrored": layer.is_mirrored,
         "chance": np.zeros(len(order), np.float32),
-        **{name: getattr(full.points, name) for name in _POINTS},
-        **{name: getattr(full, name) for name in _SURFACE},
-        **dict(zip(_CHAIN, seen.chain, strict=True)),
+        **{name: getattr(surface.points, name) for name in _POINT_COLUMNS},
+        **{name: getattr(surface, name) for name in _SURFACE_COLUMNS},
+        **dict(zip(_CHAIN_COLUMNS, layer.chain, strict=True)),
     }  # fmt: skip
 
 
-def _split(
-    eye: Eye, columns: Mapping[str, Column], most: int, *, by_channel: bool
+def _split_tinted(
+    camera_setup: CameraSetup, columns: Mapping[str, Column], sample_limit: int, *, by_channel: bool
 ) -> tuple[dict[str, Any], int]:
     """Split samples that light reaches through tinted glass; none where they were too many.
 
     Args:
-        eye: that sees the samples. columns: of them. most: samples that a plan has room for.
+        camera_setup: that sees the samples. columns: of them. sample_limit: samples that a plan has room for.
         by_channel: see `sample_view`.
     Returns:
         Columns in place of those; how many rays were traced.
     """
-    key = _key(np.asarray(columns["material"]), np.asarray(columns["level"]))
-    num, num_surface = len(key), int(np.searchsorted(key, BACKGROUND * _LEVELS))
-    light = TintedLight(eye.geometry, eye.scene.environment.radiance)
+    key = _sort_key(np.asarray(columns["material"]), np.asarray(columns["level"]))
+    num, num_surface = len(key), int(np.searchsorted(key, BACKGROUND * _NUM_LEVELS))
+    light = TintedLight(camera_setup.geometry, camera_setup.scene.environment.radiance)
     tints, num_rays = np.full((num, light.num_groups, 3), np.nan, np.float32), 0
-    for start in range(0, num_surface, POINTS_A_BLOCK):
-        block = slice(start, min(start + POINTS_A_BLOCK, num_surface))
+    for start in range(0, num_surface, POINTS_PER_BLOCK):
+        block = slice(start, min(start + POINTS_PER_BLOCK, num_surface))
         tints[block], num_traced = light.tints(columns["position"][block], columns["normal"][block])
         num_rays += num_traced
-    split = Split(tints, np.append(np.flatnonzero(np.diff(key, prepend=-1)), num), by_channel=by_channel)
-    if len(split.row) > most:
+    split = TintSplit(tints, np.append(np.flatnonzero(np.diff(key, prepend=-1)), num), by_channel=by_channel)
+    if len(split.row) > sample_limit:
         return {}, num_rays
     return {name: SplitColumn(name, column, split) for name, column in columns.items()}, num_rays

@@ -10,7 +10,7 @@ import numpy as np
 import OpenImageIO
 from numpy.typing import NDArray
 
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 F64 = NDArray[np.float64]
 Precision = Literal["half", "float"]
@@ -18,11 +18,11 @@ Channels = Sequence[tuple[str, NDArray[np.floating]]]
 Attributes = Mapping[str, str | float | F64]
 
 _TYPES = {"half": OpenImageIO.HALF, "float": OpenImageIO.FLOAT}
-LARGEST_HALF = 65504.0
-_ROWS_AT_ONCE = 64
+MAX_HALF = 65504.0
+_STRIP_ROWS = 64
 
 
-def channels_of(image: NDArray[np.floating], layer: str = "") -> Channels:
+def image_channels(image: NDArray[np.floating], layer: str = "") -> Channels:
     """The channels of a picture, (height, width, 3 or 4): R, G, B and A, or those of a layer."""
     prefix = f"{layer}." if layer else ""
     return [(prefix + name, image[..., c]) for c, name in enumerate("RGBA"[: image.shape[2]])]
@@ -37,7 +37,7 @@ def write_exr(path: Path, channels: Channels, attributes: Attributes, precision:
     Raises:
         RelumeError: the file cannot be written.
     """
-    with replacing(path) as unfinished:
+    with atomic_write(path) as unfinished:
         write_scanlines(unfinished, channels, attributes, precision)
 
 
@@ -62,11 +62,11 @@ def write_scanlines(path: Path, channels: Channels, attributes: Attributes, prec
     if output is None or not output.open(str(path), specification):
         raise OSError(OpenImageIO.geterror() if output is None else output.geterror())
     is_written = True
-    for first in range(0, height, _ROWS_AT_ONCE):
-        last = min(first + _ROWS_AT_ONCE, height)
+    for first in range(0, height, _STRIP_ROWS):
+        last = min(first + _STRIP_ROWS, height)
         strip = np.stack([values[first:last] for _, values in channels], axis=-1).astype(np.float32)
         if precision == "half":
-            np.minimum(strip, LARGEST_HALF, out=strip)
+            np.minimum(strip, MAX_HALF, out=strip)
         is_written = is_written and output.write_scanlines(first, last, 0, strip)
     if not output.close() or not is_written:
         raise OSError(output.geterror())

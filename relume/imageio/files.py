@@ -12,10 +12,10 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from relume.errors import ParameterError, ShapeMismatchError
-from relume.imageio.exr import channels_of, write_scanlines
+from relume.imageio.exr import image_channels, write_scanlines
 from relume.imageio.ocio.view import OcioView
 from relume.imageio.tonemap import tone_map
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 F32 = NDArray[np.float32]
 
@@ -50,31 +50,31 @@ def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: st
         raise ParameterError("the image format", path.suffix, f"a file name ending in {', '.join(_WRITERS)}")
     if image.ndim != 3 or image.shape[2] not in (3, 4) or image.size == 0:
         raise ShapeMismatchError(f"an image has the shape (height, width, 3 or 4), not {image.shape}; reshape it")
-    with replacing(path) as unfinished:
+    with atomic_write(path) as unfinished:
         write(unfinished, image, exposure, tone_map_name)
 
 
 def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
-    write_scanlines(path, channels_of(image), {"oiio:ColorSpace": "lin_rec709_scene"}, "float")
+    write_scanlines(path, image_channels(image), {"oiio:ColorSpace": "lin_rec709_scene"}, "float")
 
 
-def _displayed(image: F32, exposure: float, tone_map_name: str | OcioView) -> NDArray[np.uint8]:
+def _to_display_bytes(image: F32, exposure: float, tone_map_name: str | OcioView) -> NDArray[np.uint8]:
     """What the screen shows of the surfaces themselves, and how much of each pixel they cover."""
     alpha = np.clip(image[..., 3:], 0, 1)
     surfaces = image[..., :3] if image.shape[2] == 3 else image[..., :3] / np.maximum(alpha, 1e-6)
-    shown = tone_map(np.asarray(surfaces, np.float32), exposure, tone_map_name)
-    return np.concatenate([to_bytes(shown), to_bytes(alpha)], axis=-1)
+    display = tone_map(np.asarray(surfaces, np.float32), exposure, tone_map_name)
+    return np.concatenate([to_bytes(display), to_bytes(alpha)], axis=-1)
 
 
 def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
     tags = PngInfo()
     if isinstance(tone_map_name, str) or "sRGB" in tone_map_name.display:
         tags.add(b"sRGB", b"\x00")  # to be shown perceptually
-    Image.fromarray(_displayed(image, exposure, tone_map_name)).save(path, "PNG", pnginfo=tags)
+    Image.fromarray(_to_display_bytes(image, exposure, tone_map_name)).save(path, "PNG", pnginfo=tags)
 
 
 def _write_webp(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
-    Image.fromarray(_displayed(image, exposure, tone_map_name)).save(path, "WEBP", quality=92, method=4)
+    Image.fromarray(_to_display_bytes(image, exposure, tone_map_name)).save(path, "WEBP", quality=92, method=4)
 
 
 _WRITERS: dict[str, Callable[[Path, F32, float, str | OcioView], None]] = {

@@ -21,7 +21,7 @@ Chromaticities = tuple[float, float, float, float, float, float, float, float]
 REC_709: Chromaticities = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 """ITU-R BT.709-6."""
 
-KNOWN: Mapping[str, Chromaticities] = {
+INTEROP_SPACES: Mapping[str, Chromaticities] = {
     "lin_rec709_scene": REC_709,
     "lin_ap0_scene": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),  # ACES2065-1
     "lin_ap1_scene": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),  # ACEScg
@@ -32,14 +32,14 @@ KNOWN: Mapping[str, Chromaticities] = {
 """Linear spaces in use, by the ids that files name them by (ASWF Color Interop Forum)."""
 
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
-_FURTHEST = 2.0  # of a coordinate from 0; primaries that enclose all colours are within 1.1
-_LEAST_WHITE = 0.1  # y of a white
-_LEAST_AREA = 0.01  # of the primaries' triangle, twice; Rec. 709 has 0.22
-_MOST_GAIN = 10.0  # of a channel in the result; of the widest primaries in use it is 2.5
-_SAME = 2e-3  # files round, and some write D65 with three digits
-_SAME_MATRIX = 5e-4  # of a matrix: AP1 and Rec. 2020, the most alike of those in use, differ by sixty times that
-_LEAST_SUM = 1e-6  # X + Y + Z of a primary
-_ROWS_AT_ONCE = 256
+_MAX_COORDINATE = 2.0  # of a coordinate from 0; primaries that enclose all colours are within 1.1
+_MIN_WHITE = 0.1  # y of a white
+_MIN_AREA = 0.01  # of the primaries' triangle, twice; Rec. 709 has 0.22
+_MAX_GAIN = 10.0  # of a channel in the result; of the widest primaries in use it is 2.5
+_TOLERANCE = 2e-3  # files round, and some write D65 with three digits
+_MATRIX_TOLERANCE = 5e-4  # of a matrix: AP1 and Rec. 2020, the most alike of those in use, differ by sixty times that
+_MIN_SUM = 1e-6  # X + Y + Z of a primary
+_STRIP_ROWS = 256
 
 
 def to_rec_709(chromaticities: Sequence[float]) -> F64 | None:
@@ -53,32 +53,32 @@ def to_rec_709(chromaticities: Sequence[float]) -> F64 | None:
         ValueError: no colours can be told by such primaries.
     """
     values = np.array(chromaticities, np.float64)
-    if values.shape != (8,) or not np.isfinite(values).all() or np.abs(values).max() > _FURTHEST:
+    if values.shape != (8,) or not np.isfinite(values).all() or np.abs(values).max() > _MAX_COORDINATE:
         raise ValueError("its chromaticities are no colours")
-    if np.abs(values - REC_709).max() <= _SAME:
+    if np.abs(values - REC_709).max() <= _TOLERANCE:
         return None
-    ours = _to_xyz(np.array(REC_709))
-    theirs = _to_xyz(values)
-    cones, own_cones = _BRADFORD @ theirs.sum(axis=1), _BRADFORD @ ours.sum(axis=1)
-    if cones.min() <= 0:
+    rec_709_to_xyz = _to_xyz(np.array(REC_709))
+    source_to_xyz = _to_xyz(values)
+    source_cones, rec_709_cones = _BRADFORD @ source_to_xyz.sum(axis=1), _BRADFORD @ rec_709_to_xyz.sum(axis=1)
+    if source_cones.min() <= 0:
         raise ValueError("its white is no colour")
-    adapted = np.linalg.solve(_BRADFORD, (own_cones / cones)[:, None] * _BRADFORD)
-    matrix = np.linalg.solve(ours, adapted @ theirs)
-    if not np.abs(matrix).max() <= _MOST_GAIN:
+    adapted = np.linalg.solve(_BRADFORD, (rec_709_cones / source_cones)[:, None] * _BRADFORD)
+    matrix = np.linalg.solve(rec_709_to_xyz, adapted @ source_to_xyz)
+    if not np.abs(matrix).max() <= _MAX_GAIN:
         raise ValueError("its primaries lie too close together")
     return np.asarray(matrix)
 
 
-def known_as(matrix: F64) -> str | None:
+def interop_id(matrix: F64) -> str | None:
     """The id of a linear space that is in use. matrix: what its red, green and blue are in Rec. 709. (3, 3), columns"""
-    for name, chromaticities in KNOWN.items():
-        theirs = to_rec_709(chromaticities)
-        if np.abs(matrix - (np.eye(3) if theirs is None else theirs)).max() <= _SAME_MATRIX:
+    for name, chromaticities in INTEROP_SPACES.items():
+        candidate = to_rec_709(chromaticities)
+        if np.abs(matrix - (np.eye(3) if candidate is None else candidate)).max() <= _MATRIX_TOLERANCE:
             return name
     return None
 
 
-def chromaticities_of(matrix: F64) -> Chromaticities:
+def chromaticities_from_matrix(matrix: F64) -> Chromaticities:
     """Primaries and white by which a file's reader finds the matrix: those that it has where the white is ours.
 
     Args:
@@ -86,14 +86,14 @@ def chromaticities_of(matrix: F64) -> Chromaticities:
     Raises:
         ValueError: no primaries do that.
     """
-    ours = _to_xyz(np.array(REC_709)) @ matrix
-    corners = np.column_stack([ours, ours.sum(axis=1)])
+    primaries_xyz = _to_xyz(np.array(REC_709)) @ matrix
+    corners = np.column_stack([primaries_xyz, primaries_xyz.sum(axis=1)])
     sums = corners.sum(axis=0)
-    if np.abs(sums).min() < _LEAST_SUM:
+    if np.abs(sums).min() < _MIN_SUM:
         raise ValueError("one of its primaries is no colour")
     values = (corners[:2] / sums).T.ravel()
-    found = to_rec_709(values)
-    if not np.allclose(np.eye(3) if found is None else found, matrix, atol=_SAME):
+    round_trip = to_rec_709(values)
+    if not np.allclose(np.eye(3) if round_trip is None else round_trip, matrix, atol=_TOLERANCE):
         raise ValueError("its white is not ours")
     return tuple(map(float, values))  # type: ignore[return-value]
 
@@ -107,8 +107,8 @@ def convert(pixels: F32, matrix: F64) -> None:
     """
     small = matrix.T.astype(np.float32)
     with np.errstate(invalid="ignore", over="ignore"):
-        for first in range(0, len(pixels), _ROWS_AT_ONCE):
-            rows = slice(first, first + _ROWS_AT_ONCE)
+        for first in range(0, len(pixels), _STRIP_ROWS):
+            rows = slice(first, first + _STRIP_ROWS)
             pixels[rows] = pixels[rows] @ small
 
 
@@ -117,9 +117,9 @@ def _to_xyz(values: F64) -> F64:
     x, y = values.reshape(4, 2).T
     corners = np.stack([x, y, 1 - x - y])
     primaries, white = corners[:, :3], corners[:, 3]
-    if abs(np.linalg.det(primaries)) < _LEAST_AREA or white[1] < _LEAST_WHITE:
+    if abs(np.linalg.det(primaries)) < _MIN_AREA or white[1] < _MIN_WHITE:
         raise ValueError("its primaries lie on a line, or its white is black")
-    shares = np.linalg.solve(primaries, white / white[1])
-    if shares.min() <= 0:
+    scales = np.linalg.solve(primaries, white / white[1])
+    if scales.min() <= 0:
         raise ValueError("its white is not among its primaries")
-    return np.asarray(primaries * shares)
+    return np.asarray(primaries * scales)

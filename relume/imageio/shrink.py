@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 
-def shrink(image: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+def downsample(image: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
     """A smaller image, each of its pixels the mean over the area that it covers.
 
     Args:

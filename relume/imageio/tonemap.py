@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError, ShapeMismatchError
-from relume.imageio.ocio.current import needed
+from relume.imageio.ocio.current import require_config
 from relume.imageio.ocio.view import OcioView
 from relume.parallel import for_ranges
 from relume.uncounted import UNCOUNTED
@@ -24,10 +24,10 @@ F32 = NDArray[np.float32]
 
 TONE_MAPS = ("none", "agx", "filmic")
 _AGX, _FILMIC = np.int64(1), np.int64(2)
-_ROWS_AT_ONCE = 1 << 15
+_PIXELS_PER_RANGE = 1 << 15
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_BRIGHTEST = np.float32(1e9)  # far above white in every map; keeps infinities out of the quotients
+_MAX_RADIANCE = np.float32(1e9)  # far above white in every map; keeps infinities out of the quotients
 _INSET = np.array(
     [
         [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
@@ -45,12 +45,12 @@ _OUTSET = np.array(
     np.float32,
 )
 _AGX_MIN_EV, _AGX_RANGE_EV = np.float32(-12.47393), np.float32(4.026069 + 12.47393)
-_DARKEST = np.float32(1e-10)  # has a logarithm, and lies below AGX_MIN_EV
+_MIN_RADIANCE = np.float32(1e-10)  # has a logarithm, and lies below AGX_MIN_EV
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _agx_curve(v):  # type: ignore[no-untyped-def]
-    x = min(max((math.log2(max(v, _DARKEST)) - _AGX_MIN_EV) / _AGX_RANGE_EV, _ZERO), _ONE)
+    x = min(max((math.log2(max(v, _MIN_RADIANCE)) - _AGX_MIN_EV) / _AGX_RANGE_EV, _ZERO), _ONE)
     p = np.float32(15.5) * x - np.float32(40.14)
     p = p * x + np.float32(31.96)
     p = p * x - np.float32(6.868)
@@ -79,7 +79,7 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
     for k in range(start, stop):
         for c in range(3):
             v = gain * pixels[k, c]
-            rgb[c] = min(v, _BRIGHTEST) if v > _ZERO else _ZERO  # NaN is not above zero
+            rgb[c] = min(v, _MAX_RADIANCE) if v > _ZERO else _ZERO  # NaN is not above zero
         if kind == _AGX:
             for c in range(3):
                 out[k, c] = _agx_curve(_INSET[c, 0] * rgb[0] + _INSET[c, 1] * rgb[1] + _INSET[c, 2] * rgb[2])
@@ -92,13 +92,13 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
                 out[k, c] = _srgb(_filmic(rgb[c]) if kind == _FILMIC else rgb[c])
 
 
-def tone_map(image: F32, exposure: float, name: str | OcioView, *, quick: bool = False) -> F32:
+def tone_map(image: F32, exposure: float, name: str | OcioView, *, use_table: bool = False) -> F32:
     """Display values of linear radiance, sRGB-encoded, or as a view's display has them.
 
     Args:
         image: linear Rec. 709; negative values and NaN are black. (height, width, 3) float32
         exposure: stops. name: one of TONE_MAPS, or a view of the config in use.
-        quick: views as the editor's shader shows them, by tables; else as the config does.
+        use_table: views as the editor's shader shows them, by tables; else as the config does.
     Returns:
         In [0, 1]. (height, width, 3) float32
     Raises:
@@ -107,19 +107,23 @@ def tone_map(image: F32, exposure: float, name: str | OcioView, *, quick: bool =
     if image.ndim != 3 or image.shape[2] != 3:
         raise ShapeMismatchError(f"an image has the shape (height, width, 3), not {image.shape}; reshape it")
     pixels, gain = np.ascontiguousarray(image, np.float32).reshape(-1, 3), np.float32(2.0**exposure)
-    shown = _viewed(pixels, gain, name, quick) if isinstance(name, OcioView) else _mapped(pixels, gain, name)
-    return shown.reshape(image.shape)
+    display = (
+        _apply_view(pixels, gain, name, use_table)
+        if isinstance(name, OcioView)
+        else _apply_tone_map(pixels, gain, name)
+    )
+    return display.reshape(image.shape)
 
 
-def _mapped(pixels: F32, gain: np.float32, name: str) -> F32:
+def _apply_tone_map(pixels: F32, gain: np.float32, name: str) -> F32:
     if name not in TONE_MAPS:
         raise ParameterError("tone_map", name, f"one of {', '.join(TONE_MAPS)}")
     out, kind = np.empty_like(pixels), TONE_MAPS.index(name)
-    for_ranges(lambda start, stop: _tone_map_rows(pixels, gain, kind, out, start, stop), len(pixels), _ROWS_AT_ONCE)
+    for_ranges(lambda start, stop: _tone_map_rows(pixels, gain, kind, out, start, stop), len(pixels), _PIXELS_PER_RANGE)
     return out
 
 
-def _viewed(pixels: F32, gain: np.float32, view: OcioView, quick: bool) -> F32:
-    shown = np.clip(np.nan_to_num(gain * pixels, nan=0.0), 0, _BRIGHTEST)
-    needed().show(shown, view, quick=quick)
-    return np.asarray(np.clip(np.nan_to_num(shown, copy=False), 0, 1), np.float32)
+def _apply_view(pixels: F32, gain: np.float32, view: OcioView, use_table: bool) -> F32:
+    display = np.clip(np.nan_to_num(gain * pixels, nan=0.0), 0, _MAX_RADIANCE)
+    require_config().apply_view(display, view, use_table=use_table)
+    return np.asarray(np.clip(np.nan_to_num(display, copy=False), 0, 1), np.float32)

@@ -15,15 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from relume.images.base_colour import Base, Document, ReadMaterial, base_of, places, scattered
-from relume.images.shelf import MadeOf, get_record, keep_made, texture_of
+from relume.images.base_colour import (
+    BaseColor,
+    Document,
+    ReadMaterial,
+    base_color_terms,
+    diffuse_fraction,
+    find_base_color,
+)
+from relume.images.shelf import ImageRecipe, get_record, load_texture, store_derived
 from relume.scene.coding import F64
-from relume.scene.gltf.blend import Blend
+from relume.scene.gltf.blend import MetallicBlend
 from relume.scene.gltf.raster import Raster
-from relume.scene.model import Coding, Texture
+from relume.scene.model import Texture, TextureEncoding
 
-_LEAST_F0 = 1e-4
-_LONGEST = 60  # of an image's name that those made of it begin with
+_MIN_F0 = 1e-4
+_MAX_NAME_LENGTH = 60  # of an image's name that those made of it begin with
 
 
 def with_metalness(
@@ -40,49 +47,53 @@ def with_metalness(
         ParameterError: the material has nothing that scatters light, or no highlight with f0.
         NotFoundError, SceneError: an image or the scene cannot be had, or the shelf is full.
     """
-    scatters, shines = places(terms)
-    base = base_of(terms[scatters[0]], terms[shines[0]], scene, material, read)
+    diffuse_indices, specular_indices = base_color_terms(terms)
+    base = find_base_color(terms[diffuse_indices[0]], terms[specular_indices[0]], scene, material, read)
     record = get_record(folder, image)
-    blend = _blend(base, texture_of(record.texture))
+    blend = _blend(base, load_texture(record.texture))
     _, highest, mean, _ = blend.f0_and_f90()
-    mean = np.maximum(mean, _LEAST_F0)
+    mean = np.maximum(mean, _MIN_F0)
 
-    def kept(channel: str, called: str, make: Callable[[], Texture]) -> str:
-        of = MadeOf(channel, record.texture, *_described(base))
-        return keep_made(folder, f"{record.name[:_LONGEST]}, {called}", of, make).texture
+    def store_texture(channel: str, suffix: str, compute: Callable[[], Texture]) -> str:
+        recipe = ImageRecipe(channel, record.texture, *_recipe_fields(base))
+        return store_derived(folder, f"{record.name[:_MAX_NAME_LENGTH]}, {suffix}", recipe, compute).texture
 
-    made = [dict(term) for term in terms]
-    diffuse = kept("diffuse", "what scatters", lambda: _times(blend.diffuse(), base.scale))
-    for place in scatters:
-        made[place]["texture"] = diffuse
-    made[scatters[0]]["color"] = _triple(base.factor * scattered(base.dielectric))  # what was metal scattered less
-    specular = kept("specular", "highlights", lambda: blend.f0_over(mean, highest))
-    for place in shines:
-        made[place]["texture"] = specular
-    shining = made[shines[0]]
-    shining["params"] = {**shining["params"], "f0": _triple(np.clip(mean, 0, 1))}
-    return made
+    new_terms = [dict(term) for term in terms]
+    diffuse = store_texture("diffuse", "what scatters", lambda: _scale_texture(blend.diffuse(), base.scale))
+    for index in diffuse_indices:
+        new_terms[index]["texture"] = diffuse
+    new_terms[diffuse_indices[0]]["color"] = _triple(
+        base.factor * diffuse_fraction(base.dielectric)
+    )  # what was metal scattered less
+    specular = store_texture("specular", "highlights", lambda: blend.normalized_f0(mean, highest))
+    for index in specular_indices:
+        new_terms[index]["texture"] = specular
+    specular_term = new_terms[specular_indices[0]]
+    specular_term["params"] = {**specular_term["params"], "f0": _triple(np.clip(mean, 0, 1))}
+    return new_terms
 
 
-def _blend(base: Base, metalness: Texture) -> Blend:
+def _blend(base: BaseColor, metalness: Texture) -> MetallicBlend:
     pixels = metalness.pixels
-    if metalness.coding is None:
+    if metalness.encoding is None:
         pixels = np.rint(255 * pixels.astype(np.float32)).astype(np.uint8)
     opaque = np.full((*pixels.shape[:2], 1), 255, np.uint8)
-    packed = np.concatenate([pixels, opaque], axis=-1), metalness.wrap
-    images = {"packed": packed} if base.pixels is None else {"base": base.pixels, "packed": packed}
+    metalness_image = np.concatenate([pixels, opaque], axis=-1), metalness.wrap
+    images = {"packed": metalness_image} if base.pixels is None else {"base": base.pixels, "packed": metalness_image}
     height, width = (max(image.shape[k] for image, _ in images.values()) for k in (0, 1))
-    return Blend(Raster(images, (height, width)), np.clip(base.factor * base.scale, 0, 1), base.dielectric, 1.0, 1.0)
+    return MetallicBlend(
+        Raster(images, (height, width)), np.clip(base.factor * base.scale, 0, 1), base.dielectric, 1.0, 1.0
+    )
 
 
-def _times(texture: Texture, scale: F64) -> Texture:
-    assert texture.coding is not None
-    red, green, blue = (scale * texture.coding.scale).tolist()
-    return replace(texture, coding=Coding("srgb", (red, green, blue)))
+def _scale_texture(texture: Texture, scale: F64) -> Texture:
+    assert texture.encoding is not None
+    red, green, blue = (scale * texture.encoding.scale).tolist()
+    return replace(texture, encoding=TextureEncoding("srgb", (red, green, blue)))
 
 
-def _described(base: Base) -> tuple[Any, ...]:
-    return base.said, base.scene, base.material, tuple(_triple(base.factor)), tuple(_triple(base.dielectric))
+def _recipe_fields(base: BaseColor) -> tuple[Any, ...]:
+    return base.source, base.scene, base.material, tuple(_triple(base.factor)), tuple(_triple(base.dielectric))
 
 
 def _triple(values: F64) -> list[float]:

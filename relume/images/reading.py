@@ -12,14 +12,14 @@ from PIL import Image
 from relume.errors import SceneError
 from relume.imageio.decoding import Decoder
 from relume.imageio.linear import EXR_MAGIC, read_pixels
-from relume.remarks import Remark, simplified, wrong
-from relume.scene.model import Coding, Texture
+from relume.remarks import ImportRemark, approximated, unsupported
+from relume.scene.model import Texture, TextureEncoding
 
 MAX_FILE_BYTES = 100_000_000
 MAX_SIDE = 4_096
 
 
-def read_image(path: Path, name: str) -> tuple[Texture, tuple[Remark, ...]]:
+def read_image(path: Path, name: str) -> tuple[Texture, tuple[ImportRemark, ...]]:
     """Read a file of an image, and say what was changed.
 
     Args:
@@ -29,43 +29,48 @@ def read_image(path: Path, name: str) -> tuple[Texture, tuple[Remark, ...]]:
     Raises:
         SceneError: none of the formats, damaged, or too large.
     """
-    what = f"image {name!r}"
+    label = f"image {name!r}"
     num_bytes = path.stat().st_size
     if num_bytes > MAX_FILE_BYTES:
-        raise SceneError(f"{what} has {num_bytes / 1e6:,.0f} MB, {MAX_FILE_BYTES / 1e6:,.0f} MB are taken; scale it")
+        raise SceneError(f"{label} has {num_bytes / 1e6:,.0f} MB, {MAX_FILE_BYTES / 1e6:,.0f} MB are taken; scale it")
     data = path.read_bytes()
     if data.startswith(EXR_MAGIC):
-        return _of_exr(data, what)
-    pixels = Decoder().decode(data, what)
-    kept, said = held(pixels[..., :3]), tuple[Remark, ...]()
-    if kept.shape != pixels[..., :3].shape:
-        sizes = [f"{of.shape[1]}×{of.shape[0]}" for of in (pixels, kept)]
-        said = (simplified(f"{what} is {sizes[0]}; it is kept as {sizes[1]}, each texel the mean of its own"),)
+        return _read_exr(data, label)
+    pixels = Decoder().decode(data, label)
+    limited, warnings = limit_size(pixels[..., :3]), tuple[ImportRemark, ...]()
+    if limited.shape != pixels[..., :3].shape:
+        sizes = [f"{array.shape[1]}×{array.shape[0]}" for array in (pixels, limited)]
+        warnings = (approximated(f"{label} is {sizes[0]}; it is kept as {sizes[1]}, each texel the mean of its own"),)
     if pixels[..., 3].min() < 255:
-        said = (*said, simplified(f"{what} is transparent somewhere; its colours are taken as they are there"))
-    return Texture(np.ascontiguousarray(kept), coding=Coding("srgb")), said
+        warnings = (
+            *warnings,
+            approximated(f"{label} is transparent somewhere; its colours are taken as they are there"),
+        )
+    return Texture(np.ascontiguousarray(limited), encoding=TextureEncoding("srgb")), warnings
 
 
-def held(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def limit_size(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Hold an image to `MAX_SIDE`, each texel the mean of its own. texels: (height, width, channels)"""
-    most = max(texels.shape[:2])
-    if most <= MAX_SIDE:
+    longest_side = max(texels.shape[:2])
+    if longest_side <= MAX_SIDE:
         return texels
-    return np.asarray(Image.fromarray(texels).reduce(-(-most // MAX_SIDE)))
+    return np.asarray(Image.fromarray(texels).reduce(-(-longest_side // MAX_SIDE)))
 
 
-def _check_size(what: str, width: int, height: int) -> None:
+def _check_size(label: str, width: int, height: int) -> None:
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-        raise SceneError(f"{what} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is taken, scale it down")
+        raise SceneError(f"{label} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is taken, scale it down")
 
 
-def _of_exr(data: bytes, what: str) -> tuple[Texture, tuple[Remark, ...]]:
-    pixels = read_pixels(data, ".exr", what, partial(_check_size, what))
-    said = []
+def _read_exr(data: bytes, label: str) -> tuple[Texture, tuple[ImportRemark, ...]]:
+    pixels = read_pixels(data, ".exr", label, partial(_check_size, label))
+    warnings = []
     broken = ~np.isfinite(pixels).all(axis=-1, keepdims=True)
     if broken.any():
-        said.append(wrong(f"{int(broken.sum()):,} texels of {what} are not finite; they are black now"))
-    held = np.clip(np.where(broken, np.float32(0), pixels), 0, 1)
-    if (held != pixels).any(axis=-1, keepdims=True)[~broken].any():
-        said.append(simplified(f"{what} reflects less than nothing or more than all somewhere; it is held to that"))
-    return Texture(held.astype(np.float16)), tuple(said)
+        warnings.append(unsupported(f"{int(broken.sum()):,} texels of {label} are not finite; they are black now"))
+    clamped = np.clip(np.where(broken, np.float32(0), pixels), 0, 1)
+    if (clamped != pixels).any(axis=-1, keepdims=True)[~broken].any():
+        warnings.append(
+            approximated(f"{label} reflects less than nothing or more than all somewhere; it is held to that")
+        )
+    return Texture(clamped.astype(np.float16)), tuple(warnings)

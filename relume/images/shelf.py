@@ -25,20 +25,20 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.brdf.channels import IMAGES, NormalMap, is_image
+from relume.brdf.channels import IMAGES, NormalMap, is_user_image
 from relume.color import srgb_encode
 from relume.imageio.files import png_bytes, to_bytes
 from relume.images.reading import MAX_SIDE, read_image
-from relume.memory import stored
-from relume.remarks import Remark, remark_of
-from relume.scene.model import WRAPS, Coding, Texture
+from relume.memory import asset_cached
+from relume.remarks import ImportRemark, warning_of
+from relume.scene.model import WRAPS, Texture, TextureEncoding
 
 THUMBNAIL_SIDE = 96
 _TEXELS, _THUMBNAIL = "texels.npy", "thumbnail.png"
-_LEAST_ROUGHNESS = 1 / 255  # of a mean: black images are smooth everywhere
+_MIN_MEAN_ROUGHNESS = 1 / 255  # of a mean: black images are smooth everywhere
 
 
-class MadeOf(NamedTuple):
+class ImageRecipe(NamedTuple):
     """What an image was made of that nobody sent, see `relume.images.metals`.
 
     Attributes:
@@ -60,7 +60,7 @@ class MadeOf(NamedTuple):
     @property
     def images(self) -> tuple[str, ...]:
         """The images among them."""
-        return tuple(name for name in (self.metalness, self.base) if is_image(name))
+        return tuple(name for name in (self.metalness, self.base) if is_user_image(name))
 
 
 @dataclass(frozen=True)
@@ -69,16 +69,16 @@ class ImageRecord:
 
     Attributes:
         created: seconds since 1970. size: width and height. warnings: what was changed, one sentence each.
-        roughness: the mean of it, as a map of roughness. made_of: other images; None where it was sent.
+        roughness: the mean of it, as a map of roughness. recipe: other images; None where it was sent.
     """
 
     id: str
     name: str
     created: float
     size: tuple[int, int]
-    warnings: tuple[Remark, ...]
+    warnings: tuple[ImportRemark, ...]
     roughness: float
-    made_of: MadeOf | None = None
+    recipe: ImageRecipe | None = None
 
     @property
     def texture(self) -> str:
@@ -86,7 +86,7 @@ class ImageRecord:
         return IMAGES.prefix + self.id
 
 
-def keep(folder: Path, source: Path, name: str) -> ImageRecord:
+def store(folder: Path, source: Path, name: str) -> ImageRecord:
     """Keep an image under the hash of its file; the same content twice is the same, its newest name wins.
 
     Args:
@@ -94,32 +94,37 @@ def keep(folder: Path, source: Path, name: str) -> ImageRecord:
     Raises:
         SceneError: the file cannot be used, or the store is full.
     """
-    texture, said = read_image(source, name)
+    texture, warnings = read_image(source, name)
 
-    def fill(made: Path) -> dict[str, Any]:
-        return _write(made, texture) | {"warnings": [remark.document() for remark in said]}
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        return _write(staged_folder, texture) | {"warnings": [remark.document() for remark in warnings]}
 
-    return get_record(folder, IMAGES.keep(folder, source, name, fill))
+    return get_record(folder, IMAGES.store(folder, source, name, fill))
 
 
-def keep_made(folder: Path, name: str, of: MadeOf, make: Callable[[], Texture]) -> ImageRecord:
+def store_derived(folder: Path, name: str, recipe: ImageRecipe, compute: Callable[[], Texture]) -> ImageRecord:
     """Keep an image that is made of others under the hash of what it is made of; one that is here is not made again.
 
     Args:
-        folder: of the asset store. name: what people call it. of: the others. make: its texels, bytes.
+        folder: of the asset store. name: what people call it. recipe: the others. compute: its texels, bytes.
     Raises:
-        SceneError: the store is full. And what `make` raises.
+        SceneError: the store is full. And what `compute` raises.
     """
 
-    def fill(made: Path) -> dict[str, Any]:
-        texture = make()
-        scale = (texture.coding or Coding("srgb")).scale
-        return _write(made, texture) | {"warnings": [], "made_of": of._asdict(), "scale": scale, "wrap": texture.wrap}
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        texture = compute()
+        scale = (texture.encoding or TextureEncoding("srgb")).scale
+        return _write(staged_folder, texture) | {
+            "warnings": [],
+            "made_of": recipe._asdict(),
+            "scale": scale,
+            "wrap": texture.wrap,
+        }
 
     with tempfile.TemporaryDirectory() as unfinished:
         source = Path(unfinished) / "made_of.json"
-        source.write_text(json.dumps(of._asdict(), sort_keys=True))
-        return get_record(folder, IMAGES.keep(folder, source, name, fill))
+        source.write_text(json.dumps(recipe._asdict(), sort_keys=True))
+        return get_record(folder, IMAGES.store(folder, source, name, fill))
 
 
 def _write(folder: Path, texture: Texture) -> dict[str, Any]:
@@ -127,7 +132,7 @@ def _write(folder: Path, texture: Texture) -> dict[str, Any]:
     height, width = texture.pixels.shape[:2]
     np.save(folder / _TEXELS, texture.pixels)
     (folder / _THUMBNAIL).write_bytes(_thumbnail(texture))
-    return {"size": [width, height], "roughness": _mean(_shares(texture))}
+    return {"size": [width, height], "roughness": _mean_fraction(_roughness_bytes(texture))}
 
 
 def records(folder: Path) -> list[ImageRecord]:
@@ -138,34 +143,36 @@ def records(folder: Path) -> list[ImageRecord]:
 def get_record(folder: Path, identity: str) -> ImageRecord:
     """One image. Raises NotFoundError; SceneError where its files are damaged."""
     path = IMAGES.path(folder, identity)
-    document = IMAGES.read(path)
+    document = IMAGES.load_record(path)
     size, warnings = document.get("size"), document.get("warnings")
     if not isinstance(warnings, list) or not isinstance(size, list) or [*map(type, size)] != [int, int]:
-        raise IMAGES.damaged(path)
-    said, roughness = tuple(map(remark_of, warnings)), document.get("roughness")
+        raise IMAGES.damaged_error(path)
+    parsed_warnings, roughness = tuple(map(warning_of, warnings)), document.get("roughness")
     if not isinstance(roughness, float):  # kept before images were maps of roughness
         roughness = mean_roughness(IMAGES.prefix + identity)
-    made = _made_of(document, path)
-    return ImageRecord(identity, document["name"], document["created"], (size[0], size[1]), said, roughness, made)
+    recipe = _parse_recipe(document, path)
+    return ImageRecord(
+        identity, document["name"], document["created"], (size[0], size[1]), parsed_warnings, roughness, recipe
+    )
 
 
-def made_of(name: str) -> MadeOf | None:
-    """What the image that a look names was made of; None where it was sent. Raises what `texture_of` raises."""
-    path = IMAGES.found(name)
-    return _made_of(IMAGES.read(path), path)
+def get_recipe(name: str) -> ImageRecipe | None:
+    """What the image that a look names was made of; None where it was sent. Raises what `load_texture` raises."""
+    path = IMAGES.resolve(name)
+    return _parse_recipe(IMAGES.load_record(path), path)
 
 
-def _made_of(document: dict[str, Any], path: Path) -> MadeOf | None:
-    """Written by `keep_made`: damaged where anything of it is missing."""
-    said = document.get("made_of")
+def _parse_recipe(document: dict[str, Any], path: Path) -> ImageRecipe | None:
+    """Written by `store_derived`: damaged where anything of it is missing."""
+    fields = document.get("made_of")
     try:
-        if said is None:
+        if fields is None:
             return None
-        of = MadeOf(**said)
-        (red, green, blue), (r, g, b) = of.factor, of.dielectric
-        return of._replace(factor=(red, green, blue), dielectric=(r, g, b))
+        recipe = ImageRecipe(**fields)
+        (red, green, blue), (r, g, b) = recipe.factor, recipe.dielectric
+        return recipe._replace(factor=(red, green, blue), dielectric=(r, g, b))
     except (TypeError, ValueError) as error:
-        raise IMAGES.damaged(path) from error
+        raise IMAGES.damaged_error(path) from error
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:
@@ -173,80 +180,82 @@ def thumbnail_path(folder: Path, identity: str) -> Path:
     return IMAGES.path(folder, identity) / _THUMBNAIL
 
 
-def texture_of(name: str) -> Texture:
+def load_texture(name: str) -> Texture:
     """What a term's `texture` names; its texels stay on the disk and are read where they are needed.
 
     Raises:
         NotFoundError: it is not here. SceneError: its files are damaged.
     """
-    return _load(IMAGES.found(name))
+    return _load(IMAGES.resolve(name))
 
 
-def roughness_of(name: str) -> Texture:
-    """What a term's `roughness_map` names: roughness over its mean. Raises what `texture_of` raises."""
-    return _load_roughness(IMAGES.found(name))
+def load_roughness_map(name: str) -> Texture:
+    """What a term's `roughness_map` names: roughness over its mean. Raises what `load_texture` raises."""
+    return _load_roughness(IMAGES.resolve(name))
 
 
-def normals_of(map_: NormalMap) -> Texture:
-    """What a material's `normal_map` names, `map_`: normals of tangent space. Raises what `texture_of` raises."""
-    return _load_normals(IMAGES.found(map_.image), map_.scale)
+def load_normal_map(map_: NormalMap) -> Texture:
+    """What a material's `normal_map` names, `map_`: normals of tangent space. Raises what `load_texture` raises."""
+    return _load_normals(IMAGES.resolve(map_.image), map_.scale)
 
 
 def mean_roughness(name: str) -> float:
-    """The mean of it, before it was divided by that. Raises what `texture_of` raises."""
-    return _load_mean(IMAGES.found(name))
+    """The mean of it, before it was divided by that. Raises what `load_texture` raises."""
+    return _load_mean(IMAGES.resolve(name))
 
 
-@stored("image of normals")
+@asset_cached("image of normals")
 def _load_normals(path: Path, scale: float) -> Texture:
     texture = _load(path)
-    return Texture(_bytes_of(texture), texture.wrap, Coding("normal", (scale, scale, 1.0)))
+    return Texture(_raw_bytes(texture), texture.wrap, TextureEncoding("normal", (scale, scale, 1.0)))
 
 
-@stored("image of roughness")
+@asset_cached("image of roughness")
 def _load_roughness(path: Path) -> Texture:
-    most = 1 / max(_load_mean(path), _LEAST_ROUGHNESS)
-    return Texture(_shares(_load(path)), coding=Coding("share", (most, most, most)))
+    inverse_mean = 1 / max(_load_mean(path), _MIN_MEAN_ROUGHNESS)
+    return Texture(
+        _roughness_bytes(_load(path)), encoding=TextureEncoding("share", (inverse_mean, inverse_mean, inverse_mean))
+    )
 
 
 @lru_cache(maxsize=1_000)
 def _load_mean(path: Path) -> float:
-    return _mean(_shares(_load(path)))
+    return _mean_fraction(_roughness_bytes(_load(path)))
 
 
-def _shares(texture: Texture) -> NDArray[np.uint8]:
+def _roughness_bytes(texture: Texture) -> NDArray[np.uint8]:
     """Roughness as bytes. (height, width, 1)"""
-    return np.ascontiguousarray(_bytes_of(texture, slice(1, 2)))
+    return np.ascontiguousarray(_raw_bytes(texture, slice(1, 2)))
 
 
-def _bytes_of(texture: Texture, channels: slice = slice(None)) -> NDArray[np.uint8]:
+def _raw_bytes(texture: Texture, channels: slice = slice(None)) -> NDArray[np.uint8]:
     """The numbers of its file, no display values, as bytes. (height, width, channels)"""
     values = texture.pixels[..., channels]
-    return values if texture.coding else np.rint(255 * values.astype(np.float32)).astype(np.uint8)
+    return values if texture.encoding else np.rint(255 * values.astype(np.float32)).astype(np.uint8)
 
 
-def _mean(shares: NDArray[np.uint8]) -> float:
-    return float(shares.mean() / 255)
+def _mean_fraction(roughness_bytes: NDArray[np.uint8]) -> float:
+    return float(roughness_bytes.mean() / 255)
 
 
-@stored("image file")
+@asset_cached("image file")
 def _load(path: Path) -> Texture:
-    texels = IMAGES.array(path, _TEXELS)
+    texels = IMAGES.open_array(path, _TEXELS)
     is_image = texels.ndim == 3 and texels.shape[2] == 3 and min(texels.shape[:2]) >= 1
     if not is_image or max(texels.shape[:2]) > MAX_SIDE or texels.dtype not in (np.uint8, np.float16):
-        raise IMAGES.damaged(path)
+        raise IMAGES.damaged_error(path)
     if texels.dtype == np.float16:
         return Texture(texels)
-    document = IMAGES.read(path)
+    document = IMAGES.load_record(path)
     scale, wrap = document.get("scale", [1.0, 1.0, 1.0]), document.get("wrap", ["repeat", "repeat"])
     if [*map(type, scale)] != 3 * [float] or len(wrap) != 2 or not set(wrap) <= set(WRAPS):
-        raise IMAGES.damaged(path)
-    return Texture(texels, (wrap[0], wrap[1]), Coding("srgb", (scale[0], scale[1], scale[2])))
+        raise IMAGES.damaged_error(path)
+    return Texture(texels, (wrap[0], wrap[1]), TextureEncoding("srgb", (scale[0], scale[1], scale[2])))
 
 
 def _thumbnail(texture: Texture) -> bytes:
     """A square of what it shows, as a list has room for. PNG"""
     pixels = texture.pixels
-    shown = pixels if texture.coding else to_bytes(srgb_encode(pixels.astype(np.float32)))
+    display = pixels if texture.encoding else to_bytes(srgb_encode(pixels.astype(np.float32)))
     size = THUMBNAIL_SIDE, THUMBNAIL_SIDE
-    return png_bytes(np.asarray(Image.fromarray(shown).resize(size, Image.Resampling.BOX)))
+    return png_bytes(np.asarray(Image.fromarray(display).resize(size, Image.Resampling.BOX)))

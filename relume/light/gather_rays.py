@@ -39,7 +39,7 @@ _STEP_U, _STEP_V = (np.uint32(round(2**32 / _PLASTIC**k)) for k in (3, 4))
 _PER_UNIT = np.float32(1 / (1 << 24))
 
 
-class Pattern(NamedTuple):
+class RayPattern(NamedTuple):
     """The rays of every point, before they are shifted.
 
     Attributes:
@@ -62,7 +62,7 @@ class Pattern(NamedTuple):
         return len(self.rays)
 
 
-def make_pattern(num_cosine: int, num_glossy: int, seed: int) -> Pattern:
+def make_pattern(num_cosine: int, num_glossy: int, seed: int) -> RayPattern:
     """Spread two sets of rays evenly.
 
     Args:
@@ -76,8 +76,8 @@ def make_pattern(num_cosine: int, num_glossy: int, seed: int) -> Pattern:
     uv = np.concatenate([_lattice(num_cosine), _lattice(num_glossy)])
     u, v = uv.T
     rays = np.stack([u, (1 + 1e3) ** u, np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)], axis=1)
-    sides = np.stack([_sides(num_cosine), _sides(max(1, num_glossy))])
-    return Pattern(
+    sides = np.stack([_shortest_lattice_vectors(num_cosine), _shortest_lattice_vectors(max(1, num_glossy))])
+    return RayPattern(
         uv.astype(np.float32), rays.astype(np.float32), num_cosine, sides.astype(np.float32), seed & 0x7FFFFFFF
     )
 
@@ -96,102 +96,102 @@ def _lattice(count: int) -> F64:
     return np.stack([(i + 0.5) / max(1, count), i * _step(count) % max(1, count) / max(1, count)], axis=1)
 
 
-def _sides(count: int) -> F64:
+def _shortest_lattice_vectors(count: int) -> F64:
     """Find the shortest two vectors between points of the lattice, by Lagrange's reduction. (2, 2)"""
-    short, long = np.array([1.0, _step(count)]) / count, np.array([0.0, 1.0])
+    shorter, longer = np.array([1.0, _step(count)]) / count, np.array([0.0, 1.0])
     while True:
-        if short @ short > long @ long:
-            short, long = long, short
-        times = round(float(short @ long / (short @ short)))
-        if times == 0:
-            return np.stack([short, long])
-        long = long - times * short
+        if shorter @ shorter > longer @ longer:
+            shorter, longer = longer, shorter
+        multiple = round(float(shorter @ longer / (shorter @ shorter)))
+        if multiple == 0:
+            return np.stack([shorter, longer])
+        longer = longer - multiple * shorter
 
 
 # What follows is inlined: a call would count references to the pattern's arrays, which threads share.
 @nb.njit(nogil=True, cache=True, inline="always")
-def shift_of(pattern, point):  # type: ignore[no-untyped-def]
+def cranley_patterson_offset(pattern, seed):  # type: ignore[no-untyped-def]
     """Find the shift of the unit square for a point, by its seed. Two float32 in [0, 1).
 
     Points that follow each other are neighbours in the picture, and their shifts a low-discrepancy sequence: together
     they see more than each alone, and what noise is left is as fine as the pixels.
     """
     start = np.uint32(pattern.seed) * np.uint32(0x9E3779B9)
-    u = np.uint32(start + np.uint32(point) * _STEP_U)
-    v = np.uint32(start + np.uint32(point) * _STEP_V)
+    u = np.uint32(start + np.uint32(seed) * _STEP_U)
+    v = np.uint32(start + np.uint32(seed) * _STEP_V)
     return np.float32(u >> np.uint32(8)) * _PER_UNIT, np.float32(v >> np.uint32(8)) * _PER_UNIT
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def _along(sides, s, t):  # type: ignore[no-untyped-def]
+def _along_lattice(sides, s, t):  # type: ignore[no-untyped-def]
     """Go s and t times along the two sides of a cell of a lattice: u, (1 + 1/ε)^u, cos 2πv and sin 2πv."""
     u = s * sides[0, 0] + t * sides[1, 0]
-    turn = np.float32(2) * _PI * (s * sides[0, 1] + t * sides[1, 1])
-    return np.float32(u), np.float32(math.exp(_LN * u)), np.float32(math.cos(turn)), np.float32(math.sin(turn))
+    azimuth = np.float32(2) * _PI * (s * sides[0, 1] + t * sides[1, 1])
+    return np.float32(u), np.float32(math.exp(_LN * u)), np.float32(math.cos(azimuth)), np.float32(math.sin(azimuth))
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def small_shifts_of(pattern, point):  # type: ignore[no-untyped-def]
+def lattice_offsets(pattern, seed):  # type: ignore[no-untyped-def]
     """Find a point's shift within a cell of each set's lattice: of u, (1 + 1/ε)^u, cos 2πv and sin 2πv."""
-    s, t = shift_of(pattern, point)
+    s, t = cranley_patterson_offset(pattern, seed)
     s, t = s - np.float32(0.5), t - np.float32(0.5)
-    return _along(pattern.sides[0], s, t), _along(pattern.sides[1], s, t)
+    return _along_lattice(pattern.sides[0], s, t), _along_lattice(pattern.sides[1], s, t)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def density_about_mirror(cos_theta_h, cos_theta_d):  # type: ignore[no-untyped-def]
+def glossy_pdf(cos_theta_h, cos_theta_d):  # type: ignore[no-untyped-def]
     """Compute p(ωi) of the glossy rays, 1/sr."""
-    away = np.float32(1) - cos_theta_h + _EPSILON
-    return np.float32(1) / (np.float32(8) * _PI * _LN * away * max(cos_theta_d, np.float32(1e-6)))
+    one_minus_cosine = np.float32(1) - cos_theta_h + _EPSILON
+    return np.float32(1) / (np.float32(8) * _PI * _LN * one_minus_cosine * max(cos_theta_d, np.float32(1e-6)))
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def cosine_ray(ray, shift):  # type: ignore[no-untyped-def]
+def cosine_ray(ray, offset):  # type: ignore[no-untyped-def]
     """Direct a cosine ray, in the frame x = tangent, y = n × t, z = n.
 
-    ray: a row of `Pattern.rays`. shift: of the set, from `small_shifts_of`.
+    ray: a row of `RayPattern.rays`. shift: of the set, from `lattice_offsets`.
     """
-    u = ray[0] + shift[0]
+    u = ray[0] + offset[0]
     u -= np.float32(u >= 1)
     u += np.float32(u < 0)
-    across = np.float32(math.sqrt(u))
-    x, y = ray[2] * shift[2] - ray[3] * shift[3], ray[3] * shift[2] + ray[2] * shift[3]
-    return across * x, across * y, np.float32(math.sqrt(np.float32(1) - u))
+    radius = np.float32(math.sqrt(u))
+    x, y = ray[2] * offset[2] - ray[3] * offset[3], ray[3] * offset[2] + ray[2] * offset[3]
+    return radius * x, radius * y, np.float32(math.sqrt(np.float32(1) - u))
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def glossy_ray(ray, shift, ox, oy, oz):  # type: ignore[no-untyped-def]
+def glossy_ray(ray, offset, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Direct a glossy ray in the same frame; it is below the horizon where it is not to be traced.
 
     Args:
-        ray: a row of `Pattern.rays`. shift: of the set, from `small_shifts_of`.
+        ray: a row of `RayPattern.rays`. offset: of the set, from `lattice_offsets`.
         ox, oy, oz: local wo, towards the viewer.
     """
-    u, grown = ray[0] + shift[0], ray[1] * shift[1]
-    grown *= np.float32(1 / 1001) if u >= 1 else (_GROWTH if u < 0 else np.float32(1))
-    away = max(np.float32(0), min(_EPSILON * (grown - np.float32(1)), np.float32(1)))
-    across = np.float32(math.sqrt(away * (np.float32(2) - away)))
-    x, y = ray[2] * shift[2] - ray[3] * shift[3], ray[3] * shift[2] + ray[2] * shift[3]
-    hx, hy, hz = across * x, across * y, np.float32(1) - away
-    twice = np.float32(2) * (ox * hx + oy * hy + oz * hz)
-    return twice * hx - ox, twice * hy - oy, twice * hz - oz
+    u, growth = ray[0] + offset[0], ray[1] * offset[1]
+    growth *= np.float32(1 / 1001) if u >= 1 else (_GROWTH if u < 0 else np.float32(1))
+    one_minus_cosine = max(np.float32(0), min(_EPSILON * (growth - np.float32(1)), np.float32(1)))
+    sine = np.float32(math.sqrt(one_minus_cosine * (np.float32(2) - one_minus_cosine)))
+    x, y = ray[2] * offset[2] - ray[3] * offset[3], ray[3] * offset[2] + ray[2] * offset[3]
+    hx, hy, hz = sine * x, sine * y, np.float32(1) - one_minus_cosine
+    twice_cosine = np.float32(2) * (ox * hx + oy * hy + oz * hz)
+    return twice_cosine * hx - ox, twice_cosine * hy - oy, twice_cosine * hz - oz
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def local_ray(pattern, ray, shifts, ox, oy, oz):  # type: ignore[no-untyped-def]
+def local_ray(pattern, ray, offsets, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Direct a ray of a point, in the point's local frame.
 
     Args:
         pattern: the rays of every point. ray: number of one of them.
-        shifts: the point's, from `small_shifts_of`. ox, oy, oz: local wo.
+        offsets: the point's, from `lattice_offsets`. ox, oy, oz: local wo.
     """
     if ray < pattern.num_cosine:
-        return cosine_ray(pattern.rays[ray], shifts[0])
-    return glossy_ray(pattern.rays[ray], shifts[1], ox, oy, oz)
+        return cosine_ray(pattern.rays[ray], offsets[0])
+    return glossy_ray(pattern.rays[ray], offsets[1], ox, oy, oz)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def weight_of(pattern, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+def ray_weight(pattern, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Weigh a ray: cos θi over the expected number of rays per solid angle, sr.
 
     Args:
@@ -204,5 +204,5 @@ def weight_of(pattern, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     hx, hy, hz = ix + ox, iy + oy, iz + oz
     length = math.sqrt(hx * hx + hy * hy + hz * hz)
     cos_theta_h = min(hz / max(length, np.float32(1e-6)), np.float32(1))
-    about_mirror = density_about_mirror(cos_theta_h, np.float32(0.5) * length)
-    return iz / (num_cosine * iz / _PI + num_glossy * about_mirror)
+    pdf = glossy_pdf(cos_theta_h, np.float32(0.5) * length)
+    return iz / (num_cosine * iz / _PI + num_glossy * pdf)

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 F64 = NDArray[np.float64]
 Codes = NDArray[np.uint64]
 
-_FIRST_INNER = 32  # codes of tiles below are octants
+_FIRST_INNER_CODE = 32  # codes of tiles below are octants
 
 
-def inner_nodes(codes: Codes, values: F64) -> tuple[Codes, F64]:
+def sum_inner_nodes(codes: Codes, values: F64) -> tuple[Codes, F64]:
     """Find the nodes above tiles, and sum what lies below each.
 
     Args:
@@ -19,25 +19,25 @@ def inner_nodes(codes: Codes, values: F64) -> tuple[Codes, F64]:
     Returns:
         Codes of N nodes, none of them a tile, in order; and sums (K, N).
     """
-    nodes, sums = [np.empty(0, np.uint64)], [values[:, :0]]
-    while (is_deeper := codes >= _FIRST_INNER).any():
+    ancestors, sums = [np.empty(0, np.uint64)], [values[:, :0]]
+    while (is_deeper := codes >= _FIRST_INNER_CODE).any():
         codes, values = codes[is_deeper] >> np.uint64(2), values[:, is_deeper]
-        nodes.append(codes)
+        ancestors.append(codes)
         sums.append(values)
-    found, place = np.unique(np.concatenate(nodes), return_inverse=True)
-    below = np.concatenate(sums, axis=1)
-    return found, np.array([np.bincount(place, row, len(found)) for row in below])
+    inner_codes, node_index = np.unique(np.concatenate(ancestors), return_inverse=True)
+    leaf_values = np.concatenate(sums, axis=1)
+    return inner_codes, np.array([np.bincount(node_index, row, len(inner_codes)) for row in leaf_values])
 
 
-def highest(codes: Codes, split: Codes) -> Codes:
+def highest_ancestors(codes: Codes, split_codes: Codes) -> Codes:
     """Find the node above each tile under which nothing is split: the highest below those that are. (M,)
 
     Args:
-        codes: of the tiles. (M,) split: nodes that do not stand for what lies below them, with all above them.
+        codes: of the tiles. (M,) split_codes: nodes that do not stand for what lies below them, with all above them.
     """
-    found = codes.copy()
+    ancestors = codes.copy()
     while True:
-        rises = (found >= _FIRST_INNER) & ~np.isin(found >> np.uint64(2), split)
-        if not rises.any():
-            return found
-        found[rises] >>= np.uint64(2)
+        can_rise = (ancestors >= _FIRST_INNER_CODE) & ~np.isin(ancestors >> np.uint64(2), split_codes)
+        if not can_rise.any():
+            return ancestors
+        ancestors[can_rise] >>= np.uint64(2)

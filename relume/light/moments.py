@@ -19,7 +19,7 @@ from relume.uncounted import UNCOUNTED
 F64 = NDArray[np.float64]
 
 
-class Texels(NamedTuple):
+class LightTexels(NamedTuple):
     """The texels of an environment, or other small places, and the tiles they lie in.
 
     Attributes:
@@ -38,26 +38,28 @@ class Texels(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
-def _sum(tile, luminous, directions, solid_angles, place_of, per, mean, frames, out):  # type: ignore[no-untyped-def]
+def _sum_moments(tile, luminous, directions, solid_angles, fitted_index, inverse_light, mean, frames, out):  # type: ignore[no-untyped-def]
     """Sum w x, w x xᵀ and w Ω of the texels of each fitted tile. out: added to. (F, 6)"""
     for n in range(tile.shape[0]):
-        place = place_of[tile[n]]
-        if place < 0:
+        row = fitted_index[tile[n]]
+        if row < 0:
             continue
         x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
-        height = x * mean[place, 0] + y * mean[place, 1] + z * mean[place, 2]
-        u = (x * frames[place, 0, 0] + y * frames[place, 0, 1] + z * frames[place, 0, 2]) / height
-        v = (x * frames[place, 1, 0] + y * frames[place, 1, 1] + z * frames[place, 1, 2]) / height
-        weight = luminous[n] * per[place]
-        out[place, 0] += weight * u
-        out[place, 1] += weight * v
-        out[place, 2] += weight * u * u
-        out[place, 3] += weight * u * v
-        out[place, 4] += weight * v * v
-        out[place, 5] += weight * solid_angles[n]
+        height = x * mean[row, 0] + y * mean[row, 1] + z * mean[row, 2]
+        u = (x * frames[row, 0, 0] + y * frames[row, 0, 1] + z * frames[row, 0, 2]) / height
+        v = (x * frames[row, 1, 0] + y * frames[row, 1, 1] + z * frames[row, 1, 2]) / height
+        weight = luminous[n] * inverse_light[row]
+        out[row, 0] += weight * u
+        out[row, 1] += weight * v
+        out[row, 2] += weight * u * u
+        out[row, 3] += weight * u * v
+        out[row, 4] += weight * v * v
+        out[row, 5] += weight * solid_angles[n]
 
 
-def moments_of(texels: Texels, total: F64, mean: F64, frames: F64, fitted: NDArray[np.intp]) -> tuple[F64, F64]:
+def compute_moments(
+    texels: LightTexels, total: F64, mean: F64, frames: F64, fitted: NDArray[np.intp]
+) -> tuple[F64, F64]:
     """Find m and S of some tiles.
 
     Args:
@@ -67,25 +69,27 @@ def moments_of(texels: Texels, total: F64, mean: F64, frames: F64, fitted: NDArr
     Returns:
         m (F, 2) and S (F, 2, 2)
     """
-    place_of = np.full(int(max(texels.tile.max(initial=-1), fitted.max(initial=-1))) + 1, -1, np.int32)
-    place_of[fitted] = np.arange(len(fitted))
+    fitted_index = np.full(int(max(texels.tile.max(initial=-1), fitted.max(initial=-1))) + 1, -1, np.int32)
+    fitted_index[fitted] = np.arange(len(fitted))
     sums = np.zeros((len(fitted), 6))
     tile, luminous, directions, solid_angles = map(np.ascontiguousarray, texels)
-    _sum(tile, luminous, directions, solid_angles, place_of, 1 / total, mean, frames, sums)
+    _sum_moments(tile, luminous, directions, solid_angles, fitted_index, 1 / total, mean, frames, sums)
     (x, y), (xx, xy, yy, extent) = sums.T[:2], sums.T[2:]
-    own = extent / 12
-    return sums[:, :2], np.stack([xx - x * x + own, xy - x * y, xy - x * y, yy - y * y + own], axis=1).reshape(-1, 2, 2)
+    texel_variance = extent / 12
+    return sums[:, :2], np.stack(
+        [xx - x * x + texel_variance, xy - x * y, xy - x * y, yy - y * y + texel_variance], axis=1
+    ).reshape(-1, 2, 2)
 
 
-def moments_numpy(texels: Texels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:
-    """Do as `moments_of` for one tile, in plain NumPy: its oracle.
+def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:
+    """Do as `compute_moments` for one tile, in plain NumPy: its oracle.
 
     Args:
         texels: of all tiles. mean: n of this one. (3,) frame: its t. (2, 3) tile: its number.
     """
     _, luminous, directions, solid_angles = (each[texels.tile == tile] for each in texels)
-    share = luminous / luminous.sum()
+    weight = luminous / luminous.sum()
     position = directions @ frame.T / (directions @ mean)[:, None]
-    centre = share @ position
-    off = position - centre
-    return centre, np.einsum("n,ni,nj->ij", share, off, off) + np.eye(2) * (share @ solid_angles) / 12
+    center = weight @ position
+    offset = position - center
+    return center, np.einsum("n,ni,nj->ij", weight, offset, offset) + np.eye(2) * (weight @ solid_angles) / 12

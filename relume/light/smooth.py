@@ -18,27 +18,27 @@ from relume.light.triangles import TriangleLights
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_MISSED = 0.03  # of all light: what neither harmonics nor triangles tell
-_ROUNDS = 8
-_LEAST = 0.003  # of the mean triangle's light: differences below it count as squares
+_MAX_RESIDUAL_FRACTION = 0.03  # of all light: what neither harmonics nor triangles tell
+_NUM_ROUNDS = 8
+_MIN_DIFFERENCE_FRACTION = 0.003  # of the mean triangle's light: differences below it count as squares
 _DAMPING = 1e-6
 
 
-class Divided(NamedTuple):
+class FrequencySplit(NamedTuple):
     """Light of M triangles.
 
     Attributes:
-        smooth: coefficients of its smooth part. (NUM_HARMONICS, 3) float32
-        chosen: triangles that differ from it. (N,) intp
-        beyond: these, with what they differ by, below nothing too.
+        low_frequency: coefficients of its smooth part. (NUM_HARMONICS, 3) float32
+        residual_triangles: triangles that differ from it. (N,) intp
+        residual: these, with what they differ by, below nothing too.
     """
 
-    smooth: F32
-    chosen: NDArray[np.intp]
-    beyond: TriangleLights
+    low_frequency: F32
+    residual_triangles: NDArray[np.intp]
+    residual: TriangleLights
 
 
-def divide(lights: TriangleLights, basis: F64) -> Divided:
+def split_frequencies(lights: TriangleLights, basis: F64) -> FrequencySplit:
     """Divide light into what is smooth and the triangles that differ from that.
 
     Args:
@@ -47,32 +47,36 @@ def divide(lights: TriangleLights, basis: F64) -> Divided:
         As few triangles as leave `_MISSED` of all light or less untold.
     """
     light = lights.irradiance.astype(np.float64)
-    whole = float(np.abs(light).sum())
-    if whole == 0:
-        return Divided(np.zeros((NUM_HARMONICS, 3), np.float32), np.empty(0, np.intp), lights.none())
-    smooth = _fitted(basis, light, whole)
-    beyond = light - basis @ smooth
-    size = np.abs(beyond).sum(axis=1)
+    total = float(np.abs(light).sum())
+    if total == 0:
+        return FrequencySplit(np.zeros((NUM_HARMONICS, 3), np.float32), np.empty(0, np.intp), lights.empty())
+    low_frequency = _fit_harmonics(basis, light, total)
+    residual = light - basis @ low_frequency
+    size = np.abs(residual).sum(axis=1)
     order = np.argsort(-size, kind="stable")
-    left = _left_without(size[order])
-    chosen = np.sort(order[: int(np.argmax(left <= _MISSED * whole))])
-    return Divided(smooth.astype(np.float32), chosen, lights.some(chosen, beyond[chosen].astype(np.float32)))
+    tail = _tail_sums(size[order])
+    residual_triangles = np.sort(order[: int(np.argmax(tail <= _MAX_RESIDUAL_FRACTION * total))])
+    return FrequencySplit(
+        low_frequency.astype(np.float32),
+        residual_triangles,
+        lights.select(residual_triangles, residual[residual_triangles].astype(np.float32)),
+    )
 
 
-def _left_without(sizes: F64) -> F64:
+def _tail_sums(sizes: F64) -> F64:
     """What is left of some sizes (n,) without the first 0, 1, … n of them. (n + 1,)"""
     return np.asarray(np.concatenate([np.cumsum(sizes[::-1])[::-1], [0.0]]))
 
 
-def _fitted(basis: F64, light: F64, whole: float) -> F64:
+def _fit_harmonics(basis: F64, light: F64, total: float) -> F64:
     """Make Σ |light − basis · c| small, by least squares whose weights follow the differences. (harmonics, 3)"""
-    least = _LEAST * whole / len(light)
-    weight = np.full(len(light), 1 / least)
-    found = np.zeros((basis.shape[1], light.shape[1]))
-    for _ in range(_ROUNDS):
-        weighed = basis * weight[:, None]
-        normal = weighed.T @ basis
+    min_difference = _MIN_DIFFERENCE_FRACTION * total / len(light)
+    weight = np.full(len(light), 1 / min_difference)
+    coefficients = np.zeros((basis.shape[1], light.shape[1]))
+    for _ in range(_NUM_ROUNDS):
+        weighted_basis = basis * weight[:, None]
+        normal = weighted_basis.T @ basis
         normal += _DAMPING * np.trace(normal) / len(normal) * np.eye(len(normal))
-        found = np.linalg.solve(normal, weighed.T @ light)
-        weight = 1 / np.maximum(np.abs(light - basis @ found).sum(axis=1), least)
-    return found
+        coefficients = np.linalg.solve(normal, weighted_basis.T @ light)
+        weight = 1 / np.maximum(np.abs(light - basis @ coefficients).sum(axis=1), min_difference)
+    return coefficients

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from relume.color import luminance
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.errors import PlanError
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
@@ -29,9 +29,9 @@ MAX_DEPTH = 28  # of the hierarchy: what a code of 64 bits holds
 # Agarwal 2003 use ΔΩ^(1/4) against the error of shadows; highlights show the map itself, so that size counts more
 # here, and a little of plain solid angle is added, weighted by the mean radiance (docs/adr/0010-light-metric.md).
 SOLID_ANGLE_EXPONENT = 0.4
-UNIFORM_SHARE = 1e-2
+UNIFORM_FRACTION = 1e-2
 # Light that may come to any azimuth has more dim places where a lamp may arrive (docs/adr/0013-relightable-bakes.md).
-_RELIGHTABLE_UNIFORM_SHARE = 0.1
+_RELIGHTABLE_UNIFORM_FRACTION = 0.1
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
 # counter-clockwise seen from outside, and so are all their descendants; in the order of the signs of x, y, z
@@ -77,7 +77,7 @@ class Tiles:
         return _corners(self.codes)
 
     @cached_property
-    def along(self) -> NDArray[np.uint64]:
+    def traversal_key(self) -> NDArray[np.uint64]:
         """Numbers that rise along a way through all tiles, which leaves no node before it was in all of it. (M,)"""
         levels = np.array([(code.bit_length() - 4) // 2 for code in map(int, self.codes)], np.uint64)
         return self.codes << (2 * (MAX_DEPTH - levels)).astype(np.uint64)
@@ -95,9 +95,11 @@ class Tiles:
     def locate(self, directions: F64) -> NDArray[np.int32]:
         """Find the tile that each direction (n, 3) lies in; a direction on an edge has exactly one. (n,) int32"""
         edges, children = self._tree
-        found = np.empty(len(directions), np.int32)
-        for_shares(lambda start, stop: _locate(directions, edges, children, start, stop, found), len(directions))
-        return found
+        tile_index = np.empty(len(directions), np.int32)
+        parallel_for_chunks(
+            lambda start, stop: _locate(directions, edges, children, start, stop, tile_index), len(directions)
+        )
+        return tile_index
 
     @cached_property
     def _tree(self) -> tuple[F64, NDArray[np.int32]]:
@@ -132,8 +134,8 @@ def _corners(codes: NDArray[np.uint64]) -> F64:
 
 def _children(corners: F64) -> F64:
     """Find the corners of the four children of triangles (n, 3, 3). (n, 4, 3, 3)"""
-    six = np.concatenate([corners, _middles(corners)], axis=1)
-    return np.asarray(six[:, _CHILDREN], np.float64)
+    six_points = np.concatenate([corners, _middles(corners)], axis=1)
+    return np.asarray(six_points[:, _CHILDREN], np.float64)
 
 
 def _middles(corners: F64) -> F64:
@@ -161,30 +163,30 @@ def _child(d, edges):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _locate(directions, edges, children, start, stop, found):  # type: ignore[no-untyped-def]
+def _locate(directions, edges, children, start, stop, tile_index):  # type: ignore[no-untyped-def]
     for n in range(start, stop):
         d = directions[n]
         node = 4 * (d[0] >= 0) + 2 * (d[1] >= 0) + (d[2] >= 0)
         while node >= 0:
             node = children[node, _child(d, edges[node])]
-        found[n] = -1 - node
+        tile_index[n] = -1 - node
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _split(texels, directions, edges, child_of):  # type: ignore[no-untyped-def]
+def _find_children(texels, directions, edges, child_index):  # type: ignore[no-untyped-def]
     for k in range(texels.shape[0]):
-        child_of[k] = _child(directions[texels[k]], edges)
+        child_index[k] = _child(directions[texels[k]], edges)
 
 
 class _Subdivision:
     """The growing hierarchy: a heap of leaves by metric."""
 
-    def __init__(self, radiance: F32, uniform_share: float) -> None:
+    def __init__(self, radiance: F32, uniform_fraction: float) -> None:
         height, width, _ = radiance.shape
         self.directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64)
         self.solid_angles = np.repeat(texel_solid_angles(height, width), width)
         self.luminous = luminance(radiance.reshape(-1, 3)).astype(np.float64) * self.solid_angles
-        self.uniform = uniform_share * float(self.luminous.sum()) / (4 * np.pi)
+        self.uniform = uniform_fraction * float(self.luminous.sum()) / (4 * np.pi)
         self.heap: list[tuple[float, int, int, F64, NDArray[np.int64]]] = []
         self.count = 0
         sign = (self.directions >= 0).astype(np.int64)
@@ -206,10 +208,10 @@ class _Subdivision:
         if self.heap[0][0] == 0.0:
             return False
         _, _, code, corners, texels = heapq.heappop(self.heap)
-        child_of = np.empty(len(texels), np.int8)
-        _split(texels, self.directions, _middle_edges(corners[None])[0], child_of)
-        for child, its_corners in enumerate(_children(corners[None])[0]):
-            self._push(4 * code + child, its_corners, texels[child_of == child])
+        child_index = np.empty(len(texels), np.int8)
+        _find_children(texels, self.directions, _middle_edges(corners[None])[0], child_index)
+        for child, child_corners in enumerate(_children(corners[None])[0]):
+            self._push(4 * code + child, child_corners, texels[child_index == child])
         return True
 
 
@@ -228,9 +230,9 @@ def choose_tiles(radiance: F32, num_lights: int, relightable: bool = False) -> T
         raise PlanError(f"{num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
     if relightable:
         ring = radiance.mean(axis=1, keepdims=True, dtype=np.float64).astype(np.float32)
-        tree = _Subdivision(np.broadcast_to(ring, radiance.shape), _RELIGHTABLE_UNIFORM_SHARE)
+        tree = _Subdivision(np.broadcast_to(ring, radiance.shape), _RELIGHTABLE_UNIFORM_FRACTION)
     else:
-        tree = _Subdivision(radiance, UNIFORM_SHARE)
+        tree = _Subdivision(radiance, UNIFORM_FRACTION)
     while len(tree.heap) + 3 <= num_lights and tree.split_largest():
         pass
     leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbours together

@@ -6,9 +6,9 @@ from relume.look.model import (
     EnvironmentKey,
     LightGeometry,
     LightLook,
+    LightPaths,
     Look,
     MaterialLook,
-    Paths,
     TermLook,
 )
 from relume.look.patch import apply_patch
@@ -18,9 +18,9 @@ __all__ = [
     "EnvironmentKey",
     "LightGeometry",
     "LightLook",
+    "LightPaths",
     "Look",
     "MaterialLook",
-    "Paths",
     "TermLook",
     "apply_patch",
     "complete",

@@ -10,16 +10,16 @@ import jsonpointer
 Operation = dict[str, Any]
 
 
-def difference(before: Mapping[str, Any], after: Mapping[str, Any], but: Collection[str] = ()) -> list[Operation]:
+def diff_looks(before: Mapping[str, Any], after: Mapping[str, Any], excluded: Collection[str] = ()) -> list[Operation]:
     """The operations `add`, `remove` and `replace` of a JSON Patch that lead from a look to another.
 
     Lists of objects of one length are compared object by object; any other list is one value, as is each edited curve
     of a term: half of a drawn curve never travels alone. Parts that both share are not looked into.
 
     Args:
-        before: a look document. after: another. but: sections that are left out.
+        before: a look document. after: another. excluded: sections that are left out.
     """
-    names = [name for name in {**before, **after} if name not in but]
+    names = [name for name in {**before, **after} if name not in excluded]
     return list(_members((), before, after, names))
 
 
@@ -42,20 +42,20 @@ def _changes(path: tuple[str, ...], before: Any, after: Any) -> Iterator[Operati
     is_curve = len(path) > 1 and path[-2] == "curves"
     if isinstance(before, Mapping) and isinstance(after, Mapping) and not is_curve:
         yield from _members(path, before, after, list({**before, **after}))
-    elif _are_alike(before, after):
+    elif _are_aligned_lists(before, after):
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
             yield from _changes((*path, str(k)), old, new)
     elif before != after:
         yield {"op": "replace", "path": _pointer(path), "value": after}
 
 
-def _are_alike(before: Any, after: Any) -> bool:
+def _are_aligned_lists(before: Any, after: Any) -> bool:
     """Whether both are lists of as many objects."""
     return (
         isinstance(before, list | tuple)
         and isinstance(after, list | tuple)
         and len(before) == len(after)
-        and all(isinstance(each, Mapping) for each in (*before, *after))
+        and all(isinstance(item, Mapping) for item in (*before, *after))
     )
 
 

@@ -8,11 +8,11 @@ from typing import Any, get_args
 from relume import environments
 from relume.brdf.channels import check_image, check_shared
 from relume.brdf.document import complete_term
-from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, fail, names_text
+from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, invalid_value, names_text
 from relume.errors import ParameterError
 from relume.imageio.ocio.view import MAX_NAME
 from relume.look.lights import MAX_SCALE, complete_lights, default_lights
-from relume.look.model import Backdrop, Look, Show, ToneMap
+from relume.look.model import BackgroundKind, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
@@ -43,7 +43,7 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
         "materials": {
             material.name: {
                 "terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ()),
-                **({"catcher": True} if material.catcher else {}),
+                **({"catcher": True} if material.shadow_catcher else {}),
             }
             for material in scene_materials
         },
@@ -71,137 +71,145 @@ def validate(document: Mapping[str, Any], default: Mapping[str, Any]) -> Look:
     return Look.model_validate(complete(document, default))
 
 
-def complete_changes(partial: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
+def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
     """`complete`, checking only what an edit changed, which is little.
 
     Args:
         partial: the look after an edit; anything.
         default: the complete look of the scene that nobody has edited.
-        known: a valid document; what is part of it, as an object, is not checked again.
+        previous: a valid document; what is part of it, as an object, is not checked again.
     Returns:
-        A document that shares with `known` all that did not change.
+        A document that shares with `previous` all that did not change.
     Raises:
         ParameterError: as `complete` does.
     """
     check_object((), partial, _SECTIONS)
     return {
-        "materials": _complete_materials(partial.get("materials", {}), default["materials"], known["materials"]),
+        "materials": _complete_materials(partial.get("materials", {}), default["materials"], previous["materials"]),
         "environment": _complete_environment(
-            partial.get("environment", {}), default["environment"], known["environment"]
+            partial.get("environment", {}), default["environment"], previous["environment"]
         ),
         "background": _complete_background(partial.get("background", {}), default.get("background", {})),
-        "lights": complete_lights(partial.get("lights", {}), default["lights"], known["lights"]),
+        "lights": complete_lights(partial.get("lights", {}), default["lights"], previous["lights"]),
         "transport": _complete_transport(partial.get("transport", {}), default.get("transport", {})),
         "display": _complete_display(partial.get("display", {}), default["display"]),
     }
 
 
-def _complete_materials(given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
-    _check_names(("materials",), given, default, "material")
-    return {name: _complete_material(name, given.get(name, default[name]), default, known) for name in default}
+def _complete_materials(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
+    _check_names(("materials",), partial, default, "material")
+    return {name: _complete_material(name, partial.get(name, default[name]), default, previous) for name in default}
 
 
-def _complete_material(name: str, given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> Any:
-    if given is known[name] or given is default[name]:
-        return given
+def _complete_material(name: str, partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> Any:
+    if partial is previous[name] or partial is default[name]:
+        return partial
     pointer: Pointer = ("materials", name)
-    merged = _merged(pointer, given, {**default[name], "normal_map": None})  # only a scene's ground may be a catcher
-    if not isinstance(merged.get("catcher", True), bool):
-        raise fail((*pointer, "catcher"), merged["catcher"], "true or false")
-    normals = _complete_normals((*pointer, "normal_map"), merged.pop("normal_map", None))
-    return {**merged, "terms": _complete_terms((*pointer, "terms"), merged["terms"], known[name]["terms"]), **normals}
+    fields = _merge(pointer, partial, {**default[name], "normal_map": None})  # only a scene's ground may be a catcher
+    if not isinstance(fields.get("catcher", True), bool):
+        raise invalid_value((*pointer, "catcher"), fields["catcher"], "true or false")
+    normals = _complete_normals((*pointer, "normal_map"), fields.pop("normal_map", None))
+    return {
+        **fields,
+        "terms": _complete_terms((*pointer, "terms"), fields["terms"], previous[name]["terms"]),
+        **normals,
+    }
 
 
-def _complete_normals(pointer: Pointer, given: Any) -> dict[str, Any]:
+def _complete_normals(pointer: Pointer, partial: Any) -> dict[str, Any]:
     """The image in the place of a material's normal map, with its scale; left out where there is none."""
-    if given is None:
+    if partial is None:
         return {}
-    merged = _merged(pointer, given, {"image": None, "scale": 1.0})
-    check_number((*pointer, "scale"), merged["scale"], *NORMAL_SCALE)
-    return {"normal_map": {**merged, "image": check_image((*pointer, "image"), merged["image"])}}
+    fields = _merge(pointer, partial, {"image": None, "scale": 1.0})
+    check_number((*pointer, "scale"), fields["scale"], *NORMAL_SCALE)
+    return {"normal_map": {**fields, "image": check_image((*pointer, "image"), fields["image"])}}
 
 
-def _complete_terms(pointer: Pointer, given: Any, known: Sequence[Any]) -> list[Any]:
-    if not isinstance(given, list | tuple) or len(given) > MAX_TERMS:
-        raise fail(pointer, given, f"a list of at most {MAX_TERMS} terms")
-    before = [*known, *[None] * (len(given) - len(known))]
+def _complete_terms(pointer: Pointer, partial: Any, previous: Sequence[Any]) -> list[Any]:
+    if not isinstance(partial, list | tuple) or len(partial) > MAX_TERMS:
+        raise invalid_value(pointer, partial, f"a list of at most {MAX_TERMS} terms")
+    previous_terms = [*previous, *[None] * (len(partial) - len(previous))]
     terms = [
-        term if term is was and was is not None else complete_term((*pointer, k), term, was)
-        for k, (term, was) in enumerate(zip(given, before, strict=False))
+        term
+        if term is previous_term and previous_term is not None
+        else complete_term((*pointer, k), term, previous_term)
+        for k, (term, previous_term) in enumerate(zip(partial, previous_terms, strict=False))
     ]
     check_shared(pointer, terms)
     return terms
 
 
-def _complete_environment(given: Any, default: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any]:
-    merged = _merged(("environment",), given, {**DEFAULTS["environment"], **default})  # older stores name no map
-    if merged["map"] != known.get("map"):
-        _check_map(("environment", "map"), merged["map"])
+def _complete_environment(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
+    fields = _merge(("environment",), partial, {**DEFAULTS["environment"], **default})  # older stores name no map
+    if fields["map"] != previous.get("map"):
+        _check_map(("environment", "map"), fields["map"])
     ranges = RANGES["environment"]
-    check_number(("environment", "scale"), merged["scale"], *ranges["scale"])
-    check_triple(("environment", "color"), merged["color"], *ranges["color"])
-    check_number(("environment", "rotation"), merged["rotation"], *ranges["rotation"])
-    return merged
+    check_number(("environment", "scale"), fields["scale"], *ranges["scale"])
+    check_triple(("environment", "color"), fields["color"], *ranges["color"])
+    check_number(("environment", "rotation"), fields["rotation"], *ranges["rotation"])
+    return fields
 
 
 def _check_map(pointer: Pointer, name: Any) -> None:
-    if name is not None and not (isinstance(name, str) and environments.is_known(name)):
-        known = names_text(environments.known_names())
-        raise fail(pointer, name, f"null for the scene's own, or an environment that is here: {known}")
+    if name is not None and not (isinstance(name, str) and environments.environment_exists(name)):
+        available = names_text(environments.environment_names())
+        raise invalid_value(pointer, name, f"null for the scene's own, or an environment that is here: {available}")
 
 
-def _complete_background(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+def _complete_background(partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     pointer = ("background",)
-    merged = _merged(pointer, given, {**DEFAULTS["background"], **default})  # older stores know of no background
-    if merged["kind"] not in get_args(Backdrop):
-        raise fail((*pointer, "kind"), merged["kind"], f"one of {names_text(get_args(Backdrop))}")
-    check_triple((*pointer, "color"), merged["color"], *RANGES["background"]["color"])
-    check_number((*pointer, "blur"), merged["blur"], *RANGES["background"]["blur"])
-    return merged
+    fields = _merge(pointer, partial, {**DEFAULTS["background"], **default})  # older stores know of no background
+    if fields["kind"] not in get_args(BackgroundKind):
+        raise invalid_value((*pointer, "kind"), fields["kind"], f"one of {names_text(get_args(BackgroundKind))}")
+    check_triple((*pointer, "color"), fields["color"], *RANGES["background"]["color"])
+    check_number((*pointer, "blur"), fields["blur"], *RANGES["background"]["blur"])
+    return fields
 
 
-def _complete_transport(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+def _complete_transport(partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     pointer = ("transport",)
-    merged = _merged(pointer, given, {**DEFAULTS["transport"], **default})  # older stores know of no transport
-    if merged["show"] not in get_args(Show):
-        raise fail((*pointer, "show"), merged["show"], f"one of {names_text(get_args(Show))}")
-    bounces = merged["bounces"]
+    fields = _merge(pointer, partial, {**DEFAULTS["transport"], **default})  # older stores know of no transport
+    if fields["show"] not in get_args(PathFilter):
+        raise invalid_value((*pointer, "show"), fields["show"], f"one of {names_text(get_args(PathFilter))}")
+    bounces = fields["bounces"]
     if not isinstance(bounces, int) or isinstance(bounces, bool) or not 0 <= bounces <= MAX_BOUNCES:
-        raise fail((*pointer, "bounces"), bounces, f"a whole number from 0 to {MAX_BOUNCES}")
-    return merged
+        raise invalid_value((*pointer, "bounces"), bounces, f"a whole number from 0 to {MAX_BOUNCES}")
+    return fields
 
 
-def _complete_display(given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
-    merged = _merged(("display",), given, default)
-    check_number(("display", "exposure"), merged["exposure"], *RANGES["display"]["exposure"])
-    _check_tone_map(("display", "tone_map"), merged["tone_map"])
-    return merged
+def _complete_display(partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    fields = _merge(("display",), partial, default)
+    check_number(("display", "exposure"), fields["exposure"], *RANGES["display"]["exposure"])
+    _check_tone_map(("display", "tone_map"), fields["tone_map"])
+    return fields
 
 
-def _check_tone_map(pointer: Pointer, given: Any) -> None:
+def _check_tone_map(pointer: Pointer, value: Any) -> None:
     """Whether the server has such a view is told where it is shown: looks travel between servers."""
-    is_name = isinstance(given, str) and given in get_args(ToneMap)
-    is_view = isinstance(given, Mapping) and given.keys() == {"display", "view"}
+    is_name = isinstance(value, str) and value in get_args(ToneMap)
+    is_view = isinstance(value, Mapping) and value.keys() == {"display", "view"}
     if is_view:
-        is_view = all(isinstance(name, str) and _is_told(name) for name in given.values())
+        is_view = all(isinstance(name, str) and _is_printable_name(name) for name in value.values())
     if not (is_name or is_view):
         views = "or a view of an OpenColorIO config, {display, view}"
-        raise fail(pointer, given, f"one of {names_text(get_args(ToneMap))}, {views}")
+        raise invalid_value(pointer, value, f"one of {names_text(get_args(ToneMap))}, {views}")
 
 
-def _is_told(name: str) -> bool:
+def _is_printable_name(name: str) -> bool:
     return 0 < len(name) <= MAX_NAME and name.isprintable()  # half of a surrogate pair is no text that can be sent
 
 
-def _merged(pointer: Pointer, given: Any, default: Mapping[str, Any]) -> dict[str, Any]:
-    check_object(pointer, given, default)
-    return {**default, **given}
+def _merge(pointer: Pointer, partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:
+    check_object(pointer, partial, default)
+    return {**default, **partial}
 
 
-def _check_names(pointer: Pointer, given: Any, default: Mapping[str, Any], what: str) -> None:
-    if not isinstance(given, Mapping):
-        raise fail(pointer, given, f"an object with a field for each {what} to change")
-    unknown = given.keys() - default.keys()
+def _check_names(pointer: Pointer, partial: Any, default: Mapping[str, Any], label: str) -> None:
+    if not isinstance(partial, Mapping):
+        raise invalid_value(pointer, partial, f"an object with a field for each {label} to change")
+    unknown = partial.keys() - default.keys()
     if unknown:
         name = min(unknown, key=str)
-        raise ParameterError("/".join(["", *map(str, pointer)]), name, f"a {what} of this scene: {names_text(default)}")
+        raise ParameterError(
+            "/".join(["", *map(str, pointer)]), name, f"a {label} of this scene: {names_text(default)}"
+        )

@@ -17,8 +17,8 @@ Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
 LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
 ToneMap = Literal["agx", "filmic", "none"]
-Show = Literal["all", "direct", "reflected", "first_bounce", "further_bounces"]
-Backdrop = Literal["map", "blurred", "color", "transparent"]
+PathFilter = Literal["all", "direct", "reflected", "first_bounce", "further_bounces"]
+BackgroundKind = Literal["map", "blurred", "color", "transparent"]
 
 
 class DrawnCurve(TypedDict):
@@ -50,11 +50,11 @@ class TermLook(TypedDict):
     curves: dict[str, DrawnCurve | list[DrawnCurve]]
 
 
-class _Frozen(BaseModel):
+class _FrozenModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class NormalMapLook(_Frozen):
+class NormalMapLook(_FrozenModel):
     """An image in the place of a material's normal map: "image:<id>", and how strong its bumps are, as `scale` of
     glTF."""
 
@@ -62,9 +62,12 @@ class NormalMapLook(_Frozen):
     scale: float = 1.0
 
 
-class MaterialLook(_Frozen):
-    """A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as
-    its shadows and as bright as what is reflected onto it. `normal_map` stands in the place of the scene's own."""
+class MaterialLook(_FrozenModel):
+    """A material is the sum of its terms.
+
+    A `shadow_catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is
+    reflected onto it. `normal_map` stands in the place of the scene's own.
+    """
 
     terms: tuple[TermLook, ...]
     catcher: bool = False
@@ -73,8 +76,8 @@ class MaterialLook(_Frozen):
     @property
     def normals(self) -> NormalMap | None:
         """The same as a value; none of a catcher, whose own surface is not seen."""
-        found = None if self.catcher else self.normal_map
-        return None if found is None else NormalMap(found.image, found.scale)
+        normal_map = None if self.catcher else self.normal_map
+        return None if normal_map is None else NormalMap(normal_map.image, normal_map.scale)
 
 
 class EnvironmentKey(NamedTuple):
@@ -91,7 +94,7 @@ class EnvironmentKey(NamedTuple):
 BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
 
 
-class EnvironmentLook(_Frozen):
+class EnvironmentLook(_FrozenModel):
     """The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise
     seen from above. `map` names it, see `relume.environments`; None: the scene's own."""
 
@@ -125,7 +128,7 @@ class LightGeometry(NamedTuple):
     material: str = ""
 
 
-class _LightLook(_Frozen):
+class _LightLook(_FrozenModel):
     """What lights of all kinds have; `emission` in the unit of the kind."""
 
     scale: float
@@ -193,7 +196,7 @@ class MeshLook(_LightLook):
 LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook, Field(discriminator="kind")]
 
 
-class Paths(NamedTuple):
+class LightPaths(NamedTuple):
     """Which light paths a picture shows: light reaches a surface directly from a light, or by way of other surfaces.
 
     Attributes:
@@ -206,56 +209,58 @@ class Paths(NamedTuple):
     last: int
 
     @property
-    def reflect(self) -> bool:
+    def has_indirect(self) -> bool:
         """Whether any paths between surfaces count."""
         return self.last >= self.first
 
-    def without_reflections(self) -> Paths:
+    def without_reflections(self) -> LightPaths:
         """Only those of these paths that reach a surface straight from a light."""
-        return Paths(self.direct, 1, 0)
+        return LightPaths(self.direct, 1, 0)
 
-    def without_direct(self) -> Paths:
+    def without_direct(self) -> LightPaths:
         """Only those of these paths that go by way of other surfaces."""
         return self._replace(direct=False)
 
 
-class TransportLook(_Frozen):
+class TransportLook(_FrozenModel):
     """Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any,
     those with any, those with one, or those with more."""
 
-    show: Show
+    show: PathFilter
     bounces: int
 
     @property
-    def paths(self) -> Paths:
+    def paths(self) -> LightPaths:
         """The paths as numbers, which are equal wherever the pictures are."""
         first = 2 if self.show == "further_bounces" else 1
-        most = {"direct": 0, "first_bounce": 1}.get(self.show, self.bounces)
-        paths = Paths(self.show in ("all", "direct"), first, min(most, self.bounces))
-        return paths if paths.reflect else paths.without_reflections()
+        max_bounces = {"direct": 0, "first_bounce": 1}.get(self.show, self.bounces)
+        paths = LightPaths(self.show in ("all", "direct"), first, min(max_bounces, self.bounces))
+        return paths if paths.has_indirect else paths.without_reflections()
 
-    def followed(self, *, reflects: bool) -> Paths:
+    def supported_by(self, *, has_indirect: bool) -> LightPaths:
         """Those of the paths that a method follows. reflects: whether it has light between surfaces."""
-        return self.paths if reflects else self.paths.without_reflections()
+        return self.paths if has_indirect else self.paths.without_reflections()
 
 
-class DisplayLook(_Frozen):
+class DisplayLook(_FrozenModel):
     """How radiance becomes a picture: `exposure` in stops, then the tone map, or a view of an OpenColorIO config."""
 
     exposure: float
     tone_map: ToneMap | OcioView
 
 
-class BackgroundLook(_Frozen):
-    """What the eye sees where no surface is; it lights nothing. The map of the environment, the same `blurred` by that
-    many degrees, one `color` (radiance), or nothing."""
+class BackgroundLook(_FrozenModel):
+    """The background: what the camera sees where no surface is; it lights nothing.
 
-    kind: Backdrop
+    The map of the environment, the same `prefiltered` by that many degrees, one `color` (radiance), or nothing.
+    """
+
+    kind: BackgroundKind
     color: Rgb
     blur: float
 
 
-class Look(_Frozen):
+class Look(_FrozenModel):
     """A complete, valid look; made by `relume.look.validate`."""
 
     materials: dict[str, MaterialLook]
@@ -265,7 +270,7 @@ class Look(_Frozen):
     transport: TransportLook
     display: DisplayLook
 
-    def on_the_map(self) -> Look:
+    def without_compositing(self) -> Look:
         """The same with nothing that is only put behind or under the objects: what brute force can be asked for."""
         plain = {name: material.model_copy(update={"catcher": False}) for name, material in self.materials.items()}
         background = self.background.model_copy(update={"kind": "map"})

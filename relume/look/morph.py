@@ -13,89 +13,91 @@ from typing import Any, Literal
 
 from relume.brdf.registry import TERMS
 
-Way = Literal["parameters", "map"]
+InterpolationMode = Literal["parameters", "map"]
 
 
-def neighbours(num_looks: int, share: float) -> tuple[int, int, float]:
+def enclosing_keyframes(num_looks: int, fraction: float) -> tuple[int, int, float]:
     """Find the two of some looks, at even distances, that a share of the way through them lies between.
 
     Args:
-        num_looks: at least one. share: 0 for the first, 1 for the last.
+        num_looks: at least one. fraction: 0 for the first, 1 for the last.
     Returns:
         Their places, the same where it lies on one of them, and the share of the way from the one to the other.
     """
-    at = share * (num_looks - 1)
-    first = min(int(at), num_looks - 1)
-    part = at - first
-    return (first, first, 0.0) if part == 0 else (first, first + 1, part)
+    position = fraction * (num_looks - 1)
+    first = min(int(position), num_looks - 1)
+    weight = position - first
+    return (first, first, 0.0) if weight == 0 else (first, first + 1, weight)
 
 
-def morph(looks: Sequence[Mapping[str, Any]], share: float, way: Way = "parameters") -> Mapping[str, Any]:
+def interpolate_looks(
+    looks: Sequence[Mapping[str, Any]], fraction: float, mode: InterpolationMode = "parameters"
+) -> Mapping[str, Any]:
     """The look at a share of the way through some.
 
     Args:
-        looks: complete documents, at least one, at even distances. share: 0 for the first, 1 for the last.
-        way: of materials: from parameter to parameter, or across the navigation map where both are of its kind.
+        looks: complete documents, at least one, at even distances. fraction: 0 for the first, 1 for the last.
+        mode: of materials: from parameter to parameter, or across the navigation map where both are of its kind.
     """
-    first, second, part = neighbours(len(looks), share)
+    first, second, weight = enclosing_keyframes(len(looks), fraction)
     if first == second:
         return looks[first]
-    one, other = looks[first], looks[second]
-    found: Mapping[str, Any] = _between(one, other, part)
-    if way == "map":
-        from relume.look.library.way import across_map  # SciPy, which a process that describes its API does without
+    start, end = looks[first], looks[second]
+    interpolated: Mapping[str, Any] = _interpolate(start, end, weight)
+    if mode == "map":
+        from relume.look.library.way import path_on_map  # SciPy, which a process that describes its API does without
 
-        for name, material in found["materials"].items():
-            ends = [look["materials"].get(name) for look in (one, other)]
+        for name, material in interpolated["materials"].items():
+            ends = [look["materials"].get(name) for look in (start, end)]
             if None not in ends and ends[0] != ends[1]:
-                between = across_map(ends[0]["terms"], ends[1]["terms"], material["terms"], part)
-                found["materials"][name] = {**material, "terms": between}
-    return found
+                terms = path_on_map(ends[0]["terms"], ends[1]["terms"], material["terms"], weight)
+                interpolated["materials"][name] = {**material, "terms": terms}
+    return interpolated
 
 
-def _between(one: Any, other: Any, share: float) -> Any:
-    if one == other:
-        return one
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        if "model" in one and "model" in other:
-            return _between_terms(one, other, share)
-        return _between_fields(one, other, share)
-    if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-        return [_between(a, b, share) for a, b in zip(one, other, strict=True)]
-    if _is_number(one) and _is_number(other):
-        value = (1 - share) * one + share * other
-        return round(value) if isinstance(one, int) and isinstance(other, int) else value
-    return one if share < 0.5 else other
+def _interpolate(start: Any, end: Any, weight: float) -> Any:
+    if start == end:
+        return start
+    if isinstance(start, Mapping) and isinstance(end, Mapping):
+        if "model" in start and "model" in end:
+            return _interpolate_terms(start, end, weight)
+        return _interpolate_fields(start, end, weight)
+    if isinstance(start, list) and isinstance(end, list) and len(start) == len(end):
+        return [_interpolate(a, b, weight) for a, b in zip(start, end, strict=True)]
+    if _is_number(start) and _is_number(end):
+        value = (1 - weight) * start + weight * end
+        return round(value) if isinstance(start, int) and isinstance(end, int) else value
+    return start if weight < 0.5 else end
 
 
-def _between_fields(one: Mapping[str, Any], other: Mapping[str, Any], share: float) -> dict[str, Any]:
+def _interpolate_fields(start: Mapping[str, Any], end: Mapping[str, Any], weight: float) -> dict[str, Any]:
     """What both have is between; all else is that of the nearer."""
-    nearer = one if share < 0.5 else other
+    nearest = start if weight < 0.5 else end
     return {
-        name: _between(one[name], other[name], share) if name in one and name in other else value
-        for name, value in nearer.items()
+        name: _interpolate(start[name], end[name], weight) if name in start and name in end else value
+        for name, value in nearest.items()
     }
 
 
-def _between_terms(one: Mapping[str, Any], other: Mapping[str, Any], share: float) -> Mapping[str, Any]:
-    if one["model"] != other["model"]:
-        return one if share < 0.5 else other
-    found = _between_fields(one, other, share)
-    term = TERMS.get(one["model"])
+def _interpolate_terms(start: Mapping[str, Any], end: Mapping[str, Any], weight: float) -> Mapping[str, Any]:
+    if start["model"] != end["model"]:
+        return start if weight < 0.5 else end
+    interpolated = _interpolate_fields(start, end, weight)
+    term = TERMS.get(start["model"])
     logarithmic = [p.name for p in term.parameters if p.scale == "log"] if term is not None else []
     for name in logarithmic:
-        if name in one["params"] and name in other["params"]:
-            found["params"][name] = _between_logarithms(one["params"][name], other["params"][name], share)
-    return found
+        if name in start["params"] and name in end["params"]:
+            interpolated["params"][name] = _interpolate_log(start["params"][name], end["params"][name], weight)
+    return interpolated
 
 
-def _between_logarithms(one: Any, other: Any, share: float) -> Any:
-    if isinstance(one, list) or isinstance(other, list):  # a value for each channel in one of them at least
-        first, second = (value if isinstance(value, list) else [value] * 3 for value in (one, other))
-        return [_between_logarithms(a, b, share) for a, b in zip(first, second, strict=True)]
-    if one <= 0 or other <= 0:
-        return (1 - share) * one + share * other
-    return math.exp((1 - share) * math.log(one) + share * math.log(other))
+def _interpolate_log(start: Any, end: Any, weight: float) -> Any:
+    if isinstance(start, list) or isinstance(end, list):  # a value for each channel in one of them at least
+        first, second = (value if isinstance(value, list) else [value] * 3 for value in (start, end))
+        return [_interpolate_log(a, b, weight) for a, b in zip(first, second, strict=True)]
+    if start <= 0 or end <= 0:
+        return (1 - weight) * start + weight * end
+    return math.exp((1 - weight) * math.log(start) + weight * math.log(end))
 
 
 def _is_number(value: Any) -> bool:

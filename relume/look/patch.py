@@ -15,7 +15,7 @@ from relume.look.document import complete_changes
 MAX_OPERATIONS = 256
 MAX_PATH = 1024
 _OPERATIONS = ("add", "remove", "replace", "test")
-_DOES_NOT_FIT = (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError)
+_PATCH_ERRORS = (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException, TypeError, LookupError)
 
 
 def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, Any]) -> dict[str, Any]:
@@ -34,19 +34,19 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
     """
     if not isinstance(patch, list | tuple) or len(patch) > MAX_OPERATIONS:
         raise EditError(f"an edit is a list of at most {MAX_OPERATIONS} operations; send several edits")
-    changed: Any = document
+    patched: Any = document
     for k, operation in enumerate(patch):
         try:
-            changed = _apply(changed, _checked(operation, k))
+            patched = _apply(patched, _check_operation(operation, k))
         except RecursionError as error:  # jsonpatch copies values recursively
             raise EditError(f"operation {k} has a value nested too deep; no look is nested like that") from error
-        except _DOES_NOT_FIT as error:
-            where = f"{operation['op']} at {operation['path']!r}"
-            raise EditError(f"operation {k} cannot be applied, {where}: {_why(error)}") from error
-    return complete_changes(changed, default, document)
+        except _PATCH_ERRORS as error:
+            location = f"{operation['op']} at {operation['path']!r}"
+            raise EditError(f"operation {k} cannot be applied, {location}: {_failure_reason(error)}") from error
+    return complete_changes(patched, default, document)
 
 
-def rebased(document: Any, patch: Iterable[dict[str, Any]]) -> Any:
+def rebase(document: Any, patch: Iterable[dict[str, Any]]) -> Any:
     """A look after a patch that was made for another state of it; operations that do not fit are left out.
 
     The editor does the same (`client_web/src/document/change.ts`). Nothing is completed or checked.
@@ -55,19 +55,19 @@ def rebased(document: Any, patch: Iterable[dict[str, Any]]) -> Any:
         document: a look; it is not changed, unchanged parts are shared. patch: operations that are well formed.
     """
     for operation in patch:
-        with suppress(*_DOES_NOT_FIT):
+        with suppress(*_PATCH_ERRORS):
             document = _apply(document, operation)
     return document
 
 
-def _why(error: Exception) -> str:
+def _failure_reason(error: Exception) -> str:
     """Say what went wrong without the piece of a look that the libraries quote."""
     if isinstance(error, jsonpatch.JsonPatchTestFailed):
         return "the test failed"
     return "there is nothing like that in this look"
 
 
-def _checked(operation: Any, k: int) -> dict[str, Any]:
+def _check_operation(operation: Any, k: int) -> dict[str, Any]:
     if not isinstance(operation, dict) or operation.get("op") not in _OPERATIONS:
         raise EditError(f"operation {k} is not one of {', '.join(_OPERATIONS)}")
     path = operation.get("path")
@@ -80,23 +80,23 @@ def _checked(operation: Any, k: int) -> dict[str, Any]:
 
 def _apply(document: Any, operation: dict[str, Any]) -> Any:
     """One operation on a copy of the containers along its path: the rest of the document is shared."""
-    parts = jsonpointer.JsonPointer(operation["path"]).parts
-    if not parts and operation["op"] == "remove":
+    path = jsonpointer.JsonPointer(operation["path"]).parts
+    if not path and operation["op"] == "remove":
         raise EditError('the whole look cannot be removed; replace the path "" by {} for the default look')
-    return jsonpatch.apply_patch(_unshared(document, parts), [operation], in_place=True)
+    return jsonpatch.apply_patch(_copy_along_path(document, path), [operation], in_place=True)
 
 
-def _unshared(document: Any, parts: list[str]) -> Any:
-    if not parts:
+def _copy_along_path(document: Any, path: list[str]) -> Any:
+    if not path:
         return document
     if isinstance(document, dict):
         copy: Any = dict(document)
-        if parts[0] in copy:
-            copy[parts[0]] = _unshared(copy[parts[0]], parts[1:])
+        if path[0] in copy:
+            copy[path[0]] = _copy_along_path(copy[path[0]], path[1:])
         return copy
     if isinstance(document, list | tuple):
         copy = list(document)
-        if parts[0].isdecimal() and int(parts[0]) < len(copy):
-            copy[int(parts[0])] = _unshared(copy[int(parts[0])], parts[1:])
+        if path[0].isdecimal() and int(path[0]) < len(copy):
+            copy[int(path[0])] = _copy_along_path(copy[int(path[0])], path[1:])
         return copy
     return document

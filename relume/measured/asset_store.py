@@ -18,10 +18,10 @@ import numpy as np
 
 from relume.asset_store import AssetStore
 from relume.errors import MaterialError
-from relume.measured.factors import factorise
-from relume.measured.lookup import F32, NUM_KNOTS, table_of
+from relume.measured.factors import factorize
+from relume.measured.lookup import F32, NUM_KNOTS, build_table
 from relume.measured.merl import F64, SHAPE, read_merl
-from relume.memory import stored
+from relume.memory import asset_cached
 
 STORE = AssetStore("measured material", "merl:", "material.json", MaterialError, max_entries=500)
 _SOURCE, _TABLE = "measured.binary", "table.npy"
@@ -34,7 +34,7 @@ class MaterialRecord:
 
     Attributes:
         created: seconds since 1970.
-        lobes_error, homomorphic_error: of the curves alone, see `relume.measured.factors.Factors`.
+        lobes_error, homomorphic_error: of the curves alone, see `relume.measured.factors.MeasuredFactors`.
     """
 
     id: str
@@ -54,15 +54,15 @@ class MaterialRecord:
 
 
 @dataclass(frozen=True)
-class Measured:
-    """What the quotients and curves of a material read. lobes, homomorphic: as in `Factors`. (4, 3, 90) each"""
+class MeasuredBrdf:
+    """What the quotients and curves of a material read. lobes, homomorphic: as in `MeasuredFactors`. (4, 3, 90) each"""
 
     table: F32
     lobes: F64
     homomorphic: F64
 
 
-def keep(folder: Path, source: Path, name: str, file_name: str | None = None) -> MaterialRecord:
+def store_material(folder: Path, source: Path, name: str, file_name: str | None = None) -> MaterialRecord:
     """Import a MERL file; the same content twice is the same material, its newest name wins.
 
     Args:
@@ -76,13 +76,13 @@ def keep(folder: Path, source: Path, name: str, file_name: str | None = None) ->
     """
     planes = read_merl(source, file_name)
 
-    def fill(made: Path) -> dict[str, Any]:
-        table = table_of(planes)
-        shutil.copyfile(source, made / _SOURCE)
-        np.save(made / _TABLE, table)
-        return {key: np.asarray(value).tolist() for key, value in asdict(factorise(planes, table)).items()}
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        table = build_table(planes)
+        shutil.copyfile(source, staged_folder / _SOURCE)
+        np.save(staged_folder / _TABLE, table)
+        return {key: np.asarray(value).tolist() for key, value in asdict(factorize(planes, table)).items()}
 
-    return get_record(folder, STORE.keep(folder, source, name, fill))
+    return get_record(folder, STORE.store(folder, source, name, fill))
 
 
 def records(folder: Path) -> list[MaterialRecord]:
@@ -93,41 +93,41 @@ def records(folder: Path) -> list[MaterialRecord]:
 def get_record(folder: Path, identity: str) -> MaterialRecord:
     """One material. Raises NotFoundError; MaterialError where its files are damaged."""
     path = STORE.path(folder, identity)
-    document = STORE.read(path)
+    document = STORE.load_record(path)
     try:
         errors = [_rgb(document[key]) for key in ("lobes_error", "homomorphic_error")]
     except (KeyError, TypeError, ValueError) as error:
-        raise STORE.damaged(path) from error
+        raise STORE.damaged_error(path) from error
     return MaterialRecord(identity, document["name"], document["created"], *errors)
 
 
-def source_of(data: str) -> Path:
+def source_path(data: str) -> Path:
     """The file that a material was imported from. Raises NotFoundError."""
-    return STORE.found(data) / _SOURCE
+    return STORE.resolve(data) / _SOURCE
 
 
-def material(data: str) -> Measured:
+def load_material(data: str) -> MeasuredBrdf:
     """What a look's `data` names; its table stays on the disk and is read where it is needed.
 
     Raises:
         NotFoundError: it is not here. MaterialError: its files are damaged.
     """
-    return _load(STORE.found(data))
+    return _load(STORE.resolve(data))
 
 
-@stored("measured material")
-def _load(path: Path) -> Measured:
-    document, table = STORE.read(path), STORE.array(path, _TABLE)
+@asset_cached("measured material")
+def _load(path: Path) -> MeasuredBrdf:
+    document, table = STORE.load_record(path), STORE.open_array(path, _TABLE)
     try:
-        curves = [np.array(document[part], np.float64) for part in ("lobes", "homomorphic")]
+        curves = [np.array(document[key], np.float64) for key in ("lobes", "homomorphic")]
     except (ValueError, KeyError, TypeError) as error:
-        raise STORE.damaged(path) from error
+        raise STORE.damaged_error(path) from error
     if table.shape != (*SHAPE, 3) or table.dtype != np.float32:
-        raise STORE.damaged(path)
+        raise STORE.damaged_error(path)
     for curve in curves:
         if curve.shape != (4, 3, NUM_KNOTS) or not (np.isfinite(curve) & (curve > 0)).all():
-            raise STORE.damaged(path)
-    return Measured(table, *curves)
+            raise STORE.damaged_error(path)
+    return MeasuredBrdf(table, *curves)
 
 
 def _rgb(values: Any) -> Rgb:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import MaterialError
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 F64 = NDArray[np.float64]
 
@@ -39,27 +39,27 @@ def read_merl(path: Path, file_name: str | None = None) -> F64:
         MaterialError: the file has another size or header, holds a value that is not finite or above 10⁶ per
             steradian, or holds nothing that was measured.
     """
-    what = file_name or path.name
+    label = file_name or path.name
     with path.open("rb") as file:
         header = file.read(_HEADER.size)
         size = path.stat().st_size
         if len(header) < _HEADER.size or _HEADER.unpack(header) != SHAPE:
-            raise MaterialError(f"{what} is not a MERL file: it does not begin with 90, 90, 180; give a .binary")
+            raise MaterialError(f"{label} is not a MERL file: it does not begin with 90, 90, 180; give a .binary")
         if size != FILE_BYTES:
-            raise MaterialError(f"{what} has {size:,} bytes, a MERL file {FILE_BYTES:,}; fetch it again")
+            raise MaterialError(f"{label} has {size:,} bytes, a MERL file {FILE_BYTES:,}; fetch it again")
         planes = np.fromfile(file, "<f8").reshape(3, *SHAPE).astype(np.float64, copy=False)
     if not np.isfinite(planes).all():
-        raise MaterialError(f"{what} holds values that are not finite; fetch it again")
+        raise MaterialError(f"{label} holds values that are not finite; fetch it again")
     if float((planes.max(axis=(1, 2, 3)) * CHANNEL_SCALE).max()) > MAX_VALUE:
-        raise MaterialError(f"{what} holds values above {MAX_VALUE:g} per steradian; no material reflects that")
+        raise MaterialError(f"{label} holds values above {MAX_VALUE:g} per steradian; no material reflects that")
     if not is_measured(planes).any():
-        raise MaterialError(f"{what} holds no measured value; give another one")
+        raise MaterialError(f"{label} holds no measured value; give another one")
     return planes
 
 
 def write_merl(path: Path, planes: F64) -> None:
     """Write what `read_merl` reads, bit for bit; the file takes its name when it is complete."""
-    with replacing(path) as unfinished, unfinished.open("wb") as file:
+    with atomic_write(path) as unfinished, unfinished.open("wb") as file:
         file.write(_HEADER.pack(*SHAPE))
         file.write(np.ascontiguousarray(planes, "<f8").data)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Protocol
 
 from relume.bake import BakeMethod, StoreReader
-from relume.memory import Memory
-from relume.picture.transfer import Opened
+from relume.memory import Cache
+from relume.picture.transfer import OpenBake
 
 
 class TransferMethod(BakeMethod, Protocol):
@@ -16,12 +16,12 @@ class TransferMethod(BakeMethod, Protocol):
     line in `relume.methods.registry`, and inherits the contract suite in tests/contract.
     """
 
-    def open(self, store: StoreReader, key: str, memory: Memory) -> Opened:
+    def open(self, store: StoreReader, key: str, cache: Cache) -> OpenBake:
         """A store of this method, opened for freezing and frames.
 
         Args:
-            key: tells what is made from this bake from what is made from others in the memory: the store's path.
-            memory: of all that is made from the bake and may be made again.
+            key: tells what is made from this bake from what is made from others in the cache: the store's path.
+            cache: of all that is made from the bake and may be made again.
         Raises:
             StoreError: the store's description is not of this form.
             ChunkDamagedError: its arrays do not fit each other.

@@ -13,46 +13,46 @@ from numpy.typing import NDArray
 
 from relume.bake import Recipe
 from relume.errors import PlanError
-from relume.eye.layers import most_layers, most_shown
-from relume.eye.merged import PATTERNS, POSITIONS_A_PIXEL
-from relume.eye.tinted import num_tints, rays_to_tinted
-from relume.eye.view_samples import most_samples
-from relume.eye.windows import SIDE
+from relume.eye.layers import max_layers, max_samples
+from relume.eye.merged import PATTERNS, POSITIONS_PER_PIXEL
+from relume.eye.tinted import max_tint_rays, num_tints
+from relume.eye.view_samples import view_sample_limit
+from relume.eye.windows import TILE_SIZE
 from relume.light.gather_rays import MAX_RAYS
-from relume.scene.emission import has_images
+from relume.scene.emission import has_emission_images
 from relume.scene.model import Mesh, Scene, Texture
 
 MIN_GATHER_SAMPLES, MIN_GATHER_RAYS = 64, 16
 PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
 
-_TREE_BYTES_A_TRIANGLE = 160  # Embree's, while it is built
-LIGHT_BYTES_A_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
-BYTES_A_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
+_TREE_BYTES_PER_TRIANGLE = 160  # Embree's, while it is built
+LIGHT_BYTES_PER_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
+BYTES_PER_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
 _PIXEL_BYTES = 16  # of what is known of every pixel before samples are made, and while they are looked through
 _SPLIT_BYTES, _TINT_BYTES = 36, 12  # of a sample, while tinted light is looked for; of each of its tints
 _WRITING_BYTES = 64 << 20  # a shard of a column, as it is, compressed, and while it is read
-_HALVINGS = 1 / 3  # of a texture's texels, in half precision
-_HALVING = 2  # of the largest texture's bytes, while its first halving is made
-_CUTOUT_BYTES = 80  # of a material: its row of `relume.trace.cutouts.Cutouts`
+_MIP_CHAIN_FRACTION = 1 / 3  # of a texture's texels, in half precision
+_MIP_PEAK_FACTOR = 2  # of the largest texture's bytes, while its first halving is made
+_ALPHA_MASK_BYTES = 80  # of a material: its row of `relume.trace.cutouts.Cutouts`
 _LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power, place in the tree
 
 
-def samples_of_view(scene: Scene, recipe: Recipe) -> int:
+def max_view_samples(scene: Scene, recipe: Recipe) -> int:
     """View samples of one view."""
     width, height = recipe.size
-    return most_samples(scene.materials, width * height)
+    return view_sample_limit(scene.materials, width * height)
 
 
-def camera_rays(scene: Scene, recipe: Recipe) -> int:
+def num_camera_rays(scene: Scene, recipe: Recipe) -> int:
     """Rays that find the samples of all views: one through each pixel, then all positions of each, and all layers."""
     width, height = recipe.size
-    of_pixel = 2 + sum(map(len, PATTERNS))  # where many found too much, fewer are tried
-    return of_pixel * width * height * len(recipe.views) * most_layers(scene.materials)
+    rays_per_pixel = 2 + sum(map(len, PATTERNS))  # where many found too much, fewer are tried
+    return rays_per_pixel * width * height * len(recipe.views) * max_layers(scene.materials)
 
 
-def tinted_rays(scene: Scene, num_samples: int) -> int:
+def num_tinted_rays(scene: Scene, num_samples: int) -> int:
     """Rays that find which of some samples see light through tinted glass."""
-    return num_samples * rays_to_tinted(scene.materials)
+    return num_samples * max_tint_rays(scene.materials)
 
 
 def lights_bytes(scene: Scene, recipe: Recipe) -> int:
@@ -63,9 +63,11 @@ def lights_bytes(scene: Scene, recipe: Recipe) -> int:
 def triangles_bytes(scene: Scene) -> int:
     """Of the store: the triangles, their corners, the material and the mesh of each, how brightly they shine where
     images say it; where rays pass some, which and where."""
-    of_face = 12 if has_images(scene) else 8
-    triangles = sum(mesh.positions.nbytes + mesh.faces.nbytes + of_face * len(mesh.faces) for mesh in scene.meshes)
-    if not any(material.lets_pass for material in scene.materials):
+    bytes_per_face = 12 if has_emission_images(scene) else 8
+    triangles = sum(
+        mesh.positions.nbytes + mesh.faces.nbytes + bytes_per_face * len(mesh.faces) for mesh in scene.meshes
+    )
+    if not any(material.is_alpha_tested for material in scene.materials):
         return triangles
     return triangles + sum(mesh.uvs.nbytes for mesh in scene.meshes) + opacity_bytes(scene)
 
@@ -73,7 +75,7 @@ def triangles_bytes(scene: Scene) -> int:
 def opacity_bytes(scene: Scene) -> int:
     """Of all opacity, and of what says how materials are passed."""
     images = sum(material.opacity.alpha.nbytes for material in scene.materials if material.opacity is not None)
-    return images + len(scene.materials) * _CUTOUT_BYTES
+    return images + len(scene.materials) * _ALPHA_MASK_BYTES
 
 
 def corner_bytes(scene: Scene) -> int:
@@ -96,13 +98,13 @@ def num_triangles(scene: Scene) -> int:
     return sum(len(mesh.faces) for mesh in scene.meshes)
 
 
-def of_every_position(scene: Scene, recipe: Recipe) -> float:
+def supersampling_ratio(scene: Scene, recipe: Recipe) -> float:
     """Samples by all positions of all pixels ÷ those that a plan counts: work goes with the number of pixels."""
     num_pixels = recipe.size[0] * recipe.size[1]
-    return POSITIONS_A_PIXEL * num_pixels * most_shown(scene.materials) / samples_of_view(scene, recipe)
+    return POSITIONS_PER_PIXEL * num_pixels * max_samples(scene.materials) / max_view_samples(scene, recipe)
 
 
-def work_s(scene: Scene, num_rays: float, ray_ns: float, triangle_us: float) -> float:
+def estimated_work(scene: Scene, num_rays: float, ray_ns: float, triangle_us: float) -> float:
     """What one core takes for a bake, about.
 
     Args:
@@ -115,62 +117,62 @@ def work_s(scene: Scene, num_rays: float, ray_ns: float, triangle_us: float) -> 
 def process_bytes(scene: Scene) -> int:
     """What a process holds between tasks: the program, the scene, its merged triangles, their tree, mip pyramids."""
     textures = [texture.pixels.nbytes for texture in _textures(scene)]
-    halvings = sum(_HALVINGS * texture.pixels.size * 2 for texture in _textures(scene))
+    mip_bytes = sum(_MIP_CHAIN_FRACTION * texture.pixels.size * 2 for texture in _textures(scene))
     meshes = [array.nbytes for mesh in scene.meshes for array in _arrays(mesh)]
     largest = max([scene.environment.radiance.nbytes, *textures, *meshes])  # read from disk, it is there twice
     return (
         PROGRAM_BYTES
         + scene.environment.radiance.nbytes
         + 2 * sum(meshes)
-        + num_triangles(scene) * _TREE_BYTES_A_TRIANGLE
+        + num_triangles(scene) * _TREE_BYTES_PER_TRIANGLE
         + sum(textures)
-        + int(halvings)
+        + int(mip_bytes)
         + 2 * opacity_bytes(scene)
-        + _HALVING * largest
+        + _MIP_PEAK_FACTOR * largest
     )
 
 
 def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
     """What a task of the first stage takes besides: the lights, or the samples of a view."""
     num_pixels = recipe.size[0] * recipe.size[1]
-    num_rays = (1 + POSITIONS_A_PIXEL) * min(num_pixels, SIDE**2) * most_layers(scene.materials)
+    num_rays = (1 + POSITIONS_PER_PIXEL) * min(num_pixels, TILE_SIZE**2) * max_layers(scene.materials)
     tints = num_tints(scene.materials)
-    split = (_SPLIT_BYTES + tints * _TINT_BYTES) * samples_of_view(scene, recipe) if tints else 0
-    sampling = num_rays * BYTES_A_RAY + num_pixels * _PIXEL_BYTES + split + _WRITING_BYTES
-    return max(weighing_bytes(scene), sampling)
+    split = (_SPLIT_BYTES + tints * _TINT_BYTES) * max_view_samples(scene, recipe) if tints else 0
+    sampling = num_rays * BYTES_PER_RAY + num_pixels * _PIXEL_BYTES + split + _WRITING_BYTES
+    return max(light_selection_bytes(scene), sampling)
 
 
-def weighing_bytes(scene: Scene) -> int:
+def light_selection_bytes(scene: Scene) -> int:
     """What it takes to choose the lights."""
     height, width, _ = scene.environment.radiance.shape
-    return int(height * width) * LIGHT_BYTES_A_TEXEL
+    return int(height * width) * LIGHT_BYTES_PER_TEXEL
 
 
 def _textures(scene: Scene) -> list[Texture]:
-    found = [texture for material in scene.materials for texture in material.textures.values()]
-    return found + [material.normal_map for material in scene.materials if material.normal_map is not None]
+    textures = [texture for material in scene.materials for texture in material.textures.values()]
+    return textures + [material.normal_map for material in scene.materials if material.normal_map is not None]
 
 
 def _arrays(mesh: Mesh) -> list[NDArray[Any]]:
     return [mesh.positions, mesh.normals, mesh.tangents, mesh.uvs, mesh.faces]
 
 
-def check_gathering(recipe: Recipe, most_samples: int) -> None:
+def check_gathering(recipe: Recipe, max_samples: int) -> None:
     """Refuse numbers of gather samples and rays that no store can have.
 
     Args:
-        recipe: whose `gather_samples` and `gather_rays` are looked at. most_samples: that the method can keep; 0 where
+        recipe: whose `sample_points` and `gather_rays` are looked at. max_samples: that the method can keep; 0 where
             it gathers no light.
     Raises:
         PlanError: they are out of bounds.
     """
-    for number, least, most, what in (
-        (recipe.gather_samples, MIN_GATHER_SAMPLES, most_samples, "gather samples"),
+    for count, minimum, maximum, label in (
+        (recipe.gather_samples, MIN_GATHER_SAMPLES, max_samples, "gather samples"),
         (recipe.gather_rays, MIN_GATHER_RAYS, MAX_RAYS, "gather rays"),
     ):
-        if number is None:
+        if count is None:
             continue
-        if most_samples == 0:
-            raise PlanError(f"{number} {what} were asked for; method {recipe.method} has none, leave them out")
-        if not least <= number <= most:
-            raise PlanError(f"{number} {what} were asked for; give {least} to {most:,}")
+        if max_samples == 0:
+            raise PlanError(f"{count} {label} were asked for; method {recipe.method} has none, leave them out")
+        if not minimum <= count <= maximum:
+            raise PlanError(f"{count} {label} were asked for; give {minimum} to {maximum:,}")

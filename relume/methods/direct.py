@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, Written
-from relume.memory import Memory
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
+from relume.memory import Cache
 from relume.methods import bounds
-from relume.methods.opened.baked_views import BakedViews
-from relume.methods.opened.described import described
+from relume.methods.opened.baked_views import BakedFixedViews
+from relume.methods.opened.described import read_fields
 from relume.methods.sampled_views import SampledViews
 from relume.scene.model import Scene
 
@@ -47,10 +47,10 @@ class DirectMethod:
         """The visibility of each view; the arrays of the first stage are made by its tasks. See `BakeMethod`."""
         return self._views.arrays(stage, scene, recipe, store)
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
         """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
         return self._views.compute(scene, recipe, task, store)
 
-    def open(self, store: StoreReader, key: str, memory: Memory) -> BakedViews:
+    def open(self, store: StoreReader, key: str, cache: Cache) -> BakedFixedViews:
         """Views lit by the environment and by local lights. See `TransferMethod`."""
-        return BakedViews(**described(store, key, memory))
+        return BakedFixedViews(**read_fields(store, key, cache))

@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.basis.harmonics import NUM_HARMONICS, harmonics
-from relume.basis.zernike import QUICK_DEGREE, num_functions
+from relume.basis.zernike import FAST_DEGREE, num_functions
 from relume.errors import ChunkDamagedError
-from relume.light.smooth import Divided, divide
+from relume.light.smooth import FrequencySplit, split_frequencies
 from relume.light.triangles import TriangleLights
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.last_read import LastRead
-from relume.methods.store_io import read_cells, read_tiles, read_traced_directions
-from relume.moving.points.surface import read_surface_points
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.last_read import ReadCache
+from relume.methods.store_io import read_patches, read_shadow_ray_directions, read_tiles
+from relume.moving.points.surface import read_probes
 from relume.project.harmonic_transfer import NUM_CLUSTERS, NUM_COMPONENTS, ClusteredTransfer, transfer_matrices
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-CELL_DEGREE = 2  # cells are seen from all around: in the mean little more is left of what they send
+PATCH_DEGREE = 2  # cells are seen from all around: in the mean little more is left of what they send
 
 
 @dataclass(frozen=True)
@@ -38,54 +38,58 @@ class HarmonicLight:
     """Transfer of harmonics to the points and cells of a bake.
 
     Attributes:
-        of_points: in the in-basis of `QUICK_DEGREE`.
+        probe_transfer: in the in-basis of `FAST_DEGREE`.
         irradiance: of cells. (C, NUM_HARMONICS) float32
-        vectors: of their first points, of `CELL_DEGREE`. (C, K, NUM_HARMONICS) float32
-        brought: by the bake's lights in light that is a harmonic. (M, NUM_HARMONICS)
+        patch_coefficients: of their first points, of `PATCH_DEGREE`. (C, K, NUM_HARMONICS) float32
+        light_coefficients: by the bake's lights in light that is a harmonic. (M, NUM_HARMONICS)
     """
 
-    of_points: ClusteredTransfer
+    probe_transfer: ClusteredTransfer
     irradiance: F32
-    vectors: F32
-    brought: F64
+    patch_coefficients: F32
+    light_coefficients: F64
 
     @cached_property
-    def divided(self) -> LastRead[TriangleLights, Divided]:
+    def frequency_split(self) -> ReadCache[TriangleLights, FrequencySplit]:
         """Divides light into what harmonics tell and what they do not; asked thrice for each."""
-        return LastRead(lambda lights: divide(lights, self.brought))
+        return ReadCache(lambda lights: split_frequencies(lights, self.light_coefficients))
 
 
 def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]]:
     """Find the arrays of a store in which points and cells know their lights. seed: of the clusters."""
-    asked = read_traced_directions(store), read_tiles(store).solid_angles
-    points, visible, cells = read_surface_points(store), store.read("points/visibility"), read_cells(store)
+    light_samples = read_shadow_ray_directions(store), read_tiles(store).solid_angles
+    probes, visible, patches = read_probes(store), store.read("points/visibility"), read_patches(store)
 
     def matrices(rows: NDArray[np.intp]) -> F32:
-        return transfer_matrices(points.rows(rows), visible[rows], *asked, QUICK_DEGREE)
+        return transfer_matrices(probes.rows(rows), visible[rows], *light_samples, FAST_DEGREE)
 
-    clustered = ClusteredTransfer.of(points.num_points, matrices, np.random.default_rng(seed))
-    of_points = transfer_matrices(
-        cells.points, cells.visible.reshape(cells.points.num_points, cells.visible.shape[2]), *asked, 0
+    clustered = ClusteredTransfer.fit(probes.num_points, matrices, np.random.default_rng(seed))
+    point_transfer = transfer_matrices(
+        patches.points, patches.visible.reshape(patches.points.num_points, patches.visible.shape[2]), *light_samples, 0
     )
-    irradiance = np.sqrt(np.pi) * of_points.reshape(cells.num_cells, cells.points_a_cell, NUM_HARMONICS).mean(axis=1)
-    every = np.arange(cells.num_cells)
-    first = np.ascontiguousarray(cells.visible[:, 0])
-    vectors = transfer_matrices(cells.first_points(every), first, *asked, CELL_DEGREE)
+    irradiance = np.sqrt(np.pi) * point_transfer.reshape(
+        patches.num_patches, patches.points_per_patch, NUM_HARMONICS
+    ).mean(axis=1)
+    patch_rows = np.arange(patches.num_patches)
+    first_visible = np.ascontiguousarray(patches.visible[:, 0])
+    patch_coefficients = transfer_matrices(
+        patches.first_points(patch_rows), first_visible, *light_samples, PATCH_DEGREE
+    )
     return {
         **{f"harmonics/{name}": array for name, array in clustered._asdict().items()},
         "harmonics/irradiance": irradiance.astype(np.float16),
-        "harmonics/vectors": vectors.astype(np.float16),
+        "harmonics/vectors": patch_coefficients.astype(np.float16),
     }
 
 
-def harmonic_bytes(num_points: int, num_cells: int) -> int:
+def harmonic_bytes(num_probes: int, num_patches: int) -> int:
     """What its arrays need in a store, at most."""
-    basis = 2 * NUM_CLUSTERS * (1 + NUM_COMPONENTS) * num_functions(QUICK_DEGREE) * NUM_HARMONICS
-    of_points = num_points * (1 + 2 * NUM_COMPONENTS)
-    return basis + of_points + 2 * num_cells * (1 + num_functions(CELL_DEGREE)) * NUM_HARMONICS
+    basis_bytes = 2 * NUM_CLUSTERS * (1 + NUM_COMPONENTS) * num_functions(FAST_DEGREE) * NUM_HARMONICS
+    probe_bytes = num_probes * (1 + 2 * NUM_COMPONENTS)
+    return basis_bytes + probe_bytes + 2 * num_patches * (1 + num_functions(PATCH_DEGREE)) * NUM_HARMONICS
 
 
-def read_harmonic_light(store: StoreReader, cells: CellLight) -> HarmonicLight | None:
+def read_harmonic_light(store: StoreReader, patches: PatchLight) -> HarmonicLight | None:
     """Read it; None where a store has none, as those of fixed views and of earlier versions.
 
     Raises:
@@ -93,14 +97,18 @@ def read_harmonic_light(store: StoreReader, cells: CellLight) -> HarmonicLight |
     """
     if not store.attributes.get("has_harmonics"):
         return None
-    of_points = ClusteredTransfer(*(store.read(f"harmonics/{name}") for name in ClusteredTransfer._fields))
-    irradiance, vectors = (store.read(f"harmonics/{name}").astype(np.float32) for name in ("irradiance", "vectors"))
-    shape = num_functions(QUICK_DEGREE), NUM_HARMONICS
-    fits = len(of_points.cluster) == len(of_points.weight) == store.shape("points/material")[0]
-    fits = fits and of_points.basis.shape[1:] == (1 + of_points.weight.shape[1], *shape)
-    fits = fits and int(of_points.cluster.max(initial=0)) < len(of_points.basis)
-    of_cells = cells.num_cells, num_functions(CELL_DEGREE), NUM_HARMONICS
-    if not (fits and irradiance.shape == of_cells[::2] and vectors.shape == of_cells):
+    probe_transfer = ClusteredTransfer(*(store.read(f"harmonics/{name}") for name in ClusteredTransfer._fields))
+    irradiance, patch_coefficients = (
+        store.read(f"harmonics/{name}").astype(np.float32) for name in ("irradiance", "vectors")
+    )
+    shape = num_functions(FAST_DEGREE), NUM_HARMONICS
+    fits = len(probe_transfer.cluster) == len(probe_transfer.weight) == store.shape("points/material")[0]
+    fits = fits and probe_transfer.basis.shape[1:] == (1 + probe_transfer.weight.shape[1], *shape)
+    fits = fits and int(probe_transfer.cluster.max(initial=0)) < len(probe_transfer.basis)
+    patch_shape = patches.num_patches, num_functions(PATCH_DEGREE), NUM_HARMONICS
+    if not (fits and irradiance.shape == patch_shape[::2] and patch_coefficients.shape == patch_shape):
         raise ChunkDamagedError("harmonics", "they do not fit the points and cells")
-    brought = harmonics(read_traced_directions(store).astype(np.float64)) * read_tiles(store).solid_angles[:, None]
-    return HarmonicLight(of_points, irradiance, vectors, brought)
+    light_coefficients = (
+        harmonics(read_shadow_ray_directions(store).astype(np.float64)) * read_tiles(store).solid_angles[:, None]
+    )
+    return HarmonicLight(probe_transfer, irradiance, patch_coefficients, light_coefficients)

@@ -10,7 +10,7 @@ Source = TypeVar("Source")
 Value = TypeVar("Value")
 
 
-class LastRead(Generic[Source, Value]):
+class ReadCache(Generic[Source, Value]):
     """A function that remembers its last answer; for several threads, and travelling without what it keeps.
 
     Args:
@@ -21,7 +21,7 @@ class LastRead(Generic[Source, Value]):
         self._read, self._lock = read, threading.Lock()
         self._last: tuple[Source, Value] | None = None
 
-    def __reduce__(self) -> tuple[type[LastRead[Source, Value]], tuple[Callable[[Source], Value]]]:
+    def __reduce__(self) -> tuple[type[ReadCache[Source, Value]], tuple[Callable[[Source], Value]]]:
         return type(self), (self._read,)
 
     def __call__(self, source: Source) -> Value:

@@ -10,29 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.light.local import LocalLight, Triangles, make_local, shadow_geometry, strata_of
-from relume.light.strata import Strata
+from relume.light.local import LightTriangles, LocalLight, emitter_geometry, make_light_strata, prepare_local_lights
+from relume.light.strata import LightStrata
 from relume.look import LightGeometry
-from relume.memory import Memory
-from relume.methods.store_io import has_holes, read_holes
-from relume.picture.light import Light, Source
-from relume.points import Points
+from relume.memory import Cache
+from relume.methods.store_io import has_alpha_tested_surfaces, read_alpha_test
+from relume.picture.light import Illumination, LightSource
+from relume.points import SurfacePoints
 from relume.project.receivers import LocalRays
 from relume.trace.embree import EmbreeScene
-from relume.trace.geometry import is_front, off_surface
-from relume.trace.local_shadows import arriving, trace_local
-from relume.trace.preview_light import PreviewLight, preview_light
+from relume.trace.geometry import is_front, offset_point
+from relume.trace.local_shadows import compute_irradiance, trace_light_visibility
+from relume.trace.preview_light import MovingLight, trace_moving_light
 
 F32 = NDArray[np.float32]
 
 SAMPLES = 64  # of a rectangle, for each view sample
-FINER_OF_FEW, FEW = 4, 4  # times as many of a mesh, where no more materials of the scene shine
+MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # times as many of a mesh, where no more materials of the scene shine
 PREVIEW_SAMPLES = 4  # while a hand moves it
 _ONES = np.ones(3, np.float32)
 
 
 @dataclass(frozen=True)
-class Shadows:
+class ShadowCache:
     """Samples of a light that points see, as in `LocalRays.visible`."""
 
     visible: NDArray[np.uint8]
@@ -47,11 +47,11 @@ class LocalLights:
     """The triangles of a store, and lights among them; shared by all pictures of the bake.
 
     Args:
-        key: of the bake in `memory`.
+        key: of the bake in `cache`.
     """
 
-    def __init__(self, store: StoreReader, memory: Memory, key: str) -> None:
-        self._store, self._memory, self._key = store, memory, key
+    def __init__(self, store: StoreReader, cache: Cache, key: str) -> None:
+        self._store, self._cache, self._key = store, cache, key
 
     @cached_property
     def positions(self) -> F32:
@@ -64,31 +64,33 @@ class LocalLights:
         return np.asarray(self._store.read("scene/faces"), np.uint32)
 
     @property
-    def has_holes(self) -> bool:
+    def has_alpha_tested_surfaces(self) -> bool:
         """Whether rays may pass some of them."""
-        return has_holes(self._store)
+        return has_alpha_tested_surfaces(self._store)
 
     @cached_property
     def embree(self) -> EmbreeScene:
         """Their search tree."""
-        return EmbreeScene.build(self.positions, self.faces, read_holes(self._store, self.positions, self.faces))
+        return EmbreeScene.build(self.positions, self.faces, read_alpha_test(self._store, self.positions, self.faces))
 
     @cached_property
-    def _off_surface(self) -> float:
-        return off_surface(self.positions)
+    def _ray_offset(self) -> float:
+        return offset_point(self.positions)
 
-    def samples_of(self, geometry: LightGeometry, of_rectangle: int = SAMPLES) -> int:
-        """How many samples a light has where a rectangle has so many, see `strata_of`: more of a mesh, of which walls
-        hide parts, and which is near to the frame that it stands in."""
+    def num_samples(self, geometry: LightGeometry, rectangle_samples: int = SAMPLES) -> int:
+        """The samples of a light where a rectangle has so many; see `make_light_strata`.
+
+        A mesh has more: walls hide parts of it, and it is near to the frame that it stands in.
+        """
         lights = self._store.attributes["look"]["lights"].values()
-        is_one_of_few = sum(light["kind"] == "mesh" for light in lights) <= FEW
-        return of_rectangle * (FINER_OF_FEW if geometry.kind == "mesh" and is_one_of_few else 1)
+        has_few_meshes = sum(light["kind"] == "mesh" for light in lights) <= MAX_FINE_MESHES
+        return rectangle_samples * (MESH_SAMPLE_FACTOR if geometry.kind == "mesh" and has_few_meshes else 1)
 
-    def all_rays(
+    def rays_to(
         self,
-        light: Light,
-        points: Points,
-        shadows_of: Callable[[LightGeometry, Points], Shadows] | None = None,
+        light: Illumination,
+        points: SurfacePoints,
+        find_shadows: Callable[[LightGeometry, SurfacePoints], ShadowCache] | None = None,
         *,
         is_coarse: bool = False,
     ) -> list[LocalRays]:
@@ -96,53 +98,59 @@ class LocalLights:
 
         Args:
             light: all that arrives at the picture. points: where it arrives.
-            shadows_of: where they are remembered; they are traced where there is no such place.
+            find_shadows: where they are remembered; they are traced where there is no such place.
             is_coarse: without it, for broad functions of where light comes from; every light has `SAMPLES`.
         """
         if not light.paths.direct:
             return []
-        found = []
+        rays = []
         for geometry, gain in light.local:
-            num, shadow = SAMPLES if is_coarse else self.samples_of(geometry), shadow_geometry(geometry)
-            seen = self.trace(shadow, points, num) if shadows_of is None else shadows_of(shadow, points).visible
-            found.append(LocalRays(*self.sampled(geometry, num), np.array(gain, np.float32), seen))
-        return found
+            num_samples, emitter = SAMPLES if is_coarse else self.num_samples(geometry), emitter_geometry(geometry)
+            visible = (
+                self.trace(emitter, points, num_samples)
+                if find_shadows is None
+                else find_shadows(emitter, points).visible
+            )
+            rays.append(LocalRays(*self.sample_light(geometry, num_samples), np.array(gain, np.float32), visible))
+        return rays
 
-    def preview(self, geometry: LightGeometry, points: Points) -> PreviewLight:
+    def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
         """Preview what points get of a light of unit emission, by few samples of it where it has an extent."""
-        return preview_light(self.embree, self._off_surface, *self.sampled(geometry, PREVIEW_SAMPLES), points)
+        return trace_moving_light(self.embree, self._ray_offset, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
 
-    def preview_rays(self, source: Source, seen: NDArray[np.uint8]) -> LocalRays:
-        """Make rays of a previewed light, for terms that ask where light comes from. seen: `PreviewLight.visible`"""
-        return LocalRays(*self.sampled(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), seen)
+    def preview_rays(self, source: LightSource, visible: NDArray[np.uint8]) -> LocalRays:
+        """Make rays of a previewed light, for terms that ask where light comes from. seen: `MovingLight.visible`"""
+        return LocalRays(
+            *self.sample_light(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), visible
+        )
 
-    def unhidden_rays(self, geometry: LightGeometry, points: Points) -> LocalRays:
+    def unoccluded_rays(self, geometry: LightGeometry, points: SurfacePoints) -> LocalRays:
         """What would come to points from a light of unit emission if nothing were in its way, as rays."""
-        light, strata = self.sampled(geometry, SAMPLES)
-        seen = np.full((points.num_points, -(-len(strata.uv) // 8)), 255, np.uint8)
-        return LocalRays(light, strata, _ONES, seen)
+        light, strata = self.sample_light(geometry, SAMPLES)
+        visible = np.full((points.num_points, -(-len(strata.uv) // 8)), 255, np.uint8)
+        return LocalRays(light, strata, _ONES, visible)
 
-    def unhidden(self, geometry: LightGeometry, points: Points) -> F32:
+    def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> F32:
         """What would come to points from a light of unit emission if nothing were in its way. (n,) float32"""
-        rays = self.unhidden_rays(geometry, points)
-        return arriving(rays.light, rays.strata, points, rays.visible)
+        rays = self.unoccluded_rays(geometry, points)
+        return compute_irradiance(rays.light, rays.strata, points, rays.visible)
 
-    def shadows(self, geometry: LightGeometry, points: Points) -> Shadows:
+    def shadows(self, geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
         """What points see of a light."""
-        return Shadows(self.trace(geometry, points, self.samples_of(geometry)))
+        return ShadowCache(self.trace(geometry, points, self.num_samples(geometry)))
 
-    def shines_at(self, material: int, eye: F32, position: F32) -> NDArray[np.bool_]:
+    def is_emissive_at(self, material: int, camera_position: F32, position: F32) -> NDArray[np.bool_]:
         """Whether points of a material that shines are seen from a side that does.
 
         Args:
-            material: its index. eye: places that they are seen from. (n, 3) or (1, 3) float32
+            material: its index. camera_position: places that they are seen from. (n, 3) or (1, 3) float32
             position: of the points. (n, 3) float32
         """
         if self._is_two_sided(material):
             return np.ones(len(position), np.bool_)
-        return is_front(self.embree, self.positions, self.faces, eye, position)
+        return is_front(self.embree, self.positions, self.faces, camera_position, position)
 
-    def trace(self, geometry: LightGeometry, points: Points, num_samples: int) -> NDArray[np.uint8]:
+    def trace(self, geometry: LightGeometry, points: SurfacePoints, num_samples: int) -> NDArray[np.uint8]:
         """Find which samples of a light points see.
 
         Args:
@@ -150,26 +158,26 @@ class LocalLights:
         Returns:
             As in `LocalRays.visible`. (n, bytes) uint8
         """
-        return trace_local(self.embree, self._off_surface, *self.sampled(geometry, num_samples), points)
+        return trace_light_visibility(self.embree, self._ray_offset, *self.sample_light(geometry, num_samples), points)
 
-    def sampled(self, geometry: LightGeometry, of_rectangle: int) -> tuple[LocalLight, Strata]:
-        """Make a light, and its samples. of_rectangle: see `strata_of`"""
+    def sample_light(self, geometry: LightGeometry, rectangle_samples: int) -> tuple[LocalLight, LightStrata]:
+        """Make a light, and its samples. of_rectangle: see `make_light_strata`"""
         light = self._light(geometry)
-        return light, strata_of(light, of_rectangle)
+        return light, make_light_strata(light, rectangle_samples)
 
     def _light(self, geometry: LightGeometry) -> LocalLight:
-        return self._memory.keep((self._key, "local light", geometry), lambda: self._make(geometry))
+        return self._cache.get_value((self._key, "local light", geometry), lambda: self._build_light(geometry))
 
-    def _make(self, geometry: LightGeometry) -> LocalLight:
+    def _build_light(self, geometry: LightGeometry) -> LocalLight:
         if geometry.kind != "mesh":
-            return make_local(geometry)
+            return prepare_local_lights(geometry)
         material = list(self._store.attributes["materials"]).index(geometry.material)
-        chosen = self._store.read("scene/face_material") == material
-        shares = np.ones(np.count_nonzero(chosen), np.float32)
+        face_mask = self._store.read("scene/face_material") == material
+        face_emission = np.ones(np.count_nonzero(face_mask), np.float32)
         if self._store.attributes.get("has_emission_images"):
-            shares = self._store.read("scene/face_emission")[chosen]
-        corners = self.positions[self.faces[chosen]]
-        return make_local(geometry, Triangles(corners, shares, self._is_two_sided(material)))
+            face_emission = self._store.read("scene/face_emission")[face_mask]
+        corners = self.positions[self.faces[face_mask]]
+        return prepare_local_lights(geometry, LightTriangles(corners, face_emission, self._is_two_sided(material)))
 
     def _is_two_sided(self, material: int) -> bool:
         return bool(self._store.attributes["double_sided"][material])

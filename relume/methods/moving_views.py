@@ -1,4 +1,4 @@
-"""An opened bake of the method `surface`: what a moving eye sees, and what arrives there under any light."""
+"""An opened bake of the method `stored_scene`: what a moving eye sees, and what arrives there under any light."""
 
 from __future__ import annotations
 
@@ -11,257 +11,285 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.basis.zernike import NUM_FUNCTIONS, QUICK_DEGREE
-from relume.estimated import Estimated
-from relume.light.gather_rays import Pattern
+from relume.basis.zernike import FAST_DEGREE, NUM_FUNCTIONS
+from relume.estimated import JackknifeEstimate
+from relume.light.gather_rays import RayPattern
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
-from relume.memory import Memory
-from relume.methods.opened.bounced_views import BouncedViews
-from relume.methods.opened.described import described_light
-from relume.methods.skies_in_lobes import SkiesInLobes
-from relume.methods.store_io import read_cells
-from relume.methods.suns_of_skies import SunsOfSkies
-from relume.methods.thrown import read_thrown
-from relume.moving.beams.beam import Beam, lamps_of, targets_of_lamp
-from relume.moving.highlights.by_lights import SkyLights
-from relume.moving.highlights.lobe_lights import LobeLights
-from relume.moving.parted import find_parted
-from relume.moving.points.images import OWN, Wears, dressed
-from relume.moving.points.surface import Surface, pattern_of_points, read_surface
-from relume.moving.sky import Sky
-from relume.moving.solid import Solid
+from relume.memory import Cache
+from relume.methods.opened.bounced_views import BakedIndirectViews
+from relume.methods.opened.described import read_light_fields
+from relume.methods.skies_in_lobes import PrefilteredEnvironments
+from relume.methods.store_io import read_patches
+from relume.methods.suns_of_skies import SunExtractor
+from relume.methods.thrown import read_mirror_lights
+from relume.moving.beams.beam import HardShadowLight, hard_shadow_lights, local_shadow_targets
+from relume.moving.highlights.by_lights import EnvironmentLights
+from relume.moving.highlights.lobe_lights import LobeLightLists
+from relume.moving.parted import find_occluded_probes
+from relume.moving.points.images import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
+from relume.moving.points.surface import StoredScene, ray_pattern, read_surface
+from relume.moving.sky import EnvironmentLookup
+from relume.moving.solid import OcclusionMesh
 from relume.moving.view import FreeView
-from relume.picture.light import Light, Source
-from relume.picture.transfer import Axis, Eyes
-from relume.points import Points
-from relume.project.alike_rays import alike_ray_vectors, weighed_functions
-from relume.project.light_vectors import light_vectors, ray_vectors
-from relume.project.receivers import GatherRays, Rays
-from relume.project.sent import Sent
-from relume.project.squares import Squares, leaving_squares
+from relume.picture.light import Illumination, LightSource
+from relume.picture.transfer import CameraMode, EditAxis
+from relume.points import SurfacePoints
+from relume.project.alike_rays import shared_direction_coefficients, weighted_basis
+from relume.project.light_vectors import incident_coefficients, ray_incident_coefficients
+from relume.project.receivers import GatherRays, RayList
+from relume.project.sent import OutgoingLight
+from relume.project.squares import DirectionBins, outgoing_bins
 from relume.trace.embree import EmbreeScene
-from relume.trace.visibility import visible_of
+from relume.trace.visibility import select_visibility
 from relume.views.store_io import read_camera
 
 F32 = NDArray[np.float32]
 
-_PERMUTED = 4096  # points whose bits are unpacked at once
+_PROBES_PER_BATCH = 4096  # points whose bits are unpacked at once
 
 
 @dataclass(frozen=True)
-class MovingViews:
+class BakedFreeCamera:
     """Pictures from anywhere; a `relume.picture.transfer.Opened`, and what `relume.moving.picture` asks.
 
     Attributes:
-        lit: the light of the bake, in which no view was baked.
-        surface: what the eye sees.
+        light_transport: the light of the bake, in which no view was baked.
+        stored_scene: what the eye sees.
         views: where eyes begin.
-        moving_error: how far pictures are off while an eye moves, measured in the bake; None where that is not known.
+        free_camera_error: how far pictures are off while an eye moves, measured in the bake; None where that is not
+            known.
     """
 
-    lit: BouncedViews
-    surface: Surface
+    light_transport: BakedIndirectViews
+    stored_scene: StoredScene
     views: dict[str, FreeView]
-    moving_error: Estimated | None = None
+    free_camera_error: JackknifeEstimate | None = None
 
-    eyes = Eyes.FREE
-    axes = BouncedViews.axes | {Axis.EYE}
+    camera_mode = CameraMode.FREE
+    axes = BakedIndirectViews.axes | {EditAxis.CAMERA}
 
     @classmethod
-    def of(cls, store: StoreReader, key: str, memory: Memory) -> Self:
+    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
         """Open a store.
 
         Args:
-            store: an open one. key: of the bake in the memory. memory: of all that is made from the bake.
+            store: an open one. key: of the bake in the memory. cache: of all that is made from the bake.
         Raises:
             StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
         """
-        light = described_light(store, key, memory)
-        lit = BouncedViews(**light, cells=read_cells(store), thrown=read_thrown(store))
+        light_fields = read_light_fields(store, key, cache)
+        light_transport = BakedIndirectViews(
+            **light_fields, patches=read_patches(store), mirror_lights=read_mirror_lights(store)
+        )
         width, height = store.attributes["size"]
         cameras = (read_camera(store, k) for k in range(len(store.attributes["views"])))
-        surface = read_surface(store)
-        place = surface.points.position
-        bounds = place.min(axis=0).astype(np.float64), place.max(axis=0).astype(np.float64)
-        return cls(lit, surface, {camera.name: FreeView(camera, width, height, bounds) for camera in cameras})
+        stored_scene = read_surface(store)
+        probe_positions = stored_scene.probes.position
+        bounds = probe_positions.min(axis=0).astype(np.float64), probe_positions.max(axis=0).astype(np.float64)
+        return cls(
+            light_transport, stored_scene, {camera.name: FreeView(camera, width, height, bounds) for camera in cameras}
+        )
 
     @property
-    def memory(self) -> Memory:
+    def cache(self) -> Cache:
         """Of all that is made from the bake and may be made again."""
-        return self.lit.memory
+        return self.light_transport.cache
 
     @property
     def key(self) -> str:
         """Path of the store."""
-        return self.lit.key
+        return self.light_transport.key
 
     @property
     def scene_id(self) -> str:
         """Of the scene that was baked."""
-        return self.lit.scene_id
+        return self.light_transport.scene_id
 
     @property
     def method(self) -> str:
         """That it was baked by."""
-        return self.lit.method
+        return self.light_transport.method
 
     @property
     def default_look(self) -> dict[str, Any]:
         """The complete look of the scene as it was imported."""
-        return self.lit.default_look
+        return self.light_transport.default_look
 
     @property
     def material_names(self) -> Sequence[str]:
         """In the scene's order."""
-        return self.lit.material_names
+        return self.light_transport.material_names
 
-    def radiance_of(self, name: str | None) -> F32:
+    def environment_radiance(self, name: str | None) -> F32:
         """Radiance of an environment, None for the scene's own. (height, width, 3) float32"""
-        return self.lit.radiance_of(name)
+        return self.light_transport.environment_radiance(name)
 
-    def surface_with(self, wears: tuple[Wears, ...]) -> Surface:
+    def stored_scene_with(self, overrides: tuple[ProbeMapOverrides, ...]) -> StoredScene:
         """What the eye sees where a look names images in the place of the materials' own.
 
         Args:
-            wears: what it names, of each material.
+            overrides: what it names, of each material.
         Raises:
             NotFoundError, SceneError: an image cannot be had.
         """
-        if all(of == OWN for of in wears):
-            return self.surface
-        key = self.key, "images on surfaces", wears
-        found = self.memory.keep(key, lambda: dressed(self.surface, self.positions, wears))
-        return replace(self.surface, **found._asdict())
+        if all(override == NO_OVERRIDES for override in overrides):
+            return self.stored_scene
+        key = self.key, "images on surfaces", overrides
+        textures = self.cache.get_value(key, lambda: overridden_textures(self.stored_scene, self.positions, overrides))
+        return replace(self.stored_scene, **textures._asdict())
 
     @property
-    def has_holes(self) -> bool:
+    def has_alpha_tested_surfaces(self) -> bool:
         """Whether rays may pass some triangles."""
-        return self.lit.local.has_holes
+        return self.light_transport.local.has_alpha_tested_surfaces
 
     @property
     def embree(self) -> EmbreeScene:
         """The triangles' search tree."""
-        return self.lit.local.embree
+        return self.light_transport.local.embree
 
     @property
     def positions(self) -> F32:
         """Of the triangles' corners, metres. (corners, 3) float32"""
-        return self.lit.local.positions
+        return self.light_transport.local.positions
 
     @cached_property
-    def solid(self) -> Solid:
+    def occlusion_mesh(self) -> OcclusionMesh:
         """What rays between places on surfaces meet."""
-        return Solid.of(self.surface, self.positions, self.embree)
+        return OcclusionMesh.build(self.stored_scene, self.positions, self.embree)
 
     @cached_property
-    def parted(self) -> NDArray[np.uint8]:
+    def has_occluded_neighbor(self) -> NDArray[np.uint8]:
         """Vertices that do not see all of their neighbours, from `relume.moving.parted`. (vertices,) uint8"""
-        return find_parted(self.solid)
+        return find_occluded_probes(self.occlusion_mesh)
 
     @cached_property
     def visible(self) -> NDArray[np.uint8]:
         """Which light triangles points see: triangle l in bit l & 7 of byte l >> 3. (points, bytes) uint8"""
-        return np.asarray(self.lit.store.read("points/visibility"), np.uint8)
+        return np.asarray(self.light_transport.store.read("points/visibility"), np.uint8)
 
     @cached_property
-    def _links(self) -> NDArray[np.uint16]:
-        return np.asarray(self.lit.store.read("points/links"), np.uint16)
+    def _gather_hits(self) -> NDArray[np.uint16]:
+        return np.asarray(self.light_transport.store.read("points/links"), np.uint16)
 
-    def vectors(self, element: Light, beside_suns: bool = False) -> F32:
+    def vectors(self, element: Illumination, without_sun_disks: bool = False) -> F32:
         """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32
 
         Args:
-            element: that light. beside_suns: what comes straight from suns of the sky is left out.
+            element: that light. without_sun_disks: what comes straight from suns of the sky is left out.
         """
-        key = self._key_of(element, beside_suns)
-        return self.memory.keep(key, lambda: self._vectors(element, beside_suns))
+        key = self._vectors_key(element, without_sun_disks)
+        return self.cache.get_value(key, lambda: self._vectors(element, without_sun_disks))
 
-    def knows(self, element: Light, beside_suns: bool = False) -> bool:
+    def has_vectors(self, element: Illumination, without_sun_disks: bool = False) -> bool:
         """Whether they have been made."""
-        return self.memory.holds(self._key_of(element, beside_suns))
+        return self.cache.contains(self._vectors_key(element, without_sun_disks))
 
-    def _key_of(self, element: Light, beside_suns: bool) -> tuple[Hashable, ...]:
-        return self.key, "light vectors", element, beside_suns and self.suns.are_in(element)
+    def _vectors_key(self, element: Illumination, without_sun_disks: bool) -> tuple[Hashable, ...]:
+        return self.key, "light vectors", element, without_sun_disks and self.sun_disks.are_in(element)
 
-    def _vectors(self, element: Light, beside_suns: bool) -> F32:
-        points = self.surface.points
-        rays: list[Rays] = list(self.lit.local.all_rays(element, points, is_coarse=True))
-        sent = self.lit.reflected_in(element)
-        if sent is not None:
-            rays.append(GatherRays(self._links, self._pattern, sent))
-        lights = self.suns.lights_beside(element) if beside_suns else self.lit.lights_of(element)
-        return light_vectors(points, self.visible, lights, rays)
+    def _vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
+        probes = self.stored_scene.probes
+        rays: list[RayList] = list(self.light_transport.local.rays_to(element, probes, is_coarse=True))
+        outgoing = self.light_transport.outgoing_patch_light(element)
+        if outgoing is not None:
+            rays.append(GatherRays(self._gather_hits, self._pattern, outgoing))
+        lights = (
+            self.sun_disks.remaining_lights(element) if without_sun_disks else self.light_transport.lights_for(element)
+        )
+        return incident_coefficients(probes, self.visible, lights, rays)
 
-    def preview_vectors(self, element: Light, chosen: NDArray[np.intp], beside_suns: bool = False) -> F32:
+    def fast_vectors(
+        self, element: Illumination, probe_indices: NDArray[np.intp], without_sun_disks: bool = False
+    ) -> F32:
         """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32
 
         Args:
-            element, beside_suns: as of `vectors`. chosen: the points.
+            element, without_sun_disks: as of `vectors`. probe_indices: the points.
         """
-        points, rays = self.surface.points.rows(chosen), list[Rays]()
+        probes, rays = self.stored_scene.probes.rows(probe_indices), list[RayList]()
         if element.paths.direct:
             for source in element.local:
-                seen = self.lit.local.preview(source.geometry, points).visible
-                rays.append(self.lit.local.preview_rays(source, seen))
-        found = ray_vectors(points, rays, QUICK_DEGREE)
-        quick = self.suns.preview_lights_beside if beside_suns else self.lit.preview_lights_of
-        lights = quick(element)
+                visible = self.light_transport.local.preview(source.geometry, probes).visible
+                rays.append(self.light_transport.local.preview_rays(source, visible))
+        vectors = ray_incident_coefficients(probes, rays, FAST_DEGREE)
+        find_lights = (
+            self.sun_disks.preview_remaining_lights if without_sun_disks else self.light_transport.preview_lights_for
+        )
+        lights = find_lights(element)
         if lights.num_lights:
-            found += self._quick_sky(lights, points, chosen)
-        if element.paths.reflect:
-            found += self._of_rays(self.lit.reflected.quickly_under(element), chosen)
-        return found
+            vectors += self._preview_environment(lights, probes, probe_indices)
+        if element.paths.has_indirect:
+            vectors += self._ray_vectors(self.light_transport.indirect.fast(element), probe_indices)
+        return vectors
 
-    def change_between(self, before: Light, after: Light, chosen: NDArray[np.intp]) -> F32:
+    def indirect_delta(self, before: Illumination, after: Illumination, probe_indices: NDArray[np.intp]) -> F32:
         """How what surfaces send to some points changes, of a low degree, found quickly. (chosen, 3, functions) float32
 
         Args:
-            before, after: lights of equal sources. chosen: the points.
+            before, after: lights of equal sources. probe_indices: the points.
         """
-        return self._of_rays(self.lit.reflected.change(before, after), chosen)
+        return self._ray_vectors(self.light_transport.indirect.delta(before, after), probe_indices)
 
-    def _of_rays(self, sent: Sent, chosen: NDArray[np.intp]) -> F32:
-        return alike_ray_vectors(self._links, self._squares, chosen, self._functions_of_rays, sent)
+    def _ray_vectors(self, outgoing: OutgoingLight, probe_indices: NDArray[np.intp]) -> F32:
+        return shared_direction_coefficients(
+            self._gather_hits, self._hit_bins, probe_indices, self._ray_basis, outgoing
+        )
 
     @property
-    def _squares(self) -> Squares:
-        def found() -> Squares:
-            return leaving_squares(self.surface.points, self._links, self._pattern, self.lit.cells.frames)
+    def _hit_bins(self) -> DirectionBins:
+        def compute() -> DirectionBins:
+            return outgoing_bins(
+                self.stored_scene.probes, self._gather_hits, self._pattern, self.light_transport.patches.frames
+            )
 
-        return self.memory.keep((self.key, "squares of links"), found)
+        return self.cache.get_value((self.key, "squares of links"), compute)
 
     @cached_property
-    def suns(self) -> SunsOfSkies:
+    def sun_disks(self) -> SunExtractor:
         """Suns of environments, and what there is beside them."""
-        return SunsOfSkies(self.lit)
+        return SunExtractor(self.light_transport)
 
-    def beams(self, light: Light, chosen: NDArray[np.intp] | None) -> tuple[Beam, ...]:
+    def hard_shadow_lights(
+        self, light: Illumination, probe_indices: NDArray[np.intp] | None
+    ) -> tuple[HardShadowLight, ...]:
         """Suns and small lamps of a light, and what they bring to some points, None for all, if nothing hides them."""
-        points = self.surface.points if chosen is None else self.surface.points.rows(chosen)
-        found = [*self.suns.beams(light, points), *(self._beam_of(lamp, points) for lamp in lamps_of(light))]
-        return tuple(found) if chosen is None else tuple(beam.spread(chosen, self.vectors_shape) for beam in found)
+        probes = self.stored_scene.probes if probe_indices is None else self.stored_scene.probes.rows(probe_indices)
+        shadow_lights = [
+            *self.sun_disks.hard_shadow_lights(light, probes),
+            *(self._hard_shadow_light(source, probes) for source in hard_shadow_lights(light)),
+        ]
+        return (
+            tuple(shadow_lights)
+            if probe_indices is None
+            else tuple(shadow_light.scatter(probe_indices, self.vectors_shape) for shadow_light in shadow_lights)
+        )
 
-    def _beam_of(self, lamp: Source, points: Points) -> Beam:
-        rays = self.lit.local.unhidden_rays(lamp.geometry, points)
-        vectors = ray_vectors(points, [rays])
-        return Beam(lamp.geometry, targets_of_lamp(lamp.geometry), vectors, np.array(lamp.gain, np.float32))
+    def _hard_shadow_light(self, source: LightSource, probes: SurfacePoints) -> HardShadowLight:
+        rays = self.light_transport.local.unoccluded_rays(source.geometry, probes)
+        vectors = ray_incident_coefficients(probes, [rays])
+        return HardShadowLight(
+            source.geometry, local_shadow_targets(source.geometry), vectors, np.array(source.gain, np.float32)
+        )
 
-    def _quick_sky(self, lights: TriangleLights, points: Points, chosen: NDArray[np.intp]) -> F32:
+    def _preview_environment(
+        self, lights: TriangleLights, probes: SurfacePoints, probe_indices: NDArray[np.intp]
+    ) -> F32:
         """Light vectors of an environment at some points, by harmonics where the bake has them."""
-        harmonic = self.lit.harmonic
+        harmonic = self.light_transport.harmonic
         if harmonic is None:
-            return light_vectors(points, self.visible[chosen], lights, (), QUICK_DEGREE)
-        divided = harmonic.divided(lights)
-        seen = visible_of(self.visible, chosen, divided.chosen)
-        beyond = light_vectors(points, seen, divided.beyond, (), QUICK_DEGREE)
-        return beyond + harmonic.of_points.vectors(divided.smooth, chosen)
+            return incident_coefficients(probes, self.visible[probe_indices], lights, (), FAST_DEGREE)
+        split = harmonic.frequency_split(lights)
+        visible = select_visibility(self.visible, probe_indices, split.residual_triangles)
+        residual = incident_coefficients(probes, visible, split.residual, (), FAST_DEGREE)
+        return residual + harmonic.probe_transfer.incident_coefficients(split.low_frequency, probe_indices)
 
     @cached_property
-    def _functions_of_rays(self) -> F32:
-        return weighed_functions(self._pattern, 0, QUICK_DEGREE)  # all points have one seed
+    def _ray_basis(self) -> F32:
+        return weighted_basis(self._pattern, 0, FAST_DEGREE)  # all points have one seed
 
-    def unhidden(self, light: Light, material: int, *, is_preview: bool) -> F32:
+    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> F32:
         """What white points of a material would send if nothing were in the light's way; of others nothing.
 
         Args:
@@ -270,71 +298,75 @@ class MovingViews:
         Returns:
             (points, 3) float32
         """
-        rows, kept = np.flatnonzero(self.surface.material == material), self.memory.passing
+        rows, cache = np.flatnonzero(self.stored_scene.material == material), self.cache.transient
         key = self.key, "unhidden light", material
 
-        def sky() -> F32:
-            return self._open_sky(light, self.surface.points.rows(rows), is_preview=is_preview)
+        def compute_environment() -> F32:
+            return self._unoccluded_environment(light, self.stored_scene.probes.rows(rows), is_preview=is_preview)
 
-        def of(lamp: LightGeometry) -> F32:
-            return self.lit.local.unhidden(lamp, self.surface.points.rows(rows))
+        def compute_local(geometry: LightGeometry) -> F32:
+            return self.light_transport.local.unoccluded(geometry, self.stored_scene.probes.rows(rows))
 
-        found = kept.keep((*key, light.environment, is_preview), sky) * np.array(light.environment_gain, np.float32)
-        for lamp, gain in light.local:
-            if lamp.kind != "mesh":
-                one = kept.keep((*key, lamp), lambda lamp=lamp: of(lamp))  # type: ignore[misc]
-                found += np.outer(one, np.array(gain, np.float32) / np.float32(np.pi))
-        out = np.zeros((self.surface.points.num_points, 3), np.float32)
-        out[rows] = found
+        radiance = cache.get_value((*key, light.environment, is_preview), compute_environment) * np.array(
+            light.environment_gain, np.float32
+        )
+        for geometry, gain in light.local:
+            if geometry.kind != "mesh":
+                irradiance = cache.get_value((*key, geometry), lambda geometry=geometry: compute_local(geometry))  # type: ignore[misc]
+                radiance += np.outer(irradiance, np.array(gain, np.float32) / np.float32(np.pi))
+        out = np.zeros((self.stored_scene.probes.num_points, 3), np.float32)
+        out[rows] = radiance
         return out
 
-    def _open_sky(self, light: Light, points: Points, *, is_preview: bool) -> F32:
+    def _unoccluded_environment(self, light: Illumination, probes: SurfacePoints, *, is_preview: bool) -> F32:
         """What white points send under the whole sky, of which there are few that differ. (n, 3) float32"""
-        _, first, of_normal = np.unique(points.normal, axis=0, return_index=True, return_inverse=True)
-        lights, receivers = self.lit.open_sky(light, points.rows(first), is_preview=is_preview)
+        _, first, normal_index = np.unique(probes.normal, axis=0, return_index=True, return_inverse=True)
+        lights, receivers = self.light_transport.unoccluded_environment(
+            light, probes.rows(first), is_preview=is_preview
+        )
         # the first function is constant, and its light vector the irradiance
-        constant = light_vectors(receivers.points, receivers.visible, lights, (), 0)[:, :, 0]
-        return np.asarray(constant[of_normal.ravel()] / np.float32(np.sqrt(np.pi)), np.float32)
+        constant = incident_coefficients(receivers.points, receivers.visible, lights, (), 0)[:, :, 0]
+        return np.asarray(constant[normal_index.ravel()] / np.float32(np.sqrt(np.pi)), np.float32)
 
     @cached_property
-    def _pattern(self) -> Pattern:
-        return pattern_of_points(self.lit.store, self._links.shape[1])
+    def _pattern(self) -> RayPattern:
+        return ray_pattern(self.light_transport.store, self._gather_hits.shape[1])
 
     @property
     def vectors_shape(self) -> tuple[int, int, int]:
         """Of light vectors: points, channels, K."""
-        return self.surface.points.num_points, 3, NUM_FUNCTIONS
+        return self.stored_scene.probes.num_points, 3, NUM_FUNCTIONS
 
     @cached_property
-    def _in_lobes(self) -> SkiesInLobes:
-        return SkiesInLobes(self.lit)
+    def _prefiltered(self) -> PrefilteredEnvironments:
+        return PrefilteredEnvironments(self.light_transport)
 
     @cached_property
-    def seen_lights(self) -> NDArray[np.uint8]:
+    def light_visibility_bits(self) -> NDArray[np.uint8]:
         """Which light triangles points see, those beside each other one after another. (points, bytes) uint8"""
-        order, out = self._in_lobes.order, np.empty_like(self.visible)
-        for rows in np.array_split(np.arange(len(out)), len(out) // _PERMUTED + 1):
+        order, out = self._prefiltered.order, np.empty_like(self.visible)
+        for rows in np.array_split(np.arange(len(out)), len(out) // _PROBES_PER_BATCH + 1):
             bits = np.unpackbits(self.visible[rows], axis=1, bitorder="little")
             bits[:, : len(order)] = bits[:, order]
             out[rows] = np.packbits(bits, axis=1, bitorder="little")
         return out
 
-    def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
+    def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLightLists:
         """The light triangles of an environment, as lobes of some widths look for them."""
-        return self._in_lobes.lights(environment, widths)
+        return self._prefiltered.directional_lights(environment, widths)
 
-    def sky_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> SkyLights:
+    def environment_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
         """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
-        return self._in_lobes.summed(environment, is_preview=is_preview)
+        return self._prefiltered.combined(environment, is_preview=is_preview)
 
-    def lamps_in(self, environment: EnvironmentKey) -> F32:
-        """Lamps of an environment, turned; see `relume.moving.highlights.looking.SkyLight`. (lamps, 7) float32"""
-        return self._in_lobes.lamps(environment)
+    def bright_lights(self, environment: EnvironmentKey) -> F32:
+        """Bright lights of an environment, turned; see `PrefilteredEnvironment`. (lights, 7) float32"""
+        return self._prefiltered.bright_lights(environment)
 
-    def sky_in(self, name: str | None) -> Sky:
+    def prefiltered(self, name: str | None) -> EnvironmentLookup:
         """An environment, None for the scene's own, and what it is when it is blurred without its lamps."""
-        return self._in_lobes.sky(name)
+        return self._prefiltered.environment_lookup(name)
 
-    def map_of(self, name: str | None, blur: float = 0) -> F32:
+    def environment_map(self, name: str | None, blur: float = 0) -> F32:
         """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
-        return self.lit.map_of(name, blur)
+        return self.light_transport.environment_map(name, blur)

@@ -8,58 +8,64 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import SENT_DEGREE
-from relume.light.local import LocalLight, shadow_geometry
-from relume.light.strata import Strata
+from relume.basis.zernike import OUTGOING_DEGREE
+from relume.light.local import LocalLight, emitter_geometry
+from relume.light.strata import LightStrata
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey, LightGeometry
-from relume.memory import Memory
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.in_lobes import Coming
-from relume.methods.cells.reflecting import Arrived, Reflecting
-from relume.methods.harmonic_light import CELL_DEGREE, HarmonicLight
+from relume.memory import Cache
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.in_lobes import DirectLobes
+from relume.methods.cells.reflecting import IncidentLight, ReflectanceOperator
+from relume.methods.harmonic_light import PATCH_DEGREE, HarmonicLight
 from relume.methods.local_lights import LocalLights
-from relume.picture.light import Light, Source
-from relume.project.light_vectors import ray_vectors
+from relume.picture.light import Illumination, LightSource
+from relume.project.light_vectors import ray_incident_coefficients
 from relume.project.receivers import LocalRays
-from relume.project.sent import NUM_SENT
-from relume.trace.local_shadows import arriving
-from relume.trace.preview_light import PreviewLight
+from relume.project.sent import NUM_OUTGOING
+from relume.trace.local_shadows import compute_irradiance
+from relume.trace.preview_light import MovingLight
 
 F32 = NDArray[np.float32]
 
-SAMPLES_OF_CELLS = 16  # of a rectangle, for each point of a cell
+SAMPLES_PER_PATCH_POINT = 16  # of a rectangle, for each point of a cell
 
 
-class LocalOnCells:
+class LocalPatchLight:
     """What local lights bring to gather cells, each of unit emission.
 
     Args:
-        local: the lights. cells: that they shine on.
-        memory: of all that is made from the bake. key: of the bake in it. leaning: see `LightOnCells`.
+        local: the lights. patches: that they shine on.
+        cache: of all that is made from the bake. key: of the bake in it. normal_overrides: see `DirectPatchLight`.
     """
 
     def __init__(
-        self, local: LocalLights, cells: CellLight, memory: Memory, key: str, leaning: tuple[Hashable, ...]
+        self, local: LocalLights, patches: PatchLight, cache: Cache, key: str, normal_overrides: tuple[Hashable, ...]
     ) -> None:
-        self._local, self._cells = local, cells
-        self._memory, self._key, self._leaning = memory, key, leaning
+        self._local, self._patches = local, patches
+        self._cache, self._key, self._normal_overrides = cache, key, normal_overrides
 
     def irradiance(self, geometry: LightGeometry) -> F32:
         """What comes to every cell, the mean over its points. (C,) float32"""
-        key = self._key, "light on cells", geometry, *self._leaning
-        return self._memory.keep(key, lambda: self._irradiance(geometry))
+        key = self._key, "light on cells", geometry, *self._normal_overrides
+        return self._cache.get_value(key, lambda: self._irradiance(geometry))
 
     def _irradiance(self, geometry: LightGeometry) -> F32:
-        of_points = arriving(*self._sampled(geometry), self._cells.points, self._seen(geometry))
-        shape = self._cells.num_cells, self._cells.points_a_cell
-        return np.asarray(of_points.reshape(shape).mean(axis=1, dtype=np.float64), np.float32)
+        point_irradiance = compute_irradiance(
+            *self._sample_light(geometry), self._patches.points, self._visibility(geometry)
+        )
+        shape = self._patches.num_patches, self._patches.points_per_patch
+        return np.asarray(point_irradiance.reshape(shape).mean(axis=1, dtype=np.float64), np.float32)
 
-    def _seen(self, geometry: LightGeometry) -> NDArray[np.uint8]:
-        def traced() -> NDArray[np.uint8]:
-            return self._local.trace(geometry, self._cells.points, self._local.samples_of(geometry, SAMPLES_OF_CELLS))
+    def _visibility(self, geometry: LightGeometry) -> NDArray[np.uint8]:
+        def trace() -> NDArray[np.uint8]:
+            return self._local.trace(
+                geometry, self._patches.points, self._local.num_samples(geometry, SAMPLES_PER_PATCH_POINT)
+            )
 
-        return self._memory.keep((self._key, "shadows on cells", shadow_geometry(geometry), *self._leaning), traced)
+        return self._cache.get_value(
+            (self._key, "shadows on cells", emitter_geometry(geometry), *self._normal_overrides), trace
+        )
 
     def rays(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
         """What comes to the points of some cells, as rays.
@@ -67,126 +73,153 @@ class LocalOnCells:
         Args:
             geometry: of the light. rows: the cells. (G,)
         """
-        seen, num = self._seen(geometry), self._cells.points_a_cell
-        bits = seen.reshape(-1, num, seen.shape[1])[rows].reshape(-1, seen.shape[1])
-        return LocalRays(*self._sampled(geometry), np.ones(3, np.float32), bits)
+        visible, points_per_patch = self._visibility(geometry), self._patches.points_per_patch
+        bits = visible.reshape(-1, points_per_patch, visible.shape[1])[rows].reshape(-1, visible.shape[1])
+        return LocalRays(*self._sample_light(geometry), np.ones(3, np.float32), bits)
 
     def preview_irradiance(self, geometry: LightGeometry) -> F32:
         """Preview what comes to every cell, at one of its points. (C,) float32"""
-        return self._preview(geometry).arriving
+        return self._preview(geometry).irradiance
 
     def preview_rays(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
         """The same of some cells as rays, at the first of their points. rows: the cells. (G,)"""
-        return self._local.preview_rays(Source(geometry, (1.0, 1.0, 1.0)), self._preview(geometry).visible[rows])
+        return self._local.preview_rays(LightSource(geometry, (1.0, 1.0, 1.0)), self._preview(geometry).visible[rows])
 
-    def _preview(self, geometry: LightGeometry) -> PreviewLight:
-        key, every = (self._key, "preview light on cells", geometry, *self._leaning), np.arange(self._cells.num_cells)
-        return self._memory.passing.keep(key, lambda: self._local.preview(geometry, self._cells.first_points(every)))
+    def _preview(self, geometry: LightGeometry) -> MovingLight:
+        key, patch_rows = (
+            (self._key, "preview light on cells", geometry, *self._normal_overrides),
+            np.arange(self._patches.num_patches),
+        )
+        return self._cache.transient.get_value(
+            key, lambda: self._local.preview(geometry, self._patches.first_points(patch_rows))
+        )
 
-    def _sampled(self, geometry: LightGeometry) -> tuple[LocalLight, Strata]:
-        return self._local.sampled(geometry, self._local.samples_of(geometry, SAMPLES_OF_CELLS))
+    def _sample_light(self, geometry: LightGeometry) -> tuple[LocalLight, LightStrata]:
+        return self._local.sample_light(geometry, self._local.num_samples(geometry, SAMPLES_PER_PATCH_POINT))
 
 
-class LightOnCells:
+class DirectPatchLight:
     """Found for one source after another, and kept: transport is linear in them.
 
     Args:
-        cells: that it comes to. local: local lights. lights_in: finds the triangles of an environment.
-        preview_lights_in: finds them quickly.
-        memory: of all that is made from the bake. key: of the bake in it.
+        patches: that it comes to. local: local lights. find_lights: finds the triangles of an environment.
+        find_preview_lights: finds them quickly.
+        cache: of all that is made from the bake. key: of the bake in it.
         harmonic: transfer of smooth light, for previews; None where a bake has none.
-        leaning: names how cells lean that lean otherwise than they were baked; empty for those that were.
+        normal_overrides: names how cells lean that lean otherwise than they were baked; empty for those that were.
     """
 
     def __init__(
         self,
-        cells: CellLight,
+        patches: PatchLight,
         local: LocalLights,
-        lights_in: Callable[[EnvironmentKey], TriangleLights],
-        preview_lights_in: Callable[[EnvironmentKey], TriangleLights],
-        memory: Memory,
+        find_lights: Callable[[EnvironmentKey], TriangleLights],
+        find_preview_lights: Callable[[EnvironmentKey], TriangleLights],
+        cache: Cache,
         key: str,
         harmonic: HarmonicLight | None = None,
-        leaning: tuple[Hashable, ...] = (),
+        normal_overrides: tuple[Hashable, ...] = (),
     ) -> None:
-        self.cells, self._local = cells, LocalOnCells(local, cells, memory, key, leaning)
-        self._lights_in, self._preview_lights_in = lights_in, preview_lights_in
-        self._memory, self._key, self._harmonic, self._leaning = memory, key, harmonic, leaning
+        self.patches, self._local = patches, LocalPatchLight(local, patches, cache, key, normal_overrides)
+        self._find_lights, self._find_preview_lights = find_lights, find_preview_lights
+        self._cache, self._key, self._harmonic, self._normal_overrides = cache, key, harmonic, normal_overrides
 
-    def arrived(self, light: Light, reflecting: Reflecting, *, is_preview: bool) -> Arrived:
+    def incident_light(
+        self, light: Illumination, reflectance_operator: ReflectanceOperator, *, is_preview: bool
+    ) -> IncidentLight:
         """Sum what all sources bring.
 
         Args:
-            light: all that shines. reflecting: tells which cells ask where light comes from.
+            light: all that shines. reflectance_operator: tells which cells ask where light comes from.
             is_preview: local lights by few samples, large environments by small maps, directions roughly.
         """
-        out = Arrived(
-            np.zeros((self.cells.num_cells, 3), np.float32),
-            np.zeros((len(reflecting.rows), 3, NUM_SENT), np.float32),
+        incident = IncidentLight(
+            np.zeros((self.patches.num_patches, 3), np.float32),
+            np.zeros((len(reflectance_operator.rows), 3, NUM_OUTGOING), np.float32),
         )
-        of_local = self._local.preview_irradiance if is_preview else self._local.irradiance
-        if light.is_environment_lit:
+        local_irradiance = self._local.preview_irradiance if is_preview else self._local.irradiance
+        if light.has_environment:
             gain = np.array(light.environment_gain, np.float32)
-            out.irradiance[:] += gain * self._irradiance(light.environment, is_preview)
-            out.vectors[:] += gain[:, None] * self._vectors(light.environment, reflecting, is_preview)
-        for geometry, of_light in light.local:
-            gain = np.array(of_light, np.float32)
-            out.irradiance[:] += gain * of_local(geometry)[:, None]
-            out.vectors[:] += gain[:, None] * self._local_vectors(geometry, reflecting, is_preview)
-        return out
+            incident.irradiance[:] += gain * self._irradiance(light.environment, is_preview)
+            incident.coefficients[:] += gain[:, None] * self._coefficients(
+                light.environment, reflectance_operator, is_preview
+            )
+        for geometry, source_gain in light.local:
+            gain = np.array(source_gain, np.float32)
+            incident.irradiance[:] += gain * local_irradiance(geometry)[:, None]
+            incident.coefficients[:] += gain[:, None] * self._local_coefficients(
+                geometry, reflectance_operator, is_preview
+            )
+        return incident
 
-    def straight(self, light: Light, rows: NDArray[np.intp]) -> Coming:
+    def direct(self, light: Illumination, rows: NDArray[np.intp]) -> DirectLobes:
         """What comes to the points of some cells, exactly, source after source. rows: the cells. (G,)"""
-        of_local = ((self._local.rays(geometry, rows), gain) for geometry, gain in light.local)
-        rays = [replace(rays, gain=np.array(gain, np.float32)) for rays, gain in of_local]
-        if not light.is_environment_lit:
-            return Coming(rays=rays)
-        lights = self._lights_in(light.environment)
+        local_rays = ((self._local.rays(geometry, rows), gain) for geometry, gain in light.local)
+        rays = [replace(rays, gain=np.array(gain, np.float32)) for rays, gain in local_rays]
+        if not light.has_environment:
+            return DirectLobes(rays=rays)
+        lights = self._find_lights(light.environment)
         gain = np.array(light.environment_gain, np.float32)
-        return Coming(replace(lights, irradiance=gain * lights.irradiance), self.cells.seen_by(rows), rays)
+        return DirectLobes(
+            replace(lights, irradiance=gain * lights.irradiance), self.patches.visibility_bits(rows), rays
+        )
 
     def _irradiance(self, environment: EnvironmentKey, is_preview: bool) -> F32:
-        key = self._key, "environment on cells", environment, *self._leaning
-        if not is_preview or self._memory.holds(key):
-            return self._memory.keep(key, lambda: self.cells.irradiance(self._lights_in(environment)))
-        quick = *key, "for a preview"
-        return self._memory.passing.keep(quick, lambda: self._quick_irradiance(environment))
+        key = self._key, "environment on cells", environment, *self._normal_overrides
+        if not is_preview or self._cache.contains(key):
+            return self._cache.get_value(key, lambda: self.patches.irradiance(self._find_lights(environment)))
+        preview_key = *key, "for a preview"
+        return self._cache.transient.get_value(preview_key, lambda: self._preview_irradiance(environment))
 
-    def _quick_irradiance(self, environment: EnvironmentKey) -> F32:
-        lights, harmonic = self._preview_lights_in(environment), self._harmonic
+    def _preview_irradiance(self, environment: EnvironmentKey) -> F32:
+        lights, harmonic = self._find_preview_lights(environment), self._harmonic
         if harmonic is None:
-            return self.cells.irradiance(lights)
-        divided = harmonic.divided(lights)
-        beyond = self.cells.irradiance(divided.beyond, divided.chosen)
-        return beyond + harmonic.irradiance @ divided.smooth
+            return self.patches.irradiance(lights)
+        split = harmonic.frequency_split(lights)
+        residual = self.patches.irradiance(split.residual, split.residual_triangles)
+        return residual + harmonic.irradiance @ split.low_frequency
 
-    def _vectors(self, environment: EnvironmentKey, reflecting: Reflecting, is_preview: bool) -> F32:
-        cells, rows = self.cells, reflecting.rows
-        key = self._key, "environment on cells, by direction", environment, reflecting.has_lobe, *self._leaning
+    def _coefficients(
+        self, environment: EnvironmentKey, reflectance_operator: ReflectanceOperator, is_preview: bool
+    ) -> F32:
+        patches, rows = self.patches, reflectance_operator.rows
+        key = (
+            self._key,
+            "environment on cells, by direction",
+            environment,
+            reflectance_operator.has_lobe,
+            *self._normal_overrides,
+        )
         if is_preview:
-            quick = *key, "for a preview"
-            return self._memory.passing.keep(quick, lambda: self._quick_vectors(environment, rows))
-        return self._memory.keep(key, lambda: cells.vectors(rows, self._lights_in(environment), SENT_DEGREE))
+            preview_key = *key, "for a preview"
+            return self._cache.transient.get_value(preview_key, lambda: self._preview_coefficients(environment, rows))
+        return self._cache.get_value(
+            key, lambda: patches.incident_coefficients(rows, self._find_lights(environment), OUTGOING_DEGREE)
+        )
 
-    def _quick_vectors(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> F32:
-        lights, harmonic, cells = self._preview_lights_in(environment), self._harmonic, self.cells
+    def _preview_coefficients(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> F32:
+        lights, harmonic, patches = self._find_preview_lights(environment), self._harmonic, self.patches
         if harmonic is None:
-            return cells.vectors(rows, lights, CELL_DEGREE)
-        divided = harmonic.divided(lights)
-        beyond = cells.vectors(rows, divided.beyond, CELL_DEGREE, divided.chosen)
-        smooth = np.einsum("gkl,lc->gck", harmonic.vectors[rows], divided.smooth)
-        return beyond + cells.vectors_of(rows, cells.first_points(rows), smooth)
+            return patches.incident_coefficients(rows, lights, PATCH_DEGREE)
+        split = harmonic.frequency_split(lights)
+        residual = patches.incident_coefficients(rows, split.residual, PATCH_DEGREE, split.residual_triangles)
+        low_frequency = np.einsum("gkl,lc->gck", harmonic.patch_coefficients[rows], split.low_frequency)
+        return residual + patches.mean_coefficients(rows, patches.first_points(rows), low_frequency)
 
-    def _local_vectors(self, geometry: LightGeometry, reflecting: Reflecting, is_preview: bool) -> F32:
+    def _local_coefficients(
+        self, geometry: LightGeometry, reflectance_operator: ReflectanceOperator, is_preview: bool
+    ) -> F32:
         """Of a light of unit emission; for a preview at one point of each cell. (G, 3, J) float32"""
-        cells, rows = self.cells, reflecting.rows
+        patches, rows = self.patches, reflectance_operator.rows
 
-        def found() -> F32:
+        def compute() -> F32:
             if is_preview:
-                points, rays = cells.first_points(rows), self._local.preview_rays(geometry, rows)
+                points, rays = patches.first_points(rows), self._local.preview_rays(geometry, rows)
             else:
-                points, rays = cells.points_of(rows), self._local.rays(geometry, rows)
-            return cells.vectors_of(rows, points, ray_vectors(points, [rays], SENT_DEGREE))
+                points, rays = patches.points_of(rows), self._local.rays(geometry, rows)
+            return patches.mean_coefficients(rows, points, ray_incident_coefficients(points, [rays], OUTGOING_DEGREE))
 
-        memory, named = self._memory.passing if is_preview else self._memory, "light on cells, by direction"
-        return memory.keep((self._key, named, geometry, reflecting.has_lobe, is_preview, *self._leaning), found)
+        cache, label = self._cache.transient if is_preview else self._cache, "light on cells, by direction"
+        return cache.get_value(
+            (self._key, label, geometry, reflectance_operator.has_lobe, is_preview, *self._normal_overrides), compute
+        )

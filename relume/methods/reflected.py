@@ -7,135 +7,163 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.memory import Memory
-from relume.methods.cells.between import preview_between, quickly_between, sent_between
-from relume.methods.cells.in_lobes import sent_in_lobes
-from relume.methods.cells.leaving import InLobes, Leaving
-from relume.methods.cells.reflecting import Reflecting
-from relume.methods.on_cells import LightOnCells
-from relume.picture.light import Light, Normals, is_same_but_for_surfaces
-from relume.project.sent import Sent, evenly
-from relume.trace.cell_tree import NO_CELL
+from relume.memory import Cache
+from relume.methods.cells.between import solve_indirect, solve_indirect_fast, solve_indirect_preview
+from relume.methods.cells.in_lobes import outgoing_in_highlights
+from relume.methods.cells.leaving import OutgoingHighlights, OutgoingRadiance
+from relume.methods.cells.reflecting import ReflectanceOperator
+from relume.methods.on_cells import DirectPatchLight
+from relume.picture.light import Illumination, Normals, equal_up_to_reflectances
+from relume.project.sent import OutgoingLight, isotropic
+from relume.trace.cell_tree import NO_PATCH
 
 F32 = NDArray[np.float32]
 
 
-class Reflected:
+class IndirectSolver:
     """Light that cells send; safe to use from several threads.
 
     What follows a hand is of the normals that were baked: it is made of both ends of an edit alike.
 
     Args:
-        on_cells: what comes to them from the lights themselves.
-        leaning: finds the same where images lean materials, by the image of each.
-        key: of the bake in `memory`.
+        direct_light: what comes to them from the lights themselves.
+        find_direct_light: finds the same where images lean materials, by the image of each.
+        key: of the bake in `cache`.
     """
 
     def __init__(
         self,
-        on_cells: LightOnCells,
-        leaning: Callable[[Normals], LightOnCells],
-        memory: Memory,
+        direct_light: DirectPatchLight,
+        find_direct_light: Callable[[Normals], DirectPatchLight],
+        cache: Cache,
         key: str,
     ) -> None:
-        self._on_cells, self._leaning, self._cells = on_cells, leaning, on_cells.cells
-        self.num_cells = self._cells.num_cells
-        self._memory, self._key = memory, key
+        self._direct_light, self._find_direct_light, self._patches = (
+            direct_light,
+            find_direct_light,
+            direct_light.patches,
+        )
+        self.num_patches = self._patches.num_patches
+        self._cache, self._key = cache, key
 
-    def under(self, light: Light) -> Sent:
+    def exact(self, light: Illumination) -> OutgoingLight:
         """What exact pictures show."""
-        between = _between_surfaces(light)
-        return self._memory.keep((self._key, "reflected light", between), lambda: self._sent(between))
+        indirect = _without_direct(light)
+        return self._cache.get_value((self._key, "reflected light", indirect), lambda: self._outgoing_light(indirect))
 
-    def beside(self, light: Light, taken: Callable[[Light], Leaving]) -> Sent:
-        """The same without what `taken` finds of it: what is shown of that is found otherwise."""
-        between = _between_surfaces(light)
+    def excluding(self, light: Illumination, excluded: Callable[[Illumination], OutgoingRadiance]) -> OutgoingLight:
+        """The same without what `excluded` finds of it: what is shown of that is found otherwise."""
+        indirect = _without_direct(light)
 
-        def found() -> Sent:
-            return self._leaving(between).less(taken(between)).sent(self._exactly_on(between).cells)
+        def compute() -> OutgoingLight:
+            return (
+                self._outgoing(indirect)
+                .subtract(excluded(indirect))
+                .outgoing_light(self._direct_light_for(indirect).patches)
+            )
 
-        return self._memory.keep((self._key, "reflected light beside what is thrown", between), found)
+        return self._cache.get_value((self._key, "reflected light beside what is thrown", indirect), compute)
 
-    def preview_under(self, light: Light) -> F32:
+    def preview(self, light: Illumination) -> F32:
         """What pictures follow while a hand moves, the same in every direction; waits for nobody who wants something
         exact. (NO_CELL + 1, 3) float32"""
-        between = _between_surfaces(light)
-        key = self._key, "reflected light for a preview", between
-        return self._memory.passing.keep(key, lambda: self._preview(between))
+        indirect = _without_direct(light)
+        key = self._key, "reflected light for a preview", indirect
+        return self._cache.transient.get_value(key, lambda: self._preview(indirect))
 
-    def quickly_under(self, light: Light) -> Sent:
+    def fast(self, light: Illumination) -> OutgoingLight:
         """What moving pictures follow while a hand moves a light."""
-        return self._quickly(_between_surfaces(light), is_preview=True).sent(self._cells)
+        return self._fast(_without_direct(light), is_preview=True).outgoing_light(self._patches)
 
-    def preview_change(self, before: Light, after: Light) -> F32:
+    def preview_delta(self, before: Illumination, after: Illumination) -> F32:
         """How much more cells send, the same in every direction; both ends alike, so that what is wrong with both
         cancels. Where surfaces alone have changed, highlights give light directions on its way between cells, and
         what others see of each in the mean is what is left of them in the end. (C, 3) float32"""
-        if is_same_but_for_surfaces(before, after):
-            return self._change(before, after).seen(self._cells)
-        change = self.preview_under(after) - self.preview_under(before)
-        return change[: self.num_cells]
+        if equal_up_to_reflectances(before, after):
+            return self._delta(before, after).mean_to_others(self._patches)
+        change = self.preview(after) - self.preview(before)
+        return change[: self.num_patches]
 
-    def change(self, before: Light, after: Light) -> Sent:
+    def delta(self, before: Illumination, after: Illumination) -> OutgoingLight:
         """How what cells send changes, found quickly, where the lights themselves are as before and their light on
         cells is found exactly; both ends alike, so that what is wrong with both cancels.
 
         Args:
             before, after: of equal sources.
         """
-        return self._change(before, after, is_sharp=True).sent(self._cells)
+        return self._delta(before, after, is_sharp=True).outgoing_light(self._patches)
 
-    def _change(self, before: Light, after: Light, *, is_sharp: bool = False) -> Leaving:
-        here, there = (
-            self._quickly(_between_surfaces(light), is_preview=False, is_sharp=is_sharp) for light in (before, after)
+    def _delta(self, before: Illumination, after: Illumination, *, is_sharp: bool = False) -> OutgoingRadiance:
+        outgoing_before, outgoing_after = (
+            self._fast(_without_direct(light), is_preview=False, is_sharp=is_sharp) for light in (before, after)
         )
-        return there.less(here)
+        return outgoing_after.subtract(outgoing_before)
 
-    def _quickly(self, light: Light, *, is_preview: bool, is_sharp: bool = False) -> Leaving:
+    def _fast(self, light: Illumination, *, is_preview: bool, is_sharp: bool = False) -> OutgoingRadiance:
         """What cells send. is_preview: lights are found quickly. is_sharp: sharp highlights go by tables."""
 
-        def found() -> Leaving:
-            reflecting = self._reflecting(light, self._memory.passing)
-            arrived = self._on_cells.arrived(light, reflecting, is_preview=is_preview)
-            in_lobes = self._in_lobes(light, reflecting, self._on_cells) if is_sharp else None
-            return quickly_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
+        def compute() -> OutgoingRadiance:
+            reflectance_operator = self._reflectance_operator(light, self._cache.transient)
+            incident = self._direct_light.incident_light(light, reflectance_operator, is_preview=is_preview)
+            outgoing_highlights = (
+                self._outgoing_highlights(light, reflectance_operator, self._direct_light) if is_sharp else None
+            )
+            return solve_indirect_fast(
+                self._patches, reflectance_operator, incident, light.paths.first, light.paths.last, outgoing_highlights
+            )
 
         key = self._key, "reflected light, quickly", light, is_preview, is_sharp
-        return self._memory.passing.keep(key, found)
+        return self._cache.transient.get_value(key, compute)
 
-    def _sent(self, light: Light) -> Sent:
-        if not light.paths.reflect:
-            return evenly(np.zeros((NO_CELL + 1, 3), np.float32))
-        return self._leaving(light).sent(self._exactly_on(light).cells)
+    def _outgoing_light(self, light: Illumination) -> OutgoingLight:
+        if not light.paths.has_indirect:
+            return isotropic(np.zeros((NO_PATCH + 1, 3), np.float32))
+        return self._outgoing(light).outgoing_light(self._direct_light_for(light).patches)
 
-    def _exactly_on(self, light: Light) -> LightOnCells:
+    def _direct_light_for(self, light: Illumination) -> DirectPatchLight:
         """What comes to cells, which lean as the look says."""
-        return self._leaning(light.normals) if any(light.normals) else self._on_cells
+        return self._find_direct_light(light.normals) if any(light.normals) else self._direct_light
 
-    def _leaving(self, light: Light) -> Leaving:
-        reflecting, on_cells = self._reflecting(light, self._memory), self._exactly_on(light)
-        arrived = on_cells.arrived(light, reflecting, is_preview=False)
-        in_lobes = self._in_lobes(light, reflecting, on_cells)
-        return sent_between(on_cells.cells, reflecting, arrived, light.paths.first, light.paths.last, in_lobes)
+    def _outgoing(self, light: Illumination) -> OutgoingRadiance:
+        reflectance_operator, direct_light = (
+            self._reflectance_operator(light, self._cache),
+            self._direct_light_for(light),
+        )
+        incident = direct_light.incident_light(light, reflectance_operator, is_preview=False)
+        outgoing_highlights = self._outgoing_highlights(light, reflectance_operator, direct_light)
+        return solve_indirect(
+            direct_light.patches,
+            reflectance_operator,
+            incident,
+            light.paths.first,
+            light.paths.last,
+            outgoing_highlights,
+        )
 
     @staticmethod
-    def _in_lobes(light: Light, reflecting: Reflecting, on_cells: LightOnCells) -> InLobes:
+    def _outgoing_highlights(
+        light: Illumination, reflectance_operator: ReflectanceOperator, direct_light: DirectPatchLight
+    ) -> OutgoingHighlights:
         """What sharp highlights send of light that comes straight to them."""
-        lobes = on_cells.cells.lobes(light.reflectances, reflecting)
-        return lobes, sent_in_lobes(on_cells.cells, lobes, on_cells.straight(light, lobes.rows))
+        highlights = direct_light.patches.highlight_tables(light.reflectances, reflectance_operator)
+        return highlights, outgoing_in_highlights(
+            direct_light.patches, highlights, direct_light.direct(light, highlights.rows)
+        )
 
-    def _preview(self, light: Light) -> F32:
-        if not light.paths.reflect:
-            return np.zeros((NO_CELL + 1, 3), np.float32)
-        reflecting = self._reflecting(light, self._memory.passing)
-        arrived = self._on_cells.arrived(light, reflecting, is_preview=True)
-        return preview_between(self._cells, reflecting, arrived, light.paths.first, light.paths.last)
+    def _preview(self, light: Illumination) -> F32:
+        if not light.paths.has_indirect:
+            return np.zeros((NO_PATCH + 1, 3), np.float32)
+        reflectance_operator = self._reflectance_operator(light, self._cache.transient)
+        incident = self._direct_light.incident_light(light, reflectance_operator, is_preview=True)
+        return solve_indirect_preview(
+            self._patches, reflectance_operator, incident, light.paths.first, light.paths.last
+        )
 
-    def _reflecting(self, light: Light, memory: Memory) -> Reflecting:
-        key, chosen = (self._key, "reflectance", light.reflectances), light.reflectances
-        return memory.keep(key, lambda: self._cells.reflecting(chosen))
+    def _reflectance_operator(self, light: Illumination, cache: Cache) -> ReflectanceOperator:
+        key, reflectances = (self._key, "reflectance", light.reflectances), light.reflectances
+        return cache.get_value(key, lambda: self._patches.reflectance_operator(reflectances))
 
 
-def _between_surfaces(light: Light) -> Light:
+def _without_direct(light: Illumination) -> Illumination:
     """All of a light that cells depend on."""
     return light._replace(paths=light.paths.without_direct())

@@ -6,24 +6,24 @@ from pathlib import Path
 from typing import cast
 
 from relume.errors import StoreError
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.base import TransferMethod
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
-from relume.methods.surface import SurfaceMethod
-from relume.picture.transfer import Eyes, Opened, Transfer
+from relume.methods.surface import ProbesMethod
+from relume.picture.transfer import CameraMode, FixedViewTransfer, OpenBake
 from relume.store import open_store
 
 METHODS: dict[str, TransferMethod] = {
-    method.name: method for method in (DirectMethod(), GatherMethod(), SurfaceMethod())
+    method.name: method for method in (DirectMethod(), GatherMethod(), ProbesMethod())
 }
 
 
-def open_bake(path: Path, memory: Memory) -> Opened:
+def open_bake(path: Path, cache: Cache) -> OpenBake:
     """Open a published store by the method that baked it.
 
     Args:
-        memory: of all that is made from the bake and may be made again.
+        cache: of all that is made from the bake and may be made again.
     Raises:
         StoreNotFoundError, SchemaVersionError, ChunkDamagedError, StoreError: see `relume.store.open_store`.
     """
@@ -31,18 +31,18 @@ def open_bake(path: Path, memory: Memory) -> Opened:
     method = METHODS.get(str(store.attributes.get("method")))
     if method is None:
         raise StoreError(f"no method of this version bakes like {path.name}; delete the bake, bake again")
-    return method.open(store, str(path.resolve()), memory)
+    return method.open(store, str(path.resolve()), cache)
 
 
-def open_transfer(path: Path, memory: Memory) -> Transfer:
+def open_transfer(path: Path, cache: Cache) -> FixedViewTransfer:
     """Open a published store of fixed views.
 
     Args:
-        memory: of all that is made from the bake and may be made again.
+        cache: of all that is made from the bake and may be made again.
     Raises:
         StoreError: its eyes move. Else as `open_bake`.
     """
-    opened = open_bake(path, memory)
-    if opened.eyes is not Eyes.BAKED:
+    bake = open_bake(path, cache)
+    if bake.camera_mode is not CameraMode.FIXED:
         raise StoreError(f"{path.name} has no fixed views; bake the scene by another method")
-    return cast("Transfer", opened)
+    return cast("FixedViewTransfer", bake)

@@ -9,57 +9,57 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.errors import ChunkDamagedError, StoreError
-from relume.eye.flat_mirrors import lights_in_mirrors
-from relume.light.gather_rays import Pattern
+from relume.eye.flat_mirrors import lights_visible_in_mirrors
+from relume.light.gather_rays import RayPattern
 from relume.methods.local_lights import LocalLights
-from relume.methods.store_io import read_traced_directions, read_tree
-from relume.methods.thrown import Thrown
-from relume.points import Points
-from relume.trace.cell_tree import CellTree
-from relume.trace.geometry import Geometry, off_surface
-from relume.trace.links import trace_links
+from relume.methods.store_io import read_shadow_ray_directions, read_tree
+from relume.methods.thrown import MirrorLights
+from relume.points import SurfacePoints
+from relume.trace.cell_tree import PatchTree
+from relume.trace.geometry import SceneBuffers, offset_point
+from relume.trace.links import trace_gather_rays
 from relume.trace.visibility import trace_visibility
 
 F32 = NDArray[np.float32]
 
-_POINTS_AT_ONCE = 4096
+_POINTS_PER_BATCH = 4096
 
 
-class Retracing:
-    """The triangles of a store, and where its rays go; a `relume.views.worn_store.Tracer`.
+class NormalRetracer:
+    """The triangles of a store, and where its rays go; a `relume.views.worn_store.RayTracer`.
 
     Args:
-        local: with the triangles' search tree. thrown: what flat mirrors send exactly, where they do.
+        local: with the triangles' search tree. mirror_lights: what flat mirrors send exactly, where they do.
     """
 
-    def __init__(self, store: StoreReader, local: LocalLights, thrown: Thrown | None) -> None:
-        self._store, self._local, self._thrown = store, local, thrown
+    def __init__(self, store: StoreReader, local: LocalLights, mirror_lights: MirrorLights | None) -> None:
+        self._store, self._local, self._mirror_lights = store, local, mirror_lights
 
     def check(self) -> None:
         """Raises StoreError where the store does not say what is needed to trace its rays."""
         if "gather_rays" in self._store.attributes:
             _ = self._geometry
 
-    def seen(self, points: Points, before: F32, known: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def visibility(self, points: SurfacePoints, baked_normals: F32, baked_bits: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Find which lights points see: those that come up are traced, those that go down are hidden.
 
         Args:
-            points: as they lean now. before: their normals when the bake was traced. (n, 3) float32
-            known: what it found. (n, bytes) uint8
+            points: as they lean now. baked_normals: their normals when the bake was traced. (n, 3) float32
+            baked_bits: what it found. (n, bytes) uint8
         Returns:
             (n, bytes) uint8
         """
-        directions = read_traced_directions(self._store)
-        found = trace_visibility(
-            self._local.embree, points.position, points.normal, directions, points.chance, before
+        directions = read_shadow_ray_directions(self._store)
+        visible = trace_visibility(
+            self._local.embree, points.position, points.normal, directions, points.alpha_sample, baked_normals
         ).visible
-        for start in range(0, len(found), _POINTS_AT_ONCE):
-            some = slice(start, start + _POINTS_AT_ONCE)
-            above = np.packbits(points.normal[some] @ directions.T > 0, axis=1, bitorder="little")
-            found[some] |= known[some] & above
-        return found
+        for start in range(0, len(visible), _POINTS_PER_BATCH):
+            batch = slice(start, start + _POINTS_PER_BATCH)
+            above = np.packbits(points.normal[batch] @ directions.T > 0, axis=1, bitorder="little")
+            visible[batch] |= baked_bits[batch] & above
+        return visible
 
-    def linked(self, points: Points, wo: F32, pattern: Pattern) -> NDArray[np.uint16]:
+    def gather_hits(self, points: SurfacePoints, wo: F32, pattern: RayPattern) -> NDArray[np.uint16]:
         """Find the cells that gather rays of points hit.
 
         Args:
@@ -67,19 +67,21 @@ class Retracing:
         Returns:
             (n, rays) uint16
         """
-        return trace_links(self._geometry, self._tree, points, wo, pattern).cell
+        return trace_gather_rays(self._geometry, self._tree, points, wo, pattern).patch
 
-    def thrown(self, points: Points) -> NDArray[np.uint8]:
+    def mirror_lights(self, points: SurfacePoints) -> NDArray[np.uint8]:
         """Find which lights points see in flat mirrors. points: as they lean now. Returns (n, bytes) uint8"""
-        assert self._thrown is not None  # who asks has read them from the store
-        return lights_in_mirrors(self._geometry, self._thrown.mirrors, points, self._thrown.direction).visible
+        assert self._mirror_lights is not None  # who asks has read them from the store
+        return lights_visible_in_mirrors(
+            self._geometry, self._mirror_lights.mirrors, points, self._mirror_lights.direction
+        ).visible
 
     @cached_property
-    def _tree(self) -> CellTree:
+    def _tree(self) -> PatchTree:
         return read_tree(self._store)
 
     @cached_property
-    def _geometry(self) -> Geometry:
+    def _geometry(self) -> SceneBuffers:
         """What of a scene's triangles rays between surfaces ask for: no normals, no textures."""
         store, positions, faces = self._store, self._local.positions, self._local.faces
         try:
@@ -88,7 +90,7 @@ class Retracing:
             raise
         except StoreError:
             raise StoreError("this bake is too old to show images of normals; bake the scene again") from None
-        nothing = np.empty((0, 3), np.float32)
-        return Geometry(
-            positions, nothing, nothing, nothing, faces, material, mesh, self._local.embree, off_surface(positions)
+        empty = np.empty((0, 3), np.float32)
+        return SceneBuffers(
+            positions, empty, empty, empty, faces, material, mesh, self._local.embree, offset_point(positions)
         )

@@ -29,43 +29,43 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskStore, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 from relume.errors import PlanError
 from relume.eye.layers import has_layers
-from relume.eye.mirrors import MOST_MIRRORS
+from relume.eye.mirrors import MAX_MIRROR_BOUNCES
 from relume.eye.tinted import num_tints
-from relume.eye.view_samples import BACKGROUND, eye_of, sampled
+from relume.eye.view_samples import BACKGROUND, camera_setup, sample_pixels
 from relume.light.tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
-from relume.light.triangles import Unturned, weigh
+from relume.light.triangles import RotatedEnvironment, integrate_environment
 from relume.look import default_look
 from relume.methods import bounds
-from relume.methods.last_read import LastRead
-from relume.methods.store_io import SHARD_ROWS, read_lights, read_traced_directions
-from relume.scene.emission import has_images, shares_of_faces
+from relume.methods.last_read import ReadCache
+from relume.methods.store_io import SHARD_ROWS, read_lights, read_shadow_ray_directions
+from relume.scene.emission import has_emission_images, relative_emission
 from relume.scene.model import Camera, Scene
-from relume.scene.roughness import levels_of, shortest_normal
-from relume.trace.coherent import Targets, targets_of, trace_coherent
-from relume.trace.geometry import Geometry, merge
-from relume.views.store_io import read_chance
+from relume.scene.roughness import levels_of_material, min_mean_normal_length
+from relume.trace.coherent import LightTargets, make_light_targets, trace_visibility_masks
+from relume.trace.geometry import SceneBuffers, build_scene_buffers
+from relume.views.store_io import read_alpha_samples
 
 CHUNK_ROWS = 1024
 MIN_SIDE, MAX_PIXELS = 16, 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
-_EMISSION_BYTES, _BUMP_BYTES = 12, 4 + 12
-_LAYER_BYTES = 12 + 12 + 1 + 4 + MOST_MIRRORS * (2 + 4 + 12)
+_EMISSION_BYTES, _NORMAL_MAP_BYTES = 12, 4 + 12
+_LAYER_BYTES = 12 + 12 + 1 + 4 + MAX_MIRROR_BOUNCES * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
 _METADATA_BYTES = 1 << 20
 _RAY_NS, _TRIANGLE_US = 5.0, 2.0  # of one core, on scenes of 200 to a million triangles
 
 
-class Sampled(NamedTuple):
+class ViewStage(NamedTuple):
     """What every task of the second stage needs of the first.
 
     Attributes:
         targets: of shadow rays. num_surface_samples: of each view.
     """
 
-    targets: Targets
+    targets: LightTargets
     num_surface_samples: tuple[int, ...]
 
 
@@ -81,18 +81,18 @@ class SampledViews:
     def __init__(self, *, smooths_edges: bool = True) -> None:
         self._smooths_edges = smooths_edges
         self._lock = threading.Lock()
-        self._geometry: tuple[str, Geometry] | None = None
-        self.sampled_of = LastRead(_read_sampled)
+        self._geometry: tuple[str, SceneBuffers] | None = None
+        self.view_stage = ReadCache(_read_view_stage)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _sampled_views, (self._smooths_edges,)  # travels to workers without what it keeps
+        return _make_sampled_views, (self._smooths_edges,)  # travels to workers without what it keeps
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
         width, height = recipe.size
-        known = [camera.name for camera in scene.cameras]
-        if unknown := [view for view in recipe.views if view not in known]:
-            raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(known)}")
+        view_names = [camera.name for camera in scene.cameras]
+        if unknown := [view for view in recipe.views if view not in view_names]:
+            raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(view_names)}")
         if not recipe.views or len(set(recipe.views)) != len(recipe.views):
             raise PlanError("name each view once, and at least one")
         if not (min(width, height) >= MIN_SIDE and width * height <= MAX_PIXELS):
@@ -100,23 +100,29 @@ class SampledViews:
             raise PlanError(f"{width}×{height} pixels were asked for; {able}")
         if not MIN_LIGHTS <= recipe.num_lights <= MAX_LIGHTS:
             raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
-        samples = bounds.samples_of_view(scene, recipe) * len(recipe.views)
+        samples = bounds.max_view_samples(scene, recipe) * len(recipe.views)
         bits = (recipe.num_lights + 7) // 8
-        surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_images(scene) else 0)
-        surface_bytes += _BUMP_BYTES if _has_bumps(scene) else 0
+        surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_emission_images(scene) else 0)
+        surface_bytes += _NORMAL_MAP_BYTES if _has_normal_maps(scene) else 0
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
         # while samples are sorted, files of them are there twice, and no bits yet
         in_store = samples * (surface_bytes + max(bits, surface_bytes)) + bounds.lights_bytes(scene, recipe)
-        num_rays = samples * recipe.num_lights + bounds.camera_rays(scene, recipe) + bounds.tinted_rays(scene, samples)
+        num_rays = (
+            samples * recipe.num_lights + bounds.num_camera_rays(scene, recipe) + bounds.num_tinted_rays(scene, samples)
+        )
         sampling, tracing = bounds.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)
-        besides = max(tracing, bounds.weighing_bytes(scene))  # while a single view is sampled, others do this at most
+        concurrent_bytes = max(
+            tracing, bounds.light_selection_bytes(scene)
+        )  # while a single view is sampled, others do this at most
         return Plan(
             num_view_samples=samples,
             num_rays=num_rays,
-            work_s=bounds.work_s(scene, num_rays * bounds.of_every_position(scene, recipe), _RAY_NS, _TRIANGLE_US),
+            work_s=bounds.estimated_work(
+                scene, num_rays * bounds.supersampling_ratio(scene, recipe), _RAY_NS, _TRIANGLE_US
+            ),
             store_bytes=in_store + bounds.triangles_bytes(scene) + _METADATA_BYTES,
             peak_bytes=bounds.process_bytes(scene) + max(sampling, tracing),
-            lone_bytes=max(0, sampling - besides) if len(recipe.views) == 1 else 0,
+            lone_bytes=max(0, sampling - concurrent_bytes) if len(recipe.views) == 1 else 0,
         )
 
     def prepare(self, scene: Scene) -> None:
@@ -135,13 +141,13 @@ class SampledViews:
             "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
-            "has_holes": any(material.lets_pass for material in scene.materials),
+            "has_holes": any(material.is_alpha_tested for material in scene.materials),
             "has_layers": has_layers(scene.materials),
             "has_tints": num_tints(scene.materials) > 0,
-            "has_emission_images": has_images(scene),
-            "roughness_levels": [list(levels_of(material)) for material in scene.materials],
-            "shortest_normals": [shortest_normal(material.normal_map) for material in scene.materials],
-            "views": [_described(cameras[view]) for view in recipe.views],
+            "has_emission_images": has_emission_images(scene),
+            "roughness_levels": [list(levels_of_material(material)) for material in scene.materials],
+            "shortest_normals": [min_mean_normal_length(material.normal_map) for material in scene.materials],
+            "views": [_view_attributes(cameras[view]) for view in recipe.views],
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
@@ -151,7 +157,7 @@ class SampledViews:
         ranges = [
             (view, start, min(start + SHARD_ROWS, rows))
             for k, view in enumerate(recipe.views)
-            for rows in [self.sampled_of(store).num_surface_samples[k]]
+            for rows in [self.view_stage(store).num_surface_samples[k]]
             for start in range(0, rows, SHARD_ROWS)
         ]
         return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
@@ -161,7 +167,7 @@ class SampledViews:
         if stage == 0:
             return []
         bits = (store.shape("lights/power")[0] + 7) // 8
-        num_surface_samples = self.sampled_of(store).num_surface_samples
+        num_surface_samples = self.view_stage(store).num_surface_samples
         return [
             ArraySpec(
                 f"views/{k}/visibility",
@@ -173,32 +179,41 @@ class SampledViews:
             for k in range(len(recipe.views))
         ]
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
         """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
         if task.stage == 1:
-            return self._visibility(scene, recipe.views.index(task.view), task, store)
-        if not task.view:
-            return Written({**lights_of(scene, recipe), **triangles_of(self.geometry_of(scene), scene)}, 0, 0.0)
-        eye = eye_of(scene, self.geometry_of(scene), task.view, recipe.size)
-        columns, num_rays = sampled(eye, store.scratch, _columns(scene), smooths_edges=self._smooths_edges)
-        prefix = f"views/{recipe.views.index(task.view)}"
-        return Written({f"{prefix}/{name}": column for name, column in columns.items()}, num_rays, 0.0)
+            return self._visibility(scene, recipe.views.index(task.group), task, store)
+        if not task.group:
+            return TaskOutput(
+                {**light_arrays(scene, recipe), **triangle_arrays(self.geometry_of(scene), scene)}, 0, 0.0
+            )
+        camera = camera_setup(scene, self.geometry_of(scene), task.group, recipe.size)
+        columns, num_rays = sample_pixels(camera, store.scratch, _columns(scene), smooths_edges=self._smooths_edges)
+        prefix = f"views/{recipe.views.index(task.group)}"
+        return TaskOutput({f"{prefix}/{name}": column for name, column in columns.items()}, num_rays, 0.0)
 
-    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> Written:
+    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> TaskOutput:
         prefix = f"views/{k}"
         position = store.read(f"{prefix}/position", task.start, task.stop)
         normal = store.read(f"{prefix}/normal", task.start, task.stop)
-        chance, targets = read_chance(store, k, task.start, task.stop), self.sampled_of(store).targets
-        found = trace_coherent(self.geometry_of(scene).embree, position, normal, targets, chance)
-        rays = np.array([found.rays.traced, found.rays.full, found.rays.checked, found.rays.wrong])
-        arrays = {f"{prefix}/visibility": found.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
-        return Written(arrays, found.rays.traced, found.trace_s)
+        alpha_sample, targets = read_alpha_samples(store, k, task.start, task.stop), self.view_stage(store).targets
+        visibility = trace_visibility_masks(self.geometry_of(scene).embree, position, normal, targets, alpha_sample)
+        rays = np.array(
+            [
+                visibility.rays.num_traced,
+                visibility.rays.num_full,
+                visibility.rays.num_checked,
+                visibility.rays.num_wrong,
+            ]
+        )
+        arrays = {f"{prefix}/visibility": visibility.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
+        return TaskOutput(arrays, visibility.rays.num_traced, visibility.trace_s)
 
-    def geometry_of(self, scene: Scene) -> Geometry:
+    def geometry_of(self, scene: Scene) -> SceneBuffers:
         """The scene's triangles, built once for all tasks of a process."""
         with self._lock:
             if self._geometry is None or self._geometry[0] != scene.id:
-                self._geometry = scene.id, merge(scene)
+                self._geometry = scene.id, build_scene_buffers(scene)
             return self._geometry[1]
 
 
@@ -209,30 +224,30 @@ def _columns(scene: Scene) -> list[str]:
         names += ["through", "eye", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
     if num_tints(scene.materials):
         names.append("chance")
-    if has_images(scene):
+    if has_emission_images(scene):
         names.append("emission")
-    return names + ["normal_length", "surface_normal"] * _has_bumps(scene)
+    return names + ["normal_length", "surface_normal"] * _has_normal_maps(scene)
 
 
-def _has_bumps(scene: Scene) -> bool:
+def _has_normal_maps(scene: Scene) -> bool:
     return any(material.normal_map is not None for material in scene.materials)
 
 
-def _sampled_views(smooths_edges: bool) -> SampledViews:
+def _make_sampled_views(smooths_edges: bool) -> SampledViews:
     return SampledViews(smooths_edges=smooths_edges)
 
 
-def _read_sampled(store: StoreReader) -> Sampled:
+def _read_view_stage(store: StoreReader) -> ViewStage:
     views = range(len(store.attributes["views"]))
     rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
-    return Sampled(read_targets(store), rows)
+    return ViewStage(read_targets(store), rows)
 
 
-def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
     """The light triangles of a scene's environment, as arrays of a store."""
     radiance = scene.environment.radiance
     tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
-    lights = weigh(tiles, Unturned.of(radiance))
+    lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance))
     return {
         "lights/nodes": lights.nodes,
         "lights/direction": lights.direction,
@@ -242,22 +257,25 @@ def lights_of(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
     }
 
 
-def triangles_of(geometry: Geometry, scene: Scene) -> dict[str, NDArray[Any]]:
+def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[Any]]:
     """The triangles of a scene, merged, as arrays of a store."""
     arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material", "face_mesh")}
-    if has_images(scene):
-        arrays["scene/face_emission"] = shares_of_faces(scene)
-    holes = geometry.embree.holes
-    if holes is not None:
-        arrays |= {"scene/uvs": holes.uvs, **{f"cutouts/{k}": array for k, array in holes.cutouts._asdict().items()}}
+    if has_emission_images(scene):
+        arrays["scene/face_emission"] = relative_emission(scene)
+    alpha_test = geometry.embree.alpha_test
+    if alpha_test is not None:
+        arrays |= {
+            "scene/uvs": alpha_test.uvs,
+            **{f"cutouts/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()},
+        }
     return arrays
 
 
-def read_targets(store: StoreReader) -> Targets:
+def read_targets(store: StoreReader) -> LightTargets:
     """What shadow rays of a store are sent to."""
-    return targets_of(read_traced_directions(store), read_lights(store).irradiance)
+    return make_light_targets(read_shadow_ray_directions(store), read_lights(store).irradiance)
 
 
-def _described(camera: Camera) -> dict[str, Any]:
+def _view_attributes(camera: Camera) -> dict[str, Any]:
     """A view among a store's attributes."""
     return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}

@@ -9,77 +9,99 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
-from relume.environments.equirect import turned
-from relume.light.blur import blurred, reduced
-from relume.light.suns import LAMPS, Divided, without_suns
+from relume.environments.equirect import rotate_about_y
+from relume.light.blur import downsampled, prefiltered
+from relume.light.suns import BRIGHT_LIGHT_BOUNDS, SplitEnvironment, remove_sun_disks
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
-from relume.methods.opened.baked_views import BakedViews
-from relume.moving.highlights.by_lights import SkyLights
-from relume.moving.highlights.lobe_lights import LobeLights, lobe_lights
-from relume.moving.sky import Sky, sky_of
+from relume.methods.opened.baked_views import BakedFixedViews
+from relume.moving.highlights.by_lights import EnvironmentLights
+from relume.moving.highlights.lobe_lights import LobeLightLists, build_light_lists
+from relume.moving.sky import EnvironmentLookup, build_environment_lookup
 
 F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class SkiesInLobes:
+class PrefilteredEnvironments:
     """Of an opened bake. lit: whose light it is."""
 
-    lit: BakedViews
+    light_transport: BakedFixedViews
 
-    def _divided(self, name: str | None) -> Divided:
+    def _split(self, name: str | None) -> SplitEnvironment:
         """An environment without its lamps, None for the scene's own."""
-        key = self.lit.owner_of(name), "lamps", name
-        return self.lit.memory.keep(key, lambda: without_suns(self.lit.radiance_of(name), LAMPS))
+        key = self.light_transport.cache_owner(name), "lamps", name
+        return self.light_transport.cache.get_value(
+            key, lambda: remove_sun_disks(self.light_transport.environment_radiance(name), BRIGHT_LIGHT_BOUNDS)
+        )
 
     @cached_property
     def order(self) -> NDArray[np.intp]:
         """The light triangles, those beside each other one after another. (lights,)"""
-        return np.argsort(self.lit.tiles.along, kind="stable")
+        return np.argsort(self.light_transport.tiles.traversal_key, kind="stable")
 
-    def sky(self, name: str | None) -> Sky:
+    def environment_lookup(self, name: str | None) -> EnvironmentLookup:
         """An environment and what it is when it is blurred without its lamps."""
 
-        def made() -> Sky:
-            few = reduced(self._divided(name).beside)
-            return sky_of(self.lit.radiance_of(name), lambda degrees: blurred(few, degrees))
-
-        return self.lit.memory.keep((self.lit.owner_of(name), "sky", name), made)
-
-    def lamps(self, environment: EnvironmentKey) -> F32:
-        """Lamps of an environment, turned; see `SkyLight`. (lamps, 7) float32"""
-        suns = self._divided(environment.map).suns
-        mean, light = (
-            np.reshape([getattr(sun, name) for sun in suns], (len(suns), 3)) for name in ("mean", "irradiance")
-        )
-        length = np.linalg.norm(mean, axis=1, keepdims=True)
-        direction = turned(mean / length, environment.rotation)
-        return np.ascontiguousarray(np.hstack([direction, light, 1 - length]), np.float32)
-
-    def lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLights:
-        """The light triangles of an environment, as lobes of some widths look for them, in `order`."""
-
-        def listed() -> LobeLights:
-            luminous = luminance(self.lit.preview_lights_in(environment).irradiance)
-            suns = self._divided(environment.map).suns
-            of_lamps = np.zeros((len(suns), len(luminous)), np.float32)
-            for share, sun in zip(of_lamps, suns, strict=True):
-                tile = self.lit.tiles.locate(turned(sun.towards.reshape(-1, 3), environment.rotation))
-                share += np.bincount(tile, minlength=len(luminous)) / np.float32(len(tile))
-            beside = np.maximum(luminous - luminance(self.lamps(environment)[:, 3:6]) @ of_lamps, 0)
-            of_lights = self.lit.traced_directions[self.order], self.lit.lights.radius[self.order], beside[self.order]
-            return lobe_lights(*of_lights, of_lamps[:, self.order], widths)
-
-        return self.lit.memory.passing.keep((self.lit.key, "lights of lobes", environment, widths), listed)
-
-    def summed(self, environment: EnvironmentKey, *, is_preview: bool) -> SkyLights:
-        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
-        lit, is_quick = self.lit, is_preview and environment != BAKED_ENVIRONMENT
-
-        def made() -> SkyLights:
-            lights = lit.preview_lights_in(environment) if is_quick else lit.lights_in(environment)
-            return SkyLights.of(
-                *(each[self.order] for each in (lights.direction, lights.irradiance, lit.lights.radius))
+        def compute() -> EnvironmentLookup:
+            downsampled_radiance = downsampled(self._split(name).residual)
+            return build_environment_lookup(
+                self.light_transport.environment_radiance(name),
+                lambda degrees: prefiltered(downsampled_radiance, degrees),
             )
 
-        return lit.memory.passing.keep((lit.key, "lights of highlights", environment, is_quick), made)
+        return self.light_transport.cache.get_value((self.light_transport.cache_owner(name), "sky", name), compute)
+
+    def bright_lights(self, environment: EnvironmentKey) -> F32:
+        """Lamps of an environment, turned; see `PrefilteredEnvironment`. (lamps, 7) float32"""
+        sun_disks = self._split(environment.map).sun_disks
+        mean, light = (
+            np.reshape([getattr(sun_disk, name) for sun_disk in sun_disks], (len(sun_disks), 3))
+            for name in ("mean", "irradiance")
+        )
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        direction = rotate_about_y(mean / length, environment.rotation)
+        return np.ascontiguousarray(np.hstack([direction, light, 1 - length]), np.float32)
+
+    def directional_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLightLists:
+        """The light triangles of an environment, as lobes of some widths look for them, in `order`."""
+
+        def compute() -> LobeLightLists:
+            tile_luminance = luminance(self.light_transport.preview_light_of_environment(environment).irradiance)
+            sun_disks = self._split(environment.map).sun_disks
+            tile_fractions = np.zeros((len(sun_disks), len(tile_luminance)), np.float32)
+            for fractions, sun_disk in zip(tile_fractions, sun_disks, strict=True):
+                tile = self.light_transport.tiles.locate(
+                    rotate_about_y(sun_disk.directions.reshape(-1, 3), environment.rotation)
+                )
+                fractions += np.bincount(tile, minlength=len(tile_luminance)) / np.float32(len(tile))
+            residual_luminance = np.maximum(
+                tile_luminance - luminance(self.bright_lights(environment)[:, 3:6]) @ tile_fractions, 0
+            )
+            light_arrays = (
+                self.light_transport.shadow_ray_directions[self.order],
+                self.light_transport.lights.radius[self.order],
+                residual_luminance[self.order],
+            )
+            return build_light_lists(*light_arrays, tile_fractions[:, self.order], widths)
+
+        return self.light_transport.cache.transient.get_value(
+            (self.light_transport.key, "lights of lobes", environment, widths), compute
+        )
+
+    def combined(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
+        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        light_transport, is_fast = self.light_transport, is_preview and environment != BAKED_ENVIRONMENT
+
+        def compute() -> EnvironmentLights:
+            lights = (
+                light_transport.preview_light_of_environment(environment)
+                if is_fast
+                else light_transport.light_of_environment(environment)
+            )
+            return EnvironmentLights.from_lights(
+                *(values[self.order] for values in (lights.direction, lights.irradiance, light_transport.lights.radius))
+            )
+
+        return light_transport.cache.transient.get_value(
+            (light_transport.key, "lights of highlights", environment, is_fast), compute
+        )

@@ -8,22 +8,22 @@ from numpy.typing import NDArray
 from relume.bake import StoreReader
 from relume.brdf.channels import TEXTURES
 from relume.errors import ChunkDamagedError, StoreError
-from relume.estimated import Estimated
+from relume.estimated import JackknifeEstimate
 from relume.light.gather_rays import make_pattern
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
-from relume.methods.cells.cell_light import CellLight
-from relume.points import Points
-from relume.trace.cell_tree import CellTree
-from relume.trace.cells import gather_samples_of
+from relume.methods.cells.cell_light import PatchLight
+from relume.points import SurfacePoints
+from relume.trace.cell_tree import PatchTree
+from relume.trace.cells import patch_sample_points
 from relume.trace.coherent import RayCounts
-from relume.trace.cutout_filter import Holes
-from relume.trace.cutouts import Cutouts, check_cutouts
+from relume.trace.cutout_filter import AlphaTest
+from relume.trace.cutouts import AlphaMasks, check_alpha_masks
 
 F32 = NDArray[np.float32]
 
 SHARD_ROWS = 16_384
-MOVING_ERROR = "error/moving"
+FREE_CAMERA_ERROR = "error/moving"
 
 
 def read_lights(store: StoreReader) -> TriangleLights:
@@ -40,42 +40,42 @@ def read_tiles(store: StoreReader) -> Tiles:
     return tiles
 
 
-def read_traced_directions(store: StoreReader) -> F32:
+def read_shadow_ray_directions(store: StoreReader) -> F32:
     """Where shadow rays went: light that may come to any part of a tile is asked for in its middle. (M, 3) float32"""
     if store.attributes["relightable"]:
         return read_tiles(store).centroids.astype(np.float32)
     return read_lights(store).direction
 
 
-def read_tree(store: StoreReader) -> CellTree:
+def read_tree(store: StoreReader) -> PatchTree:
     """The tree over a store's gather cells."""
-    return CellTree(*(store.read(f"cells/{name}") for name in CellTree._fields))
+    return PatchTree(*(store.read(f"cells/{name}") for name in PatchTree._fields))
 
 
-def read_gather_samples(store: StoreReader, start: int = 0, stop: int | None = None) -> Points:
+def read_patch_points(store: StoreReader, start: int = 0, stop: int | None = None) -> SurfacePoints:
     """The points that stand for gather cells [start, stop) of a store, those of a cell one after another."""
     position, normal = (store.read(f"cells/{name}", start, stop) for name in ("position", "normal"))
-    return gather_samples_of(position, normal, start)
+    return patch_sample_points(position, normal, start)
 
 
-def read_cells(store: StoreReader) -> CellLight:
+def read_patches(store: StoreReader) -> PatchLight:
     """The gather cells of a store."""
-    points, visible = read_gather_samples(store), store.read("cells/visibility")
-    links, material = store.read("cells/links"), store.read("cells/material")
-    points_a_cell = store.shape("cells/normal")[1]
-    return CellLight(
+    points, visible = read_patch_points(store), store.read("cells/visibility")
+    gather_hits, material = store.read("cells/links"), store.read("cells/material")
+    points_per_patch = store.shape("cells/normal")[1]
+    return PatchLight(
         points,
-        visible.reshape(len(material), points_a_cell, visible.shape[1] // points_a_cell),
-        links,
-        make_pattern(links.shape[1] // points_a_cell, 0, int(store.attributes["gather_seed"])),
+        visible.reshape(len(material), points_per_patch, visible.shape[1] // points_per_patch),
+        gather_hits,
+        make_pattern(gather_hits.shape[1] // points_per_patch, 0, int(store.attributes["gather_seed"])),
         material,
         np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
-        _read_if_there(store, "cells/uv"),
-        _read_if_there(store, "cells/surface_normal"),
+        _read_optional(store, "cells/uv"),
+        _read_optional(store, "cells/surface_normal"),
     )
 
 
-def _read_if_there(store: StoreReader, path: str) -> F32 | None:
+def _read_optional(store: StoreReader, path: str) -> F32 | None:
     """An array that stores of before do not have; None in those."""
     try:
         store.shape(path)
@@ -84,12 +84,12 @@ def _read_if_there(store: StoreReader, path: str) -> F32 | None:
     return np.asarray(store.read(path), np.float32)
 
 
-def has_holes(store: StoreReader) -> bool:
+def has_alpha_tested_surfaces(store: StoreReader) -> bool:
     """Tell whether rays may pass some triangles of a store."""
     return bool(store.attributes.get("has_holes"))
 
 
-def read_holes(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) -> Holes | None:
+def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) -> AlphaTest | None:
     """Where triangles of a store have holes; None where all are whole.
 
     Args:
@@ -98,10 +98,10 @@ def read_holes(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) ->
     Raises:
         ChunkDamagedError: what says so does not fit the triangles.
     """
-    if not has_holes(store):
+    if not has_alpha_tested_surfaces(store):
         return None
     names = store.attributes["materials"]
-    cutouts = check_cutouts({name: store.read(f"cutouts/{name}") for name in Cutouts._fields}, len(names))
+    alpha_masks = check_alpha_masks({name: store.read(f"cutouts/{name}") for name in AlphaMasks._fields}, len(names))
     uvs, material = store.read("scene/uvs"), store.read("scene/face_material")
     corner, last = int(faces.max(initial=0)), int(material.max(initial=0))
     if (
@@ -110,15 +110,15 @@ def read_holes(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) ->
         or not 0 <= material.min(initial=0) <= last < len(names)
     ):
         raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that the scene has not")
-    return Holes.of(faces, positions, uvs, material, cutouts)
+    return AlphaTest.build(faces, positions, uvs, material, alpha_masks)
 
 
-def read_moving_error(store: StoreReader) -> Estimated | None:
+def read_free_camera_error(store: StoreReader) -> JackknifeEstimate | None:
     """How far moving pictures of a bake are off, relative RMS; None where that is not known, as of bakes of before."""
     if not store.attributes.get("has_moving_error"):
         return None
-    error, standard_error = store.read(MOVING_ERROR).tolist()
-    return Estimated(error, standard_error) if np.isfinite([error, standard_error]).all() else None
+    error, standard_error = store.read(FREE_CAMERA_ERROR).tolist()
+    return JackknifeEstimate(error, standard_error) if np.isfinite([error, standard_error]).all() else None
 
 
 def read_rays(store: StoreReader) -> RayCounts:

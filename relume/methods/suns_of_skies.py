@@ -8,56 +8,66 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.suns import Divided, without_suns
-from relume.light.triangles import TriangleLights, Unturned, weigh
+from relume.light.suns import SplitEnvironment, remove_sun_disks
+from relume.light.triangles import RotatedEnvironment, TriangleLights, integrate_environment
 from relume.look import EnvironmentKey
-from relume.methods.opened.baked_views import BakedViews, shown_of
-from relume.moving.beams.beam import Beam, light_of_sun, targets_of_sun
-from relume.picture.light import Light
-from relume.points import Points
+from relume.methods.opened.baked_views import BakedFixedViews, displayed_of
+from relume.moving.beams.beam import HardShadowLight, sun_shadow_targets, unoccluded_sun_vectors
+from relume.picture.light import Illumination
+from relume.points import SurfacePoints
 
 F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class SunsOfSkies:
+class SunExtractor:
     """What comes straight from suns, and what comes beside them. lit: whose light it is."""
 
-    lit: BakedViews
+    light_transport: BakedFixedViews
 
-    def _divided(self, name: str | None) -> Divided:
+    def _split(self, name: str | None) -> SplitEnvironment:
         """An environment without its suns, None for the scene's own."""
-        key = self.lit.owner_of(name), "suns", name
-        return self.lit.memory.keep(key, lambda: without_suns(self.lit.radiance_of(name)))
+        key = self.light_transport.cache_owner(name), "suns", name
+        return self.light_transport.cache.get_value(
+            key, lambda: remove_sun_disks(self.light_transport.environment_radiance(name))
+        )
 
-    def are_in(self, light: Light) -> bool:
+    def are_in(self, light: Illumination) -> bool:
         """Whether light of suns comes straight to a picture."""
-        return light.shows_sky and bool(self._divided(light.environment.map).suns)
+        return light.has_direct_environment and bool(self._split(light.environment.map).sun_disks)
 
-    def lights_beside(self, light: Light) -> TriangleLights:
+    def remaining_lights(self, light: Illumination) -> TriangleLights:
         """The triangles by which light comes straight, without that of suns."""
         if not self.are_in(light):
-            return self.lit.lights_of(light)
-        key = self.lit.key, "lights beside suns", light.environment
-        return shown_of(self.lit.memory.keep(key, lambda: self._weighed(light.environment)), light)
+            return self.light_transport.lights_for(light)
+        key = self.light_transport.key, "lights beside suns", light.environment
+        return displayed_of(
+            self.light_transport.cache.get_value(key, lambda: self._integrate_residual(light.environment)), light
+        )
 
-    def preview_lights_beside(self, light: Light) -> TriangleLights:
+    def preview_remaining_lights(self, light: Illumination) -> TriangleLights:
         """The same, found quickly."""
         if not self.are_in(light):
-            return self.lit.preview_lights_of(light)
-        return shown_of(self.lit.weighed_quickly("lights beside suns", light.environment, self._beside), light)
+            return self.light_transport.preview_lights_for(light)
+        return displayed_of(
+            self.light_transport.coarse_weights("lights beside suns", light.environment, self._residual_radiance), light
+        )
 
-    def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
-        return weigh(self.lit.tiles, Unturned.of(self._beside(environment.map)), environment.rotation)
+    def _integrate_residual(self, environment: EnvironmentKey) -> TriangleLights:
+        return integrate_environment(
+            self.light_transport.tiles,
+            RotatedEnvironment.from_radiance(self._residual_radiance(environment.map)),
+            environment.rotation,
+        )
 
-    def _beside(self, name: str | None) -> F32:
-        return self._divided(name).beside
+    def _residual_radiance(self, name: str | None) -> F32:
+        return self._split(name).residual
 
-    def beams(self, light: Light, points: Points) -> Iterator[Beam]:
+    def hard_shadow_lights(self, light: Illumination, points: SurfacePoints) -> Iterator[HardShadowLight]:
         """Suns whose light comes straight, and what they bring to points if nothing hides them."""
         if not self.are_in(light):
             return
         key, gain = light.environment, np.array(light.environment_gain, np.float32)
-        for k, sun in enumerate(self._divided(key.map).suns):
-            vectors = light_of_sun(sun, key.rotation, points)
-            yield Beam((key, k), targets_of_sun(sun, key.rotation), vectors, gain)
+        for k, sun_disk in enumerate(self._split(key.map).sun_disks):
+            vectors = unoccluded_sun_vectors(sun_disk, key.rotation, points)
+            yield HardShadowLight((key, k), sun_shadow_targets(sun_disk, key.rotation), vectors, gain)

@@ -19,35 +19,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import Recipe, StoreReader
-from relume.basis.zernike import SENT_DEGREE
-from relume.brdf.albedo import Reflectances, mirrors_in, reflectances_of
-from relume.brdf.mirror import mirrored, mirrored_part
+from relume.basis.zernike import OUTGOING_DEGREE
+from relume.brdf.albedo import Reflectances, pack_reflectance, unpack_mirrors
+from relume.brdf.mirror import specular_terms, split_specular
 from relume.color import luminance
 from relume.errors import ChunkDamagedError, StoreError
-from relume.eye.flat_mirrors import MOST_PLANES, FlatMirrors, flat_mirrors, has_flat_mirrors, seen_in
+from relume.eye.flat_mirrors import MAX_PLANES, FlatMirrors, find_flat_mirrors, has_flat_mirrors, mirrored_lights
 from relume.light.tiles import Tiles
 from relume.light.triangles import TriangleLights
 from relume.look import EnvironmentKey
-from relume.memory import Memory
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.in_lobes import Coming, sent_in_lobes
-from relume.methods.cells.leaving import Leaving, sent_once
-from relume.methods.cells.reflecting import Arrived, Reflecting
+from relume.memory import Cache
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.in_lobes import DirectLobes, outgoing_in_highlights
+from relume.methods.cells.leaving import OutgoingRadiance, first_bounce
+from relume.methods.cells.reflecting import IncidentLight, ReflectanceOperator
 from relume.methods.store_io import read_lights, read_tiles
-from relume.picture.light import Light
-from relume.project.receivers import ThrownRays
+from relume.picture.light import Illumination
+from relume.project.receivers import MirrorRays
 from relume.scene.model import Scene
-from relume.trace.geometry import Geometry
+from relume.trace.geometry import SceneBuffers
 
 F32 = NDArray[np.float32]
 
 NO_PLANE = 255  # of cells
-MOST_GROUPS = 128
+MAX_GROUPS = 128
 _BRIGHT = 8.0  # times the mean radiance of the sky: gather rays find what is dimmer
 
 
 @dataclass(frozen=True)
-class Thrown:
+class MirrorLights:
     """What was traced: bright lights, those that lie together as one.
 
     Attributes:
@@ -64,27 +64,31 @@ class Thrown:
     plane: NDArray[np.uint8]
 
     @property
-    def num_seen(self) -> int:
+    def num_mirrored_lights(self) -> int:
         """Groups in all planes together, P G."""
         return self.mirrors.num_planes * len(self.direction)
 
     @classmethod
-    def of(cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: NDArray[np.uint8]) -> Thrown:
+    def from_lights(
+        cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: NDArray[np.uint8]
+    ) -> MirrorLights:
         """Choose the lights that are too bright for few functions.
 
         Args:
             lights: of a bake. tiles: that they lie in. mirrors: of its scene. plane: of its cells.
         """
-        light = luminance(lights.irradiance).astype(np.float64)
-        bright = np.flatnonzero(light > _BRIGHT * light.sum() / (4 * np.pi) * tiles.solid_angles)
-        bright = bright[np.argsort(tiles.along[bright], kind="stable")]  # neighbours beside each other
-        num_groups = min(len(bright), MOST_GROUPS)
-        group = np.arange(len(bright)) * num_groups // max(1, len(bright))
-        towards = np.zeros((num_groups, 3))
-        np.add.at(towards, group, light[bright, None] * lights.direction[bright])
-        direction = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).astype(np.float32)
-        chosen = bright.astype(np.int32), group.astype(np.int32), direction
-        return cls(*chosen, mirrors, plane)
+        brightness = luminance(lights.irradiance).astype(np.float64)
+        bright_indices = np.flatnonzero(brightness > _BRIGHT * brightness.sum() / (4 * np.pi) * tiles.solid_angles)
+        bright_indices = bright_indices[
+            np.argsort(tiles.traversal_key[bright_indices], kind="stable")
+        ]  # neighbours beside each other
+        num_groups = min(len(bright_indices), MAX_GROUPS)
+        group = np.arange(len(bright_indices)) * num_groups // max(1, len(bright_indices))
+        summed_direction = np.zeros((num_groups, 3))
+        np.add.at(summed_direction, group, brightness[bright_indices, None] * lights.direction[bright_indices])
+        direction = (summed_direction / np.linalg.norm(summed_direction, axis=1, keepdims=True)).astype(np.float32)
+        selected_groups = bright_indices.astype(np.int32), group.astype(np.int32), direction
+        return cls(*selected_groups, mirrors, plane)
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -94,26 +98,30 @@ class Thrown:
         return {f"thrown/{name}": array for name, array in fields.items()}
 
 
-def most_seen(scene: Scene, recipe: Recipe) -> int:
+def max_mirror_lights(scene: Scene, recipe: Recipe) -> int:
     """The most lights that a sample may see in flat mirrors, P G."""
-    return MOST_PLANES * min(MOST_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
+    return MAX_PLANES * min(MAX_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
 
 
-def make_thrown(scene: Scene, geometry: Geometry, store: StoreReader, cells: F32) -> dict[str, NDArray[Any]]:
-    """Find the arrays of a store from which `read_thrown` reads; none where nothing is thrown.
+def make_mirror_lights(
+    scene: Scene, geometry: SceneBuffers, store: StoreReader, patch_positions: F32
+) -> dict[str, NDArray[Any]]:
+    """Find the arrays of a store from which `read_mirror_lights` reads; none where nothing is thrown.
 
     Args:
         scene: that is baked. geometry: its triangles. store: with its lights.
-        cells: where the points of gather cells are. (C, points, 3)
+        patch_positions: where the points of gather cells are. (C, points, 3)
     """
     if not has_flat_mirrors(scene):
         return {}
-    mirrors = flat_mirrors(scene, geometry)
-    found = Thrown.of(read_lights(store), read_tiles(store), mirrors, mirrors.holding(cells, geometry.epsilon))
-    return found.arrays if found.num_seen else {}
+    mirrors = find_flat_mirrors(scene, geometry)
+    mirror_lights = MirrorLights.from_lights(
+        read_lights(store), read_tiles(store), mirrors, mirrors.containing_plane(patch_positions, geometry.epsilon)
+    )
+    return mirror_lights.arrays if mirror_lights.num_mirrored_lights else {}
 
 
-def read_thrown(store: StoreReader) -> Thrown | None:
+def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
     """What a store knows of flat mirrors; None where there is none, or no bright light."""
     try:
         store.shape("thrown/offset")
@@ -124,136 +132,162 @@ def read_thrown(store: StoreReader) -> Thrown | None:
         return store.read(f"thrown/{name}")
 
     mirrors = FlatMirrors(*map(read, FlatMirrors._fields))
-    found = Thrown(read("lights"), read("group"), read("direction"), mirrors, read("plane"))
+    mirror_lights = MirrorLights(read("lights"), read("group"), read("direction"), mirrors, read("plane"))
     limits: list[tuple[NDArray[Any], int]] = [
-        (found.lights, store.shape("lights/power")[0]),
-        (found.group, len(found.direction)),
+        (mirror_lights.lights, store.shape("lights/power")[0]),
+        (mirror_lights.group, len(mirror_lights.direction)),
         (mirrors.material, len(store.attributes["materials"])),
     ]
-    are_known = all(len(numbers) == 0 or 0 <= numbers.min() <= numbers.max() < limit for numbers, limit in limits)
-    if not are_known or found.plane.shape != store.shape("cells/material"):
+    are_valid = all(len(indices) == 0 or 0 <= indices.min() <= indices.max() < limit for indices, limit in limits)
+    if not are_valid or mirror_lights.plane.shape != store.shape("cells/material"):
         raise ChunkDamagedError("thrown", "it does not fit the lights, materials and cells of the bake")
-    return found
+    return mirror_lights
 
 
 @dataclass(frozen=True)
-class MoreThrown:
+class AddedMirrorLights:
     """How much more flat mirrors throw in one light than in another; a `relume.picture.transfer.MoreThrown`.
 
     Attributes:
-        direction: of what is thrown. (K, 3) float32 across: what comes across it. (K, 3) float32
-        by_cells: what other cells see of the same in the mean, which is no part of what samples get. (C, 3) float32
+        direction: of what is thrown. (K, 3) float32 normal_irradiance: what comes across it. (K, 3) float32
+        patch_radiance: what other cells see of the same in the mean, which is no part of what samples get. (C, 3)
+            float32
     """
 
     direction: F32
-    across: F32
-    by_cells: F32
+    normal_irradiance: F32
+    patch_radiance: F32
 
-    def rays(self, visible: NDArray[np.uint8]) -> ThrownRays:
+    def rays(self, visible: NDArray[np.uint8]) -> MirrorRays:
         """What comes to samples. visible: of the lights by the planes. (n, bytes) uint8"""
-        return ThrownRays(self.direction, self.across, visible)
+        return MirrorRays(self.direction, self.normal_irradiance, visible)
 
 
-class ThrownLight:
+class MirrorLightTransfer:
     """Of one bake, in any look; safe to use from several threads.
 
     Args:
-        thrown: what was traced. cells: that have sent it. lights_in: finds the triangles of an environment.
-        memory: of all that is made from the bake. key: of the bake in it.
+        mirror_lights: what was traced. patches: that have sent it. find_lights: finds the triangles of an environment.
+        cache: of all that is made from the bake. key: of the bake in it.
     """
 
     def __init__(
         self,
-        thrown: Thrown,
-        cells: CellLight,
-        lights_in: Callable[[EnvironmentKey], TriangleLights],
-        memory: Memory,
+        mirror_lights: MirrorLights,
+        patches: PatchLight,
+        find_lights: Callable[[EnvironmentKey], TriangleLights],
+        cache: Cache,
         key: str,
     ) -> None:
-        self._thrown, self._cells, self._lights_in = thrown, cells, lights_in
-        self._memory, self._key = memory, key
-        self._directions = seen_in(thrown.mirrors.normal, thrown.direction).reshape(-1, 3)
+        self._mirror_lights, self._patches, self._find_lights = mirror_lights, patches, find_lights
+        self._cache, self._key = cache, key
+        self._directions = mirrored_lights(mirror_lights.mirrors.normal, mirror_lights.direction).reshape(-1, 3)
 
     @staticmethod
-    def is_in(light: Light) -> bool:
+    def is_in(light: Illumination) -> bool:
         """Whether anything of it may be in a light: it is reflected once before it comes."""
-        return light.paths.reflect and light.paths.first == 1 and light.is_environment_lit
+        return light.paths.has_indirect and light.paths.first == 1 and light.has_environment
 
-    def rays(self, light: Light, visible: NDArray[np.uint8]) -> ThrownRays:
+    def rays(self, light: Illumination, visible: NDArray[np.uint8]) -> MirrorRays:
         """What comes to samples.
 
         Args:
-            light: that `is_in` says has any. visible: see `relume.eye.flat_mirrors.Seen`. (n, bytes) uint8
+            light: that `is_in` says has any. visible: see `relume.eye.find_flat_mirrors.Seen`. (n, bytes) uint8
         """
-        return ThrownRays(self._directions, self._sent(light), visible)
+        return MirrorRays(self._directions, self._reflected_irradiance(light), visible)
 
-    def more(self, before: Light, after: Light) -> MoreThrown | None:
+    def delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
         """What changes of it where surfaces do, as when a hand drags a mirror's colour; None for nothing.
 
         Args:
             before, after: in the same environment.
         """
-        here, there = (self._sent(light) if self.is_in(light) else np.float32(0) for light in (before, after))
-        change = np.asarray(there - here, np.float32)
+        irradiance_before, irradiance_after = (
+            self._reflected_irradiance(light) if self.is_in(light) else np.float32(0) for light in (before, after)
+        )
+        change = np.asarray(irradiance_after - irradiance_before, np.float32)
         if not change.any():
             return None
-        taken = [self._taken_quickly(light).seen(self._cells) if self.is_in(light) else 0 for light in (before, after)]
-        return MoreThrown(self._directions, change, np.asarray(taken[1] - taken[0], np.float32))
+        patch_radiances = [
+            self._fast_patch_part(light).mean_to_others(self._patches) if self.is_in(light) else 0
+            for light in (before, after)
+        ]
+        return AddedMirrorLights(
+            self._directions, change, np.asarray(patch_radiances[1] - patch_radiances[0], np.float32)
+        )
 
-    def _sent(self, light: Light) -> F32:
+    def _reflected_irradiance(self, light: Illumination) -> F32:
         """What each group sends by each plane, across its way. (P G, 3) float32"""
-        thrown, gain = self._thrown, np.array(light.environment_gain)
-        arriving = np.zeros((len(thrown.direction), 3))
-        np.add.at(arriving, thrown.group, gain * self._lights_in(light.environment).irradiance[thrown.lights])
-        cosine, tints = np.abs(thrown.mirrors.normal @ thrown.direction.T), self._cells.textures[1]
-        sent = np.zeros((*cosine.shape, 3))
-        for p, material in enumerate(thrown.mirrors.material):
-            on_plane = thrown.plane == p
+        mirror_lights, gain = self._mirror_lights, np.array(light.environment_gain)
+        incident = np.zeros((len(mirror_lights.direction), 3))
+        np.add.at(
+            incident, mirror_lights.group, gain * self._find_lights(light.environment).irradiance[mirror_lights.lights]
+        )
+        cosine, tints = np.abs(mirror_lights.mirrors.normal @ mirror_lights.direction.T), self._patches.textures[1]
+        mirror_reflectance = np.zeros((*cosine.shape, 3))
+        for p, material in enumerate(mirror_lights.mirrors.material):
+            on_plane = mirror_lights.plane == p
             tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
-            terms = mirrors_in(light.reflectances[material])
-            sent[p] = mirrored(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
-        return np.asarray((sent * arriving).reshape(-1, 3), np.float32)
+            terms = unpack_mirrors(light.reflectances[material])
+            mirror_reflectance[p] = specular_terms(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
+        return np.asarray((mirror_reflectance * incident).reshape(-1, 3), np.float32)
 
-    def taken(self, light: Light) -> Leaving:
+    def patch_part(self, light: Illumination) -> OutgoingRadiance:
         """What cells in the planes send of the same lights, as exact pictures have it."""
-        alone, lights = _mirrors_alone(light.reflectances), self._bright_in(light.environment)
-        reflecting, arrived = self._taking(light, alone)
-        lobes = self._cells.lobes(alone, reflecting)
+        mirror_reflectances, lights = _mirror_reflectances(light.reflectances), self._bright_lights(light.environment)
+        reflectance_operator, incident = self._patch_light(light, mirror_reflectances)
+        highlights = self._patches.highlight_tables(mirror_reflectances, reflectance_operator)
         lights = replace(lights, irradiance=np.array(light.environment_gain, np.float32) * lights.irradiance)
-        coming = Coming(lights, self._cells.seen_by(lobes.rows, self._among))
-        return sent_once(reflecting, arrived, (lobes, sent_in_lobes(self._cells, lobes, coming)))
+        direct_lobes = DirectLobes(lights, self._patches.visibility_bits(highlights.rows, self._light_indices))
+        return first_bounce(
+            reflectance_operator,
+            incident,
+            (highlights, outgoing_in_highlights(self._patches, highlights, direct_lobes)),
+        )
 
-    def _taken_quickly(self, light: Light) -> Leaving:
+    def _fast_patch_part(self, light: Illumination) -> OutgoingRadiance:
         """The same as functions have it."""
-        return sent_once(*self._taking(light, _mirrors_alone(light.reflectances)))
+        return first_bounce(*self._patch_light(light, _mirror_reflectances(light.reflectances)))
 
-    def _taking(self, light: Light, alone: Reflectances) -> tuple[Reflecting, Arrived]:
+    def _patch_light(
+        self, light: Illumination, mirror_reflectances: Reflectances
+    ) -> tuple[ReflectanceOperator, IncidentLight]:
         """What cells in the planes make of light, and what comes to them. alone: what mirrors reflect"""
-        whole = self._cells.reflecting(alone)
-        is_among = self._thrown.plane[whole.rows] != NO_PLANE
-        rows = whole.rows[is_among]
-        arrived, gain = self._arrived(light.environment, rows), np.array(light.environment_gain, np.float32)
-        reflectance = whole.reflectance * (self._thrown.plane != NO_PLANE)[:, None]
-        some = replace(whole, reflectance=reflectance, rows=rows, shares=whole.shares[:, is_among])
-        return some, Arrived(gain * arrived.irradiance, gain[:, None] * arrived.vectors)
+        all_patches = self._patches.reflectance_operator(mirror_reflectances)
+        is_on_plane = self._mirror_lights.plane[all_patches.rows] != NO_PLANE
+        rows = all_patches.rows[is_on_plane]
+        incident, gain = self._incident_light(light.environment, rows), np.array(light.environment_gain, np.float32)
+        reflectance = all_patches.reflectance * (self._mirror_lights.plane != NO_PLANE)[:, None]
+        plane_patches = replace(
+            all_patches,
+            reflectance=reflectance,
+            rows=rows,
+            reflectance_matrix=all_patches.reflectance_matrix[:, is_on_plane],
+        )
+        return plane_patches, IncidentLight(gain * incident.irradiance, gain[:, None] * incident.coefficients)
 
     @property
-    def _among(self) -> NDArray[np.intp]:
-        return self._thrown.lights.astype(np.intp)
+    def _light_indices(self) -> NDArray[np.intp]:
+        return self._mirror_lights.lights.astype(np.intp)
 
-    def _bright_in(self, environment: EnvironmentKey) -> TriangleLights:
+    def _bright_lights(self, environment: EnvironmentKey) -> TriangleLights:
         """The lights that were traced, in an environment."""
-        whole = self._lights_in(environment)
-        return whole.some(self._among, whole.irradiance[self._among])
+        all_lights = self._find_lights(environment)
+        return all_lights.select(self._light_indices, all_lights.irradiance[self._light_indices])
 
-    def _arrived(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> Arrived:
-        def found() -> Arrived:
-            among, cells, some = self._among, self._cells, self._bright_in(environment)
-            return Arrived(cells.irradiance(some, among), cells.vectors(rows, some, SENT_DEGREE, among))
+    def _incident_light(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> IncidentLight:
+        def compute() -> IncidentLight:
+            light_indices, patches, bright_lights = self._light_indices, self._patches, self._bright_lights(environment)
+            return IncidentLight(
+                patches.irradiance(bright_lights, light_indices),
+                patches.incident_coefficients(rows, bright_lights, OUTGOING_DEGREE, light_indices),
+            )
 
-        return self._memory.keep((self._key, "thrown light on cells", environment, rows.tobytes()), found)
+        return self._cache.get_value((self._key, "thrown light on cells", environment, rows.tobytes()), compute)
 
 
-def _mirrors_alone(reflectances: Reflectances) -> Reflectances:
+def _mirror_reflectances(reflectances: Reflectances) -> Reflectances:
     """Of materials as far as they are mirrors."""
-    return tuple(reflectances_of(list(map(mirrored_part, mirrors_in(one)))) for one in reflectances)
+    return tuple(
+        pack_reflectance(list(map(split_specular, unpack_mirrors(reflectance)))) for reflectance in reflectances
+    )

@@ -14,109 +14,129 @@ from numpy.typing import NDArray
 
 from relume.color import LUMINANCE, srgb_encode
 from relume.look.model import BackgroundLook
-from relume.moving.look_up import Seen
-from relume.moving.points.surface import Surface
-from relume.moving.sky import fill_sky
-from relume.moving.transfer import MovingTransfer
-from relume.parallel import for_shares
-from relume.picture.background.backdrop import MOST_SHARE
-from relume.picture.light import Light
+from relume.moving.look_up import GBuffer
+from relume.moving.points.surface import StoredScene
+from relume.moving.sky import sample
+from relume.moving.transfer import FreeCameraTransfer
+from relume.parallel import parallel_for_chunks
+from relume.picture.background.backdrop import MAX_CATCHER_RATIO
+from relume.picture.light import Illumination
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
-_MOST = np.float32(MOST_SHARE)
+_MAX_CATCHER_RATIO = np.float32(MAX_CATCHER_RATIO)
 
 
-class Caught(NamedTuple):
+class ShadowCatcher(NamedTuple):
     """What catchers compare with.
 
     Attributes:
-        is_catcher: of every material. (materials,) bool
-        unhidden: what a white surface at each vertex of catchers would send if nothing were in the light's way.
+        is_shadow_catcher: of every material. (materials,) bool
+        unoccluded: what a white surface at each vertex of catchers would send if nothing were in the light's way.
             (vertices or 0, 3) float32
     """
 
-    is_catcher: NDArray[np.bool_]
-    unhidden: F32
+    is_shadow_catcher: NDArray[np.bool_]
+    unoccluded: F32
 
 
-def seen_behind(
-    transfer: MovingTransfer,
+def background_radiance(
+    transfer: FreeCameraTransfer,
     background: BackgroundLook,
-    light: Light,
+    light: Illumination,
     gain: F32,
-    seen: Seen,
-    is_catcher: NDArray[np.bool_],
+    gbuffer: GBuffer,
+    is_shadow_catcher: NDArray[np.bool_],
 ) -> F32:
     """Find what lies behind, where the background or a catcher is seen. (rays, 3) float32
 
     Args:
         transfer: of the picture. background, light: of its look. gain: of the finished picture, in each channel. (3,)
-        seen: by the rays. is_catcher: of every material. (materials,)
+        gbuffer: by the rays. is_shadow_catcher: of every material. (materials,)
     """
-    num = len(seen.directions)
+    num_rays = len(gbuffer.directions)
     if background.kind == "color":
-        return np.tile(np.array(background.color, np.float32), (num, 1))
-    behind = np.zeros((num, 3), np.float32)
+        return np.tile(np.array(background.color, np.float32), (num_rays, 1))
+    radiance = np.zeros((num_rays, 3), np.float32)
     if background.kind != "transparent":
-        past, of_face = seen.hits.face, transfer.surface.face_material
-        if is_catcher.any():
-            past = np.where((past >= 0) & is_catcher[of_face[np.maximum(past, 0)]], -1, past).astype(np.int32)
-        radiance = transfer.map_of(light.environment.map, background.blur if background.kind == "blurred" else 0.0)
-        shown = np.array(light.environment_gain, np.float32) * gain
-        fill_sky(radiance, light.environment.rotation, shown, past, seen.directions, behind)
-    return behind
+        face, face_material = gbuffer.hits.face, transfer.stored_scene.face_material
+        if is_shadow_catcher.any():
+            face = np.where((face >= 0) & is_shadow_catcher[face_material[np.maximum(face, 0)]], -1, face).astype(
+                np.int32
+            )
+        environment_map = transfer.environment_map(
+            light.environment.map, background.blur if background.kind == "blurred" else 0.0
+        )
+        environment_gain = np.array(light.environment_gain, np.float32) * gain
+        sample(environment_map, light.environment.rotation, environment_gain, face, gbuffer.directions, radiance)
+    return radiance
 
 
-def lay_over(surface: Surface, seen: Seen, behind: F32, caught: Caught, gain: F32, *, is_direct: bool, out: F32) -> F32:
+def composite_over(
+    stored_scene: StoredScene,
+    gbuffer: GBuffer,
+    background: F32,
+    shadow_catcher: ShadowCatcher,
+    gain: F32,
+    *,
+    is_direct: bool,
+    out: F32,
+) -> F32:
     """Put surfaces over what is behind them, and shadows of catchers onto it.
 
     Args:
-        surface: that is seen. seen: by the rays. behind: from `seen_behind`. caught: by catchers.
+        stored_scene: that is seen. gbuffer: by the rays. background: from `background_radiance`. shadow_catcher: by
+            catchers.
         gain: that `out` has been multiplied by. (3,) float32
         is_direct: light that comes straight is shown, and with it the background.
         out: radiance of surfaces, of catchers as white ones; changed to the picture. (rays, 3) float32
     Returns:
         How much of the light behind it is hidden along each ray. (rays,) float32
     """
-    hides = np.empty(len(out), np.float32)
+    coverage = np.empty(len(out), np.float32)
     args = (
-        np.array(LUMINANCE, np.float32), seen.hits.face, surface.face_material, caught.is_catcher, caught.unhidden,
-        seen.vertex, seen.weight, behind, np.asarray(gain, np.float32), is_direct,
+        np.array(LUMINANCE, np.float32), gbuffer.hits.face, stored_scene.face_material,
+        shadow_catcher.is_shadow_catcher, shadow_catcher.unoccluded,
+        gbuffer.lattice_node, gbuffer.weight, background, np.asarray(gain, np.float32), is_direct,
     )  # fmt: skip
-    for_shares(lambda start, stop: _lay_over(*args, start, stop, out, hides), len(out))
-    return hides
+    parallel_for_chunks(lambda start, stop: _composite_over(*args, start, stop, out, coverage), len(out))
+    return coverage
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _lay_over(  # type: ignore[no-untyped-def]
-    luminance, face, face_material, is_catcher, unhidden, vertex, weight, behind, gain, is_direct, start, stop, out,
-    hides,
+def _composite_over(  # type: ignore[no-untyped-def]
+    luminance, face, face_material, is_shadow_catcher, unoccluded, lattice_node, weight, background, gain, is_direct,
+    start, stop, out,
+    coverage,
 ):  # fmt: skip
     """Do so for rays [start, stop)."""
-    free = np.float32(1) if is_direct else np.float32(0)
+    direct_factor = np.float32(1) if is_direct else np.float32(0)
     for p in range(start, stop):
         if face[p] < 0:
-            hides[p] = 0
+            coverage[p] = 0
             for channel in range(3):
-                out[p, channel] = free * behind[p, channel]
-        elif not is_catcher[face_material[face[p]]]:
-            hides[p] = 1
+                out[p, channel] = direct_factor * background[p, channel]
+        elif not is_shadow_catcher[face_material[face[p]]]:
+            coverage[p] = 1
         else:
-            hides[p] = 1
+            coverage[p] = 1
             for channel in range(3):
-                arrives, is_lit = np.float32(0), gain[channel] > 0
+                unoccluded_radiance, is_lit = np.float32(0), gain[channel] > 0
                 for k in range(3):
-                    of_vertex = unhidden[vertex[p, k], channel]
-                    arrives += weight[p, k] * of_vertex
-                    is_lit &= of_vertex > 0
+                    node_value = unoccluded[lattice_node[p, k], channel]
+                    unoccluded_radiance += weight[p, k] * node_value
+                    is_lit &= node_value > 0
                 # beside the rim of a cone, what surfaces reflect would be held against next to nothing
-                share = min(out[p, channel] / (gain[channel] * arrives), _MOST) if is_lit else free
-                out[p, channel] = share * behind[p, channel]
-                hides[p] -= luminance[channel] * min(share, np.float32(1))
+                shadow_ratio = (
+                    min(out[p, channel] / (gain[channel] * unoccluded_radiance), _MAX_CATCHER_RATIO)
+                    if is_lit
+                    else direct_factor
+                )
+                out[p, channel] = shadow_ratio * background[p, channel]
+                coverage[p] -= luminance[channel] * min(shadow_ratio, np.float32(1))
 
 
-def alpha_of(hides: F32, *, for_display: bool) -> F32:
-    """Tell how much pixels hide of display values (sRGB) behind them, or of linear ones. hides: from `lay_over`."""
-    return np.asarray(1 - srgb_encode(1 - hides), np.float32) if for_display else hides
+def alpha(coverage: F32, *, for_display: bool) -> F32:
+    """Tell how much pixels hide of display values (sRGB) behind them, or of linear ones. See `composite_over`."""
+    return np.asarray(1 - srgb_encode(1 - coverage), np.float32) if for_display else coverage

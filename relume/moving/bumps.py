@@ -19,36 +19,36 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import NUM_FUNCTIONS, in_basis
+from relume.basis.zernike import NUM_FUNCTIONS, project
 from relume.color import LUMINANCE
-from relume.moving.points.surface import Surface
+from relume.moving.points.surface import StoredScene
 from relume.moving.points.texels import sample_texture
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_NODES = 64  # of quadrature along each of θ and φ: exact for what is expanded
-_MOST = np.float32(4)  # times: a slope that the light grazes is not blown up
-_LEAST = np.float32(1e-12)
+_NUM_QUADRATURE_NODES = 64  # of quadrature along each of θ and φ: exact for what is expanded
+_MAX_RATIO = np.float32(4)  # times: a slope that the light grazes is not blown up
+_EPSILON = np.float32(1e-12)
 
 
 @lru_cache(maxsize=1)
-def expansions() -> F32:
+def basis_gradients() -> F32:
     """Expand x / z, y / z and 1: their inner products with light vectors are D in the local frame. (3, K) float32"""
-    place, weight = np.polynomial.legendre.leggauss(_NODES)
-    theta, phi = (place + 1) * np.pi / 4, np.arange(_NODES) * 2 * np.pi / _NODES
-    around = np.stack([np.cos(phi), np.sin(phi), np.ones(_NODES)])
-    wi = np.sin(theta)[:, None, None] * around.T
+    node, weight = np.polynomial.legendre.leggauss(_NUM_QUADRATURE_NODES)
+    theta, phi = (node + 1) * np.pi / 4, np.arange(_NUM_QUADRATURE_NODES) * 2 * np.pi / _NUM_QUADRATURE_NODES
+    azimuth_vectors = np.stack([np.cos(phi), np.sin(phi), np.ones(_NUM_QUADRATURE_NODES)])
+    wi = np.sin(theta)[:, None, None] * azimuth_vectors.T
     wi[..., 2] = np.cos(theta)[:, None]
     # h is expanded under dx dy = cos θ dω, so that x / z leaves x dω
-    solid_angle = np.sin(theta) * weight * np.pi / 4 * (2 * np.pi / _NODES)
-    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, in_basis(wi), solid_angle), np.float32)
+    solid_angle = np.sin(theta) * weight * np.pi / 4 * (2 * np.pi / _NUM_QUADRATURE_NODES)
+    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, project(wi), solid_angle), np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _lean(expanded, luminance, normal, tangent, vectors, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
+def _light_gradient(gradients, luminance, normal, tangent, vectors, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
     """Find D of points [start, stop)."""
     for p in range(start, stop):
         if not is_needed[p]:
@@ -57,81 +57,83 @@ def _lean(expanded, luminance, normal, tangent, vectors, is_needed, start, stop,
         for channel in range(3):
             for k in range(vectors.shape[2]):
                 value = luminance[channel] * vectors[p, channel, k]
-                x, y, z = x + expanded[0, k] * value, y + expanded[1, k] * value, z + expanded[2, k] * value
+                x, y, z = x + gradients[0, k] * value, y + gradients[1, k] * value, z + gradients[2, k] * value
         n, t = normal[p], tangent[p]
         out[p, 0] = x * t[0] + y * (n[1] * t[2] - n[2] * t[1]) + z * n[0]
         out[p, 1] = x * t[1] + y * (n[2] * t[0] - n[0] * t[2]) + z * n[1]
         out[p, 2] = x * t[2] + y * (n[0] * t[1] - n[1] * t[0]) + z * n[2]
 
 
-def towards_light(surface: Surface, vectors: F32, is_needed: NDArray[np.uint8]) -> F32:
+def light_gradient(stored_scene: StoredScene, vectors: F32, is_needed: NDArray[np.uint8]) -> F32:
     """Find where light comes from at points: D, its length their irradiance where it comes from one side.
 
     Args:
-        surface: whose points. vectors: t of each. (points, 3, K) float32
+        stored_scene: whose points. vectors: t of each. (points, 3, K) float32
         is_needed: points that are asked; the others get nothing. (points,) uint8
     Returns:
         World space, luminance. (points, 3) float32
     """
     out = np.zeros((len(vectors), 3), np.float32)
-    points = surface.points
-    args = (expansions(), np.array(LUMINANCE, np.float32), points.normal, points.tangent, vectors, is_needed)
-    for_shares(lambda start, stop: _lean(*args, start, stop, out), len(vectors))
+    probes = stored_scene.probes
+    args = (basis_gradients(), np.array(LUMINANCE, np.float32), probes.normal, probes.tangent, vectors, is_needed)
+    parallel_for_chunks(lambda start, stop: _light_gradient(*args, start, stop, out), len(vectors))
     return out
 
 
-def towards_light_numpy(surface: Surface, vectors: F32, point: int) -> F64:
-    """Do as `towards_light` for one point, in plain NumPy: its oracle.
+def light_gradient_numpy(stored_scene: StoredScene, vectors: F32, probe: int) -> F64:
+    """Do as `light_gradient` for one point, in plain NumPy: its oracle.
 
     Args:
-        surface, vectors: as there. point: number of the point.
+        stored_scene, vectors: as there. probe: number of the point.
     Returns:
         (3,) float64
     """
-    n, t = (getattr(surface.points, name)[point].astype(np.float64) for name in ("normal", "tangent"))
-    luminous = np.asarray(LUMINANCE) @ vectors[point].astype(np.float64)
-    assert luminous.shape == (NUM_FUNCTIONS,)
-    return np.asarray((expansions().astype(np.float64) @ luminous) @ np.stack([t, np.cross(n, t), n]))
+    n, t = (getattr(stored_scene.probes, name)[probe].astype(np.float64) for name in ("normal", "tangent"))
+    luminance = np.asarray(LUMINANCE) @ vectors[probe].astype(np.float64)
+    assert luminance.shape == (NUM_FUNCTIONS,)
+    return np.asarray((basis_gradients().astype(np.float64) @ luminance) @ np.stack([t, np.cross(n, t), n]))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def unit(vector):  # type: ignore[no-untyped-def]
+def normalize(vector):  # type: ignore[no-untyped-def]
     """Scale a vector, a tuple of three, to length one."""
     x, y, z = vector
-    scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, _LEAST))
+    scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, _EPSILON))
     return np.float32(scale * x), np.float32(scale * y), np.float32(scale * z)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def leaning(textures, texture, place, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
-    """Look up where a normal map turns a normal; see `relume.trace.surface`, which does so for fixed views.
+def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
+    """Look up where a normal map turns a normal; see `relume.trace.stored_scene`, which does so for fixed views.
 
     Args:
-        textures: all of them. texture: number of the map. place, footprint: u and v, and see `sample_texture`.
+        textures: all of them. texture: number of the map. texture_uv, footprint: u and v, and see `sample_texture`.
         n: the normal, unit. t: tangent, not yet across it. handedness: of the bitangent; its sign counts.
         outward: the face's normal on the side that is seen. scratch: (3,)
     Returns:
         The unit normal; n itself where the map leans it below the face.
     """
-    sample_texture(textures, texture, place[0], place[1], footprint, scratch)
-    along: Any = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
-    tx, ty, tz = unit((t[0] - along * n[0], t[1] - along * n[1], t[2] - along * n[2]))
+    sample_texture(textures, texture, texture_uv[0], texture_uv[1], footprint, scratch)
+    tangent_dot_normal: Any = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
+    tx, ty, tz = normalize(
+        (t[0] - tangent_dot_normal * n[0], t[1] - tangent_dot_normal * n[1], t[2] - tangent_dot_normal * n[2])
+    )
     sign = np.float32(-1) if handedness < 0 else np.float32(1)
     bx, by, bz = n[1] * tz - n[2] * ty, n[2] * tx - n[0] * tz, n[0] * ty - n[1] * tx
     a, b, c = scratch[0], sign * scratch[1], scratch[2]
-    x, y, z = unit((a * tx + b * bx + c * n[0], a * ty + b * by + c * n[1], a * tz + b * bz + c * n[2]))
+    x, y, z = normalize((a * tx + b * bx + c * n[0], a * ty + b * by + c * n[1], a * tz + b * bz + c * n[2]))
     if x * outward[0] + y * outward[1] + z * outward[2] <= 0:
         return n[0], n[1], n[2]
     return x, y, z
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def shading_ratio(light, n, leant):  # type: ignore[no-untyped-def]
+def shading_ratio(gradient, n, perturbed):  # type: ignore[no-untyped-def]
     """Compute n'·D / n·D, bounded.
 
     Args:
-        light: D, a tuple of three. n: the surface's normal. leant: n', where it leans to.
+        gradient: D, a tuple of three. n: the surface's normal. perturbed: n', where it leans to.
     """
-    before: Any = light[0] * n[0] + light[1] * n[1] + light[2] * n[2]
-    after: Any = light[0] * leant[0] + light[1] * leant[1] + light[2] * leant[2]
-    return min(max(after, np.float32(0)) / max(before, _LEAST), _MOST)
+    irradiance: Any = gradient[0] * n[0] + gradient[1] * n[1] + gradient[2] * n[2]
+    perturbed_irradiance: Any = gradient[0] * perturbed[0] + gradient[1] * perturbed[1] + gradient[2] * perturbed[2]
+    return min(max(perturbed_irradiance, np.float32(0)) / max(irradiance, _EPSILON), _MAX_RATIO)

@@ -17,22 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from relume.moving.look_up import Seen
-from relume.moving.points.surface import Surface
+from relume.moving.look_up import GBuffer
+from relume.moving.points.surface import StoredScene
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
-_TURN = 8  # power of the cosine between normals
-_RISE = 0.1  # off the tangent plane, over the distance
-_LEAST = 0.02  # weight below which a pixel is hardly told of
-_FEWEST = 8  # samples of a material that tell how far they can be believed
-_LEAST_EXPLAINED = 0.2  # share of the squares of what samples are off by, explained by those about them
+_NORMAL_POWER = 8  # power of the cosine between normals
+_PLANE_TOLERANCE = 0.1  # off the tangent plane, over the distance
+_MIN_WEIGHT = 0.02  # weight below which a pixel is hardly told of
+_MIN_SAMPLES = 8  # samples of a material that tell how far they can be believed
+_MIN_EXPLAINED = 0.2  # share of the squares of what samples are off by, explained by those about them
 
 
-class Places(NamedTuple):
+class CorrectionSamples(NamedTuple):
     """Where rays through the middles of pixels hit, row after row.
 
     Attributes:
@@ -47,24 +47,24 @@ class Places(NamedTuple):
     width: int
 
     @classmethod
-    def of(cls, surface: Surface, seen: Seen, camera: Camera, width: int) -> Places:
+    def from_gbuffer(cls, stored_scene: StoredScene, gbuffer: GBuffer, camera: Camera, width: int) -> CorrectionSamples:
         """Find them.
 
         Args:
-            surface: that is seen. seen: through middles of pixels alone. camera: the eye. width: pixels.
+            stored_scene: that is seen. gbuffer: through middles of pixels alone. camera: the eye. width: pixels.
         """
-        face, is_hit = np.maximum(seen.hits.face, 0), seen.hits.face >= 0
-        distance = np.where(is_hit, seen.hits.distance, 0)[:, None]
-        position = camera.to_world[:3, 3].astype(np.float32) + distance * seen.directions
-        material = np.where(is_hit, surface.face_material[face], -1)
-        return cls(position.astype(np.float32), surface.face_normal[face], material.astype(np.int32), width)
+        face, is_hit = np.maximum(gbuffer.hits.face, 0), gbuffer.hits.face >= 0
+        distance = np.where(is_hit, gbuffer.hits.distance, 0)[:, None]
+        position = camera.to_world[:3, 3].astype(np.float32) + distance * gbuffer.directions
+        material = np.where(is_hit, stored_scene.face_material[face], -1)
+        return cls(position.astype(np.float32), stored_scene.face_normal[face], material.astype(np.int32), width)
 
     @property
     def height(self) -> int:
         """Of the picture, pixels."""
         return len(self.material) // self.width
 
-    def off_edges(self, edges: NDArray[np.integer], size: tuple[int, int]) -> Places:
+    def exclude_edges(self, edges: NDArray[np.integer], size: tuple[int, int]) -> CorrectionSamples:
         """Leave out those near edges: what is off there, as where a shadow begins, is so for a pixel or two.
 
         Args:
@@ -73,99 +73,108 @@ class Places(NamedTuple):
         width, height = size
         is_edge = np.zeros((height + 2, width + 2), np.bool_)
         is_edge[edges // width + 1, edges % width + 1] = True
-        is_near = is_edge[:-2] | is_edge[1:-1] | is_edge[2:]
-        is_near = is_near[:, :-2] | is_near[:, 1:-1] | is_near[:, 2:]
+        is_near_edge = is_edge[:-2] | is_edge[1:-1] | is_edge[2:]
+        is_near_edge = is_near_edge[:, :-2] | is_near_edge[:, 1:-1] | is_near_edge[:, 2:]
         y = ((np.arange(self.height) + 0.5) * height / self.height).astype(np.int64)
         x = ((np.arange(self.width) + 0.5) * width / self.width).astype(np.int64)
-        return self._replace(material=np.where(is_near[y][:, x].ravel(), np.int32(-1), self.material))
+        return self._replace(material=np.where(is_near_edge[y][:, x].ravel(), np.int32(-1), self.material))
 
 
-def correction(radiance: F32, exact: F32, of_samples: Places, of_pixels: Places) -> F32:
+def residual(radiance: F32, exact: F32, samples: CorrectionSamples, pixels: CorrectionSamples) -> F32:
     """Find by how much a moving picture is off.
 
     Args:
         radiance: M at the samples. exact: E there. (h, w, 3) float32
-        of_samples: where they lie: pixels of a smaller picture from the same eye.
-        of_pixels: where the pixels of the moving picture lie.
+        samples: where they lie: pixels of a smaller picture from the same eye.
+        pixels: where the pixels of the moving picture lie.
     Returns:
         β Σ w D, what is to be added. (height, width, 3) float32
     """
-    off = (exact - radiance).reshape(-1, 3).astype(np.float64)
-    off[of_samples.material < 0] = 0
-    believed = _belief(off, of_samples)[:, None] * off
-    found = _between(of_samples, of_pixels) @ believed
-    return np.asarray(found.reshape(of_pixels.height, of_pixels.width, 3), np.float32)
+    difference = (exact - radiance).reshape(-1, 3).astype(np.float64)
+    difference[samples.material < 0] = 0
+    weighted_difference = _material_confidence(difference, samples)[:, None] * difference
+    residual_image = _pixel_weights(samples, pixels) @ weighted_difference
+    return np.asarray(residual_image.reshape(pixels.height, pixels.width, 3), np.float32)
 
 
-def corrected(image: F32, by: F32) -> F32:
+def apply_residual(image: F32, residual_image: F32) -> F32:
     """Add what a moving picture is off by; nothing becomes darker than black. (height, width, 3) both"""
-    return np.asarray(np.maximum(image + by, 0), np.float32)
+    return np.asarray(np.maximum(image + residual_image, 0), np.float32)
 
 
-def _belief(off: F64, samples: Places) -> F64:
+def _material_confidence(difference: F64, samples: CorrectionSamples) -> F64:
     """Regress what samples are off by on what those about them say: β of each one's material. (n,)"""
-    said, belief = _about(samples) @ off, np.zeros(len(off))
+    predicted, confidence = _neighbor_weights(samples) @ difference, np.zeros(len(difference))
     for material in np.unique(samples.material[samples.material >= 0]):
         rows = np.flatnonzero(samples.material == material)
-        both, size, whole = (
-            float(np.sum(one * other)) for one, other in (
-                (said[rows], off[rows]), (said[rows], said[rows]), (off[rows], off[rows])
+        cross_product, predicted_energy, total_energy = (
+            float(np.sum(a * b)) for a, b in (
+                (predicted[rows], difference[rows]), (predicted[rows], predicted[rows]), (difference[rows],
+                difference[rows])
             )
         )  # fmt: skip
-        if len(rows) >= _FEWEST and both > 0 and both * both > _LEAST_EXPLAINED * size * whole:
-            belief[rows] = min(both / size, 1)
-    return belief
+        if (
+            len(rows) >= _MIN_SAMPLES
+            and cross_product > 0
+            and cross_product * cross_product > _MIN_EXPLAINED * predicted_energy * total_energy
+        ):
+            confidence[rows] = min(cross_product / predicted_energy, 1)
+    return confidence
 
 
-def _between(samples: Places, pixels: Places) -> Any:
+def _pixel_weights(samples: CorrectionSamples, pixels: CorrectionSamples) -> Any:
     """Weigh the four samples about each pixel. (pixels, samples) sparse"""
     y, x = np.divmod(np.arange(len(pixels.material)), pixels.width)
     # both pictures are as high; the smaller may be a little wider or narrower than the other
     step = pixels.height / samples.height
     u = (x + 0.5 - pixels.width / 2) / step + samples.width / 2 - 0.5
     v = (y + 0.5) / step - 0.5
-    left, top = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
-    corners = [(left + dx, top + dy) for dy in (0, 1) for dx in (0, 1)]
+    column, row = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
+    corners = [(column + dx, row + dy) for dy in (0, 1) for dx in (0, 1)]
     tents = [np.maximum(1 - abs(u - cx), 0) * np.maximum(1 - abs(v - cy), 0) for cx, cy in corners]
-    return _weighed(pixels, samples, corners, tents)
+    return _bilateral_weights(pixels, samples, corners, tents)
 
 
-def _about(samples: Places) -> Any:
+def _neighbor_weights(samples: CorrectionSamples) -> Any:
     """Weigh the eight samples about each sample. (samples, samples) sparse"""
     y, x = np.divmod(np.arange(len(samples.material)), samples.width)
-    steps = [(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dx, dy) != (0, 0)]
-    tents = [np.full(len(x), 0.5 ** (abs(dx) + abs(dy) - 1)) for dx, dy in steps]
-    return _weighed(samples, samples, [(x + dx, y + dy) for dx, dy in steps], tents)
+    offsets = [(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dx, dy) != (0, 0)]
+    tents = [np.full(len(x), 0.5 ** (abs(dx) + abs(dy) - 1)) for dx, dy in offsets]
+    return _bilateral_weights(samples, samples, [(x + dx, y + dy) for dx, dy in offsets], tents)
 
 
-def _weighed(at: Places, samples: Places, where: list[tuple[I64, I64]], tents: list[F64]) -> Any:
+def _bilateral_weights(
+    targets: CorrectionSamples, samples: CorrectionSamples, neighbors: list[tuple[I64, I64]], tents: list[F64]
+) -> Any:
     """Weigh samples for places by how near they are, and whether they are on the same surface; rows sum to one or less.
 
     Args:
-        at: the places. samples: what is known. where: x and y of one sample for each place, several times.
+        targets: the places. samples: what is known. neighbors: x and y of one sample for each place, several times.
         tents: by how near these are in the picture.
     """
     rows, columns, weights = [], [], []
-    for (x, y), tent in zip(where, tents, strict=True):
-        is_inside = (x >= 0) & (x < samples.width) & (y >= 0) & (y < samples.height) & (at.material >= 0)
+    for (x, y), tent in zip(neighbors, tents, strict=True):
+        is_inside = (x >= 0) & (x < samples.width) & (y >= 0) & (y < samples.height) & (targets.material >= 0)
         row = np.flatnonzero(is_inside & (tent > 0))
         column = y[row] * samples.width + x[row]
-        is_same = at.material[row] == samples.material[column]
+        is_same = targets.material[row] == samples.material[column]
         row, column = row[is_same], column[is_same]
         rows.append(row)
         columns.append(column)
-        weights.append(tent[row] * _likeness(at, row, samples, column))
+        weights.append(tent[row] * _similarity(targets, row, samples, column))
     row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
-    total = np.bincount(row, weight, len(at.material))
+    total = np.bincount(row, weight, len(targets.material))
     # few weigh little even together: what is hardly told of is hardly corrected
-    share = weight / np.maximum(total + _LEAST, 1e-12)[row]
-    return csr_array((share, (row, column)), shape=(len(at.material), len(samples.material)))
+    normalized = weight / np.maximum(total + _MIN_WEIGHT, 1e-12)[row]
+    return csr_array((normalized, (row, column)), shape=(len(targets.material), len(samples.material)))
 
 
-def _likeness(at: Places, row: I64, samples: Places, column: I64) -> F64:
+def _similarity(targets: CorrectionSamples, row: I64, samples: CorrectionSamples, column: I64) -> F64:
     """How much pairs of places are of one smooth surface, in [0, 1]. (pairs,)"""
-    normal = at.normal[row].astype(np.float64)
-    away = at.position[row].astype(np.float64) - samples.position[column]
-    turn = np.maximum(np.einsum("nc,nc->n", normal, samples.normal[column]), 0)
-    rise, distance = np.abs(np.einsum("nc,nc->n", normal, away)), np.linalg.norm(away, axis=1)
-    return np.asarray(turn**_TURN * np.exp(-rise / (_RISE * distance + 1e-9)), np.float64)
+    normal = targets.normal[row].astype(np.float64)
+    offset = targets.position[row].astype(np.float64) - samples.position[column]
+    alignment = np.maximum(np.einsum("nc,nc->n", normal, samples.normal[column]), 0)
+    plane_distance, distance = np.abs(np.einsum("nc,nc->n", normal, offset)), np.linalg.norm(offset, axis=1)
+    return np.asarray(
+        alignment**_NORMAL_POWER * np.exp(-plane_distance / (_PLANE_TOLERANCE * distance + 1e-9)), np.float64
+    )

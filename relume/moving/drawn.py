@@ -8,32 +8,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.moving.frame import Frame, Wanted
-from relume.moving.look_up import Seen
-from relume.views.resolve import packed
+from relume.moving.frame import Frame, FrameRequestState
+from relume.moving.look_up import GBuffer
+from relume.views.resolve import pack_pixels
 
 F32 = NDArray[np.float32]
 
 
 @dataclass
-class Drawn:
+class PreviousImage:
     """What a picture has drawn last.
 
     Attributes:
-        wanted: what it shows. seen: by the rays of its eye. frame: the finished one.
-        shares: of beams, along its rays. has_rims: it is fine, and all of its rims are found.
-        words: its pixels, packed as RGB9_E5; None where nobody has asked for them. (pixels,) uint32
+        state: what it shows. gbuffer: by the rays of its eye. frame: the finished one.
+        shadow_visibility: of beams, along its rays. has_highlight_edges: it is fine, and all of its rims are found.
+        rgb9e5: its pixels, packed as RGB9_E5; None where nobody has asked for them. (pixels,) uint32
     """
 
-    wanted: Wanted
-    seen: Seen
+    state: FrameRequestState
+    gbuffer: GBuffer
     frame: Frame
-    shares: Sequence[F32]
-    has_rims: bool
-    words: NDArray[np.uint32] | None = None
+    shadow_visibility: Sequence[F32]
+    has_highlight_edges: bool
+    rgb9e5: NDArray[np.uint32] | None = None
 
-    def packed(self) -> NDArray[np.uint32]:
+    def to_rgb9e5(self) -> NDArray[np.uint32]:
         """Its pixels, packed, from when somebody asks for them first."""
-        if self.words is None:
-            self.words = packed(self.frame.image.reshape(-1, 3))
-        return self.words
+        if self.rgb9e5 is None:
+            self.rgb9e5 = pack_pixels(self.frame.image.reshape(-1, 3))
+        return self.rgb9e5

@@ -9,50 +9,56 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.moving.frame import Frame, Wanted, frame_of
-from relume.moving.look_up import Seen
-from relume.moving.rims import add_rims
-from relume.moving.transfer import MovingTransfer
-from relume.picture.jobs import Cancelled, Progress
+from relume.moving.frame import Frame, FrameRequestState, render_frame
+from relume.moving.look_up import GBuffer
+from relume.moving.rims import add_samples
+from relume.moving.transfer import FreeCameraTransfer
+from relume.picture.jobs import CancelCheck, ProgressCallback
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 
 
-def fine_frame(
-    transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camera, size: tuple[int, int], shares: Sequence[F32]
+def render_fine_frame(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    size: tuple[int, int],
+    shadow_visibility: Sequence[F32],
 ) -> Frame:
     """Find what an eye sees, its rims too.
 
     Args:
-        transfer, wanted, seen, camera, size, shares: as of `relume.moving.frame.frame_of`; `wanted` is fine.
+        transfer, state, gbuffer, camera, size, shadow_visibility: as of `relume.moving.frame.render_frame`; `state` is
+        fine.
     """
-    frame = frame_of(transfer, wanted, seen, camera, size, shares)
-    return add_rims(transfer, wanted, seen, camera, frame, shares)
+    frame = render_frame(transfer, state, gbuffer, camera, size, shadow_visibility)
+    return add_samples(transfer, state, gbuffer, camera, frame, shadow_visibility)
 
 
 @dataclass(frozen=True)
-class FineJob:
+class RefineHighlights:
     """Finds it; a `relume.picture.jobs.Job`.
 
     Attributes:
-        find: makes the frame, of what was shown when the job was begun. key: equal for jobs of one eye and look.
-        take: gets it.
+        render: makes the frame, of what was shown when the job was begun. key: equal for jobs of one eye and look.
+        on_done: gets it.
     """
 
-    find: Callable[[], Frame]
+    render: Callable[[], Frame]
     key: tuple[Hashable, ...]
-    take: Callable[[Frame], None]
+    on_done: Callable[[Frame], None]
 
-    what = "finer highlights"
+    label = "finer highlights"
     state: ClassVar[Literal["shading"]] = "shading"
-    refines = True
-    goes_on = False
+    is_refinement = True
+    is_resumable = False
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> Frame:
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Frame:
         """Find it: as long as a few frames take."""
-        return self.find()
+        return self.render()
 
-    def install(self, made: Frame) -> None:
+    def install(self, result: Frame) -> None:
         """Hand it over."""
-        self.take(made)
+        self.on_done(result)

@@ -9,40 +9,40 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.channels import NormalMap, images_of
+from relume.brdf.channels import NormalMap, user_images
 from relume.look import Look
-from relume.moving.again import Part, Shown, resolve_some
-from relume.moving.basis.lobes import Lobes, lobes_of
-from relume.moving.basis.tables import Tables, tables_of
-from relume.moving.beams.show import add_beams
-from relume.moving.behind import Caught, lay_over, seen_behind
-from relume.moving.bumps import towards_light
+from relume.moving.again import DirtyPixels, DirtyRegion, resolve_subset
+from relume.moving.basis.lobes import Lobes, build_lobes
+from relume.moving.basis.tables import Tables, build_tables
+from relume.moving.beams.show import add_direct_sharp
+from relume.moving.behind import ShadowCatcher, background_radiance, composite_over
+from relume.moving.bumps import light_gradient
 from relume.moving.edges import resolve
-from relume.moving.evaluate import Sent, send
-from relume.moving.highlights.between_points import add_sky_in_highlights
-from relume.moving.highlights.by_lights import by_lights
-from relume.moving.highlights.glances import glance
-from relume.moving.highlights.lobe_lights import MOST_LAMPS, widths_of
-from relume.moving.highlights.looking import SkyLight
-from relume.moving.highlights.turning import turning
-from relume.moving.look_up import Seen, at_vertices
-from relume.moving.panes import hide_less, lay_over_glass
-from relume.moving.pixels import FromVertices, Mirrored, combine
-from relume.moving.points.images import Wears
-from relume.moving.points.surface import Surface
-from relume.moving.relief.light import ReliefLight
-from relume.moving.relief.show import Arrived, Sight, show_texels
-from relume.moving.relief.tables import Covers, covers_of
-from relume.moving.sky import turn_of
-from relume.moving.transfer import MovingTransfer
-from relume.moving.vectors.arriving import Arriving
-from relume.picture.light import Light, emission_of
+from relume.moving.evaluate import ProbeRadiance, shade_probes
+from relume.moving.highlights.between_points import add_environment_highlights
+from relume.moving.highlights.by_lights import sum_lights
+from relume.moving.highlights.glances import trace_lobe_visibility
+from relume.moving.highlights.lobe_lights import MAX_BRIGHT_LIGHTS, lobe_widths
+from relume.moving.highlights.looking import PrefilteredEnvironment
+from relume.moving.highlights.turning import gradients_along_lobe
+from relume.moving.look_up import GBuffer, interpolate_to_nodes
+from relume.moving.panes import adjust_alpha, composite_glass
+from relume.moving.pixels import InterpolatedProbes, MirrorData, shade_pixels
+from relume.moving.points.images import ProbeMapOverrides
+from relume.moving.points.surface import StoredScene
+from relume.moving.relief.light import TexelLight
+from relume.moving.relief.show import IncidentTexelLight, TextureFootprint, shade_texels
+from relume.moving.relief.tables import BtfMaterials, find_btf_materials
+from relume.moving.sky import rotation_of
+from relume.moving.transfer import FreeCameraTransfer
+from relume.moving.vectors.arriving import IncidentCoefficients
+from relume.picture.light import Illumination, material_emission
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 
 
-class Projected(NamedTuple):
+class ProjectedMaterial(NamedTuple):
     """The terms of one material, and what the in-basis and lobes make of them."""
 
     terms: Sequence[Mapping[str, Any]]
@@ -50,98 +50,108 @@ class Projected(NamedTuple):
     lobes: Lobes
 
 
-def _projected(terms: Sequence[Mapping[str, Any]], before: Projected | None) -> Projected:
+def _project_terms(terms: Sequence[Mapping[str, Any]], cached: ProjectedMaterial | None) -> ProjectedMaterial:
     """Project the terms of one. before: what has been projected of it."""
-    if before is not None and before.terms == terms:
-        return before
-    return Projected(terms, tables_of([terms]), lobes_of([terms]))
+    if cached is not None and cached.terms == terms:
+        return cached
+    return ProjectedMaterial(terms, build_tables([terms]), build_lobes([terms]))
 
 
-class Materials(NamedTuple):
+class MaterialState(NamedTuple):
     """What materials send.
 
     Attributes:
         tables: of what the in-basis tells. lobes: of the rest.
-        sends: whether a material sends anything of a group of terms. (materials, groups) bool
-        covers: of materials whose every texel sends something else.
-        each: the terms of each, projected.
-        wears: what a look names in the place of each one's images.
+        is_reflective: whether a material sends anything of a group of terms. (materials, groups) bool
+        btf_materials: of materials whose every texel sends something else.
+        projected: the terms of each, projected.
+        overrides: what a look names in the place of each one's images.
     """
 
     tables: Tables
     lobes: Lobes
-    sends: NDArray[np.bool_]
-    covers: Covers
-    each: Sequence[Projected]
-    wears: tuple[Wears, ...]
+    is_reflective: NDArray[np.bool_]
+    btf_materials: BtfMaterials
+    projected: Sequence[ProjectedMaterial]
+    overrides: tuple[ProbeMapOverrides, ...]
 
     @classmethod
-    def of(
+    def from_terms(
         cls,
         terms: Sequence[Sequence[Mapping[str, Any]]],
-        before: Self | None = None,
+        previous: Self | None = None,
         normals: Sequence[NormalMap | None] | None = None,
         *,
-        waits: bool = True,
+        is_blocking: bool = True,
     ) -> Self:
         """Project the terms of each, of a complete look.
 
         Args:
-            terms: of each. before: those of another, which hold what has not changed.
+            terms: of each. previous: those of another, which hold what has not changed.
             normals: in the place of the normal maps of each; None: all have their own.
-            waits: see `covers_of`.
+            is_blocking: see `find_btf_materials`.
         """
-        of_normals = [None] * len(terms) if normals is None else normals
-        wears = tuple(Wears(images_of(these), one) for these, one in zip(terms, of_normals, strict=True))
-        known = before.each if before is not None else [None] * len(terms)
-        each = [_projected(these, one) for these, one in zip(terms, known, strict=True)]
-        covers = covers_of(terms, before.covers.shown if before is not None else (), waits=waits)
-        if before is not None and all(map(operator.is_, each, before.each)):
-            is_covered = len(covers.missing) == len(before.covers.missing)
-            if before.wears == wears and is_covered:
-                return before
-            return before._replace(wears=wears, covers=before.covers if is_covered else covers)
-        tables, lobes = Tables.joined([one.tables for one in each]), Lobes.joined([one.lobes for one in each])
-        sends, with_lobe = np.asarray((tables.of >= 0).any(axis=2)), lobes.of >= 0
-        sends[with_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.of[with_lobe]]
-        return cls(tables, lobes, sends, covers, each, wears)
+        normal_maps = [None] * len(terms) if normals is None else normals
+        overrides = tuple(
+            ProbeMapOverrides(user_images(material_terms), item)
+            for material_terms, item in zip(terms, normal_maps, strict=True)
+        )
+        cached = previous.projected if previous is not None else [None] * len(terms)
+        projected = [_project_terms(material_terms, item) for material_terms, item in zip(terms, cached, strict=True)]
+        btf_materials = find_btf_materials(
+            terms, previous.btf_materials.available if previous is not None else (), is_blocking=is_blocking
+        )
+        if previous is not None and all(map(operator.is_, projected, previous.projected)):
+            is_btf_unchanged = len(btf_materials.missing) == len(previous.btf_materials.missing)
+            if previous.overrides == overrides and is_btf_unchanged:
+                return previous
+            return previous._replace(
+                overrides=overrides, btf_materials=previous.btf_materials if is_btf_unchanged else btf_materials
+            )
+        tables, lobes = (
+            Tables.joined([item.tables for item in projected]),
+            Lobes.joined([item.lobes for item in projected]),
+        )
+        is_reflective, has_lobe = np.asarray((tables.table_index >= 0).any(axis=2)), lobes.lobe_index >= 0
+        is_reflective[has_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.lobe_index[has_lobe]]
+        return cls(tables, lobes, is_reflective, btf_materials, projected, overrides)
 
 
-class Wanted(NamedTuple):
+class FrameRequestState(NamedTuple):
     """What a frame shall show.
 
     Attributes:
         look: whose materials and background. light: what arrives, by its sources. gain: of all, in each channel. (3,)
-        arriving: light vectors of that light. is_rough: they were found quickly.
-        relief: what was made of them for texels, in frames of before.
+        incident: light vectors of that light. is_coarse: they were found quickly.
+        texel_light: what was made of them for texels, in frames of before.
         is_fine: highlights are found for each pixel as for points, and rims of them smoothed (`relume.moving.rims`).
     """
 
     look: Look
-    materials: Materials
-    light: Light
+    materials: MaterialState
+    light: Illumination
     gain: F32
-    arriving: Arriving
-    is_rough: bool
-    relief: ReliefLight
+    incident: IncidentCoefficients
+    is_coarse: bool
+    texel_light: TexelLight
     is_fine: bool
 
 
-class Sums(NamedTuple):
+class ShadingBuffers(NamedTuple):
     """What a frame was summed from.
 
     Attributes:
-        glances: of points along their lobes. (points, 3) float32. sent: by points.
-        turning: of points, from `relume.moving.highlights.turning`. (points, 4) float32
-        at_vertices: all three of vertices. towards_light: of vertices, see `FromVertices`.
+        lobe_visibility: of points along their lobes. (points, 3) float32. outgoing: by points.
+        gradients: of points, from `relume.moving.highlights.turning`. (points, 4) float32
+        node_values: all three of vertices. light_gradient: of vertices, see `InterpolatedProbes`.
         radiance: along the rays. (rays, 3) float32
     """
 
-    glances: F32
-    sent: Sent
-    turning: F32
-    at_vertices: tuple[F32, F32, F32]
-    towards_light: F32
+    lobe_visibility: F32
+    outgoing: ProbeRadiance
+    gradients: F32
+    node_values: tuple[F32, F32, F32]
+    light_gradient: F32
     radiance: F32
 
 
@@ -150,223 +160,295 @@ class Frame(NamedTuple):
 
     Attributes:
         image: linear radiance. (height, width, 3) float32
-        hides: how much of what is behind it, where the background is transparent, else None. (height, width) float32
-        sums: what it was summed from.
+        coverage: how much of what is behind it, where the background is transparent, else None. (height, width) float32
+        buffers: what it was summed from.
     """
 
     image: F32
-    hides: F32 | None
-    sums: Sums
+    coverage: F32 | None
+    buffers: ShadingBuffers
 
 
-def frame_of(
-    transfer: MovingTransfer,
-    wanted: Wanted,
-    seen: Seen,
+def render_frame(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
     camera: Camera,
     size: tuple[int, int],
-    shares: Sequence[F32] = (),
+    shadow_visibility: Sequence[F32] = (),
 ) -> Frame:
     """Find what an eye sees, but for rims.
 
     Args:
-        transfer: of the bake. wanted: what is shown.
-        seen: by the rays of the camera. size: width and height in pixels.
-        shares: of each beam that arrives, seen by the rays. (rays,) float32 each
+        transfer: of the bake. state: what is shown.
+        gbuffer: by the rays of the camera. size: width and height in pixels.
+        shadow_visibility: of each beam that arrives, seen by the rays. (rays,) float32 each
     """
     width, height = size
-    found = finished_along(transfer, wanted, seen, camera, height, shares)
-    image = resolve(found.radiance, seen.owner, width * height).reshape(height, width, 3)
-    if wanted.look.background.kind != "transparent":
-        return Frame(image, None, found.sums)
-    return Frame(image, resolve(found.hides, seen.owner, width * height).reshape(height, width), found.sums)
+    final_frame = finish_rays(transfer, state, gbuffer, camera, height, shadow_visibility)
+    image = resolve(final_frame.radiance, gbuffer.owner, width * height).reshape(height, width, 3)
+    if state.look.background.kind != "transparent":
+        return Frame(image, None, final_frame.buffers)
+    return Frame(
+        image, resolve(final_frame.coverage, gbuffer.owner, width * height).reshape(height, width), final_frame.buffers
+    )
 
 
-class Finished(NamedTuple):
+class FinalFrame(NamedTuple):
     """What rays show.
 
     Attributes:
-        radiance: with the background. (rays, 3) float32. hides: how much of what is behind them. (rays,) float32
-        sums: what it was summed from.
+        radiance: with the background. (rays, 3) float32. coverage: how much of what is behind them. (rays,) float32
+        buffers: what it was summed from.
     """
 
     radiance: F32
-    hides: F32
-    sums: Sums
+    coverage: F32
+    buffers: ShadingBuffers
 
 
-def finished_along(
-    transfer: MovingTransfer, wanted: Wanted, seen: Seen, camera: Camera, height: int, shares: Sequence[F32] = ()
-) -> Finished:
+def finish_rays(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    height: int,
+    shadow_visibility: Sequence[F32] = (),
+) -> FinalFrame:
     """Find what rays show, glass and background included.
 
     Args:
-        transfer, wanted, seen, camera, shares: as of `frame_of`. height: of the picture, pixels.
+        transfer, state, gbuffer, camera, shadow_visibility: as of `render_frame`. height: of the picture, pixels.
     """
-    surface, light = transfer.surface, wanted.light
-    sums = _summed(transfer, wanted, seen, Part(seen.is_needed, seen.is_seen, None), camera, height)
-    out = sums.radiance
-    _add_beams(transfer, wanted, seen, camera, height, shares, None, out)
-    if (wanted.gain != 1).any():
-        out *= wanted.gain
-    caught = _caught(transfer, wanted, seen)
-    behind = seen_behind(transfer, wanted.look.background, light, wanted.gain, seen, caught.is_catcher)
-    hides = lay_over(surface, seen, behind, caught, wanted.gain, is_direct=light.paths.direct, out=out)
-    return Finished(lay_over_glass(seen.panes, out), hide_less(seen.panes, hides), sums)
+    stored_scene, light = transfer.stored_scene, state.light
+    buffers = _shade(transfer, state, gbuffer, DirtyRegion(gbuffer.is_needed, gbuffer.is_visible, None), camera, height)
+    out = buffers.radiance
+    _add_hard_shadow_lights(transfer, state, gbuffer, camera, height, shadow_visibility, None, out)
+    if (state.gain != 1).any():
+        out *= state.gain
+    shadow_catcher = _shadow_catcher(transfer, state, gbuffer)
+    background = background_radiance(
+        transfer, state.look.background, light, state.gain, gbuffer, shadow_catcher.is_shadow_catcher
+    )
+    coverage = composite_over(
+        stored_scene, gbuffer, background, shadow_catcher, state.gain, is_direct=light.paths.direct, out=out
+    )
+    return FinalFrame(composite_glass(gbuffer.glass, out), adjust_alpha(gbuffer.glass, coverage), buffers)
 
 
-def only_materials_differ(before: Wanted, after: Wanted) -> bool:
+def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -> bool:
     """Whether two frames of one eye differ in what materials send alone, without any whose light comes otherwise."""
-    one, other = before.look, after.look
-    catchers = (material.catcher for look in (one, other) for material in look.materials.values())
+    first, second = before.look, after.look
+    catchers = (material.catcher for look in (first, second) for material in look.materials.values())
     return (
-        before.arriving is after.arriving
-        and [one.normals for one in before.materials.wears] == [one.normals for one in after.materials.wears]
+        before.incident is after.incident
+        and [first.normals for first in before.materials.overrides]
+        == [first.normals for first in after.materials.overrides]
         and before.light._replace(reflectances=after.light.reflectances) == after.light
         and np.array_equal(before.gain, after.gain)
-        and one.background == other.background
+        and first.background == second.background
         and not any(catchers)
-        and _are_covered_alike(before.materials, after.materials)
+        and _same_btf_materials(before.materials, after.materials)
     )
 
 
-def _are_covered_alike(before: Materials, after: Materials) -> bool:
+def _same_btf_materials(before: MaterialState, after: MaterialState) -> bool:
     """Whether the same BTFs lie on the same materials, none of which was edited."""
-    one, other = before.covers.shown, after.covers.shown
-    return len(one) == len(other) and all(
-        a.material == b.material and a.tables is b.tables and before.each[a.material] is after.each[b.material]
-        for a, b in zip(one, other, strict=True)
+    first, second = before.btf_materials.available, after.btf_materials.available
+    return len(first) == len(second) and all(
+        a.material == b.material
+        and a.tables is b.tables
+        and before.projected[a.material] is after.projected[b.material]
+        for a, b in zip(first, second, strict=True)
     )
 
 
-def shows_texels(transfer: MovingTransfer, materials: Materials, seen: Seen, part: Part) -> bool:
+def shows_btf(transfer: FreeCameraTransfer, materials: MaterialState, gbuffer: GBuffer, region: DirtyRegion) -> bool:
     """Whether any ray of a part of a picture sees a material that a BTF covers.
 
     Args:
-        transfer: of the bake. materials: of the look. seen: by the rays of the picture. part: of it.
+        transfer: of the bake. materials: of the look. gbuffer: by the rays of the picture. region: of it.
     """
-    if not materials.covers.shown:
+    if not materials.btf_materials.available:
         return False
-    face = seen.hits.face if part.rays is None else seen.hits.face[part.rays]
-    covered = [cover.material for cover in materials.covers.shown]
-    return bool(np.isin(transfer.surface.face_material[face[face >= 0]], covered).any())
+    face = gbuffer.hits.face if region.rays is None else gbuffer.hits.face[region.rays]
+    btf_indices = [btf_material.material for btf_material in materials.btf_materials.available]
+    return bool(np.isin(transfer.stored_scene.face_material[face[face >= 0]], btf_indices).any())
 
 
-def change(
-    transfer: MovingTransfer,
-    wanted: Wanted,
-    seen: Seen,
+def update_for_materials(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
     camera: Camera,
     frame: Frame,
-    shown: Shown,
-    words: NDArray[np.uint32],
-    shares: Sequence[F32] = (),
+    dirty: DirtyPixels,
+    rgb9e5: NDArray[np.uint32],
+    shadow_visibility: Sequence[F32] = (),
 ) -> None:
-    """Bring a frame to what materials send now, where `only_materials_differ` and the part `shows_texels` of no BTF.
+    """Bring a frame to what materials send now, where `only_materials_differ` and the part `shows_btf` of no BTF.
 
     Args:
-        transfer, seen, camera, shares: as in `frame_of`. wanted: what is shown from now on.
-        frame: changed. words: its pixels, packed; changed too. (pixels,) uint32
-        shown: what of it shows those materials.
+        transfer, gbuffer, camera, shadow_visibility: as in `render_frame`. state: what is shown from now on.
+        frame: changed. rgb9e5: its pixels, packed; changed too. (pixels,) uint32
+        dirty: what of it shows those materials.
     """
-    height, radiance, rays = len(frame.image), frame.sums.radiance, shown.part.rays
-    _summed(transfer, wanted, seen, shown.part, camera, height, frame.sums)
-    _add_beams(transfer, wanted, seen, camera, height, shares, rays, radiance)
-    if (wanted.gain != 1).any():
-        radiance[rays] *= wanted.gain
-    resolve_some(radiance, seen.owner, shown, frame.image.reshape(-1, 3), words)
+    height, radiance, rays = len(frame.image), frame.buffers.radiance, dirty.region.rays
+    _shade(transfer, state, gbuffer, dirty.region, camera, height, frame.buffers)
+    _add_hard_shadow_lights(transfer, state, gbuffer, camera, height, shadow_visibility, rays, radiance)
+    if (state.gain != 1).any():
+        radiance[rays] *= state.gain
+    resolve_subset(radiance, gbuffer.owner, dirty, frame.image.reshape(-1, 3), rgb9e5)
 
 
-def _summed(
-    transfer: MovingTransfer,
-    wanted: Wanted,
-    seen: Seen,
-    part: Part,
+def _shade(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    region: DirtyRegion,
     camera: Camera,
     height: int,
-    into: Sums | None = None,
-) -> Sums:
+    buffers: ShadingBuffers | None = None,
+) -> ShadingBuffers:
     """What surfaces send along the rays of a part, and on the way there. into: written there; None: new."""
-    materials, arriving = wanted.materials, wanted.arriving
-    surface = transfer.surface_with(materials.wears)
-    lobes, eye, (points, vertices, rays) = materials.lobes, camera.to_world[:3, 3].astype(np.float32), part
-    glances, sent, turns, of_vertices, towards, out = into or (None, None, None, (None,) * 3, None, None)
-    glances = _glanced(transfer, wanted, eye, points, glances)
-    sky = _sky_in(transfer, wanted.light)
-    sent = send(surface, arriving.total, arriving.others, materials.tables, eye, points, sent)
-    lit = _lit(transfer, wanted, eye, points)
-    add_sky_in_highlights(surface, lobes, sky, eye, glances, lit, points, sent, is_fine=wanted.is_fine)
-    turns = turning(surface, arriving.others, materials.tables, lobes, eye, points, turns)
-    of_points = sent.radiance, glances, turns
-    broad, along, turn = (at_vertices(surface, vertices, *of) for of in zip(of_points, of_vertices, strict=True))
-    towards = _towards_light(surface, arriving, seen) if towards is None else towards
-    emission = np.array([emission_of(wanted.light, name) for name in transfer.material_names], np.float32)
-    pixel_angle, from_vertices = camera.yfov / height, FromVertices(broad, materials.sends, towards)
-    mirrored = Mirrored(lobes, sky, along, turn, wanted.is_fine)
-    out = combine(surface, seen, pixel_angle, from_vertices, emission, mirrored, rays, out)
+    materials, incident = state.materials, state.incident
+    stored_scene = transfer.stored_scene_with(materials.overrides)
+    lobes, camera_position, (probe_mask, node_mask, rays) = (
+        materials.lobes,
+        camera.to_world[:3, 3].astype(np.float32),
+        region,
+    )
+    lobe_visibility, outgoing, gradients, node_values, light_gradient, out = buffers or (
+        None,
+        None,
+        None,
+        (None,) * 3,
+        None,
+        None,
+    )
+    lobe_visibility = _lobe_visibility(transfer, state, camera_position, probe_mask, lobe_visibility)
+    environment = _prefiltered_environment(transfer, state.light)
+    outgoing = shade_probes(
+        stored_scene, incident.total, incident.non_environment, materials.tables, camera_position, probe_mask, outgoing
+    )
+    light_sums = _highlight_light_sums(transfer, state, camera_position, probe_mask)
+    add_environment_highlights(
+        stored_scene,
+        lobes,
+        environment,
+        camera_position,
+        lobe_visibility,
+        light_sums,
+        probe_mask,
+        outgoing,
+        is_fine=state.is_fine,
+    )
+    gradients = gradients_along_lobe(
+        stored_scene, incident.non_environment, materials.tables, lobes, camera_position, probe_mask, gradients
+    )
+    probe_values = outgoing.radiance, lobe_visibility, gradients
+    node_radiance, node_visibility, node_gradients = (
+        interpolate_to_nodes(stored_scene, node_mask, *values) for values in zip(probe_values, node_values, strict=True)
+    )
+    light_gradient = _node_light_gradient(stored_scene, incident, gbuffer) if light_gradient is None else light_gradient
+    emission = np.array([material_emission(state.light, name) for name in transfer.material_names], np.float32)
+    pixel_angle, interpolated_probes = (
+        camera.yfov / height,
+        InterpolatedProbes(node_radiance, materials.is_reflective, light_gradient),
+    )
+    mirror_data = MirrorData(lobes, environment, node_visibility, node_gradients, state.is_fine)
+    out = shade_pixels(stored_scene, gbuffer, pixel_angle, interpolated_probes, emission, mirror_data, rays, out)
     if rays is None:  # else none of them sees a texel
-        sight, arrived = Sight(eye, pixel_angle, seen), Arrived(arriving.total, wanted.relief)
-        show_texels(materials.covers.shown, transfer.surface, transfer.positions, sight, arrived, out)
-    return Sums(glances, sent, turns, (broad, along, turn), towards, out)
+        footprint, texel_incident = (
+            TextureFootprint(camera_position, pixel_angle, gbuffer),
+            IncidentTexelLight(incident.total, state.texel_light),
+        )
+        shade_texels(
+            materials.btf_materials.available, transfer.stored_scene, transfer.positions, footprint, texel_incident, out
+        )
+    return ShadingBuffers(
+        lobe_visibility, outgoing, gradients, (node_radiance, node_visibility, node_gradients), light_gradient, out
+    )
 
 
-def _glanced(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8], out: F32 | None) -> F32:
+def _lobe_visibility(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    camera_position: F32,
+    probe_mask: NDArray[np.uint8],
+    out: F32 | None,
+) -> F32:
     """Look from points along their lobes. out: written; None: new."""
-    lobes, light = wanted.materials.lobes, wanted.light
-    widths = widths_of(lobes) if light.shows_sky else ()
+    lobes, light = state.materials.lobes, state.light
+    widths = lobe_widths(lobes) if light.has_direct_environment else ()
     if not widths:
-        return np.zeros((len(points), 1 + MOST_LAMPS), np.float32) if out is None else out
-    listed = transfer.lobe_lights(light.environment, widths)
-    return glance(transfer.surface, transfer.seen_lights, listed, lobes, eye, points, out)
+        return np.zeros((len(probe_mask), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
+    lobe_lights = transfer.lobe_lights(light.environment, widths)
+    return trace_lobe_visibility(
+        transfer.stored_scene, transfer.light_visibility_bits, lobe_lights, lobes, camera_position, probe_mask, out
+    )
 
 
-def _lit(transfer: MovingTransfer, wanted: Wanted, eye: F32, points: NDArray[np.uint8]) -> F32:
+def _highlight_light_sums(
+    transfer: FreeCameraTransfer, state: FrameRequestState, camera_position: F32, probe_mask: NDArray[np.uint8]
+) -> F32:
     """What points send of the lights that they see in their highlights."""
-    lobes, light = wanted.materials.lobes, wanted.light
-    if not (lobes.most == 1).any() or not light.shows_sky:
-        return np.zeros((len(points), 3), np.float32)
-    lights = transfer.sky_lights(light.environment, is_preview=wanted.is_rough)
-    return by_lights(transfer.surface, transfer.seen_lights, lights, lobes, eye, points)
+    lobes, light = state.materials.lobes, state.light
+    if not (lobes.max_ratio == 1).any() or not light.has_direct_environment:
+        return np.zeros((len(probe_mask), 3), np.float32)
+    lights = transfer.environment_lights(light.environment, is_preview=state.is_coarse)
+    return sum_lights(transfer.stored_scene, transfer.light_visibility_bits, lights, lobes, camera_position, probe_mask)
 
 
-def _add_beams(
-    transfer: MovingTransfer,
-    wanted: Wanted,
-    seen: Seen,
+def _add_hard_shadow_lights(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
     camera: Camera,
     height: int,
-    shares: Sequence[F32],
+    shadow_visibility: Sequence[F32],
     rays: NDArray[np.int32] | None,
     out: F32,
 ) -> None:
     """Add what beams bring along some rays, None for all. out: added to. (rays, 3)"""
-    if not wanted.arriving.beams:
+    if not state.incident.hard_shadow_lights:
         return
-    beams, sky = wanted.arriving.beams, _sky_in(transfer, wanted.light)
-    of_eye = seen, camera, camera.yfov / height
-    add_beams(beams, shares, transfer.surface_with(wanted.materials.wears), *of_eye, wanted.materials, sky, rays, out)
+    hard_shadow_lights, environment = state.incident.hard_shadow_lights, _prefiltered_environment(transfer, state.light)
+    camera_args = gbuffer, camera, camera.yfov / height
+    add_direct_sharp(
+        hard_shadow_lights,
+        shadow_visibility,
+        transfer.stored_scene_with(state.materials.overrides),
+        *camera_args,
+        state.materials,
+        environment,
+        rays,
+        out,
+    )
 
 
-def _towards_light(surface: Surface, arriving: Arriving, seen: Seen) -> F32:
+def _node_light_gradient(stored_scene: StoredScene, incident: IncidentCoefficients, gbuffer: GBuffer) -> F32:
     """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
-    if not len(surface.tangents):
+    if not len(stored_scene.tangents):
         return np.empty((0, 3), np.float32)
-    return at_vertices(surface, seen.is_seen, towards_light(surface, arriving.total, seen.is_needed))
+    return interpolate_to_nodes(
+        stored_scene, gbuffer.is_visible, light_gradient(stored_scene, incident.total, gbuffer.is_needed)
+    )
 
 
-def _sky_in(transfer: MovingTransfer, light: Light) -> SkyLight:
+def _prefiltered_environment(transfer: FreeCameraTransfer, light: Illumination) -> PrefilteredEnvironment:
     """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
-    gain = np.array(light.environment_gain if light.shows_sky else (0.0, 0.0, 0.0), np.float32)
-    sky, lamps = transfer.sky_in(light.environment.map), transfer.lamps_in(light.environment)
-    return SkyLight(sky, lamps, turn_of(light.environment.rotation), gain)
+    gain = np.array(light.environment_gain if light.has_direct_environment else (0.0, 0.0, 0.0), np.float32)
+    environment, bright_lights = transfer.prefiltered(light.environment.map), transfer.bright_lights(light.environment)
+    return PrefilteredEnvironment(environment, bright_lights, rotation_of(light.environment.rotation), gain)
 
 
-def _caught(transfer: MovingTransfer, wanted: Wanted, seen: Seen) -> Caught:
+def _shadow_catcher(transfer: FreeCameraTransfer, state: FrameRequestState, gbuffer: GBuffer) -> ShadowCatcher:
     """What would arrive at catchers if nothing were in the way."""
-    is_catcher = np.array([wanted.look.materials[name].catcher for name in transfer.material_names])
-    if not is_catcher.any():
-        return Caught(is_catcher, np.empty((0, 3), np.float32))
-    of_points = np.zeros((transfer.surface.points.num_points, 3), np.float32)
-    for material in np.flatnonzero(is_catcher):
-        of_points += transfer.unhidden(wanted.light, int(material), is_preview=wanted.is_rough)
-    return Caught(is_catcher, at_vertices(transfer.surface, seen.is_seen, of_points))
+    is_shadow_catcher = np.array([state.look.materials[name].catcher for name in transfer.material_names])
+    if not is_shadow_catcher.any():
+        return ShadowCatcher(is_shadow_catcher, np.empty((0, 3), np.float32))
+    unoccluded = np.zeros((transfer.stored_scene.probes.num_points, 3), np.float32)
+    for material in np.flatnonzero(is_shadow_catcher):
+        unoccluded += transfer.unoccluded(state.light, int(material), is_preview=state.is_coarse)
+    return ShadowCatcher(is_shadow_catcher, interpolate_to_nodes(transfer.stored_scene, gbuffer.is_visible, unoccluded))

@@ -15,173 +15,197 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.moving.look_up import Seen
-from relume.moving.points.grids import Lattice, node_of
-from relume.moving.solid import Solid
-from relume.parallel import for_ranges, for_shares
+from relume.moving.look_up import GBuffer
+from relume.moving.points.grids import ProbeGrid, node_index
+from relume.moving.solid import OcclusionMesh
+from relume.parallel import for_ranges, parallel_for_chunks
 from relume.trace.embree import occluded, packet_arguments
-from relume.trace.packet import LANES, aim, ask_first, is_free, new_packet, set_origin, trace_shadows
+from relume.trace.packet import (
+    LANES,
+    enable_first_lanes,
+    is_unoccluded,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_shadows,
+)
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
-_FACES_A_RANGE = 256
-_RAYS = LANES // 3  # whose three nodes are looked for at once
+_FACES_PER_RANGE = 256
+_RAYS_PER_PACKET = LANES // 3  # whose three nodes are looked for at once
 
 
-class _Grids(NamedTuple):
-    """Grids of faces, as kernels want them; see `Solid`."""
+class _GridGeometry(NamedTuple):
+    """Grids of faces, as kernels want them; see `OcclusionMesh`."""
 
-    lattice: Lattice
+    probe_grid: ProbeGrid
     positions: F32
     faces: NDArray[np.uint32]
     face_normal: F32
-    off_edges: F32
-    off_surface: np.float32
+    edge_offset: F32
+    surface_offset: np.float32
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def _place(grids, f, side, u, v, at):  # type: ignore[no-untyped-def]
+def _point_on_face(geometry, f, side, u, v, point):  # type: ignore[no-untyped-def]
     """Find a place in a face, off its surface and its edges, where it would lie in other faces. at: (3,)"""
-    w = max(np.float32(1) - u - v, grids.off_edges[f, 0])
-    u, v = max(np.float32(u), grids.off_edges[f, 1]), max(np.float32(v), grids.off_edges[f, 2])
-    a, b, c = grids.faces[f, 0], grids.faces[f, 1], grids.faces[f, 2]
-    lift = -grids.off_surface if side == 1 else grids.off_surface
+    w = max(np.float32(1) - u - v, geometry.edge_offset[f, 0])
+    u, v = max(np.float32(u), geometry.edge_offset[f, 1]), max(np.float32(v), geometry.edge_offset[f, 2])
+    a, b, c = geometry.faces[f, 0], geometry.faces[f, 1], geometry.faces[f, 2]
+    lift = -geometry.surface_offset if side == 1 else geometry.surface_offset
     for axis in range(3):
-        x, y, z = grids.positions[a, axis], grids.positions[b, axis], grids.positions[c, axis]
-        at[axis] = (w * x + u * y + v * z) / (w + u + v) + lift * grids.face_normal[f, axis]
+        x, y, z = geometry.positions[a, axis], geometry.positions[b, axis], geometry.positions[c, axis]
+        point[axis] = (w * x + u * y + v * z) / (w + u + v) + lift * geometry.face_normal[f, axis]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def _join(packet, lane, start, end):  # type: ignore[no-untyped-def]
+def _aim_between(packet, lane, start, end):  # type: ignore[no-untyped-def]
     """Send a lane from one place to another."""
     set_origin(packet, lane, start[0], start[1], start[2])
-    aim(packet, lane, end[0] - start[0], end[1] - start[1], end[2] - start[2], np.float32(1))
+    set_direction(packet, lane, end[0] - start[0], end[1] - start[1], end[2] - start[2], np.float32(1))
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _flush(occluded, packet, waiting, ends, is_parted):  # type: ignore[no-untyped-def]
+def _flush(occluded, packet, num_pending, ends, has_occluded_neighbor):  # type: ignore[no-untyped-def]
     """Trace the first lanes, and note both ends of what is blocked. ends: vertices. (`LANES`, 2)"""
-    ask_first(packet, waiting)
+    enable_first_lanes(packet, num_pending)
     trace_shadows(occluded, packet)
-    for lane in range(waiting):
-        if not is_free(packet, lane):
-            is_parted[ends[lane, 0]] = is_parted[ends[lane, 1]] = 1
+    for lane in range(num_pending):
+        if not is_unoccluded(packet, lane):
+            has_occluded_neighbor[ends[lane, 0]] = has_occluded_neighbor[ends[lane, 1]] = 1
 
 
 @nb.njit(nogil=True, cache=True)
-def _part(occluded, scene, arguments, grids, start, stop, is_parted):  # type: ignore[no-untyped-def]
+def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occluded_neighbor):  # type: ignore[no-untyped-def]
     """Look along all edges of the grids of faces [start, stop)."""
-    packet, ends, waiting = new_packet(scene, arguments), np.empty((LANES, 2), np.uint32), 0
-    here, there = np.empty(3, np.float32), np.empty(3, np.float32)
+    packet, ends, num_pending = new_packet(scene, arguments), np.empty((LANES, 2), np.uint32), 0
+    origin, target = np.empty(3, np.float32), np.empty(3, np.float32)
     for f in range(start, stop):
         for side in range(2):
-            rows, first = np.int64(grids.lattice.num_rows[f, side]), np.int64(grids.lattice.first[f, side])
-            for i in range(rows if rows > 1 else 0):
-                for j in range(rows - i):
+            num_rows, first = (
+                np.int64(geometry.probe_grid.num_rows[f, side]),
+                np.int64(geometry.probe_grid.first[f, side]),
+            )
+            for i in range(num_rows if num_rows > 1 else 0):
+                for j in range(num_rows - i):
                     for edge in range(3):  # of the small triangle that begins here
                         i0, j0 = (i + 1, j) if edge == 2 else (i, j)
                         i1, j1 = (i + 1, j) if edge == 0 else (i, j + 1)
-                        _place(grids, f, side, i0 / rows, j0 / rows, here)
-                        _place(grids, f, side, i1 / rows, j1 / rows, there)
-                        _join(packet, waiting, here, there)
-                        ends[waiting, 0] = grids.lattice.node[first + node_of(rows, i0, j0)]
-                        ends[waiting, 1] = grids.lattice.node[first + node_of(rows, i1, j1)]
-                        waiting += 1
-                        if waiting == LANES:
-                            _flush(occluded, packet, waiting, ends, is_parted)
-                            waiting = 0
-    if waiting:
-        _flush(occluded, packet, waiting, ends, is_parted)
+                        _point_on_face(geometry, f, side, i0 / num_rows, j0 / num_rows, origin)
+                        _point_on_face(geometry, f, side, i1 / num_rows, j1 / num_rows, target)
+                        _aim_between(packet, num_pending, origin, target)
+                        ends[num_pending, 0] = geometry.probe_grid.node[first + node_index(num_rows, i0, j0)]
+                        ends[num_pending, 1] = geometry.probe_grid.node[first + node_index(num_rows, i1, j1)]
+                        num_pending += 1
+                        if num_pending == LANES:
+                            _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)
+                            num_pending = 0
+    if num_pending:
+        _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)
 
 
-def find_parted(solid: Solid) -> NDArray[np.uint8]:
+def find_occluded_probes(mesh: OcclusionMesh) -> NDArray[np.uint8]:
     """Find the vertices that do not see all of their neighbours in the grids of faces. (vertices,) uint8"""
-    surface, arguments = solid.surface, packet_arguments(coherent=True)
-    is_parted = np.zeros(len(surface.vertices.normal), np.uint8)
-    args = occluded, solid.embree.handle, arguments.ctypes.data, _grids_of(solid)
+    stored_scene, arguments = mesh.stored_scene, packet_arguments(coherent=True)
+    has_occluded_neighbor = np.zeros(len(stored_scene.lattice_nodes.normal), np.uint8)
+    args = occluded, mesh.embree.handle, arguments.ctypes.data, _grid_geometry(mesh)
     # threads may note one twice
-    for_ranges(lambda start, stop: _part(*args, start, stop, is_parted), len(surface.faces), _FACES_A_RANGE)
-    return is_parted
+    for_ranges(
+        lambda start, stop: _mark_occluded(*args, start, stop, has_occluded_neighbor),
+        len(stored_scene.faces),
+        _FACES_PER_RANGE,
+    )
+    return has_occluded_neighbor
 
 
-def _grids_of(solid: Solid) -> _Grids:
-    surface = solid.surface
-    of_faces = surface.faces, surface.face_normal, solid.off_edges
-    return _Grids(surface.lattice, solid.positions, *of_faces, np.float32(solid.off_surface))
+def _grid_geometry(mesh: OcclusionMesh) -> _GridGeometry:
+    stored_scene = mesh.stored_scene
+    face_arrays = stored_scene.faces, stored_scene.face_normal, mesh.edge_offset
+    return _GridGeometry(stored_scene.probe_grid, mesh.positions, *face_arrays, np.float32(mesh.surface_offset))
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def _cell(rows, u, v):  # type: ignore[no-untyped-def]
+def _grid_triangle(num_rows, u, v):  # type: ignore[no-untyped-def]
     """Find the small triangle that a place in a face lies in: i and j of its first node, whether it is turned round.
 
-    Its nodes are (i, j), (i + 1, j), (i, j + 1), or (i + 1, j + 1) instead of the first: in the order of `Seen.vertex`.
+    Its nodes are (i, j), (i + 1, j), (i, j + 1), or (i + 1, j + 1) instead of the first: in the order of
+    `Seen.lattice_node`.
     """
-    i = min(max(np.int64(u * np.float32(rows)), 0), rows - 1)
-    j = min(max(np.int64(v * np.float32(rows)), 0), rows - 1 - i)
-    is_turned = u * np.float32(rows) - i + (v * np.float32(rows) - j) > 1 and i + j < rows - 1
-    return i, j, is_turned
+    i = min(max(np.int64(u * np.float32(num_rows)), 0), num_rows - 1)
+    j = min(max(np.int64(v * np.float32(num_rows)), 0), num_rows - 1 - i)
+    is_inverted = u * np.float32(num_rows) - i + (v * np.float32(num_rows) - j) > 1 and i + j < num_rows - 1
+    return i, j, is_inverted
 
 
 @nb.njit(nogil=True, cache=True)
-def _mend(occluded, scene, arguments, grids, is_parted, face, uv, directions, vertex, start, stop, weight):  # type: ignore[no-untyped-def]
+def _reweight(  # type: ignore[no-untyped-def]
+    occluded, scene, arguments, geometry, has_occluded_neighbor, face, uv, directions, lattice_node, start, stop, weight
+):
     """Look for the nodes of rays [start, stop) about which some are parted."""
-    packet, waiting = new_packet(scene, arguments), 0
-    here, there, normals = np.empty(3, np.float32), np.empty(3, np.float32), grids.face_normal
+    packet, num_pending = new_packet(scene, arguments), 0
+    origin, target, normals = np.empty(3, np.float32), np.empty(3, np.float32), geometry.face_normal
     for p in range(start, stop):
         f = face[p]
-        if f < 0 or not (is_parted[vertex[p, 0]] or is_parted[vertex[p, 1]] or is_parted[vertex[p, 2]]):
+        if f < 0 or not (
+            has_occluded_neighbor[lattice_node[p, 0]]
+            or has_occluded_neighbor[lattice_node[p, 1]]
+            or has_occluded_neighbor[lattice_node[p, 2]]
+        ):
             continue
         side = 0
         if normals[f, 0] * directions[p, 0] + normals[f, 1] * directions[p, 1] + normals[f, 2] * directions[p, 2] > 0:
             side = 1
-        rows = np.int64(grids.lattice.num_rows[f, side])
-        if rows == 0:
-            rows = np.int64(grids.lattice.num_rows[f, 1 - side])
-        if rows < 2:
+        num_rows = np.int64(geometry.probe_grid.num_rows[f, side])
+        if num_rows == 0:
+            num_rows = np.int64(geometry.probe_grid.num_rows[f, 1 - side])
+        if num_rows < 2:
             continue
-        i, j, is_turned = _cell(rows, uv[p, 0], uv[p, 1])
-        _place(grids, f, side, uv[p, 0], uv[p, 1], here)
+        i, j, is_inverted = _grid_triangle(num_rows, uv[p, 0], uv[p, 1])
+        _point_on_face(geometry, f, side, uv[p, 0], uv[p, 1], origin)
         for k in range(3):
-            turned = 1 if is_turned and k == 0 else 0
-            a, b = i + (1 if k == 1 else turned), j + (1 if k == 2 else turned)
-            _place(grids, f, side, a / rows, b / rows, there)
-            _join(packet, 3 * waiting + k, here, there)
-        packet.owner[waiting] = p
-        waiting += 1
-        if waiting == _RAYS:
-            _weigh(occluded, packet, waiting, weight)
-            waiting = 0
-    if waiting:
-        _weigh(occluded, packet, waiting, weight)
+            inverted_step = 1 if is_inverted and k == 0 else 0
+            a, b = i + (1 if k == 1 else inverted_step), j + (1 if k == 2 else inverted_step)
+            _point_on_face(geometry, f, side, a / num_rows, b / num_rows, target)
+            _aim_between(packet, 3 * num_pending + k, origin, target)
+        packet.owner[num_pending] = p
+        num_pending += 1
+        if num_pending == _RAYS_PER_PACKET:
+            _reweight_traced(occluded, packet, num_pending, weight)
+            num_pending = 0
+    if num_pending:
+        _reweight_traced(occluded, packet, num_pending, weight)
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _weigh(occluded, packet, waiting, weight):  # type: ignore[no-untyped-def]
+def _reweight_traced(occluded, packet, num_pending, weight):  # type: ignore[no-untyped-def]
     """Trace three lanes for each ray that waits; weights of nodes that are not seen become nothing."""
-    ask_first(packet, 3 * waiting)
+    enable_first_lanes(packet, 3 * num_pending)
     trace_shadows(occluded, packet)
-    for r in range(waiting):
+    for r in range(num_pending):
         p, total = packet.owner[r], np.float32(0)
         for k in range(3):
-            total += weight[p, k] if is_free(packet, 3 * r + k) else np.float32(0)
+            total += weight[p, k] if is_unoccluded(packet, 3 * r + k) else np.float32(0)
         for k in range(3):
             if total > 0:
-                weight[p, k] = weight[p, k] / total if is_free(packet, 3 * r + k) else np.float32(0)
+                weight[p, k] = weight[p, k] / total if is_unoccluded(packet, 3 * r + k) else np.float32(0)
 
 
-def mend(seen: Seen, is_parted: NDArray[np.uint8], solid: Solid) -> None:
+def reweight(gbuffer: GBuffer, has_occluded_neighbor: NDArray[np.uint8], mesh: OcclusionMesh) -> None:
     """Let rays do without the nodes that what they hit does not see.
 
     Args:
-        seen: by an eye; its weights are changed. is_parted: from `find_parted`. (vertices,) uint8
-        solid: that is seen.
+        gbuffer: by an eye; its weights are changed. has_occluded_neighbor: from `find_occluded_probes`. (vertices,)
+            uint8
+        mesh: that is seen.
     """
-    if not is_parted.any():
+    if not has_occluded_neighbor.any():
         return
-    arguments, hits = packet_arguments(coherent=False), seen.hits
+    arguments, hits = packet_arguments(coherent=False), gbuffer.hits
     args = (
-        occluded, solid.embree.handle, arguments.ctypes.data, _grids_of(solid), is_parted, hits.face, hits.uv,
-        seen.directions, seen.vertex,
+        occluded, mesh.embree.handle, arguments.ctypes.data, _grid_geometry(mesh), has_occluded_neighbor, hits.face,
+        hits.uv,
+        gbuffer.directions, gbuffer.lattice_node,
     )  # fmt: skip
-    for_shares(lambda start, stop: _mend(*args, start, stop, seen.weight), len(hits.face))
+    parallel_for_chunks(lambda start, stop: _reweight(*args, start, stop, gbuffer.weight), len(hits.face))

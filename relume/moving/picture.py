@@ -9,31 +9,39 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.errors import NotMadeError, ParameterError
+from relume.errors import ParameterError, ResultUnavailableError
 from relume.look import Look
-from relume.moving.again import Shown, shown_of
-from relume.moving.beams.beam import Beam
-from relume.moving.beams.shadows import shares_seen
-from relume.moving.behind import alpha_of
-from relume.moving.correction import corrected
-from relume.moving.drawn import Drawn
-from relume.moving.fine_job import FineJob, fine_frame
-from relume.moving.frame import Frame, Materials, Wanted, change, frame_of, only_materials_differ, shows_texels
-from relume.moving.look_up import Seen, look
-from relume.moving.parted import mend
-from relume.moving.points.surface import Surface
+from relume.moving.again import DirtyPixels, find_dirty_pixels
+from relume.moving.beams.beam import HardShadowLight
+from relume.moving.beams.shadows import visible_fractions
+from relume.moving.behind import alpha
+from relume.moving.correction import apply_residual
+from relume.moving.drawn import PreviousImage
+from relume.moving.fine_job import RefineHighlights, render_fine_frame
+from relume.moving.frame import (
+    Frame,
+    FrameRequestState,
+    MaterialState,
+    only_materials_differ,
+    render_frame,
+    shows_btf,
+    update_for_materials,
+)
+from relume.moving.look_up import GBuffer, trace_primary
+from relume.moving.parted import reweight
+from relume.moving.points.surface import StoredScene
 from relume.moving.relief.job import TablesJob
-from relume.moving.relief.light import ReliefLight
-from relume.moving.shader.tables import Numbers, Part, numbers_of, parts_of
-from relume.moving.transfer import MovingTransfer
-from relume.moving.vectors.arriving import Arriving
-from relume.moving.vectors.jobs import FollowJob, LightJob
-from relume.moving.vectors.live import Asked, LiveVectors
-from relume.picture.fidelity import Word
-from relume.picture.light import Light, Solo, gain_of, light_of
-from relume.picture.picture import Advance
-from relume.picture.pointer import CurvePointer, ParameterPointer, check_there, parse_pointer
-from relume.picture.view_images import documents_of
+from relume.moving.relief.light import TexelLight
+from relume.moving.shader.tables import ArrayBlock, ShaderConstants, array_blocks, shader_constants
+from relume.moving.transfer import FreeCameraTransfer
+from relume.moving.vectors.arriving import IncidentCoefficients
+from relume.moving.vectors.jobs import IncrementalProbeLightJob, ProbeLightJob
+from relume.moving.vectors.live import LightRequest, ProbeLightState
+from relume.picture.fidelity import FidelityLabel
+from relume.picture.light import Illumination, Solo, illumination_from_look, picture_gain
+from relume.picture.picture import Progress
+from relume.picture.pointer import CurvePointer, ParameterPointer, check_exists, parse_pointer
+from relume.picture.view_images import material_documents
 from relume.scene.model import Camera
 from relume.views.resolve import encode_coverage, encode_pixels
 
@@ -41,7 +49,7 @@ F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
 
 
-class MovingPicture:
+class FreeCameraPicture:
     """State of one session's picture; used from one thread at a time.
 
     Args:
@@ -49,230 +57,274 @@ class MovingPicture:
             and its highlights finely only once eye and light rest.
 
     Attributes:
-        draws: its pixels are wanted at every step; else a shader elsewhere finds them from `parts`, and they are drawn
-            when somebody asks.
+        renders_pixels: its pixels are wanted at every step; else a shader elsewhere finds them from `array_blocks`, and
+            they are drawn when somebody asks.
     """
 
-    def __init__(self, transfer: MovingTransfer, view_name: str, *, is_watched: bool = False) -> None:
+    def __init__(self, transfer: FreeCameraTransfer, view_name: str, *, is_watched: bool = False) -> None:
         view = transfer.views[view_name]
         self._transfer, self._camera, self._size = transfer, view.camera, (view.width, view.height)
-        self._num_eyes = 0  # that it has been given: tells them apart
+        self._camera_seq = 0  # that it has been given: tells them apart
         self._look: Look | None = None
-        self._light: Light | None = None
+        self._light: Illumination | None = None
         self._solo: Solo = None
         self._is_watched = is_watched
-        self._is_rough = False  # what is shown was found quickly
-        self._shown: tuple[Any, ...] | None = None
-        self._drawn: Drawn | None = None
-        self._part: tuple[Seen, bytes, Shown] | None = None
-        self._seen: tuple[int, Seen] | None = None
-        self._materials: tuple[Look | None, Materials | None] = None, None
-        self._vectors, self._everywhere = LiveVectors(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
-        self._shares: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
+        self._is_coarse = False  # what is shown was found quickly
+        self._displayed: tuple[Any, ...] | None = None
+        self._previous: PreviousImage | None = None
+        self._dirty_cache: tuple[GBuffer, bytes, DirtyPixels] | None = None
+        self._gbuffer: tuple[int, GBuffer] | None = None
+        self._materials: tuple[Look | None, MaterialState | None] = None, None
+        self._probe_light, self._all_probes = ProbeLightState(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
+        self._shadow_visibility: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
         self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
-        self._relief = ReliefLight()
-        self._by: F32 | None = None  # what is added to the frame
+        self._texel_light = TexelLight()
+        self._residual_image: F32 | None = None  # what is added to the frame
         self._is_corrected = False  # what is shown has it
-        self._is_finer = False  # than it was when somebody saw it
-        self.draws = True
-        self._told: Arriving | None = None
-        self._num_told = self._num_materials = 0
+        self._is_refined = False  # than it was when somebody saw it
+        self.renders_pixels = True
+        self._published_vectors: IncidentCoefficients | None = None
+        self._vectors_version = self._materials_version = 0
 
     def check(self, look: Look) -> None:
         """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
 
-    def set_look(self, look: Look, *, hand: str | None = None, solo: Solo = None) -> None:
+    def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
         """A new target; nothing is computed yet.
 
         Args:
-            look: that is to be shown. hand: pointer to what the user's hand is on, or None.
+            look: that is to be shown. active_pointer: pointer to what the user's hand is on, or None.
             solo: names of sources of light that alone are shown, see `light_of`; None: all.
         Raises:
-            ParameterError: `hand` points to nothing that a hand may hold. NotFoundError, SceneError: the environment
-                cannot be had. The picture stays as it was.
+            ParameterError: `active_pointer` points to nothing that a hand may hold. NotFoundError, SceneError: the
+                environment cannot be had. The picture stays as it was.
         """
-        if hand is not None:
-            parse_pointer(hand)
-        light = light_of(look, self._transfer.material_names, has_bounces=True, solo=solo)
-        self._transfer.map_of(light.environment.map)  # what cannot be had is said now
+        if active_pointer is not None:
+            parse_pointer(active_pointer)
+        light = illumination_from_look(look, self._transfer.material_names, has_bounces=True, solo=solo)
+        self._transfer.environment_map(light.environment.map)  # what cannot be had is said now
         self._look, self._light, self._solo = look, light, solo
-        self._by = None
+        self._residual_image = None
 
-    def set_eye(self, camera: Camera, size: tuple[int, int]) -> None:
+    def set_camera(self, camera: Camera, size: tuple[int, int]) -> None:
         """See from elsewhere, in a picture of another size; nothing is computed yet.
 
         Args:
             camera: a rigid one. size: width and height in pixels.
         """
         self._camera, self._size = camera, size
-        self._num_eyes += 1
-        self._by = None
+        self._camera_seq += 1
+        self._residual_image = None
 
-    def correct(self, by: F32 | None) -> None:
-        """Add what it is off by, see `relume.moving.correction`, until another look or eye is given.
+    def correct(self, residual_image: F32 | None) -> None:
+        """Add what it is off by, see `relume.moving.residual`, until another look or eye is given.
 
         Args:
-            by: of each pixel, (height, width, 3) float32; None: nothing.
+            residual_image: of each pixel, (height, width, 3) float32; None: nothing.
         """
-        self._by = by
+        self._residual_image = residual_image
 
     @property
     def is_corrected(self) -> bool:
         """Whether something is added that only this picture knows, no shader elsewhere."""
-        return self._by is not None
+        return self._residual_image is not None
 
     @property
-    def eye(self) -> tuple[Camera, tuple[int, int]]:
+    def sized_camera(self) -> tuple[Camera, tuple[int, int]]:
         """Where it is seen from, and the size of the picture."""
         return self._camera, self._size
 
-    def touch(self, pointer: str) -> None:
+    def prepare(self, pointer: str) -> None:
         """Take note of what a hand holds; nothing needs to be prepared.
 
         Raises:
             ParameterError: there is no such thing.
         """
-        found = parse_pointer(pointer)
-        if isinstance(found, CurvePointer | ParameterPointer) and self._look is not None:
-            check_there(found, self._look)
+        parsed = parse_pointer(pointer)
+        if isinstance(parsed, CurvePointer | ParameterPointer) and self._look is not None:
+            check_exists(parsed, self._look)
 
-    def next_job(self) -> FollowJob | LightJob | TablesJob | FineJob | None:
+    def next_job(self) -> IncrementalProbeLightJob | ProbeLightJob | TablesJob | RefineHighlights | None:
         """What makes a rough picture as good as it gets: the light vectors that it lacks; BTFs; then its highlights."""
-        if self._is_rough and self._has_to_be_rough():
-            return self._vectors.next_job(self._asked(), self._needed)
-        if self._look is not None and (missing := self._materials_of(self._look).covers.missing):
-            return TablesJob(missing[0].data, missing[0].components, self._show_texels)
-        return self._fine_job() if self._is_watched and self.draws else None
+        if self._is_coarse and self._must_be_coarse():
+            return self._probe_light.next_job(self._light_request(), self._needed_probes)
+        if self._look is not None and (missing := self._material_state(self._look).btf_materials.missing):
+            return TablesJob(missing[0].data, missing[0].components, self._display_btf)
+        return self._refine_job() if self._is_watched and self.renders_pixels else None
 
-    def _show_texels(self) -> None:
+    def _display_btf(self) -> None:
         """Show texels whose tables are there by now."""
-        self._materials, self._shown = (None, self._materials[1]), None
+        self._materials, self._displayed = (None, self._materials[1]), None
 
-    def _fine_job(self) -> FineJob | None:
+    def _refine_job(self) -> RefineHighlights | None:
         """Find highlights finely in what is shown, if they were not."""
-        drawn = self._drawn
-        if drawn is None or drawn.has_rims or self._is_stale or self._is_rough or self._to_show != self._shown:
+        previous = self._previous
+        if (
+            previous is None
+            or previous.has_highlight_edges
+            or self._is_stale
+            or self._is_coarse
+            or self._target != self._displayed
+        ):
             return None
         # made beside frames, which go on with the relief that they have
-        finely = drawn.wanted._replace(is_fine=True, relief=ReliefLight())
-        of = self._transfer, finely, drawn.seen, self._camera, self._size, drawn.shares
+        fine_state = previous.state._replace(is_fine=True, texel_light=TexelLight())
+        args = self._transfer, fine_state, previous.gbuffer, self._camera, self._size, previous.shadow_visibility
 
-        def take(frame: Frame) -> None:
-            if self._drawn is drawn and not self._is_stale and not drawn.has_rims:
-                self._drawn = Drawn(finely, drawn.seen, frame, drawn.shares, has_rims=True)
-                self._is_finer = True
+        def accept_frame(frame: Frame) -> None:
+            if self._previous is previous and not self._is_stale and not previous.has_highlight_edges:
+                self._previous = PreviousImage(
+                    fine_state, previous.gbuffer, frame, previous.shadow_visibility, has_highlight_edges=True
+                )
+                self._is_refined = True
 
-        return FineJob(partial(fine_frame, *of), ("finer", self._num_eyes, id(drawn.wanted)), take)
+        return RefineHighlights(
+            partial(render_fine_frame, *args), ("finer", self._camera_seq, id(previous.state)), accept_frame
+        )
 
     @property
-    def _to_show(self) -> tuple[Any, ...]:
+    def _target(self) -> tuple[Any, ...]:
         """What has been asked for; equal to `_shown` where that is shown."""
-        return self._look, self._solo, self._num_eyes, self._vectors.version
+        return self._look, self._solo, self._camera_seq, self._probe_light.version
 
-    def install(self, job: Any, made: Any) -> None:
+    def install(self, job: Any, result: Any) -> None:
         """Go on with what a job has made."""
-        job.install(made)
+        job.install(result)
 
-    def advance(self, max_coefficients: int | None) -> Advance:
+    def advance(self, max_coefficients: int | None) -> Progress:
         """Bring the picture to its look and its eye."""
-        wanted = self._to_show
-        is_drawn = wanted == self._shown and self._is_rough == self._has_to_be_rough()
-        if self._look is None or (is_drawn and self._is_corrected == self.is_corrected and not self._is_finer):
-            return Advance([], exact=False, fidelity=self._fidelity, complete=True)
-        self._is_corrected, self._is_finer = self.is_corrected, False
-        if not is_drawn:
-            self._is_rough = self._has_to_be_rough()
-            self._is_stale, self._shown = True, wanted
-        if self.draws:
-            self._draw()
-        return Advance(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
+        target = self._target
+        is_displayed = target == self._displayed and self._is_coarse == self._must_be_coarse()
+        if self._look is None or (is_displayed and self._is_corrected == self.is_corrected and not self._is_refined):
+            return Progress([], exact=False, fidelity=self._fidelity, complete=True)
+        self._is_corrected, self._is_refined = self.is_corrected, False
+        if not is_displayed:
+            self._is_coarse = self._must_be_coarse()
+            self._is_stale, self._displayed = True, target
+        if self.renders_pixels:
+            self._render()
+        return Progress(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
 
     @property
-    def _fidelity(self) -> Word:
-        return "preview" if self._is_rough else "approximate"
+    def _fidelity(self) -> FidelityLabel:
+        return "preview" if self._is_coarse else "approximate"
 
-    def _has_to_be_rough(self) -> bool:
+    def _must_be_coarse(self) -> bool:
         """Whether somebody would wait for light vectors that nobody has."""
-        return self._is_watched and not self._vectors.are_there(self._asked())
+        return self._is_watched and not self._probe_light.is_available(self._light_request())
 
-    def _asked(self) -> Asked:
+    def _light_request(self) -> LightRequest:
         """What is to arrive; pixels find no shadows of beams where a shader draws, nor on BTFs."""
         assert self._look is not None
-        return Asked(self._now(), self.draws and not any(self._materials_of(self._look).covers))
+        return LightRequest(
+            self._current_light(), self.renders_pixels and not any(self._material_state(self._look).btf_materials)
+        )
 
     @property
-    def _needed(self) -> NDArray[np.uint8]:
+    def _needed_probes(self) -> NDArray[np.uint8]:
         """Points whose light is asked about: those that the eye sees, or all where a shader draws from anywhere."""
-        return self._look_around().is_needed if self.draws else self._everywhere
+        return self._current_gbuffer().is_needed if self.renders_pixels else self._all_probes
 
-    def _draw(self) -> Drawn | None:
+    def _render(self) -> PreviousImage | None:
         """What is shown, evaluated where that has not been done; None before there is a look."""
         if not self._is_stale or self._look is None:
-            return self._drawn
-        seen, drawn = self._look_around(), self._drawn
-        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))
-        self._is_stale, shares = False, self._shares_of(wanted.arriving.beams, seen)
-        if drawn is not None and self._may_change(drawn, wanted, seen):
-            wanted = wanted._replace(is_fine=drawn.wanted.is_fine)
-            shown = self._shown_of(drawn.wanted.materials, wanted.materials, seen)
-            change(self._transfer, wanted, seen, self._camera, drawn.frame, shown, drawn.packed(), shares)
-            drawn.wanted, drawn.has_rims = wanted, False
+            return self._previous
+        gbuffer, previous = self._current_gbuffer(), self._previous
+        state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))
+        self._is_stale, shadow_visibility = (
+            False,
+            self._trace_shadow_visibility(state.incident.hard_shadow_lights, gbuffer),
+        )
+        if previous is not None and self._can_update(previous, state, gbuffer):
+            state = state._replace(is_fine=previous.state.is_fine)
+            dirty = self._dirty_pixels(previous.state.materials, state.materials, gbuffer)
+            update_for_materials(
+                self._transfer,
+                state,
+                gbuffer,
+                self._camera,
+                previous.frame,
+                dirty,
+                previous.to_rgb9e5(),
+                shadow_visibility,
+            )
+            previous.state, previous.has_highlight_edges = state, False
         else:
-            find = fine_frame if wanted.is_fine else frame_of
-            frame = find(self._transfer, wanted, seen, self._camera, self._size, shares)
-            self._drawn = Drawn(wanted, seen, frame, shares, has_rims=wanted.is_fine)
-        return self._drawn
+            render = render_fine_frame if state.is_fine else render_frame
+            frame = render(self._transfer, state, gbuffer, self._camera, self._size, shadow_visibility)
+            self._previous = PreviousImage(state, gbuffer, frame, shadow_visibility, has_highlight_edges=state.is_fine)
+        return self._previous
 
-    def _may_change(self, drawn: Drawn, wanted: Wanted, seen: Seen) -> bool:
+    def _can_update(self, previous: PreviousImage, state: FrameRequestState, gbuffer: GBuffer) -> bool:
         """Whether what was drawn may be changed; where nobody waits for it, all rims are found anew."""
-        is_same = drawn.seen is seen and not len(seen.panes.ray) and only_materials_differ(drawn.wanted, wanted)
+        is_same = (
+            previous.gbuffer is gbuffer and not len(gbuffer.glass.ray) and only_materials_differ(previous.state, state)
+        )
         if not (is_same and self._is_watched):
             return False
-        shown = self._shown_of(drawn.wanted.materials, wanted.materials, seen)
-        return not shows_texels(self._transfer, wanted.materials, seen, shown.part)
+        dirty = self._dirty_pixels(previous.state.materials, state.materials, gbuffer)
+        return not shows_btf(self._transfer, state.materials, gbuffer, dirty.region)
 
-    def _shown_of(self, before: Materials, after: Materials, seen: Seen) -> Shown:
+    def _dirty_pixels(self, before: MaterialState, after: MaterialState, gbuffer: GBuffer) -> DirtyPixels:
         """What shows materials that were edited; found once while a hand is on them."""
-        is_changed = np.array([one is not other for one, other in zip(before.each, after.each, strict=True)])
+        is_changed = np.array([old is not new for old, new in zip(before.projected, after.projected, strict=True)])
         key = is_changed.tobytes()
-        if self._part is None or self._part[0] is not seen or self._part[1] != key:
+        if self._dirty_cache is None or self._dirty_cache[0] is not gbuffer or self._dirty_cache[1] != key:
             num_pixels = self._size[0] * self._size[1]
-            self._part = seen, key, shown_of(self._transfer.surface, seen, is_changed, num_pixels)
-        return self._part[2]
+            self._dirty_cache = (
+                gbuffer,
+                key,
+                find_dirty_pixels(self._transfer.stored_scene, gbuffer, is_changed, num_pixels),
+            )
+        return self._dirty_cache[2]
 
-    def _shares_of(self, beams: Sequence[Beam], seen: Seen) -> list[F32]:
+    def _trace_shadow_visibility(self, hard_shadow_lights: Sequence[HardShadowLight], gbuffer: GBuffer) -> list[F32]:
         """What the rays of the eye see of each beam, found again where the eye or the beam has moved."""
-        known = self._shares[1] if self._shares[0] == self._num_eyes else {}
-        of = self._transfer.solid, seen, self._camera, self._size
-        found = [known[b.key] if b.key in known else shares_seen(*of, b.targets) for b in beams]
-        self._shares = self._num_eyes, {beam.key: share for beam, share in zip(beams, found, strict=True)}
-        return found
+        cached = self._shadow_visibility[1] if self._shadow_visibility[0] == self._camera_seq else {}
+        args = self._transfer.occlusion_mesh, gbuffer, self._camera, self._size
+        visibility = [
+            cached[b.key] if b.key in cached else visible_fractions(*args, b.targets) for b in hard_shadow_lights
+        ]
+        self._shadow_visibility = (
+            self._camera_seq,
+            {light.key: fractions for light, fractions in zip(hard_shadow_lights, visibility, strict=True)},
+        )
+        return visibility
 
-    def _wanted(self, shown: Look, vectors: Arriving) -> Wanted:
-        gain = np.array(gain_of(shown, self._solo), np.float32)
-        is_exact_but_for_surfaces = self._vectors.follow(self._asked())
-        is_rough = self._is_rough and not is_exact_but_for_surfaces
+    def _request_state(self, look: Look, incident: IncidentCoefficients) -> FrameRequestState:
+        gain = np.array(picture_gain(look, self._solo), np.float32)
+        only_indirect_pending = self._probe_light.only_indirect_pending(self._light_request())
+        is_coarse = self._is_coarse and not only_indirect_pending
         # what is added to a frame is the error of a fine one
         is_fine = not self._is_watched or self.is_corrected
-        return Wanted(shown, self._materials_of(shown), self._now(), gain, vectors, is_rough, self._relief, is_fine)
+        return FrameRequestState(
+            look,
+            self._material_state(look),
+            self._current_light(),
+            gain,
+            incident,
+            is_coarse,
+            self._texel_light,
+            is_fine,
+        )
 
-    def parts(self) -> tuple[dict[str, Part], Numbers]:
+    def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants]:
         """What a shader needs to draw what is shown, from anywhere; after a step."""
         assert self._look is not None
-        vectors = self._vectors_now(self._everywhere)
-        self._num_told += vectors is not self._told
-        self._told = vectors
-        wanted = self._wanted(self._look, vectors)
+        incident = self._current_vectors(self._all_probes)
+        self._vectors_version += incident is not self._published_vectors
+        self._published_vectors = incident
+        state = self._request_state(self._look, incident)
         # what is exact follows from its light alone: it is not sent again after pictures that were drawn here meanwhile
-        versions = self._num_materials, self._num_told if self._is_rough else self._asked()
-        return parts_of(self._transfer, wanted, versions), numbers_of(self._transfer, wanted)
+        versions = self._materials_version, self._vectors_version if self._is_coarse else self._light_request()
+        return array_blocks(self._transfer, state, versions), shader_constants(self._transfer, state)
 
     @property
-    def seen(self) -> Seen:
+    def gbuffer(self) -> GBuffer:
         """What its rays see."""
-        return self._look_around()
+        return self._current_gbuffer()
 
-    def along_middles(self, size: tuple[int, int], *, is_fine: bool = True) -> tuple[F32, Seen]:
+    def render_pixel_centers(self, size: tuple[int, int], *, is_fine: bool = True) -> tuple[F32, GBuffer]:
         """What it shows along the rays through the middles of the pixels of a picture of another size.
 
         Args:
@@ -281,47 +333,47 @@ class MovingPicture:
             Linear radiance (height, width, 3) float32, and what the rays see.
         """
         assert self._look is not None
-        seen = self._looked(size).middles(size[0] * size[1])
-        wanted = self._wanted(self._look, self._vectors_now(seen.is_needed))._replace(is_fine=is_fine)
-        of = self._transfer.solid, seen, self._camera, size
-        shares = [shares_seen(*of, beam.targets) for beam in wanted.arriving.beams]
-        return frame_of(self._transfer, wanted, seen, self._camera, size, shares).image, seen
+        gbuffer = self._trace_gbuffer(size).pixel_centers(size[0] * size[1])
+        state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))._replace(is_fine=is_fine)
+        args = self._transfer.occlusion_mesh, gbuffer, self._camera, size
+        shadow_visibility = [visible_fractions(*args, light.targets) for light in state.incident.hard_shadow_lights]
+        return render_frame(self._transfer, state, gbuffer, self._camera, size, shadow_visibility).image, gbuffer
 
     @property
-    def surface(self) -> Surface:
+    def stored_scene(self) -> StoredScene:
         """What is seen."""
-        return self._transfer.surface
+        return self._transfer.stored_scene
 
-    def _now(self) -> Light:
+    def _current_light(self) -> Illumination:
         assert self._light is not None
         return self._light
 
-    def _look_around(self) -> Seen:
-        if self._seen is None or self._seen[0] != self._num_eyes:
-            self._seen = self._num_eyes, self._looked(self._size)
-        return self._seen[1]
+    def _current_gbuffer(self) -> GBuffer:
+        if self._gbuffer is None or self._gbuffer[0] != self._camera_seq:
+            self._gbuffer = self._camera_seq, self._trace_gbuffer(self._size)
+        return self._gbuffer[1]
 
-    def _looked(self, size: tuple[int, int]) -> Seen:
-        found = look(self._transfer.surface, self._transfer.embree, self._camera, size)
-        mend(found, self._transfer.parted, self._transfer.solid)
-        return found
+    def _trace_gbuffer(self, size: tuple[int, int]) -> GBuffer:
+        gbuffer = trace_primary(self._transfer.stored_scene, self._transfer.embree, self._camera, size)
+        reweight(gbuffer, self._transfer.has_occluded_neighbor, self._transfer.occlusion_mesh)
+        return gbuffer
 
-    def _materials_of(self, shown: Look) -> Materials:
-        before_of, before = self._materials
-        if before is None or before_of is not shown:
+    def _material_state(self, look: Look) -> MaterialState:
+        previous_look, previous = self._materials
+        if previous is None or previous_look is not look:
             names = self._transfer.material_names
-            normals = [shown.materials[name].normals for name in names]
-            terms = [documents_of(shown, name) for name in names]
-            found = Materials.of(terms, before, normals, waits=not self._is_watched)
-            self._num_materials += found is not before
-            self._materials = shown, found
-            return found
-        return before
+            normals = [look.materials[name].normals for name in names]
+            terms = [material_documents(look, name) for name in names]
+            materials = MaterialState.from_terms(terms, previous, normals, is_blocking=not self._is_watched)
+            self._materials_version += materials is not previous
+            self._materials = look, materials
+            return materials
+        return previous
 
-    def _vectors_now(self, is_needed: NDArray[np.uint8]) -> Arriving:
+    def _current_vectors(self, is_needed: NDArray[np.uint8]) -> IncidentCoefficients:
         """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
-        asked = self._asked()
-        return self._vectors.quickly(asked, is_needed) if self._is_rough else self._vectors.exactly(asked)
+        request = self._light_request()
+        return self._probe_light.fast(request, is_needed) if self._is_coarse else self._probe_light.exact(request)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture: one, for all of it changes together."""
@@ -329,12 +381,17 @@ class MovingPicture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Payload of a frame: the tiles one after another, row-major."""
-        drawn = self._draw()
-        if drawn is not None and self._by is None and form == "rgb9e5" and list(tiles) == self.all_tiles():
-            return drawn.packed().tobytes()
+        previous = self._render()
+        if (
+            previous is not None
+            and self._residual_image is None
+            and form == "rgb9e5"
+            and list(tiles) == self.all_tiles()
+        ):
+            return previous.to_rgb9e5().tobytes()
         image = self._image()
-        parts = [image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
-        return encode_pixels(np.ascontiguousarray(np.concatenate(parts)), form)
+        pixels = [image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
+        return encode_pixels(np.ascontiguousarray(np.concatenate(pixels)), form)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
         """How much each pixel of tiles hides of display values behind it; see `Picture.encode_alpha`."""
@@ -343,21 +400,25 @@ class MovingPicture:
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""
-        drawn = self._draw()
-        hides = None if drawn is None else drawn.frame.hides
-        return None if hides is None else alpha_of(hides, for_display=for_display)
+        previous = self._render()
+        coverage = None if previous is None else previous.frame.coverage
+        return None if coverage is None else alpha(coverage, for_display=for_display)
 
     def image(self) -> F32:
         """Linear radiance. (height, width, 3) float32"""
         return self._image().copy()  # the next edit writes to it
 
     def _image(self) -> F32:
-        drawn = self._draw()
-        if drawn is None:
+        previous = self._render()
+        if previous is None:
             return np.zeros((*self._size[::-1], 3), np.float32)
-        return drawn.frame.image if self._by is None else corrected(drawn.frame.image, self._by)
+        return (
+            previous.frame.image
+            if self._residual_image is None
+            else apply_residual(previous.frame.image, self._residual_image)
+        )
 
-    def probe(self, x: int, y: int) -> dict[str, Any]:
+    def inspect(self, x: int, y: int) -> dict[str, Any]:
         """What a pixel shows, and where its surface is.
 
         Raises:
@@ -367,24 +428,24 @@ class MovingPicture:
         height, width, _ = image.shape
         if not (0 <= x < width and 0 <= y < height):
             raise ParameterError("pixel", [x, y], f"x below {width} and y below {height}")
-        found: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
-        found["radiance"] = image[y, x].copy()
-        if self._seen is None:
-            return found
-        seen, surface = self._seen[1], self._transfer.surface
-        row = seen.first_row(y * width + x)
-        face = int(seen.hits.face[row])
+        info: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
+        info["radiance"] = image[y, x].copy()
+        if self._gbuffer is None:
+            return info
+        gbuffer, stored_scene = self._gbuffer[1], self._transfer.stored_scene
+        row = gbuffer.first_hit_row(y * width + x)
+        face = int(gbuffer.hits.face[row])
         if face < 0:
-            return found
-        place = self._camera.to_world[:3, 3] + float(seen.hits.distance[row]) * seen.directions[row]
-        normal = seen.weight[row] @ surface.vertices.normal[seen.vertex[row]]
-        return found | {
-            "material": self._transfer.material_names[int(surface.face_material[face])],
-            "position": place,
+            return info
+        position = self._camera.to_world[:3, 3] + float(gbuffer.hits.distance[row]) * gbuffer.directions[row]
+        normal = gbuffer.weight[row] @ stored_scene.lattice_nodes.normal[gbuffer.lattice_node[row]]
+        return info | {
+            "material": self._transfer.material_names[int(stored_scene.face_material[face])],
+            "position": position,
             "normal": normal / max(float(np.linalg.norm(normal)), 1e-12),
         }
 
-    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
         """Refuse: no curve is frozen in pictures whose eye moves.
 
         Args:
@@ -393,4 +454,6 @@ class MovingPicture:
         Raises:
             NotMadeError: always.
         """
-        raise NotMadeError("which pixels a curve lights is known where the eye rests; ask when its picture is exact")
+        raise ResultUnavailableError(
+            "which pixels a curve lights is known where the eye rests; ask when its picture is exact"
+        )

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.terms.btf import Texels
+from relume.brdf.terms.btf import BtfRef
 from relume.light.triangles import TriangleLights
-from relume.operators.shade import Shaded
-from relume.parallel import for_ranges, for_steps
-from relume.project.arrived import arrived_rows, turned_tables
-from relume.project.receivers import Receivers
-from relume.project.texels import sent_rows
+from relume.operators.shade import ShadedTerm
+from relume.parallel import for_ranges, parallel_for_cancellable
+from relume.project.arrived import rotated_tables, texture_light_rows
+from relume.project.receivers import ShadingPoints
+from relume.project.texels import outgoing_rows
 
 F32 = NDArray[np.float32]
 
-_SAMPLES_A_RANGE = 1024
-_CLUSTERS_ABOUT = 8  # a sample, in which its texels are, at most
-_QUICK = 12_000_000  # rows of tables: half a second of two cores
+_SAMPLES_PER_RANGE = 1024
+_MAX_CLUSTERS_PER_SAMPLE = 8  # a sample, in which its texels are, at most
+_MAX_TABLE_ROWS = 12_000_000  # rows of tables: half a second of two cores
 
 
 @dataclass(frozen=True, eq=False)
-class Arrived:
+class BtfIncidentLight:
     """What arrives at n samples from each direction in which a BTF is known.
 
     Attributes:
@@ -41,77 +41,79 @@ class Arrived:
         """Memory it holds."""
         return self.light.nbytes
 
-    def sent(self, texels: Texels, receivers: Receivers) -> Shaded:
+    def shade(self, btf_ref: BtfRef, receivers: ShadingPoints) -> ShadedTerm:
         """The image of a BTF of the same directions, in the threads of the caller.
 
         A texture that was turned since is lit nearly: light is spread by up to a step of a ring.
 
         Args:
-            texels: how the samples are covered. receivers: the samples; light need not be with them.
+            btf_ref: how the samples are covered. receivers: the samples; light need not be with them.
         """
-        tables, turned = texels.tables, texels.rotation - self.rotation
-        if turned:
-            tables = turned_tables(texels.btf.rings, tables, turned)
+        tables, rotation_delta = btf_ref.tables, btf_ref.rotation - self.rotation
+        if rotation_delta:
+            tables = rotated_tables(btf_ref.btf.grid, tables, rotation_delta)
         rows = np.empty((len(self.light), 3), np.float32)
 
-        def send(start: int, stop: int) -> None:
-            rows[start:stop] = sent_rows(texels, tables, self.light[start:stop], receivers, start)
+        def shade_range(start: int, stop: int) -> None:
+            rows[start:stop] = outgoing_rows(btf_ref, tables, self.light[start:stop], receivers, start)
 
-        for_ranges(send, len(rows), _SAMPLES_A_RANGE)
-        return Shaded.of(rows)
+        for_ranges(shade_range, len(rows), _SAMPLES_PER_RANGE)
+        return ShadedTerm.from_rows(rows)
 
 
-def is_quick(texels: Texels, num_samples: int) -> bool:
+def fits_budget(btf_ref: BtfRef, num_samples: int) -> bool:
     """Whether a frame can wait for texels to be summed anew: each sample sums the tables of clusters about it."""
-    clusters = min(texels.btf.mean.shape[1], _CLUSTERS_ABOUT)
-    return bool(num_samples * clusters * (1 + texels.btf.num_components) <= _QUICK)
+    clusters = min(btf_ref.btf.mean.shape[1], _MAX_CLUSTERS_PER_SAMPLE)
+    return bool(num_samples * clusters * (1 + btf_ref.btf.num_components) <= _MAX_TABLE_ROWS)
 
 
-def arrived_bytes(texels: Texels, num_samples: int) -> int:
+def incident_light_bytes(btf_ref: BtfRef, num_samples: int) -> int:
     """Memory that keeping it takes."""
-    return 4 * 3 * texels.btf.rings.num_directions * num_samples
+    return 4 * 3 * btf_ref.btf.grid.num_directions * num_samples
 
 
-def arrive(
-    texels: Texels,
+def collect_light(
+    btf_ref: BtfRef,
     lights: TriangleLights,
-    receivers: Receivers,
+    receivers: ShadingPoints,
     progress: Callable[[float], None],
-    cancelled: Callable[[], bool],
-) -> Arrived:
+    is_canceled: Callable[[], bool],
+) -> BtfIncidentLight:
     """Share light out to the directions of a BTF.
 
     Args:
-        texels: how samples are covered. lights, receivers: what arrives, and where.
-        progress: called with the share done. cancelled: asked now and then.
+        btf_ref: how samples are covered. lights, receivers: what arrives, and where.
+        progress: called with the share done. is_canceled: asked now and then.
     Raises:
-        CancelledError: `cancelled` said so.
+        CancelledError: `is_canceled` said so.
     """
     num_samples = len(receivers.normal)
-    light = np.empty((num_samples, 3, texels.btf.rings.num_directions), np.float32)
+    light = np.empty((num_samples, 3, btf_ref.btf.grid.num_directions), np.float32)
 
     def step(start: int, stop: int) -> None:
-        light[start:stop] = arrived_rows(texels, lights, receivers, start, stop)
+        light[start:stop] = texture_light_rows(btf_ref, lights, receivers, start, stop)
 
-    for_steps(step, num_samples, _SAMPLES_A_RANGE, progress, cancelled, "shading")
-    return Arrived(light, texels.rotation)
+    parallel_for_cancellable(step, num_samples, _SAMPLES_PER_RANGE, progress, is_canceled, "shading")
+    return BtfIncidentLight(light, btf_ref.rotation)
 
 
-def sent_between(texels: Texels, few: Arrived, weights: Any, receivers: Receivers) -> Shaded:
+def indirect_texel_light(
+    btf_ref: BtfRef, sampled: BtfIncidentLight, weights: Any, receivers: ShadingPoints
+) -> ShadedTerm:
     """The image of a BTF in light that is known at a few of its samples: texels are each sample's own.
 
     Args:
-        texels: how all samples are covered. few: what arrives at a few of them.
+        btf_ref: how all samples are covered. sampled: what arrives at a few of them.
         weights: of these in each. (samples, few samples) sparse float32
         receivers: all samples; light need not be with them.
     """
-    num_samples, num_few = weights.shape
-    flat = few.light.reshape(num_few, -1)
+    num_samples, num_sampled = weights.shape
+    flat_light = sampled.light.reshape(num_sampled, -1)
     rows = np.empty((num_samples, 3), np.float32)
 
-    def send(start: int, stop: int) -> None:
-        light = (weights[start:stop] @ flat).reshape(stop - start, *few.light.shape[1:])
-        rows[start:stop] = sent_rows(texels, texels.tables, light, receivers, start)
+    def shade_range(start: int, stop: int) -> None:
+        light = (weights[start:stop] @ flat_light).reshape(stop - start, *sampled.light.shape[1:])
+        rows[start:stop] = outgoing_rows(btf_ref, btf_ref.tables, light, receivers, start)
 
-    for_ranges(send, num_samples, _SAMPLES_A_RANGE)
-    return Shaded.of(rows)
+    for_ranges(shade_range, num_samples, _SAMPLES_PER_RANGE)
+    return ShadedTerm.from_rows(rows)

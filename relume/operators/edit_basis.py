@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from relume.basis.daubechies import analysis
 from relume.brdf.term import Curve, Term
 from relume.light.triangles import TriangleLights
-from relume.operators.frozen import Frozen, freeze
-from relume.operators.packed import Packed
-from relume.project.receivers import Receivers
+from relume.operators.frozen import LinearOperator, precompute
+from relume.operators.packed import QuantizedOperator
+from relume.project.receivers import ShadingPoints
 
 F64 = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class EditBasis(Protocol):
         ...
 
     @property
-    def moves(self) -> tuple[str, ...]:
+    def affected_curves(self) -> tuple[str, ...]:
         """Names of the curves that are free, all others being dormant."""
         ...
 
@@ -42,7 +42,7 @@ class EditBasis(Protocol):
         """Whether every curve can be said in it; else what it shows is near the look, not the look."""
         ...
 
-    def holds_for(self, document: Mapping[str, Any]) -> bool:
+    def is_valid_for(self, document: Mapping[str, Any]) -> bool:
         """Whether the curves of a term document of the same kind lie along it."""
         ...
 
@@ -50,17 +50,17 @@ class EditBasis(Protocol):
         """c of a term's curves, (3, J) each. (3, num_columns)"""
         ...
 
-    def freeze(
+    def precompute(
         self,
         term: Term,
         bands: Mapping[str, F64],
         lights: TriangleLights,
-        receivers: Receivers,
+        receivers: ShadingPoints,
         progress: Callable[[float], None],
-        cancelled: Callable[[], bool],
+        is_canceled: Callable[[], bool],
         *,
-        is_packed: bool = False,
-    ) -> Frozen | Packed:
+        is_quantized: bool = False,
+    ) -> LinearOperator | QuantizedOperator:
         """The operator. See `relume.operators.frozen.freeze`."""
         ...
 
@@ -76,16 +76,16 @@ class CurveBasis:
     is_complete = True
 
     @classmethod
-    def of(cls, curve: Curve) -> CurveBasis:
+    def from_curve(cls, curve: Curve) -> CurveBasis:
         """Along a declared curve."""
         return cls(curve.name, curve.label, curve.num_bands)
 
     @property
-    def moves(self) -> tuple[str, ...]:
+    def affected_curves(self) -> tuple[str, ...]:
         """The curve alone."""
         return (self.name,)
 
-    def holds_for(self, document: Mapping[str, Any]) -> bool:
+    def is_valid_for(self, document: Mapping[str, Any]) -> bool:
         """Any shape is among its own."""
         return True
 
@@ -93,16 +93,16 @@ class CurveBasis:
         """Of the wavelets."""
         return analysis(bands[self.name])
 
-    def freeze(
+    def precompute(
         self,
         term: Term,
         bands: Mapping[str, F64],
         lights: TriangleLights,
-        receivers: Receivers,
+        receivers: ShadingPoints,
         progress: Callable[[float], None],
-        cancelled: Callable[[], bool],
+        is_canceled: Callable[[], bool],
         *,
-        is_packed: bool = False,
-    ) -> Frozen | Packed:
+        is_quantized: bool = False,
+    ) -> LinearOperator | QuantizedOperator:
         """See `relume.operators.frozen.freeze`."""
-        return freeze(term, bands, self.name, lights, receivers, progress, cancelled, is_packed=is_packed)
+        return precompute(term, bands, self.name, lights, receivers, progress, is_canceled, is_quantized=is_quantized)

@@ -17,17 +17,17 @@ from relume.basis.daubechies import forward
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.operators.operator import Operator
-from relume.operators.packed import BLOCK_SAMPLES, Packed, pack
-from relume.operators.stream import TILE_SAMPLES, columns_of, stream
-from relume.parallel import for_steps
-from relume.project.levels import contract_levels, freed, num_levels, project_levels, runs
-from relume.project.receivers import Receivers
+from relume.operators.packed import BLOCK_SAMPLES, QuantizedOperator, quantize
+from relume.operators.stream import TILE_SAMPLES, changed_columns, stream
+from relume.parallel import parallel_for_cancellable
+from relume.project.levels import contract_levels, num_levels, project_levels, split_by_level, without_free_curves
+from relume.project.receivers import ShadingPoints
 
 F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Frozen(Operator):
+class LinearOperator(Operator):
     """The linear operator from one curve to the image of one term.
 
     Attributes:
@@ -52,7 +52,7 @@ class Frozen(Operator):
 
     def add(self, change: NDArray[np.float64], image: F32) -> None:
         """Add Σ_j Δc_j T_j to an image; see `Operator`."""
-        stream(self.transport, columns_of(change), image, self.bounds)
+        stream(self.transport, changed_columns(change), image, self.bounds)
 
     def columns_at(self, sample: int) -> NDArray[np.float64]:
         """What each coefficient gives to one sample. (3, J)"""
@@ -60,126 +60,132 @@ class Frozen(Operator):
         return self.transport[tile, :, :, offset].astype(np.float64)
 
 
-class Rough(Frozen):
+class MergedLightOperator(LinearOperator):
     """An operator of merged lights: how an image changes, nearly, until the exact one is there."""
 
     is_whole = False
     is_exact = False
 
 
-def tiles_of(num_samples: int) -> tuple[int, int]:
+def tile_layout(num_samples: int) -> tuple[int, int]:
     """Number of tiles, and samples a tile, that hold so many samples: tiles alike, none much larger than needed."""
     tiles = max(1, -(-num_samples // TILE_SAMPLES))
     samples = -(-num_samples // tiles)
     return tiles, -(-max(1, samples) // 16) * 16
 
 
-def frozen_bytes(num_samples: int, num_bands: int) -> int:
+def operator_bytes(num_samples: int, num_bands: int) -> int:
     """Memory that freezing needs to keep."""
-    tiles, samples = tiles_of(num_samples)
+    tiles, samples = tile_layout(num_samples)
     return tiles * samples * 3 * num_bands * 4
 
 
-def packed_bytes(num_samples: int, num_bands: int) -> int:
+def quantized_bytes(num_samples: int, num_bands: int) -> int:
     """Memory that freezing needs to keep where it packs."""
-    tiles, samples = tiles_of(num_samples)
+    tiles, samples = tile_layout(num_samples)
     return tiles * 3 * num_bands * (2 * samples + 4 * -(-samples // BLOCK_SAMPLES))
 
 
-def freeze(
+def precompute(
     term: Term,
     bands: Mapping[str, NDArray[np.float64]],
     active: str,
     lights: TriangleLights,
-    receivers: Receivers,
+    receivers: ShadingPoints,
     progress: Callable[[float], None],
-    cancelled: Callable[[], bool],
+    is_canceled: Callable[[], bool],
     *,
-    is_packed: bool = False,
-) -> Frozen | Packed:
+    is_quantized: bool = False,
+) -> LinearOperator | QuantizedOperator:
     """Project all receivers along a curve.
 
     Args:
         bands: of all the term's curves, (3, J) each, or (L, 3, J) where one differs from level to level; the active
             one's values do not matter.
         lights, receivers: what arrives, and where.
-        progress: called with the share done. cancelled: asked now and then.
-        is_packed: whether the operator is packed.
+        progress: called with the share done. is_canceled: asked now and then.
+        is_quantized: whether the operator is packed.
     Raises:
-        CancelledError: `cancelled` said so.
+        CancelledError: `is_canceled` said so.
     """
-    contractions = contract_levels(term, freed(bands, [active]), active)
+    contractions = contract_levels(term, without_free_curves(bands, [active]), active)
 
-    def rows(begin: int, end: int) -> F32:
-        projected = project_levels(term, contractions, lights, receivers, begin, end)
-        found = np.ascontiguousarray(projected.transpose(2, 0, 1))
-        forward(found.reshape(-1, found.shape[2]))
-        return found
+    def rows(start: int, stop: int) -> F32:
+        projected = project_levels(term, contractions, lights, receivers, start, stop)
+        coefficients = np.ascontiguousarray(projected.transpose(2, 0, 1))
+        forward(coefficients.reshape(-1, coefficients.shape[2]))
+        return coefficients
 
     bounds = level_bounds(receivers, bands, [active])
-    return lay_out(rows, contractions[0].num_columns, receivers, bounds, progress, cancelled, is_packed=is_packed)
+    return pack_columns(
+        rows, contractions[0].num_columns, receivers, bounds, progress, is_canceled, is_quantized=is_quantized
+    )
 
 
-def lay_out(
+def pack_columns(
     rows: Callable[[int, int], F32],
     num_columns: int,
-    receivers: Receivers,
+    receivers: ShadingPoints,
     bounds: NDArray[np.int64] | None,
     progress: Callable[[float], None],
-    cancelled: Callable[[], bool],
+    is_canceled: Callable[[], bool],
     *,
-    is_packed: bool,
-) -> Frozen | Packed:
+    is_quantized: bool,
+) -> LinearOperator | QuantizedOperator:
     """Make an operator of its rows, block after block, so that nothing but itself is in memory as a whole.
 
     Args:
         rows: columns at samples [begin, end), called from several threads. (3, end - begin, J) float32
         num_columns: J. receivers: all samples. bounds: from `level_bounds`.
-        progress: called with the share done. cancelled: asked now and then. is_packed: whether it is packed.
+        progress: called with the share done. is_canceled: asked now and then. is_quantized: whether it is packed.
     Raises:
-        CancelledError: `cancelled` said so.
+        CancelledError: `is_canceled` said so.
     """
     num_samples, lock = len(receivers.normal), threading.Lock()
-    tiles, samples = tiles_of(num_samples)
-    blocks = -(-samples // BLOCK_SAMPLES)
-    transport: NDArray[Any] = np.zeros((tiles, 3, num_columns, samples), np.int16 if is_packed else np.float32)
-    scale = np.zeros((tiles, 3, num_columns, blocks if is_packed else 0), np.float32)
-    squares = np.zeros((1 if bounds is None else len(bounds) - 1, 3, num_columns))
+    tiles, samples = tile_layout(num_samples)
+    num_blocks = -(-samples // BLOCK_SAMPLES)
+    transport: NDArray[Any] = np.zeros((tiles, 3, num_columns, samples), np.int16 if is_quantized else np.float32)
+    scale = np.zeros((tiles, 3, num_columns, num_blocks if is_quantized else 0), np.float32)
+    squared_norms = np.zeros((1 if bounds is None else len(bounds) - 1, 3, num_columns))
 
     def step(first: int, last: int) -> None:
-        for tile, block in (divmod(number, blocks) for number in range(first, last)):
+        for tile, block in (divmod(number, num_blocks) for number in range(first, last)):
             offset = block * BLOCK_SAMPLES
-            begin = tile * samples + offset
-            end = min(begin + BLOCK_SAMPLES, (tile + 1) * samples, num_samples)
-            if begin >= end:
+            start = tile * samples + offset
+            stop = min(start + BLOCK_SAMPLES, (tile + 1) * samples, num_samples)
+            if start >= stop:
                 continue
-            found = rows(begin, end)
-            for level, a, b in runs(receivers.level, len(squares), begin, end):
-                some = found[:, a - begin : b - begin]
-                lengths = np.einsum("csj,csj->cj", some, some, dtype=np.float64)
+            columns = rows(start, stop)
+            for level, a, b in split_by_level(receivers.level, len(squared_norms), start, stop):
+                level_columns = columns[:, a - start : b - start]
+                level_norms = np.einsum("csj,csj->cj", level_columns, level_columns, dtype=np.float64)
                 with lock:
-                    squares[level] += lengths
-            values: NDArray[Any] = found
-            if is_packed:
-                values, scale[tile, :, :, block] = pack(found)
-            transport[tile, :, :, offset : offset + end - begin] = values.transpose(0, 2, 1)
+                    squared_norms[level] += level_norms
+            values: NDArray[Any] = columns
+            if is_quantized:
+                values, scale[tile, :, :, block] = quantize(columns)
+            transport[tile, :, :, offset : offset + stop - start] = values.transpose(0, 2, 1)
 
-    for_steps(step, tiles * blocks, 1, progress, cancelled, "freezing")
-    importance = np.sqrt(squares if bounds is not None else squares[0])
-    return Packed(transport, scale, importance, bounds) if is_packed else Frozen(transport, importance, bounds)
+    parallel_for_cancellable(step, tiles * num_blocks, 1, progress, is_canceled, "freezing")
+    importance = np.sqrt(squared_norms if bounds is not None else squared_norms[0])
+    return (
+        QuantizedOperator(transport, scale, importance, bounds)
+        if is_quantized
+        else LinearOperator(transport, importance, bounds)
+    )
 
 
 def level_bounds(
-    receivers: Receivers, bands: Mapping[str, NDArray[np.float64]], moved: Iterable[str]
+    receivers: ShadingPoints, bands: Mapping[str, NDArray[np.float64]], free_curves: Iterable[str]
 ) -> NDArray[np.int64] | None:
     """Where the samples of each level begin and end, where the curves that move differ; None where they do not.
 
     Args:
-        receivers: sorted by level. bands: of all curves. moved: names of those that are free.
+        receivers: sorted by level. bands: of all curves. free_curves: names of those that are free.
     Returns:
         (L + 1,) int64
     """
-    num = num_levels({name: bands[name] for name in moved})
-    if num == 1 or receivers.level is None:
+    num_of_levels = num_levels({name: bands[name] for name in free_curves})
+    if num_of_levels == 1 or receivers.level is None:
         return None
-    return np.searchsorted(receivers.level, np.arange(num + 1)).astype(np.int64)
+    return np.searchsorted(receivers.level, np.arange(num_of_levels + 1)).astype(np.int64)

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from relume.errors import RelumeError
-from relume.operators.shade import Shaded
-from relume.replacing import replacing
+from relume.operators.shade import ShadedTerm
+from relume.replacing import atomic_write
 
 
 class ImageFiles:
@@ -32,15 +32,15 @@ class ImageFiles:
     def __init__(self, folder: Path, code: str, max_bytes: int | None = None) -> None:
         self._folder, self._max_bytes = folder / code, max_bytes
 
-    def get(self, key: Hashable, shape: tuple[int, ...], make: Callable[[], Shaded]) -> Shaded:
-        """The image of a key, from its file where there is a sound one of this shape, else from `make`."""
+    def get(self, key: Hashable, shape: tuple[int, ...], compute: Callable[[], ShadedTerm]) -> ShadedTerm:
+        """The image of a key, from its file where there is a sound one of this shape, else from `compute`."""
         path = self._path(key)
         with suppress(OSError, ValueError, EOFError):
-            found = np.load(path, mmap_mode="r", allow_pickle=False)
-            if found.shape == shape and found.dtype == np.float32:
+            image = np.load(path, mmap_mode="r", allow_pickle=False)
+            if image.shape == shape and image.dtype == np.float32:
                 path.touch()
-                return Shaded(np.array(found))
-        shaded = make()
+                return ShadedTerm(np.array(image))
+        shaded = compute()
         with suppress(OSError, RelumeError):  # a full or read-only disk costs time at the next opening, nothing else
             self._write(path, shaded)
         return shaded
@@ -52,31 +52,31 @@ class ImageFiles:
     def _path(self, key: Hashable) -> Path:
         return self._folder / (hashlib.sha256(repr(key).encode()).hexdigest()[:32] + ".npy")
 
-    def _write(self, path: Path, shaded: Shaded) -> None:
+    def _write(self, path: Path, shaded: ShadedTerm) -> None:
         if not self._folder.exists():
             self._folder.parent.mkdir(exist_ok=True)
-            self._remove_others()
+            self._remove_outdated()
             self._folder.mkdir(exist_ok=True)
-        with replacing(path) as unfinished:
+        with atomic_write(path) as unfinished:
             np.save(unfinished, shaded.image)
         if self._max_bytes is not None:
-            self._forget(self._max_bytes)
+            self._evict(self._max_bytes)
 
-    def _remove_others(self) -> None:
+    def _remove_outdated(self) -> None:
         """Remove what other code has made."""
-        for other in self._folder.parent.iterdir():
-            if other == self._folder:
+        for entry in self._folder.parent.iterdir():
+            if entry == self._folder:
                 continue
-            if other.is_dir():
-                shutil.rmtree(other, ignore_errors=True)
+            if entry.is_dir():
+                shutil.rmtree(entry, ignore_errors=True)
             else:
-                other.unlink(missing_ok=True)
+                entry.unlink(missing_ok=True)
 
-    def _forget(self, max_bytes: int) -> None:
+    def _evict(self, max_bytes: int) -> None:
         """Remove what was used longest ago until the rest is small enough."""
-        used = [(path.stat(), path) for path in self._folder.glob("*.npy")]
-        num_bytes = sum(stat.st_size for stat, _ in used)
-        for stat, path in sorted(used, key=lambda entry: entry[0].st_mtime_ns):
+        files = [(path.stat(), path) for path in self._folder.glob("*.npy")]
+        num_bytes = sum(stat.st_size for stat, _ in files)
+        for stat, path in sorted(files, key=lambda entry: entry[0].st_mtime_ns):
             if num_bytes <= max_bytes:
                 break
             path.unlink(missing_ok=True)

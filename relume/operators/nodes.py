@@ -20,45 +20,47 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.nodes import Nodes, choose_nodes
+from relume.basis.nodes import CurveNodes, choose_nodes
 from relume.basis.pca import joint
 from relume.brdf.curves import curve_bands, drawn_curves
 from relume.brdf.registry import TERMS
-from relume.brdf.sweep import moved_curves, slider_values, solid_angles
+from relume.brdf.sweep import curves_of_parameter, slider_values, solid_angles
 from relume.brdf.term import Curve, Term
 from relume.light.triangles import TriangleLights
-from relume.operators.frozen import Frozen, lay_out, level_bounds
-from relume.operators.packed import Packed
+from relume.operators.frozen import LinearOperator, level_bounds, pack_columns
+from relume.operators.packed import QuantizedOperator
 from relume.project.contraction import contract
-from relume.project.levels import at_level, freed, num_levels, project_levels
-from relume.project.receivers import Receivers
+from relume.project.levels import at_roughness, num_levels, project_levels, without_free_curves
+from relume.project.receivers import ShadingPoints
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
-Settings = tuple[tuple[str, float | tuple[float, ...]], ...]
+ParameterSettings = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 MAX_ERROR = 2e-2
 MAX_NODES = 36
-_ENOUGH = 0.9 * MAX_ERROR  # at the values that are looked at; between them it is a little more
+_TARGET_ERROR = 0.9 * MAX_ERROR  # at the values that are looked at; between them it is a little more
 _NUM_VALUES = 97
-_BANDS_BESIDE = 12  # of every moved curve but the first, at most: those are smooth, and a product with all is large
+_MAX_SECONDARY_BANDS = (
+    12  # of every moved curve but the first, at most: those are smooth, and a product with all is large
+)
 
 
 @dataclass(frozen=True)
-class Linearised:
+class ParameterOperator:
     """What a parameter does to a term's curves, as a combination of what it does at a few values; an `EditBasis`.
 
     Attributes:
-        others: parameters that move the same curves, with their values.
+        fixed_settings: parameters that move the same curves, with their values.
         curves: those it moves.
         nodes: of R, G and B, equally many; their curves are products of those moved (`_product`).
     """
 
     model: str
     parameter: str
-    others: Settings
+    fixed_settings: ParameterSettings
     curves: tuple[Curve, ...] = field(compare=False)
-    nodes: tuple[Nodes, Nodes, Nodes] = field(compare=False)
+    nodes: tuple[CurveNodes, CurveNodes, CurveNodes] = field(compare=False)
 
     is_complete = False
 
@@ -68,7 +70,7 @@ class Linearised:
         return TERMS[self.model].parameter(self.parameter).label
 
     @property
-    def moves(self) -> tuple[str, ...]:
+    def affected_curves(self) -> tuple[str, ...]:
         """Names of the curves it moves."""
         return tuple(curve.name for curve in self.curves)
 
@@ -77,28 +79,34 @@ class Linearised:
         """S, the number of nodes."""
         return len(self.nodes[0].values)
 
-    def holds_for(self, document: Mapping[str, Any]) -> bool:
+    def is_valid_for(self, document: Mapping[str, Any]) -> bool:
         """Whether a term document differs from the one linearised in the parameter alone, as far as its curves go."""
-        return document["model"] == self.model and _others(document, self.parameter) == self.others
+        return document["model"] == self.model and _fixed_settings(document, self.parameter) == self.fixed_settings
 
     def coefficients(self, bands: Mapping[str, F64]) -> F64:
         """c of a term's curves, (3, J) each. (3, S); (L, 3, S) where moved curves differ from level to level"""
-        moved = {name: bands[name] for name in self.moves}
-        num = num_levels(moved)
-        return self._at(moved) if num == 1 else np.stack([self._at(at_level(moved, level)) for level in range(num)])
+        moved_bands = {name: bands[name] for name in self.affected_curves}
+        num_of_levels = num_levels(moved_bands)
+        return (
+            self._coefficients_at_level(moved_bands)
+            if num_of_levels == 1
+            else np.stack(
+                [self._coefficients_at_level(at_roughness(moved_bands, level)) for level in range(num_of_levels)]
+            )
+        )
 
-    def _at(self, bands: Mapping[str, F64]) -> F64:
+    def _coefficients_at_level(self, bands: Mapping[str, F64]) -> F64:
         """c at one level. (3, S)"""
-        moved = [bands[curve.name] for curve in self.curves]
-        if all(np.all(rows == rows[0]) for rows in moved) and self.nodes[0] is self.nodes[1] is self.nodes[2]:
-            return np.tile(self.nodes[0].coefficients(_product([rows[0] for rows in moved])), (3, 1))
-        products = [_product([rows[channel] for rows in moved]) for channel in range(3)]
+        moved_rows = [bands[curve.name] for curve in self.curves]
+        if all(np.all(rows == rows[0]) for rows in moved_rows) and self.nodes[0] is self.nodes[1] is self.nodes[2]:
+            return np.tile(self.nodes[0].coefficients(_product([rows[0] for rows in moved_rows])), (3, 1))
+        products = [_product([rows[channel] for rows in moved_rows]) for channel in range(3)]
         return np.array([nodes.coefficients(curve) for nodes, curve in zip(self.nodes, products, strict=True)])
 
-    def bands_at_nodes(self) -> dict[str, F64]:
+    def node_bands(self) -> dict[str, F64]:
         """Bands of the moved curves at all nodes. (3, S, J) each"""
         documents = [
-            _at(self.model, self.others, self.parameter, values)
+            _document_at(self.model, self.fixed_settings, self.parameter, values)
             for values in zip(*(n.values for n in self.nodes), strict=True)
         ]
         return {
@@ -106,17 +114,17 @@ class Linearised:
             for curve in self.curves
         }
 
-    def freeze(
+    def precompute(
         self,
         term: Term,
         bands: Mapping[str, F64],
         lights: TriangleLights,
-        receivers: Receivers,
+        receivers: ShadingPoints,
         progress: Callable[[float], None],
-        cancelled: Callable[[], bool],
+        is_canceled: Callable[[], bool],
         *,
-        is_packed: bool = False,
-    ) -> Frozen | Packed:
+        is_quantized: bool = False,
+    ) -> LinearOperator | QuantizedOperator:
         """Contract all curves at all nodes in one pass: the columns are the images there.
 
         Where the parameter moves a single curve, its nodes are combinations of that curve's bands, which are quicker to
@@ -125,65 +133,69 @@ class Linearised:
         Args:
             bands: of all the term's curves, (3, J) each; the moved ones' values do not matter.
             lights, receivers: what arrives, and where.
-            progress: called with the share done. cancelled: asked now and then.
-            is_packed: whether the operator is packed.
+            progress: called with the share done. is_canceled: asked now and then.
+            is_quantized: whether the operator is packed.
         Raises:
-            CancelledError: `cancelled` said so.
+            CancelledError: `is_canceled` said so.
         """
-        at_nodes = self.bands_at_nodes()
-        alone = self.moves[0] if len(self.moves) == 1 else None
-        held = freed(bands, self.moves)  # nodes are the same at all levels
-        dormant = [at_level(held, level) for level in range(num_levels(held))]
-        contractions = [contract(term, b if alone else {**b, **at_nodes}, alone) for b in dormant]
-        bounds = level_bounds(receivers, bands, self.moves)
-        matrices = None if alone is None else at_nodes[alone].astype(np.float32)
+        node_bands = self.node_bands()
+        single_curve = self.affected_curves[0] if len(self.affected_curves) == 1 else None
+        fixed_bands = without_free_curves(bands, self.affected_curves)  # nodes are the same at all levels
+        fixed_by_level = [at_roughness(fixed_bands, level) for level in range(num_levels(fixed_bands))]
+        contractions = [
+            contract(term, b if single_curve else {**b, **node_bands}, single_curve) for b in fixed_by_level
+        ]
+        bounds = level_bounds(receivers, bands, self.affected_curves)
+        matrices = None if single_curve is None else node_bands[single_curve].astype(np.float32)
 
-        def rows(begin: int, end: int) -> F32:
-            projected = project_levels(term, contractions, lights, receivers, begin, end)
+        def rows(start: int, stop: int) -> F32:
+            projected = project_levels(term, contractions, lights, receivers, start, stop)
             if matrices is not None:
                 return np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)])
             return np.ascontiguousarray(projected.transpose(2, 0, 1))
 
-        return lay_out(rows, self.num_columns, receivers, bounds, progress, cancelled, is_packed=is_packed)
+        return pack_columns(rows, self.num_columns, receivers, bounds, progress, is_canceled, is_quantized=is_quantized)
 
 
-def linearise(document: Mapping[str, Any], parameter: str) -> Linearised | None:
+def linearize(document: Mapping[str, Any], parameter: str) -> ParameterOperator | None:
     """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or `MAX_NODES` are too few."""
-    others = _others(document, parameter)
-    return None if others is None else _linearised(document["model"], parameter, others)
+    fixed_settings = _fixed_settings(document, parameter)
+    return None if fixed_settings is None else _linearize_cached(document["model"], parameter, fixed_settings)
 
 
-def _others(document: Mapping[str, Any], parameter: str) -> Settings | None:
+def _fixed_settings(document: Mapping[str, Any], parameter: str) -> ParameterSettings | None:
     """What else the curves that a parameter moves are made from; None where it moves none, or one is drawn."""
     term = TERMS[document["model"]]
-    curves = moved_curves(term, parameter)
+    curves = curves_of_parameter(term, parameter)
     if not curves or any(drawn_curves(document, curve) for curve in curves):
         return None
-    read = sorted({name for curve in curves for name in curve.parameters} - {parameter})
-    given = document.get("params") or {}
-    values = ((name, given.get(name, term.parameter(name).default)) for name in read)
+    parameter_names = sorted({name for curve in curves for name in curve.parameters} - {parameter})
+    settings = document.get("params") or {}
+    values = ((name, settings.get(name, term.parameter(name).default)) for name in parameter_names)
     return tuple((name, tuple(value) if isinstance(value, list | tuple) else float(value)) for name, value in values)
 
 
 @lru_cache(maxsize=64)
-def _linearised(model: str, parameter: str, others: Settings) -> Linearised | None:
+def _linearize_cached(model: str, parameter: str, fixed_settings: ParameterSettings) -> ParameterOperator | None:
     term = TERMS[model]
-    declared, curves = term.parameter(parameter), moved_curves(term, parameter)
-    values = slider_values(declared, _NUM_VALUES)
-    between = slider_values(declared, _NUM_VALUES - 1, between=True)
-    documents = [_at(model, others, parameter, (value, value, value)) for value in (*values, *between)]
+    description, curves = term.parameter(parameter), curves_of_parameter(term, parameter)
+    values = slider_values(description, _NUM_VALUES)
+    midpoints = slider_values(description, _NUM_VALUES - 1, at_midpoints=True)
+    documents = [
+        _document_at(model, fixed_settings, parameter, (value, value, value)) for value in (*values, *midpoints)
+    ]
     # (n, 3, J) of each curve
-    rows = [np.array([curve_bands(document, curve) for document in documents]) for curve in curves]
+    curve_rows = [np.array([curve_bands(document, curve) for document in documents]) for curve in curves]
     weights = _product([solid_angles(curve) for curve in curves])
-    alike = all(bool(np.all(of_curve == of_curve[:, :1])) for of_curve in rows)
-    found = _nodes_of_channels(1 if alike else 3, values, rows, weights)
-    if found is None:
+    is_gray = all(bool(np.all(rows == rows[:, :1])) for rows in curve_rows)
+    channel_nodes = _choose_channel_nodes(1 if is_gray else 3, values, curve_rows, weights)
+    if channel_nodes is None:
         return None
-    red, green, blue = found * 3 if alike else found
-    return Linearised(model, parameter, others, curves, (red, green, blue))
+    red, green, blue = channel_nodes * 3 if is_gray else channel_nodes
+    return ParameterOperator(model, parameter, fixed_settings, curves, (red, green, blue))
 
 
-def _nodes_of_channels(num: int, values: F64, rows: Sequence[F64], weights: F64) -> list[Nodes] | None:
+def _choose_channel_nodes(num: int, values: F64, rows: Sequence[F64], weights: F64) -> list[CurveNodes] | None:
     """Equally many nodes of each channel, as few as are enough; None where `MAX_NODES` are not.
 
     Args:
@@ -191,30 +203,35 @@ def _nodes_of_channels(num: int, values: F64, rows: Sequence[F64], weights: F64)
     """
     products = [np.array([_product(bands) for bands in zip(*(r[:, c] for r in rows), strict=True)]) for c in range(num)]
 
-    def chosen(enough: float, most: int) -> list[Nodes]:
-        n = len(values)
-        return [choose_nodes(values, curves[:n], curves[n:], weights, most, enough) for curves in products]
+    def choose(max_error: float, max_nodes: int) -> list[CurveNodes]:
+        num_values = len(values)
+        return [
+            choose_nodes(values, curves[:num_values], curves[num_values:], weights, max_nodes, max_error)
+            for curves in products
+        ]
 
-    found = chosen(_ENOUGH, MAX_NODES)
-    if any(nodes.error > _ENOUGH for nodes in found):
+    channel_nodes = choose(_TARGET_ERROR, MAX_NODES)
+    if any(nodes.error > _TARGET_ERROR for nodes in channel_nodes):
         return None
-    most = max(len(nodes.values) for nodes in found)
-    if any(len(nodes.values) < most for nodes in found):
-        found = chosen(0.0, most)
-    return found
+    max_nodes = max(len(nodes.values) for nodes in channel_nodes)
+    if any(len(nodes.values) < max_nodes for nodes in channel_nodes):
+        channel_nodes = choose(0.0, max_nodes)
+    return channel_nodes
 
 
-def _at(model: str, others: Settings, parameter: str, values: Sequence[float]) -> dict[str, Any]:
+def _document_at(
+    model: str, fixed_settings: ParameterSettings, parameter: str, values: Sequence[float]
+) -> dict[str, Any]:
     """A document with one parameter at a value for R, G and B."""
-    return {"model": model, "params": {**dict(others), parameter: [float(value) for value in values]}}
+    return {"model": model, "params": {**dict(fixed_settings), parameter: [float(value) for value in values]}}
 
 
 def _product(bands: Sequence[F64]) -> F64:
     """Products of bands of all moved curves: all of the first, some of each other. (J_1,), … -> (J,)"""
-    first, *beside = bands
-    return joint([first, *(rows[_bands_beside(len(rows))] for rows in beside)])
+    first, *secondary = bands
+    return joint([first, *(rows[_secondary_bands(len(rows))] for rows in secondary)])
 
 
-def _bands_beside(num: int) -> NDArray[np.intp]:
+def _secondary_bands(num: int) -> NDArray[np.intp]:
     """Some of so many bands, denser towards the horizon, where masking turns."""
-    return num - np.unique(np.geomspace(1, num, _BANDS_BESIDE).astype(np.intp))
+    return num - np.unique(np.geomspace(1, num, _MAX_SECONDARY_BANDS).astype(np.intp))

@@ -16,25 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.operators.operator import Operator
-from relume.operators.stream import Columns, columns_of, within_tile
-from relume.parallel import for_shares
+from relume.operators.stream import Columns, changed_columns, tile_offset
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 BLOCK_SAMPLES = 512
-_LARGEST = 32_767
+_MAX_CODE = 32_767
 
 
 @dataclass(frozen=True)
-class Packed(Operator):
-    """As `relume.operators.frozen.Frozen`, in 16 bits.
+class QuantizedOperator(Operator):
+    """As `relume.operators.frozen.LinearOperator`, in 16 bits.
 
     Attributes:
         transport: integers. (tiles, 3, J, samples) int16
         scale: what they are multiplied by. (tiles, 3, J, blocks) float32
-        importance, bounds: see `Frozen`.
+        importance, bounds: see `LinearOperator`.
     """
 
     transport: NDArray[np.int16]
@@ -52,7 +52,7 @@ class Packed(Operator):
 
     def add(self, change: F64, image: F32) -> None:
         """Add Σ_j Δc_j T_j to an image; see `Operator`."""
-        stream_packed(self.transport, self.scale, columns_of(change), image, self.bounds)
+        stream_quantized(self.transport, self.scale, changed_columns(change), image, self.bounds)
 
     def columns_at(self, sample: int) -> F64:
         """What each coefficient gives to one sample. (3, J)"""
@@ -61,7 +61,7 @@ class Packed(Operator):
         return np.asarray(scale * self.transport[tile, :, :, offset])
 
 
-def pack(rows: F32) -> tuple[NDArray[np.int16], F32]:
+def quantize(rows: F32) -> tuple[NDArray[np.int16], F32]:
     """Integers of 16 bits for the columns of one block, and their scales.
 
     Args:
@@ -69,9 +69,9 @@ def pack(rows: F32) -> tuple[NDArray[np.int16], F32]:
     Returns:
         (channels, samples, J) int16, (channels, J) float32
     """
-    scale = np.abs(rows).max(axis=1) / np.float32(_LARGEST)
-    per = np.divide(1, scale, out=np.zeros_like(scale), where=scale > np.finfo(np.float32).tiny)
-    return np.rint(rows * per[:, None]).clip(-_LARGEST, _LARGEST).astype(np.int16), scale
+    scale = np.abs(rows).max(axis=1) / np.float32(_MAX_CODE)
+    inverse_scale = np.divide(1, scale, out=np.zeros_like(scale), where=scale > np.finfo(np.float32).tiny)
+    return np.rint(rows * inverse_scale[:, None]).clip(-_MAX_CODE, _MAX_CODE).astype(np.int16), scale
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
@@ -81,38 +81,50 @@ def _stream(transport, scale, bounds, index, change, count, image, start, stop):
     for plane in range(start, stop):
         tile, channel = plane // 3, plane % 3
         for level in range(count.shape[0]):
-            first, last = within_tile(bounds, level, tile, samples)
+            first, last = tile_offset(bounds, level, tile, samples)
             if first >= last:
                 continue
-            weight, which, num = change[level, channel], index[level, channel], count[level, channel]
+            weight, column_index, num = change[level, channel], index[level, channel], count[level, channel]
             columns, scales = transport[tile, channel], scale[tile, channel]
             for n in range(0, num, 4):
                 for block in range(first // BLOCK_SAMPLES, (last - 1) // BLOCK_SAMPLES + 1):
-                    begin, end = max(first, block * BLOCK_SAMPLES), min(last, (block + 1) * BLOCK_SAMPLES)
-                    sums = image[tile, channel, begin:end]
+                    block_start, block_stop = max(first, block * BLOCK_SAMPLES), min(last, (block + 1) * BLOCK_SAMPLES)
+                    sums = image[tile, channel, block_start:block_stop]
                     if n + 4 <= num:
-                        a, b = columns[which[n], begin:end], columns[which[n + 1], begin:end]
-                        c, d = columns[which[n + 2], begin:end], columns[which[n + 3], begin:end]
-                        wa, wb = weight[n] * scales[which[n], block], weight[n + 1] * scales[which[n + 1], block]
-                        wc = weight[n + 2] * scales[which[n + 2], block]
-                        wd = weight[n + 3] * scales[which[n + 3], block]
-                        for s in range(end - begin):
+                        a, b = (
+                            columns[column_index[n], block_start:block_stop],
+                            columns[column_index[n + 1], block_start:block_stop],
+                        )
+                        c, d = (
+                            columns[column_index[n + 2], block_start:block_stop],
+                            columns[column_index[n + 3], block_start:block_stop],
+                        )
+                        wa, wb = (
+                            weight[n] * scales[column_index[n], block],
+                            weight[n + 1] * scales[column_index[n + 1], block],
+                        )
+                        wc = weight[n + 2] * scales[column_index[n + 2], block]
+                        wd = weight[n + 3] * scales[column_index[n + 3], block]
+                        for s in range(block_stop - block_start):
                             sums[s] += wa * a[s] + wb * b[s] + wc * c[s] + wd * d[s]
                         continue
                     for m in range(n, num):
-                        a, wa = columns[which[m], begin:end], weight[m] * scales[which[m], block]
-                        for s in range(end - begin):
+                        a, wa = (
+                            columns[column_index[m], block_start:block_stop],
+                            weight[m] * scales[column_index[m], block],
+                        )
+                        for s in range(block_stop - block_start):
                             sums[s] += wa * a[s]
 
 
-def stream_packed(
+def stream_quantized(
     transport: NDArray[np.int16], scale: F32, columns: Columns, image: F32, bounds: NDArray[np.int64] | None = None
 ) -> None:
     """Add T · Δc to an image, in place; see `relume.operators.stream.stream`.
 
     Args:
         transport: (tiles, 3, J, samples) int16. scale: of its blocks. (tiles, 3, J, blocks) float32
-        columns: what has changed, from `columns_of`.
+        columns: what has changed, from `changed_columns`.
         image: added to. (tiles, 3, samples) float32
         bounds: where the samples of each level begin and end, tile after tile; None: there is one. (L + 1,) int64
     Cost: reads 2 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
@@ -121,4 +133,4 @@ def stream_packed(
         if bounds is None:
             bounds = np.array([0, image.shape[0] * image.shape[2]], np.int64)
         args = (transport, scale, bounds, columns.index, columns.change, columns.count, image)
-        for_shares(lambda start, stop: _stream(*args, start, stop), 3 * len(image))
+        parallel_for_chunks(lambda start, stop: _stream(*args, start, stop), 3 * len(image))

@@ -17,29 +17,29 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
-from relume.operators.frozen import tiles_of
+from relume.operators.frozen import tile_layout
 from relume.project.contraction import Contraction
 from relume.project.levels import contract_levels, project_levels
-from relume.project.receivers import Receivers
+from relume.project.receivers import ShadingPoints
 from relume.project.shading.shader import Shader
 from relume.project.texels import texel_rows
-from relume.steps import Steps
+from relume.steps import ResumableLoop
 
 F32 = NDArray[np.float32]
 
-_FEWEST_A_STEP, _MOST_A_STEP, _STEPS = 128, 2048, 8
+_MIN_ROWS_PER_STEP, _MAX_ROWS_PER_STEP, _NUM_STEPS = 128, 2048, 8
 
 
 @dataclass(frozen=True)
-class Shaded:
+class ShadedTerm:
     """An image of one term, before colour, texture and outgoing curves. (tiles, 3, samples) float32"""
 
     image: F32
 
     @classmethod
-    def of(cls, rows: F32) -> Shaded:
+    def from_rows(cls, rows: F32) -> ShadedTerm:
         """From one row for each sample, padded with zeros to whole tiles. rows: (n, 3)"""
-        tiles, samples = tiles_of(len(rows))
+        tiles, samples = tile_layout(len(rows))
         padded = np.zeros((tiles * samples, 3), np.float32)
         padded[: len(rows)] = rows
         return cls(np.ascontiguousarray(padded.reshape(tiles, samples, 3).transpose(0, 2, 1)))
@@ -56,33 +56,33 @@ class Shaded:
 
 def shaded_bytes(num_samples: int) -> int:
     """Memory that shading needs to keep."""
-    tiles, samples = tiles_of(num_samples)
+    tiles, samples = tile_layout(num_samples)
     return tiles * samples * 3 * 4
 
 
-def shaded_rows(
+def shade_rows(
     term: Term,
     contractions: Sequence[Contraction],
     lights: TriangleLights,
-    receivers: Receivers,
+    receivers: ShadingPoints,
     start: int,
     stop: int,
-    beside: F32 | None = None,
+    base_radiance: F32 | None = None,
 ) -> F32:
     """Contract all curves of a term at receivers [start, stop). (stop - start, 3)
 
     Args:
         contractions: of the term's curves, none of them free, from `contract_levels`.
-        lights, receivers: what arrives, and where. beside: as `Shader` takes it.
+        lights, receivers: what arrives, and where. base_radiance: as `Shader` takes it.
     """
     if term.texels is not None and receivers.uv is not None:
         return texel_rows(term.texels, lights, receivers, start, stop)
-    shader = Shader if beside is None else partial(Shader, beside=beside)
+    shader = Shader if base_radiance is None else partial(Shader, base_radiance=base_radiance)
     return project_levels(term, contractions, lights, receivers, start, stop, shader)[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
-class Begun:
+class PartialImage:
     """An image of one term of which some is shaded.
 
     Attributes:
@@ -91,13 +91,13 @@ class Begun:
     """
 
     rows: F32
-    steps: Steps
+    steps: ResumableLoop
 
     @classmethod
-    def of(cls, num_samples: int) -> Begun:
+    def empty(cls, num_samples: int) -> PartialImage:
         """Nothing of it."""
-        grain = min(max(num_samples // _STEPS, _FEWEST_A_STEP), _MOST_A_STEP)
-        return cls(np.zeros((num_samples, 3), np.float32), Steps.of(num_samples, grain))
+        grain = min(max(num_samples // _NUM_STEPS, _MIN_ROWS_PER_STEP), _MAX_ROWS_PER_STEP)
+        return cls(np.zeros((num_samples, 3), np.float32), ResumableLoop.start(num_samples, grain))
 
     @property
     def num_bytes(self) -> int:
@@ -109,45 +109,45 @@ class Begun:
         term: Term,
         bands: Mapping[str, NDArray[np.float64]],
         lights: TriangleLights,
-        receivers: Receivers,
+        receivers: ShadingPoints,
         progress: Callable[[float], None],
-        cancelled: Callable[[], bool],
-        wanted: NDArray[np.bool_] | None = None,
+        is_canceled: Callable[[], bool],
+        target_rows: NDArray[np.bool_] | None = None,
     ) -> None:
         """Shade what is lacking of it.
 
         Args:
             term: it is of. bands: of its curves, as of `shade`. lights, receivers: what arrives, and where.
-            progress: called with the share done. cancelled: asked now and then.
-            wanted: samples that are shaded, with those beside them; None: all. (n,)
+            progress: called with the share done. is_canceled: asked now and then.
+            target_rows: samples that are shaded, with those beside them; None: all. (n,)
         Raises:
-            CancelledError: `cancelled` said so; what was shaded stays.
+            CancelledError: `is_canceled` said so; what was shaded stays.
         """
         contractions = contract_levels(term, bands, None)
 
-        def some(start: int, stop: int) -> None:
-            self.rows[start:stop] = shaded_rows(term, contractions, lights, receivers, start, stop)
+        def shade_range(start: int, stop: int) -> None:
+            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop)
 
-        self.steps.work(some, progress, cancelled, "shading", wanted)
+        self.steps.run(shade_range, progress, is_canceled, "shading", target_rows)
 
 
 def shade(
     term: Term,
     bands: Mapping[str, NDArray[np.float64]],
     lights: TriangleLights,
-    receivers: Receivers,
+    receivers: ShadingPoints,
     progress: Callable[[float], None],
-    cancelled: Callable[[], bool],
-) -> Shaded:
+    is_canceled: Callable[[], bool],
+) -> ShadedTerm:
     """Contract all curves of a term.
 
     Args:
         bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) where it differs from level to level
         lights, receivers: what arrives, and where.
-        progress: called with the share done. cancelled: asked now and then.
+        progress: called with the share done. is_canceled: asked now and then.
     Raises:
-        CancelledError: `cancelled` said so.
+        CancelledError: `is_canceled` said so.
     """
-    begun = Begun.of(len(receivers.normal))
-    begun.shade(term, bands, lights, receivers, progress, cancelled)
-    return Shaded.of(begun.rows)
+    partial_image = PartialImage.empty(len(receivers.normal))
+    partial_image.shade(term, bands, lights, receivers, progress, is_canceled)
+    return ShadedTerm.from_rows(partial_image.rows)

@@ -11,7 +11,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
@@ -36,21 +36,21 @@ class Columns:
     count: NDArray[np.int64]
 
 
-def columns_of(change: NDArray[np.float64]) -> Columns:
+def changed_columns(change: NDArray[np.float64]) -> Columns:
     """The columns with a change; change: Δc, zero where nothing is to be done. (3, J), or (L, 3, J) float64"""
     change = change.reshape(-1, *change.shape[-2:])
     count = np.count_nonzero(change, axis=2)
     index = np.zeros((*count.shape, max(1, int(count.max()))), np.int32)
     values = np.zeros(index.shape, np.float32)
-    for place in np.ndindex(count.shape):
-        used = np.nonzero(change[place])[0]
-        index[place][: len(used)] = used
-        values[place][: len(used)] = change[place][used]
+    for entry in np.ndindex(count.shape):
+        changed = np.nonzero(change[entry])[0]
+        index[entry][: len(changed)] = changed
+        values[entry][: len(changed)] = change[entry][changed]
     return Columns(index, values, count.astype(np.int64))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def within_tile(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
+def tile_offset(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
     """Find where the samples of a level begin and end in a tile; there are none where they end before they begin.
 
     Args:
@@ -69,22 +69,22 @@ def _stream(transport, bounds, index, change, count, image, start, stop):  # typ
     for plane in range(start, stop):
         tile, channel = plane // 3, plane % 3
         for level in range(count.shape[0]):
-            first, last = within_tile(bounds, level, tile, samples)
+            first, last = tile_offset(bounds, level, tile, samples)
             if first >= last:
                 continue
             sums = image[tile, channel, first:last]
-            weight, which, num = change[level, channel], index[level, channel], count[level, channel]
-            whole = num // 4 * 4
-            for n in range(0, whole, 4):
-                a = transport[tile, channel, which[n], first:last]
-                b = transport[tile, channel, which[n + 1], first:last]
-                c = transport[tile, channel, which[n + 2], first:last]
-                d = transport[tile, channel, which[n + 3], first:last]
+            weight, column_index, num = change[level, channel], index[level, channel], count[level, channel]
+            num_unrolled = num // 4 * 4
+            for n in range(0, num_unrolled, 4):
+                a = transport[tile, channel, column_index[n], first:last]
+                b = transport[tile, channel, column_index[n + 1], first:last]
+                c = transport[tile, channel, column_index[n + 2], first:last]
+                d = transport[tile, channel, column_index[n + 3], first:last]
                 wa, wb, wc, wd = weight[n], weight[n + 1], weight[n + 2], weight[n + 3]
                 for s in range(sums.shape[0]):
                     sums[s] += wa * a[s] + wb * b[s] + wc * c[s] + wd * d[s]
-            for n in range(whole, num):
-                a, wa = transport[tile, channel, which[n], first:last], weight[n]
+            for n in range(num_unrolled, num):
+                a, wa = transport[tile, channel, column_index[n], first:last], weight[n]
                 for s in range(sums.shape[0]):
                     sums[s] += wa * a[s]
 
@@ -93,7 +93,7 @@ def stream(transport: F32, columns: Columns, image: F32, bounds: NDArray[np.int6
     """Add T · Δc to an image, in place.
 
     Args:
-        transport: (tiles, 3, J, samples) float32. columns: what has changed, from `columns_of`.
+        transport: (tiles, 3, J, samples) float32. columns: what has changed, from `changed_columns`.
         image: added to. (tiles, 3, samples) float32
         bounds: where the samples of each level begin and end, tile after tile; None: there is one. (L + 1,) int64
     Cost: reads 4 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
@@ -102,4 +102,4 @@ def stream(transport: F32, columns: Columns, image: F32, bounds: NDArray[np.int6
         if bounds is None:
             bounds = np.array([0, image.shape[0] * image.shape[2]], np.int64)
         args = (transport, bounds, columns.index, columns.change, columns.count, image)
-        for_shares(lambda start, stop: _stream(*args, start, stop), 3 * len(image))
+        parallel_for_chunks(lambda start, stop: _stream(*args, start, stop), 3 * len(image))

@@ -4,60 +4,62 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
-from relume.brdf.terms.btf import Texels
-from relume.operators.arrived import Arrived, arrive, arrived_bytes
-from relume.picture.light import Light
+from relume.brdf.terms.btf import BtfRef
+from relume.operators.arrived import BtfIncidentLight, collect_light, incident_light_bytes
+from relume.picture.light import Illumination
 from relume.picture.material_image import MaterialImage
 from relume.picture.view_images import ViewImages
 
-_SHARE = 4  # of the memory that one may take
+_BUDGET_DIVISOR = 4  # of the memory that one may take
 
 
-def _key(images: ViewImages, material: MaterialImage, texels: Texels, light: Light) -> tuple[Hashable, ...]:
-    rings = (part.tobytes() for part in texels.btf.rings)
-    return images.transfer.key, *images.view.place(material.index), light, "arrived", *rings
+def _key(images: ViewImages, material: MaterialImage, btf_ref: BtfRef, light: Illumination) -> tuple[Hashable, ...]:
+    grid_bytes = (array.tobytes() for array in btf_ref.btf.grid)
+    return images.transfer.key, *images.view.sample_key(material.index), light, "arrived", *grid_bytes
 
 
-def may_be_kept(images: ViewImages, material: MaterialImage, texels: Texels) -> bool:
+def is_cacheable(images: ViewImages, material: MaterialImage, btf_ref: BtfRef) -> bool:
     """Whether the memory has room for what arrives at a material, beside other things.
 
     Args:
-        images: of a view. material: of these. texels: how it is covered.
+        images: of a view. material: of these. btf_ref: how it is covered.
     """
-    return _SHARE * arrived_bytes(texels, material.num_samples) <= images.cache.budget_bytes
+    return _BUDGET_DIVISOR * incident_light_bytes(btf_ref, material.num_samples) <= images.cache.budget_bytes
 
 
-def known_arrived(images: ViewImages, material: MaterialImage, texels: Texels, light: Light) -> Arrived | None:
+def get_texel_light(
+    images: ViewImages, material: MaterialImage, btf_ref: BtfRef, light: Illumination
+) -> BtfIncidentLight | None:
     """What arrives at a material in a light, where the memory has it; for a texture that may be turned otherwise.
 
     Args:
-        images: of a view. material: of these. texels: how it is covered. light: what arrives.
+        images: of a view. material: of these. btf_ref: how it is covered. light: what arrives.
     """
-    return images.cache.find(_key(images, material, texels, light), Arrived)
+    return images.cache.get_cached(_key(images, material, btf_ref, light), BtfIncidentLight)
 
 
-def keep_arrived(
+def put_texel_light(
     images: ViewImages,
     material: MaterialImage,
-    texels: Texels,
-    light: Light,
+    btf_ref: BtfRef,
+    light: Illumination,
     progress: Callable[[float], None],
-    cancelled: Callable[[], bool],
-) -> Arrived:
+    is_canceled: Callable[[], bool],
+) -> BtfIncidentLight:
     """What arrives at a material in a light, in the frames of a texture as it is turned now; kept in place of what was
     known of it turned otherwise.
 
     Args:
-        images: of a view. material: of these. texels: how it is covered. light: what arrives.
-        progress: called with the share done. cancelled: asked now and then.
+        images: of a view. material: of these. btf_ref: how it is covered. light: what arrives.
+        progress: called with the share done. is_canceled: asked now and then.
     Raises:
-        CancelledError: `cancelled` said so.
+        CancelledError: `is_canceled` said so.
     """
-    known = known_arrived(images, material, texels, light)
-    if known is not None and known.rotation == texels.rotation:
-        return known
-    made = arrive(texels, *images.arriving(material, light, cancelled), progress, cancelled)
-    key = _key(images, material, texels, light)
-    images.cache.forget(key)
-    images.cache.get(key, Arrived, made.num_bytes, lambda: made)
-    return made  # another session may have put a texture that is turned otherwise into its place
+    cached = get_texel_light(images, material, btf_ref, light)
+    if cached is not None and cached.rotation == btf_ref.rotation:
+        return cached
+    incident = collect_light(btf_ref, *images.incident_light(material, light, is_canceled), progress, is_canceled)
+    key = _key(images, material, btf_ref, light)
+    images.cache.evict(key)
+    images.cache.get(key, BtfIncidentLight, incident.num_bytes, lambda: incident)
+    return incident  # another session may have put a texture that is turned otherwise into its place

@@ -18,29 +18,29 @@ class Fidelity(IntEnum):
 
     NOTHING = 0
     PREVIEW = 1
-    FOLLOWED = 2
+    INCREMENTAL = 2
     COARSE = 3
-    NEAR = 4
+    NEARLY_EXACT = 4
     EXACT = 5
 
 
-Word = Literal["preview", "approximate", "followed", "near", "exact"]
+FidelityLabel = Literal["preview", "approximate", "followed", "near", "exact"]
 """What a frame says of its picture, worst first; "approximate": it shows an older look, or not all coefficients yet."""
 
-_ORDER: tuple[Word, ...] = get_args(Word)
+_ORDER: tuple[FidelityLabel, ...] = get_args(FidelityLabel)
 
 
-def word_of(fidelity: Fidelity, *, is_wanted: bool) -> Word:
-    """The word for an image of some fidelity; `is_wanted`: what it shows is what the look asks for."""
+def fidelity_label(fidelity: Fidelity, *, is_current: bool) -> FidelityLabel:
+    """The word for an image of some fidelity; `is_current`: what it shows is what the look asks for."""
     if fidelity <= Fidelity.PREVIEW:
         return "preview"
-    if not is_wanted:
+    if not is_current:
         return "approximate"
     if fidelity <= Fidelity.COARSE:
         return "followed"
-    return "near" if fidelity == Fidelity.NEAR else "exact"
+    return "near" if fidelity == Fidelity.NEARLY_EXACT else "exact"
 
 
-def worst(found: Iterable[Word]) -> Word:
+def worst(labels: Iterable[FidelityLabel]) -> FidelityLabel:
     """What can be said of several images together; "exact" of none."""
-    return min(found, key=_ORDER.index, default="exact")
+    return min(labels, key=_ORDER.index, default="exact")

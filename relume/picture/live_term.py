@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.levels import Levels
-from relume.brdf.mirror import mirrored_share
+from relume.brdf.levels import RoughnessLevels
+from relume.brdf.mirror import specular_albedo
 from relume.operators.edit_basis import EditBasis
-from relume.operators.frozen import tiles_of
-from relume.operators.shade import Shaded
-from relume.picture.fidelity import Fidelity, Word, word_of
-from relume.picture.light import Light
-from relume.picture.shown import Shown
-from relume.picture.wanted import Wanted
+from relume.operators.frozen import tile_layout
+from relume.operators.shade import ShadedTerm
+from relume.picture.fidelity import Fidelity, FidelityLabel, fidelity_label
+from relume.picture.light import Illumination
+from relume.picture.shown import DisplayedImage
+from relume.picture.wanted import TargetTerm
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -34,22 +34,24 @@ class LiveTerm:
     Attributes:
         document: of the term in the newest look. light: in which it is wanted.
         term: the declaration of its model, fixed parameters put in. model: what tells it from other models.
-        target: bands of each curve in the newest look. (3, J) float64 each, or (L, 3, J), see `Wanted`
-        target_rows: the same as bytes, in order of the curves' names: what keys are made of.
-        outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
+        target_bands: bands of each curve in the newest look. (3, J) float64 each, or (L, 3, J), see `Wanted`
+        target_rows_key: the same as bytes, in order of the curves' names: what keys are made of.
+        view_factor: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
         ready: the newest image of it.
         displayed: the image in the picture; another one than `ready` until all terms can be shown in one light.
         is_composed: the picture's radiance has `displayed` in it as it is now.
-        mirror: the document whose mirror the picture shows, see `follow_mirror`.
+        mirror: the document whose mirror the picture shows, see `update_mirror`.
     """
 
-    def __init__(self, document: Mapping[str, Any], cos_theta_o: F64, levels: Levels, light: Light) -> None:
+    def __init__(
+        self, document: Mapping[str, Any], cos_theta_o: F64, levels: RoughnessLevels, light: Illumination
+    ) -> None:
         self.light = light
         self._is_solo = False
-        self._before_solo: Shown | None = None  # what can be gone on from when all sources come back
+        self._before_solo: DisplayedImage | None = None  # what can be gone on from when all sources come back
         self._cos_theta_o, self._levels = cos_theta_o, levels
-        tiles, samples = tiles_of(len(cos_theta_o))
-        self.ready = self.displayed = Shown(np.zeros((tiles, 3, samples), np.float32))
+        tiles, samples = tile_layout(len(cos_theta_o))
+        self.ready = self.displayed = DisplayedImage(np.zeros((tiles, 3, samples), np.float32))
         self.is_composed = False
         self.model: Hashable = None
         self.set_document(document)
@@ -60,135 +62,139 @@ class LiveTerm:
         """Of each sample, radians; kept once a curve of it is there."""
         return np.arccos(self._cos_theta_o)
 
-    def go_on_showing(self, before: LiveTerm, rows: NDArray[np.integer]) -> None:
+    def keep_displayed(self, before: LiveTerm, rows: NDArray[np.integer]) -> None:
         """Show what another term of the same samples does, until something of this one is ready.
 
         Args:
             before: the other. rows: of its samples, which each of these is. (n,)
         """
         if before.displayed.fidelity:
-            image = Shaded.of(Shaded(before.displayed.image).rows(len(rows))[rows]).image
-            alone = before.displayed.without_basis()
-            self.displayed = replace(alone, image=image, bands={}, anchor=None, exact_in=None, is_outdated=True)
+            image = ShadedTerm.from_rows(ShadedTerm(before.displayed.image).rows(len(rows))[rows]).image
+            base = before.displayed.without_edit()
+            self.displayed = replace(base, image=image, bands={}, reference=None, exact_region=None, is_outdated=True)
             self.mirror, self.is_composed = before.mirror, False
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """A new target; another model, or another value of a fixed parameter, starts from nothing."""
-        wanted = Wanted.of(document, lambda: self._theta_o, self._levels)
-        if wanted.model != self.model:
-            self.ready, self._before_solo = Shown(np.zeros_like(self.ready.image)), None
+        target = TargetTerm.from_document(document, lambda: self._theta_o, self._levels)
+        if target.model != self.model:
+            self.ready, self._before_solo = DisplayedImage(np.zeros_like(self.ready.image)), None
             self.displayed = replace(self.displayed, bands={}, is_outdated=True)  # none of its curves is wanted
-        elif self.ready.basis is not None and not self.ready.basis.holds_for(document):
-            self.ready = self._go_on_as(self.ready.without_basis())
-        self.document, self.term, self.model = wanted.document, wanted.term, wanted.model
-        self.target, self.outgoing = wanted.bands, wanted.outgoing
-        self.target_rows = _rows(self.target, ())
+        elif self.ready.basis is not None and not self.ready.basis.is_valid_for(document):
+            self.ready = self._replace_ready(self.ready.without_edit())
+        self.document, self.term, self.model = target.document, target.term, target.model
+        self.target_bands, self.view_factor = target.bands, target.view_factor
+        self.target_rows_key = _rows(self.target_bands, ())
         self.is_composed = False
 
-    def follow_mirror(self) -> None:
+    def update_mirror(self) -> None:
         """Its mirror follows the look; one that fades stays as it was until its lobe can be shown in its place."""
         if self.mirror is self.document:
             return
-        fades = bool(np.any(mirrored_share(self.document) < mirrored_share(self.mirror)))
+        is_fading = bool(np.any(specular_albedo(self.document) < specular_albedo(self.mirror)))
         basis = self.displayed.basis if self.displayed is self.ready else None
-        steps = () if basis is None else basis.moves  # curves on their way
-        if not fades or set(self.displayed.differing(self.target)) <= set(steps):
+        steps = () if basis is None else basis.affected_curves  # curves on their way
+        if not is_fading or set(self.displayed.changed_curves(self.target_bands)) <= set(steps):
             self.mirror, self.is_composed = self.document, False
 
-    def set_light(self, light: Light, *, is_solo: bool) -> None:
-        """It is wanted in another light; the picture goes on showing what it shows (`show_ready`).
+    def set_light(self, light: Illumination, *, is_solo: bool) -> None:
+        """It is wanted in another light; the picture goes on showing what it shows (`display_ready`).
 
         Args:
             is_solo: it is of some sources alone. Mixed from their images, those of the others would all be lacking when
                 they come back, so the image of all sources is stored for then.
         """
         self.light = light
-        current = self.ready.in_other_light()
+        current = self.ready.reset_for_new_light()
         if is_solo and not self._is_solo:
-            self._before_solo = current.anchor
+            self._before_solo = current.reference
         elif self._is_solo and not is_solo:
             before, self._before_solo = self._before_solo, None
-            if before is not None and not before.differing(self.target):
-                current = replace(current, anchor=before)
+            if before is not None and not before.changed_curves(self.target_bands):
+                current = replace(current, reference=before)
         self.ready, self._is_solo = current, is_solo
-        anchor = current.anchor
-        if anchor is not None and anchor.light == light:  # as before, after all
-            self.ready = replace(anchor.without_basis(), image=anchor.image.copy())
+        reference = current.reference
+        if reference is not None and reference.light == light:  # as before, after all
+            self.ready = replace(reference.without_edit(), image=reference.image.copy())
 
-    def put(self, shown: Shown) -> None:
+    def set_ready(self, image: DisplayedImage) -> None:
         """A new image is ready; the picture shows it at once, unless it is held back until all terms have one."""
-        self.ready = self._go_on_as(shown)
+        self.ready = self._replace_ready(image)
 
-    def _go_on_as(self, shown: Shown) -> Shown:
+    def _replace_ready(self, image: DisplayedImage) -> DisplayedImage:
         """The image that takes the place of `ready`, in the picture as well where that shows it."""
         if self.displayed is self.ready:
-            self.displayed, self.is_composed = shown, False
-        return shown
+            self.displayed, self.is_composed = image, False
+        return image
 
-    def show_ready(self) -> None:
+    def display_ready(self) -> None:
         """The picture shows what is ready from now on, where there is anything."""
         if self.ready.fidelity and self.displayed is not self.ready:
             self.displayed, self.is_composed = self.ready, False
 
     @property
-    def newest(self) -> Shown:
+    def latest(self) -> DisplayedImage:
         """What could be shown of it now: what is ready, else what was shown before."""
         return self.ready if self.ready.fidelity else self.displayed
 
     @property
-    def is_blank(self) -> bool:
+    def is_empty(self) -> bool:
         """Whether there is nothing of it that could be shown."""
-        return not self.newest.fidelity
+        return not self.latest.fidelity
 
     @property
-    def shows_another(self) -> bool:
+    def displays_outdated(self) -> bool:
         """Whether nothing of it is ready, and another model or other fixed parameters are shown in its place."""
         return self.displayed.is_outdated and not self.ready.fidelity
 
     @property
-    def is_firm(self) -> bool:
+    def is_converged(self) -> bool:
         """Whether steps may be added to what is ready."""
-        return self.ready.is_firm
+        return self.ready.is_converged
 
-    def differing(self) -> list[str]:
+    def changed_curves(self) -> list[str]:
         """Curves whose target is not summed in what is ready."""
-        return self.ready.differing(self.target) if self.is_firm else list(self.target)
+        return self.ready.changed_curves(self.target_bands) if self.is_converged else list(self.target_bands)
 
     def is_exact(self) -> bool:
         """Whether what is ready is all that is wanted."""
-        return self.ready.fidelity == Fidelity.EXACT and not self.differing()
+        return self.ready.fidelity == Fidelity.EXACT and not self.changed_curves()
 
-    def is_seen(self) -> bool:
+    def has_preview(self) -> bool:
         """Whether its look can be seen though nothing firm is ready, so that shading may wait for the hand to rest.
 
         Where the light has changed every position of the hand brings another preview; the first one of all, of a
         picture that has just been opened, is the only one, and knows nothing of curves that were moved since.
         """
         ready = self.ready
-        is_rough = ready.fidelity > Fidelity.NOTHING and not ready.is_firm
-        return is_rough and (ready.anchor is not None or not ready.differing(self.target))
+        is_preview = ready.fidelity > Fidelity.NOTHING and not ready.is_converged
+        return is_preview and (ready.reference is not None or not ready.changed_curves(self.target_bands))
 
-    def lacks_only_light(self) -> bool:
+    def needs_only_light(self) -> bool:
         """Whether all that is between its anchor and what is wanted is a change of light."""
-        anchor = self.ready.anchor
-        return anchor is not None and not self.is_firm and not anchor.differing(self.target)
+        reference = self.ready.reference
+        return reference is not None and not self.is_converged and not reference.changed_curves(self.target_bands)
 
     @property
-    def word(self) -> Word:
+    def fidelity_label(self) -> FidelityLabel:
         """How near what the picture shows of it is to its look."""
-        shown = self.displayed
-        is_wanted = not shown.is_outdated and shown.light == self.light and not shown.differing(self.target)
-        return word_of(shown.fidelity, is_wanted=is_wanted)
+        displayed = self.displayed
+        is_current = (
+            not displayed.is_outdated
+            and displayed.light == self.light
+            and not displayed.changed_curves(self.target_bands)
+        )
+        return fidelity_label(displayed.fidelity, is_current=is_current)
 
-    def key_of_operator(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
+    def operator_key(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
         """What an operator depends on besides view and material: model, light, and the curves that are dormant."""
-        return ((self.model, self.light), basis, *_rows(bands, basis.moves))
+        return ((self.model, self.light), basis, *_rows(bands, basis.affected_curves))
 
-    def key_of_image(self, light: Light) -> tuple[Hashable, ...]:
+    def image_key(self, light: Illumination) -> tuple[Hashable, ...]:
         """What the image of the target in some light depends on besides view and material."""
-        return ((self.model, light), None, *self.target_rows)
+        return ((self.model, light), None, *self.target_rows_key)
 
 
-def _rows(bands: Mapping[str, F64], moved: tuple[str, ...]) -> list[bytes]:
+def _rows(bands: Mapping[str, F64], affected_curves: tuple[str, ...]) -> list[bytes]:
     """Bands of the curves that are not moved, in order of their names."""
-    return [bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name not in moved]
+    return [bands[name].astype(np.float32).tobytes() for name in sorted(bands) if name not in affected_curves]

@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError
 from relume.look import Look
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.operators.shade import shaded_bytes
-from relume.picture.background.backdrop import Backdrop
-from relume.picture.fidelity import Word, worst
-from relume.picture.hand import Hand, Held
-from relume.picture.jobs import Freeze, Job, Place
+from relume.picture.background.backdrop import Background
+from relume.picture.fidelity import FidelityLabel, worst
+from relume.picture.hand import ActiveControl, HeldControl
+from relume.picture.jobs import Job, PrecomputeOperator, TermTarget
 from relume.picture.light import Solo
 from relume.picture.pointer import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
-from relume.picture.probe import brush, probe
-from relume.picture.region import word_in
-from relume.picture.transfer import Transfer
-from relume.picture.transition import Transition
-from relume.picture.view_images import ViewImages, documents_of
+from relume.picture.probe import highlight_pixels, probe
+from relume.picture.region import fidelity_label_in
+from relume.picture.transfer import FixedViewTransfer
+from relume.picture.transition import StrategyScheduler
+from relume.picture.view_images import ViewImages, material_documents
 from relume.views.resolve import encode, encode_coverage, resolve
 from relume.views.view import Tile
 
@@ -32,7 +32,7 @@ F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Advance:
+class Progress:
     """What one step changed.
 
     Attributes:
@@ -43,7 +43,7 @@ class Advance:
 
     tiles: list[Tile]
     exact: bool
-    fidelity: Word
+    fidelity: FidelityLabel
     complete: bool
     was_off: float | None = None
 
@@ -60,17 +60,17 @@ class Picture:
         is_watched: somebody looks at it while it opens, and sees a rough picture first where a better one takes long.
     """
 
-    def __init__(self, transfer: Transfer, view_name: str, cache: Memory, *, is_watched: bool = False) -> None:
+    def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache, *, is_watched: bool = False) -> None:
         self._images = ViewImages(transfer, view_name, cache)
         self._view = self._images.view
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
         self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
-        self._backdrop = Backdrop(self._images)
-        self._touched: CurvePointer | ParameterPointer | None = None
-        self._moved: CurvePointer | ParameterPointer | None = None
-        self._pointer: Pointer | None = None
-        self._transition = Transition(self._images, is_watched=is_watched)
+        self._background = Background(self._images)
+        self._prepared_pointer: CurvePointer | ParameterPointer | None = None
+        self._edited_pointer: CurvePointer | ParameterPointer | None = None
+        self._active_pointer: Pointer | None = None
+        self._scheduler = StrategyScheduler(self._images, is_watched=is_watched)
 
     def check(self, look: Look) -> None:
         """Whether a look can be shown at all, before any picture is given it; nothing changes.
@@ -78,44 +78,45 @@ class Picture:
         Raises:
             MemoryBudgetError: the images of its terms are larger than the memory may be.
         """
-        samples = ((m.num_samples, len(documents_of(look, name))) for name, m in self._images.by_name.items())
+        samples = ((m.num_samples, len(material_documents(look, name))) for name, m in self._images.by_name.items())
         self._images.cache.check(sum(shaded_bytes(num) * terms for num, terms in samples if num))
 
-    def set_look(self, look: Look, *, hand: str | None = None, solo: Solo = None) -> None:
+    def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
         """A new target; nothing is computed yet.
 
         Args:
-            hand: pointer to what the user's hand is on while it makes this look, see `parse_pointer`; None where that
-                is not known, as after an undo.
+            active_pointer: pointer to what the user's hand is on while it makes this look, see `parse_pointer`; None
+                where that is not known, as after an undo.
             solo: names of sources of light that alone are shown, see `light_of`; None: all.
         Raises:
-            ParameterError: `hand` points to nothing that a hand may hold. NotFoundError, SceneError: the environment or
-                an image cannot be had. StoreError: the bake is too old for images. The picture stays as it was.
+            ParameterError: `active_pointer` points to nothing that a hand may hold. NotFoundError, SceneError: the
+                environment or an image cannot be had. StoreError: the bake is too old for images. The picture stays as
+                it was.
         """
-        moved = None if hand is None else parse_pointer(hand)
-        before, images = self._images.light, self._images.following(look)
+        edited = None if active_pointer is None else parse_pointer(active_pointer)
+        before, images = self._images.light, self._images.view_with_overrides(look)
         images.set_look(look, solo)
         if images is not self._images:
-            self._show(images)
-        self._moved = moved if isinstance(moved, CurvePointer | ParameterPointer) else None
-        self._pointer = moved or self._pointer
+            self._switch_images(images)
+        self._edited_pointer = edited if isinstance(edited, CurvePointer | ParameterPointer) else None
+        self._active_pointer = edited or self._active_pointer
         if (images.light.environment, images.light.local) != (before.environment, before.local):
-            self._touched = None  # the hand has moved on to a light
+            self._prepared_pointer = None  # the hand has moved on to a light
         self._look = look
 
-    def _show(self, images: ViewImages) -> None:
+    def _switch_images(self, images: ViewImages) -> None:
         """Go on with other images of the same view."""
         self._images, self._view = images, images.view
         for material in images.by_name.values():
-            material.seen_in(images.view)
-        self._backdrop = Backdrop(images)
-        self._transition.go_on_with(images)
+            material.set_view(images.view)
+        self._background = Background(images)
+        self._scheduler.adopt(images)
 
     def look_at(self, region: Tile | None) -> None:
         """What is seen of the picture, and is to be exact first: x, y, width, height in pixels; None: all."""
         self._images.region = region
 
-    def touch(self, pointer: str) -> None:
+    def prepare(self, pointer: str) -> None:
         """Prepare what a hand takes hold of ahead of its first edit.
 
         Args:
@@ -123,61 +124,63 @@ class Picture:
         Raises:
             ParameterError: there is no such curve or parameter in this look.
         """
-        touched = parse_pointer(pointer)
-        if isinstance(touched, CurvePointer | ParameterPointer):
-            self._images.find(touched)
-            self._touched = touched
-        self._pointer = touched
+        prepared = parse_pointer(pointer)
+        if isinstance(prepared, CurvePointer | ParameterPointer):
+            self._images.material_term(prepared)
+            self._prepared_pointer = prepared
+        self._active_pointer = prepared
 
     def next_job(self) -> Job | None:
         """What must be made next, for the look or for what was touched; None where nothing is lacking.
 
         The picture may be advanced meanwhile: all that does not depend on it follows the look.
         """
-        return self._transition.next_job(self._hand(), self._look)
+        return self._scheduler.next_job(self._active_control(), self._look)
 
-    def install(self, job: Job, made: Any) -> None:
+    def install(self, job: Job, result: Any) -> None:
         """Go on with what a job has made, unless the look has moved on to where it is of no use."""
-        self._transition.install(job, made)
-        touched = self._hand().touched
-        if not isinstance(job, Freeze) or touched is None or touched.place.live is not job.place.live:
+        self._scheduler.install(job, result)
+        prepared = self._active_control().prepared_control
+        if not isinstance(job, PrecomputeOperator) or prepared is None or prepared.target.live is not job.target.live:
             return
-        if touched.basis != job.basis and touched.place.live.ready.basis == job.basis:
-            self._touched = None  # the hand has moved on to something else of this term
+        if prepared.basis != job.basis and prepared.target.live.ready.basis == job.basis:
+            self._prepared_pointer = None  # the hand has moved on to something else of this term
 
-    def freeze(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None:
+    def run_next_job(self, progress: Callable[[float], None], is_canceled: Callable[[], bool]) -> None:
         """Make what `next_job` names and install it.
 
         Raises:
-            CancelledError: `cancelled` said so; the picture stays as it was.
+            CancelledError: `is_canceled` said so; the picture stays as it was.
             MemoryBudgetError: it is larger than the cache may be.
         """
         job = self.next_job()
         if job is not None:
-            self.install(job, job.make(progress, cancelled))
+            self.install(job, job.run(progress, is_canceled))
 
-    def advance(self, max_coefficients: int | None) -> Advance:
+    def advance(self, max_coefficients: int | None) -> Progress:
         """Bring the picture towards its look: R += T · Δc with the most important coefficients, None for all."""
-        images, transition = self._images, self._transition
-        transition.step(max_coefficients)
+        images, scheduler = self._images, self._scheduler
+        scheduler.advance(max_coefficients)
         tiles: set[Tile] = set()
-        light, gain = transition.light, self._backdrop.gain_of(transition.gain, self._look.background)
-        is_new_behind = self._backdrop.follow(self._look, light, gain, self._radiance)
-        lamps = images.mirrors.lamps(light)
+        light, gain = scheduler.light, self._background.clamped_gain(scheduler.gain, self._look.background)
+        is_background_new = self._background.update(self._look, light, gain, self._radiance)
+        emitter_radiance = images.mirrors.mirror_emitters(light)
         for index, material in enumerate(images.by_name.values()):
-            material.set_before(lamps)
+            material.set_mirror_emission(emitter_radiance)
             if material.num_samples and material.compose(self._radiance):
-                tiles.update(self._view.tiles_of_material[index])
-        for index in images.follow_mirrors(self._look):
-            tiles.update(self._view.tiles_of_material[index])
-        if is_new_behind or not np.array_equal(self._gain, gain):
+                tiles.update(self._view.material_tiles[index])
+        for index in images.update_mirrors(self._look):
+            tiles.update(self._view.material_tiles[index])
+        if is_background_new or not np.array_equal(self._gain, gain):
             self._gain = gain
             tiles.update(self._view.all_tiles)
-        exact = all(live.word == "exact" for _, live in images.terms())
-        fidelity = worst(word_in(Place(images, *of), images.region) for of in images.terms())
-        complete = not any(live.is_blank for _, live in images.terms())
+        exact = all(live.fidelity_label == "exact" for _, live in images.terms())
+        fidelity = worst(
+            fidelity_label_in(TermTarget(images, *material_term), images.region) for material_term in images.terms()
+        )
+        complete = not any(live.is_empty for _, live in images.terms())
         in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
-        return Advance(in_order, exact, fidelity, complete)
+        return Progress(in_order, exact, fidelity, complete)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the picture."""
@@ -189,14 +192,14 @@ class Picture:
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
         """How much each pixel of tiles hides of display values behind it, a byte each; None where it hides all."""
-        if not self._backdrop.is_transparent:
+        if not self._background.is_transparent:
             return None
-        alpha = self._backdrop.alpha(for_display=True)
+        alpha = self._background.alpha(for_display=True)
         return encode_coverage(alpha, tiles)
 
     def alpha(self, *, for_display: bool) -> F32 | None:
         """The same of the whole picture, or how much it hides of linear radiance. (height, width) float32"""
-        return self._backdrop.alpha(for_display=for_display) if self._backdrop.is_transparent else None
+        return self._background.alpha(for_display=for_display) if self._background.is_transparent else None
 
     def image(self) -> F32:
         """Linear radiance, nothing where it is transparent. (height, width, 3) float32"""
@@ -206,28 +209,34 @@ class Picture:
 
     def curve(self, pointer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Bands of a curve as displayed and as its parameters alone would give it. (3, J) each"""
-        wanted = parse_curve(pointer)
-        _, term = self._images.find(wanted)
-        declared = term.term.curve(wanted.name)
+        curve_pointer = parse_curve(pointer)
+        _, term = self._images.material_term(curve_pointer)
+        declared = term.term.curve(curve_pointer.name)
         return curve_bands(term.document, declared), generated_bands(term.document, declared)
 
-    def probe(self, x: int, y: int) -> dict[str, Any]:
-        """What makes up a pixel, and where its surface is; see `relume.picture.probe.probe`."""
-        return probe(self._images, self._radiance, self._gain, self._touched, x, y)
+    def inspect(self, x: int, y: int) -> dict[str, Any]:
+        """What makes up a pixel, and where its surface is; see `relume.picture.inspect.inspect`."""
+        return probe(self._images, self._radiance, self._gain, self._prepared_pointer, x, y)
 
-    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32:
-        """Which pixels a stretch of a curve lights. See `relume.picture.probe.brush`."""
-        return brush(self._images, self._radiance, parse_curve(pointer), from_deg, to_deg)
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+        """Which pixels a stretch of a curve lights. See `relume.picture.inspect.brush`."""
+        return highlight_pixels(self._images, self._radiance, parse_curve(pointer), from_deg, to_deg)
 
-    def _hand(self) -> Hand:
+    def _active_control(self) -> ActiveControl:
         """What the hand is on in the look as it is now."""
-        return Hand(self._held(self._touched), self._held(self._moved), self._pointer)
+        return ActiveControl(
+            self._resolve_control(self._prepared_pointer),
+            self._resolve_control(self._edited_pointer),
+            self._active_pointer,
+        )
 
-    def _held(self, pointer: CurvePointer | ParameterPointer | None) -> Held | None:
+    def _resolve_control(self, pointer: CurvePointer | ParameterPointer | None) -> HeldControl | None:
         """What a pointer means in the look as it is now; None where an edit has removed it."""
         if pointer is None:
             return None
         try:
-            return Held(Place(self._images, *self._images.find(pointer)), self._images.basis(pointer))
+            return HeldControl(
+                TermTarget(self._images, *self._images.material_term(pointer)), self._images.basis(pointer)
+            )
         except ParameterError:
             return None

@@ -18,22 +18,22 @@ class _TermPointer:
     term: int
     name: str
 
-    def _written(self, group: str) -> str:
-        return f"/materials/{_escaped(self.material)}/terms/{self.term}/{group}/{self.name}"
+    def _format(self, group: str) -> str:
+        return f"/materials/{_escape(self.material)}/terms/{self.term}/{group}/{self.name}"
 
 
 class CurvePointer(_TermPointer):
     """A curve of a look."""
 
     def __str__(self) -> str:
-        return self._written("curves")
+        return self._format("curves")
 
 
 class ParameterPointer(_TermPointer):
     """A parameter of a term of a look."""
 
     def __str__(self) -> str:
-        return self._written("params")
+        return self._format("params")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ColorPointer:
     field: str
 
     def __str__(self) -> str:
-        return f"/materials/{_escaped(self.material)}/terms/{self.term}/{self.field}"
+        return f"/materials/{_escape(self.material)}/terms/{self.term}/{self.field}"
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class LightPointer:
     name: str
 
     def __str__(self) -> str:
-        return f"/lights/{_escaped(self.name)}"
+        return f"/lights/{_escape(self.name)}"
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,10 @@ class EnvironmentPointer:
 Pointer = CurvePointer | ParameterPointer | ColorPointer | TransportPointer | LightPointer | EnvironmentPointer
 
 ROTATION = EnvironmentPointer("rotation")
-_KINDS: dict[str, type[CurvePointer] | type[ParameterPointer]] = {"curves": CurvePointer, "params": ParameterPointer}
+_POINTER_TYPES: dict[str, type[CurvePointer] | type[ParameterPointer]] = {
+    "curves": CurvePointer,
+    "params": ParameterPointer,
+}
 _TERM = re.compile(
     r"/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9][0-9]{0,2})/(?P<group>curves|params)/(?P<name>[a-z_0-9]+)"
 )
@@ -98,13 +101,13 @@ def parse_pointer(pointer: str) -> Pointer:
         ParameterError: it points to nothing that a hand may hold.
     """
     if term := _TERM.fullmatch(pointer):
-        return _KINDS[term["group"]](_unescaped(term["material"]), int(term["term"]), term["name"])
+        return _POINTER_TYPES[term["group"]](_unescape(term["material"]), int(term["term"]), term["name"])
     if color := _COLOR.fullmatch(pointer):
-        return ColorPointer(_unescaped(color["material"]), int(color["term"]), color["field"])
+        return ColorPointer(_unescape(color["material"]), int(color["term"]), color["field"])
     if transport := _TRANSPORT.fullmatch(pointer):
         return TransportPointer(transport["field"])
     if light := _LIGHT.fullmatch(pointer):
-        return LightPointer(_unescaped(light["name"]))
+        return LightPointer(_unescape(light["name"]))
     if environment := _ENVIRONMENT.fullmatch(pointer):
         return EnvironmentPointer(environment["field"])
     raise ParameterError(
@@ -114,11 +117,11 @@ def parse_pointer(pointer: str) -> Pointer:
     )
 
 
-def _escaped(token: str) -> str:
+def _escape(token: str) -> str:
     return token.replace("~", "~0").replace("/", "~1")
 
 
-def _unescaped(token: str) -> str:
+def _unescape(token: str) -> str:
     return token.replace("~1", "/").replace("~0", "~")
 
 
@@ -128,18 +131,18 @@ def parse_curve(pointer: str) -> CurvePointer:
     Raises:
         ParameterError: it does not point to one.
     """
-    found = parse_pointer(pointer)
-    if not isinstance(found, CurvePointer):
+    parsed = parse_pointer(pointer)
+    if not isinstance(parsed, CurvePointer):
         raise ParameterError("curve", pointer, "a pointer like /materials/NAME/terms/0/curves/theta_h")
-    return found
+    return parsed
 
 
-def check_there(pointer: CurvePointer | ParameterPointer, look: Look) -> None:
+def check_exists(pointer: CurvePointer | ParameterPointer, look: Look) -> None:
     """Raises ParameterError where a pointer is to a term, a curve or a parameter that a look has not."""
     material = look.materials.get(pointer.material)
     if material is None or not 0 <= pointer.term < len(material.terms):
         raise ParameterError("pointer", str(pointer), "a term of this look")
     declared = TERMS[material.terms[pointer.term]["model"]]
     names = declared.curves if isinstance(pointer, CurvePointer) else declared.parameters
-    if pointer.name not in [one.name for one in names]:
+    if pointer.name not in [declaration.name for declaration in names]:
         raise ParameterError("pointer", str(pointer), "a curve or a parameter of its term")

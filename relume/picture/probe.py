@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from relume.basis.daubechies import analysis, synthesis
 from relume.color import luminance
-from relume.errors import NotFrozenError, ParameterError
+from relume.errors import NotPrecomputedError, ParameterError
 from relume.operators.edit_basis import CurveBasis
 from relume.picture.live_term import LiveTerm
 from relume.picture.pointer import CurvePointer, ParameterPointer
@@ -23,7 +23,7 @@ def probe(
     images: ViewImages,
     radiance: F32,
     gain: NDArray[np.float64],
-    touched: CurvePointer | ParameterPointer | None,
+    prepared_pointer: CurvePointer | ParameterPointer | None,
     x: int,
     y: int,
 ) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def probe(
     Args:
         images: of the picture. x, y: of the pixel.
         radiance: of every view sample. (3, samples) float32. gain: multiplies each channel. (3,)
-        touched: of the term to answer for, where it is the pixel's material's.
+        prepared_pointer: of the term to answer for, where it is the pixel's material's.
     Raises:
         ParameterError: the pixel lies outside the picture.
     """
@@ -42,29 +42,36 @@ def probe(
     pixel = y * view.width + x
     entries = slice(int(view.first[pixel]), int(view.first[pixel + 1]))
     samples, gains = view.order[entries], images.mirrors.gains[entries]
-    seen = gain * (radiance[:, samples] * gains.T).sum(axis=1)
-    heaviest = int(samples[np.argmax(view.gains[entries].max(axis=1))])
-    index = int(np.searchsorted(view.bounds, heaviest, side="right")) - 1
-    found = {"material": None, "position": None, "normal": None, "radiance": seen, "bands": None, "curve": None}
+    pixel_radiance = gain * (radiance[:, samples] * gains.T).sum(axis=1)
+    main_sample = int(samples[np.argmax(view.throughput[entries].max(axis=1))])
+    index = int(np.searchsorted(view.bounds, main_sample, side="right")) - 1
+    properties = {
+        "material": None,
+        "position": None,
+        "normal": None,
+        "radiance": pixel_radiance,
+        "bands": None,
+        "curve": None,
+    }
     if index >= len(images.by_name):
-        return found
+        return properties
     name = images.transfer.material_names[index]
-    position, normal = view.surface_at(heaviest)
-    found |= {"material": name, "position": position, "normal": normal}
-    for k, term in _touched_first(images, name, touched):
+    position, normal = view.surface_at(main_sample)
+    properties |= {"material": name, "position": position, "normal": normal}
+    for k, term in _prepared_first(images, name, prepared_pointer):
         bands = _contributions(images, name, term, samples, gains)
         if bands is not None and isinstance(term.ready.basis, CurveBasis):
             pointer = str(CurvePointer(name, k, term.ready.basis.name))
-            return found | {"bands": gain[:, None] * bands, "curve": pointer}
-    return found
+            return properties | {"bands": gain[:, None] * bands, "curve": pointer}
+    return properties
 
 
-def _touched_first(
-    images: ViewImages, name: str, touched: CurvePointer | ParameterPointer | None
+def _prepared_first(
+    images: ViewImages, name: str, prepared_pointer: CurvePointer | ParameterPointer | None
 ) -> list[tuple[int, LiveTerm]]:
     terms = list(enumerate(images.by_name[name].terms))
-    if touched is not None and touched.material == name:
-        terms.sort(key=lambda item: item[0] != touched.term)
+    if prepared_pointer is not None and prepared_pointer.material == name:
+        terms.sort(key=lambda item: item[0] != prepared_pointer.term)
     return terms
 
 
@@ -73,44 +80,44 @@ def _contributions(
 ) -> NDArray[np.float64] | None:
     """T_j · c_j of the term's active curve, summed over a pixel's samples, (3, J); None where none is frozen."""
     material = images.by_name[name]
-    frozen = images.operator(material, term)
+    operator = images.operator(material, term)
     ready = term.ready
-    if frozen is None or not isinstance(ready.basis, CurveBasis):
+    if operator is None or not isinstance(ready.basis, CurveBasis):
         return None
     rows = images.view.rows(material.index)
-    curve = synthesis(ready.coefficients) if ready.coefficients is not None else term.target[ready.basis.name]
+    curve = synthesis(ready.coefficients) if ready.coefficients is not None else term.target_bands[ready.basis.name]
     bands = np.zeros(curve.shape[-2:])
-    for sample, of_sample in zip(samples, gains, strict=True):
+    for sample, sample_gain in zip(samples, gains, strict=True):
         if rows.start <= sample < rows.stop:
             row = int(sample) - rows.start
-            columns = synthesis(frozen.columns_at(row))
-            here = curve if curve.ndim == 2 else curve[material.level_at(row)]
-            bands += of_sample[:, None] * columns * material.factors_at(term, row)[:, None] * here
+            columns = synthesis(operator.columns_at(row))
+            sample_curve = curve if curve.ndim == 2 else curve[material.level_at(row)]
+            bands += sample_gain[:, None] * columns * material.factors_at(term, row)[:, None] * sample_curve
     return bands
 
 
-def brush(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: float, to_deg: float) -> F32:
+def highlight_pixels(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: float, to_deg: float) -> F32:
     """How much of each pixel comes from a stretch of a curve, 0 to 1. (height, width) float32
 
     Args:
-        images, radiance: as in `probe`. pointer: to the curve. from_deg, to_deg: ends of the stretch, degrees.
+        images, radiance: as in `inspect`. pointer: to the curve. from_deg, to_deg: ends of the stretch, degrees.
     Raises:
         NotFrozenError: the curve is not frozen yet; touch it and freeze first.
     """
-    material, term = images.find(pointer)
-    frozen = images.operator(material, term)
-    if frozen is None or term.ready.basis != images.basis(pointer) or term.ready.coefficients is None:
-        raise NotFrozenError("this curve is not frozen yet; take it in hand, and brush over it once it is")
+    material, term = images.material_term(pointer)
+    operator = images.operator(material, term)
+    if operator is None or term.ready.basis != images.basis(pointer) or term.ready.coefficients is None:
+        raise NotPrecomputedError("this curve is not frozen yet; take it in hand, and brush over it once it is")
     bands = synthesis(term.ready.coefficients)
     edges = np.linspace(0, 90, bands.shape[-1] + 1)
     overlap = np.clip(np.minimum(edges[1:], to_deg) - np.maximum(edges[:-1], from_deg), 0, None) / np.diff(edges)
-    part = np.empty_like(term.ready.image)
-    frozen.write_image(analysis(bands * overlap), part)
+    range_image = np.empty_like(term.ready.image)
+    operator.write_image(analysis(bands * overlap), range_image)
     lit_radiance = np.zeros_like(radiance)
-    material.term_radiance(term, part, lit_radiance)
+    material.term_radiance(term, range_image, lit_radiance)
     view = images.view
     whole = [(0, 0, view.width, view.height)]
     lit = luminance(np.maximum(resolve(view, lit_radiance, whole, 1.0, images.mirrors.gains), 0))
     total = luminance(resolve(view, radiance, whole, 1.0, images.mirrors.gains))
-    share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 1e-9)
-    return np.clip(share, 0, 1).reshape(view.height, view.width).astype(np.float32)
+    fraction = np.divide(lit, total, out=np.zeros_like(lit), where=total > 1e-9)
+    return np.clip(fraction, 0, 1).reshape(view.height, view.width).astype(np.float32)

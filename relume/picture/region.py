@@ -13,16 +13,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.operators.shade import Shaded
-from relume.picture.fidelity import Fidelity, Word
-from relume.picture.jobs import Cancelled, Place, Progress, Shade
-from relume.picture.light import Light
-from relume.picture.shown import Shown
+from relume.operators.shade import ShadedTerm
+from relume.picture.fidelity import Fidelity, FidelityLabel
+from relume.picture.jobs import CancelCheck, ProgressCallback, Shade, TermTarget
+from relume.picture.light import Illumination
+from relume.picture.shown import DisplayedImage
 from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
 
-_WORTH = 20_000  # samples out of sight; shading fewer takes no longer than another frame is worth
+_MIN_HIDDEN_SAMPLES = 20_000  # samples out of sight; shading fewer takes no longer than another frame is worth
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +36,12 @@ class ShadeRegion:
     whole: Shade
     region: Tile
     state: Literal["freezing", "shading"] = "shading"
-    goes_on = True
+    is_resumable = True
 
     @property
-    def what(self) -> str:
+    def label(self) -> str:
         """In words."""
-        return self.whole.what
+        return self.whole.label
 
     @property
     def key(self) -> tuple[Hashable, ...]:
@@ -49,75 +49,75 @@ class ShadeRegion:
         return (*self.whole.key, "region", self.region)
 
     @property
-    def refines(self) -> bool:
+    def is_refinement(self) -> bool:
         """See `Job`."""
-        return self.whole.refines
+        return self.whole.is_refinement
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> F32:
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> F32:
         """See `Job`. Returns rows of the image, of which those in the region are right. (n, 3)"""
-        return self.whole.some(self.whole.place.material.lies_in(self.region), progress, cancelled)
+        return self.whole.shade_samples(self.whole.target.material.lies_in(self.region), progress, is_canceled)
 
-    def install(self, made: F32) -> None:
+    def install(self, result: F32) -> None:
         """See `Job`; samples in the region show this from now on, others what they did."""
-        images, material, live = self.whole.place
-        key = images.key_of_image(material, live, live.light)
-        if not self.whole.place.is_there() or self.whole.key != key or not _may_be_in_parts(live.ready, live.light):
+        images, material, live = self.whole.target
+        key = images.image_key(material, live, live.light)
+        if not self.whole.target.exists() or self.whole.key != key or not _allows_partial(live.ready, live.light):
             return
-        image = with_rows(live.ready.image, made, material.lies_in(self.region))
-        live.put(replace(live.ready, image=image, exact_in=(key, self.region)))
+        image = with_samples(live.ready.image, result, material.lies_in(self.region))
+        live.set_ready(replace(live.ready, image=image, exact_region=(key, self.region)))
 
 
-def _may_be_in_parts(ready: Shown, light: Light) -> bool:
+def _allows_partial(ready: DisplayedImage, light: Illumination) -> bool:
     """Whether some of an image may be exact: it is shown, in this light, and nothing is added to it."""
-    return ready.fidelity in (Fidelity.PREVIEW, Fidelity.FOLLOWED) and ready.light == light
+    return ready.fidelity in (Fidelity.PREVIEW, Fidelity.INCREMENTAL) and ready.light == light
 
 
-def with_rows(image: F32, rows: F32, which: NDArray[np.bool_]) -> F32:
+def with_samples(image: F32, rows: F32, mask: NDArray[np.bool_]) -> F32:
     """A copy of an image in which some samples are those of rows.
 
     Args:
-        image: (tiles, 3, samples) float32. rows: (n, 3) float32. which: of the rows. (n,)
+        image: (tiles, 3, samples) float32. rows: (n, 3) float32. mask: of the rows. (n,)
     """
-    return Shaded.of(np.where(which[:, None], rows, Shaded(image).rows(len(which)))).image
+    return ShadedTerm.from_rows(np.where(mask[:, None], rows, ShadedTerm(image).rows(len(mask)))).image
 
 
-def is_exact_in(place: Place, region: Tile | None) -> bool:
+def is_exact_within(target: TermTarget, region: Tile | None) -> bool:
     """Whether what a term has ready is exact in a region of the picture, though not in all of it."""
-    images, material, live = place
-    found = live.ready.exact_in
-    if region is None or found is None or not _contains(found[1], region):
+    images, material, live = target
+    exact_region = live.ready.exact_region
+    if region is None or exact_region is None or not _contains(exact_region[1], region):
         return False
-    return found[0] == images.key_of_image(material, live, live.light)
+    return exact_region[0] == images.image_key(material, live, live.light)
 
 
-def word_in(place: Place, region: Tile | None) -> Word:
+def fidelity_label_in(target: TermTarget, region: Tile | None) -> FidelityLabel:
     """How near what is shown of a term in a region is to its look; None: in all of the picture."""
-    live = place.live
-    is_shown = live.displayed is live.ready and is_exact_in(place, region)
-    return "exact" if is_shown or not is_seen(place, region) else live.word
+    live = target.live
+    is_exact = live.displayed is live.ready and is_exact_within(target, region)
+    return "exact" if is_exact or not is_visible(target, region) else live.fidelity_label
 
 
-def is_seen(place: Place, region: Tile | None) -> bool:
+def is_visible(target: TermTarget, region: Tile | None) -> bool:
     """Whether any sample of a term's material lies in a region; None: in the picture."""
-    return region is None or bool(place.material.lies_in(region).any())
+    return region is None or bool(target.material.lies_in(region).any())
 
 
-def region_first(whole: Shade, lacking: Iterable[Place], region: Tile | None) -> ShadeRegion | None:
+def make_region_job(whole: Shade, candidates: Iterable[TermTarget], region: Tile | None) -> ShadeRegion | None:
     """What of an image is to be shaded first; None where all of it is.
 
     Args:
-        whole: the image. lacking: terms of the picture that are shaded, this one among them. region: that is seen.
+        whole: the image. candidates: terms of the picture that are shaded, this one among them. region: that is seen.
     """
-    images, material, live = place = whole.place
-    if region is None or is_exact_in(place, region) or not _may_be_in_parts(live.ready, live.light):
+    images, material, live = target = whole.target
+    if region is None or is_exact_within(target, region) or not _allows_partial(live.ready, live.light):
         return None
-    if images.is_at_hand(material, live):
+    if images.is_cached(material, live):
         return None
-    out_of_sight = sum(np.count_nonzero(~other.material.lies_in(region)) for other in lacking)
+    num_hidden = sum(np.count_nonzero(~candidate.material.lies_in(region)) for candidate in candidates)
     is_split = 0 < np.count_nonzero(material.lies_in(region)) < material.num_samples
-    return ShadeRegion(whole, region) if is_split and out_of_sight > _WORTH else None
+    return ShadeRegion(whole, region) if is_split and num_hidden > _MIN_HIDDEN_SAMPLES else None
 
 
-def _contains(one: Tile, other: Tile) -> bool:
-    (x, y, width, height), (left, top, across, down) = one, other
+def _contains(outer: Tile, inner: Tile) -> bool:
+    (x, y, width, height), (left, top, across, down) = outer, inner
     return x <= left and y <= top and left + across <= x + width and top + down <= y + height

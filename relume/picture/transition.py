@@ -17,25 +17,31 @@ import numpy as np
 from relume.look import Look
 from relume.look.model import Rgb
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.frozen import Rough
+from relume.operators.frozen import MergedLightOperator
 from relume.operators.shade import shaded_bytes
 from relume.picture.fidelity import Fidelity
-from relume.picture.hand import Hand
-from relume.picture.jobs import Freeze, Job, Place, Shade, goes_on_from
-from relume.picture.light import Light, of_source, vector_of
-from relume.picture.region import is_exact_in, is_seen, region_first
+from relume.picture.hand import ActiveControl
+from relume.picture.jobs import Job, PrecomputeOperator, Shade, TermTarget, can_resume_from
+from relume.picture.light import Illumination, element_gains, single_source
+from relume.picture.region import is_exact_within, is_visible, make_region_job
 from relume.picture.routes import operator, textures
-from relume.picture.routes.base import LightRoute
-from relume.picture.routes.follow import Follow
-from relume.picture.routes.mix import Mix
-from relume.picture.routes.preview import Preview, can_preview, helps_to_open, is_prepared, is_worth_finer
-from relume.picture.routes.recall import Recall
-from relume.picture.thinning import EXACT, ROUGH, Form, comes_roughly, form_for
+from relume.picture.routes.base import LightStrategy
+from relume.picture.routes.follow import IncrementalLight
+from relume.picture.routes.mix import LinearMix
+from relume.picture.routes.preview import (
+    SparsePreview,
+    can_preview,
+    is_needed_for_first_frame,
+    is_prepared,
+    should_refine,
+)
+from relume.picture.routes.recall import CachedImage
+from relume.picture.thinning import EXACT, MERGED_LIGHT, OperatorForm, operator_form, use_coarse
 from relume.picture.view_images import ViewImages
 from relume.project.levels import contract_levels
 
 
-class Transition:
+class StrategyScheduler:
     """Of one picture.
 
     Attributes:
@@ -44,314 +50,327 @@ class Transition:
 
     def __init__(self, images: ViewImages, *, is_watched: bool) -> None:
         self._images, self._is_watched = images, is_watched
-        self._mix, self._follow = Mix(), Follow(images)
+        self._linear_mix, self._incremental = LinearMix(), IncrementalLight(images)
         # highest fidelity first, and of equal ones what costs least
-        self._routes: Sequence[LightRoute] = (Recall(), self._mix, self._follow)
-        self._previewed: tuple[Light, Rgb] | None = None
+        self._strategies: Sequence[LightStrategy] = (CachedImage(), self._linear_mix, self._incremental)
+        self._previewed: tuple[Illumination, Rgb] | None = None
         self.light, self.gain = images.light, images.gain
-        images.shine_in(self.light)
+        images.set_emission(self.light)
 
-    def go_on_with(self, images: ViewImages) -> None:
+    def adopt(self, images: ViewImages) -> None:
         """Bring other images of the same picture to what is wanted from now on: some of its samples are sorted anew."""
-        self._images, self._follow, self._previewed = images, Follow(images), None
-        self._routes = (Recall(), self._mix, self._follow)
-        images.shine_in(self.light)
+        self._images, self._incremental, self._previewed = images, IncrementalLight(images), None
+        self._strategies = (CachedImage(), self._linear_mix, self._incremental)
+        images.set_emission(self.light)
 
     # what a frame shows
 
-    def step(self, max_coefficients: int | None) -> None:
+    def advance(self, max_coefficients: int | None) -> None:
         """Bring every term as near to what is wanted as it can be now."""
-        for place in self._places():
-            textures.step(place)
+        for target in self._targets():
+            textures.step(target)
         self._change_light()
-        for place in self._places():
-            if not place.live.is_exact():
-                operator.step(place, max_coefficients)
+        for target in self._targets():
+            if not target.live.is_exact():
+                operator.step(target, max_coefficients)
 
-    def install(self, job: Job, made: object) -> None:
+    def install(self, job: Job, result: object) -> None:
         """Go on with what a job has made."""
-        job.install(made)
-        if isinstance(job, Preview):
+        job.install(result)
+        if isinstance(job, SparsePreview):
             self._previewed = job.light, job.gain
         self._change_light()
 
     def _change_light(self) -> None:
         """Bring terms to the light that is wanted, if all can be; else those that can to the light of a preview."""
-        wanted = self._images.light
-        unlit = self._unlit()
-        late = [p for p in unlit if not p.live.is_blank and p.live.ready.light != wanted]
-        if all(self._route(place, wanted) for place in late):
-            self._bring(unlit, wanted)
-        elif self._previewed is not None and any(p.live.ready.light == self._previewed[0] for p in unlit):
-            self._bring(unlit, self._previewed[0])
-        self._show()
+        target_light = self._images.light
+        unconverged = self._unconverged_targets()
+        outdated = [p for p in unconverged if not p.live.is_empty and p.live.ready.light != target_light]
+        if all(self._best_strategy(target, target_light) for target in outdated):
+            self._apply_strategies(unconverged, target_light)
+        elif self._previewed is not None and any(p.live.ready.light == self._previewed[0] for p in unconverged):
+            self._apply_strategies(unconverged, self._previewed[0])
+        self._display_latest()
 
-    def _bring(self, unlit: Iterable[Place], light: Light) -> None:
-        for place in unlit:
-            route, ready = self._route(place, light), place.live.ready
-            if route is not None and (ready.light != light or ready.fidelity < route.fidelity):
-                route.apply(place, light)
+    def _apply_strategies(self, unconverged: Iterable[TermTarget], light: Illumination) -> None:
+        for target in unconverged:
+            strategy, ready = self._best_strategy(target, light), target.live.ready
+            if strategy is not None and (ready.light != light or ready.fidelity < strategy.fidelity):
+                strategy.evaluate(target, light)
 
-    def _route(self, place: Place, light: Light) -> LightRoute | None:
+    def _best_strategy(self, target: TermTarget, light: Illumination) -> LightStrategy | None:
         """The best way to bring a term's curves to a light at once; none where it would not show them exactly."""
-        if not place.live.lacks_only_light():
+        if not target.live.needs_only_light():
             return None
-        wanted = self._images.light
-        able = (r for r in self._routes if light == wanted or r.fidelity < Fidelity.NEAR)
-        return next((r for r in able if r.reaches(place, light) and not r.needs(place, light)), None)
+        target_light = self._images.light
+        allowed = (r for r in self._strategies if light == target_light or r.fidelity < Fidelity.NEARLY_EXACT)
+        return next((r for r in allowed if r.applicable(target, light) and not r.prepare(target, light)), None)
 
-    def _show(self) -> None:
+    def _display_latest(self) -> None:
         """Show every term's newest image, if all are in one light; those that show nothing at all are in any."""
         images, before = self._images, self.light
-        lit = {place.live.newest.light for place in self._places() if not place.live.is_blank}
+        lit = {target.live.latest.light for target in self._targets() if not target.live.is_empty}
         if lit <= {images.light}:
             self.light, self.gain, self._previewed = images.light, images.gain, None
         elif self._previewed is not None and lit == {self._previewed[0]}:
             self.light, self.gain = self._previewed
         else:
             return
-        for place in self._places():
-            place.live.show_ready()
+        for target in self._targets():
+            target.live.display_ready()
         if self.light != before:
-            images.shine_in(self.light)
+            images.set_emission(self.light)
 
     # what is made next
 
-    def next_job(self, hand: Hand, look: Look) -> Job | None:
+    def next_job(self, control: ActiveControl, look: Look) -> Job | None:
         """The most urgent job; None where nothing is lacking. hand: what the user is on. look: as it is now."""
-        stages: Sequence[Callable[[Hand], Job | None]] = (
-            self._rows_wanted, self._preview_wanted, self._elements_wanted, self._lacking, self._touched, self._awaited,
+        stages: Sequence[Callable[[ActiveControl], Job | None]] = (
+            self._changed_light_job, self._preview_job, self._element_job, self._missing_image_job, self._prepared_job,
+            self._exact_operator_job,
         )  # fmt: skip
         for stage in stages:
-            found = stage(hand)
-            if found is not None:
-                return found
-        return self._refining() or self._ahead(hand, look)
+            job = stage(control)
+            if job is not None:
+                return job
+        return self._refinement_job() or self._prefetch_job(control, look)
 
-    def _rows_wanted(self, hand: Hand) -> Job | None:
+    def _changed_light_job(self, control: ActiveControl) -> Job | None:
         """Light has changed under a hand, and only rows can follow it."""
-        if not hand.moves_light or not self._must_follow():
+        if not control.edits_light or not self._needs_incremental():
             return None
-        return self._rows()
+        return self._rows_job()
 
-    def _preview_wanted(self, hand: Hand) -> Job | None:
+    def _preview_job(self, control: ActiveControl) -> Job | None:
         """The picture is in another light than is wanted, or opens; or samples are chosen before the light turns."""
         images = self._images
-        if self._lacks_preview(hand):
-            is_opening = all(place.live.is_blank for place in self._places())
-            lacking = [place for place in self._unlit() if self._route(place, images.light) is None]
-            whole = Preview.of(images, lacking, "a preview" if is_opening else "the light")
+        if self._needs_preview(control):
+            is_opening = all(target.live.is_empty for target in self._targets())
+            missing = [
+                target for target in self._unconverged_targets() if self._best_strategy(target, images.light) is None
+            ]
+            whole = SparsePreview.for_targets(images, missing, "a preview" if is_opening else "the light")
             paths = images.light.paths
-            return whole.sooner() if is_opening and paths.direct and paths.reflect else whole
-        outdated = [p for p in self._places() if p.live.shows_another and not images.is_at_hand(p.material, p.live)]
+            return whole.direct_only_first() if is_opening and paths.direct and paths.has_indirect else whole
+        outdated = [p for p in self._targets() if p.live.displays_outdated and not images.is_cached(p.material, p.live)]
         if outdated and self._is_watched and can_preview(images):
-            return Preview.of(images, outdated, "what was changed")
-        if hand.is_turning and can_preview(images) and not is_prepared(images):
-            return Preview.of(images, self._places(), "the light")
+            return SparsePreview.for_targets(images, outdated, "what was changed")
+        if control.rotates_environment and can_preview(images) and not is_prepared(images):
+            return SparsePreview.for_targets(images, self._targets(), "the light")
         return None
 
-    def _lacks_preview(self, hand: Hand) -> bool:
+    def _needs_preview(self, control: ActiveControl) -> bool:
         images = self._images
-        if all(place.live.is_blank for place in self._places()):
-            return self._is_watched and helps_to_open(images)
+        if all(target.live.is_empty for target in self._targets()):
+            return self._is_watched and is_needed_for_first_frame(images)
         if self.light == images.light or not can_preview(images):
             return False
-        is_at_once = all(self._route(place, images.light) is not None for place in self._unlit())
-        return not is_at_once and not (hand.moves_light and self._must_follow())
+        is_immediate = all(
+            self._best_strategy(target, images.light) is not None for target in self._unconverged_targets()
+        )
+        return not is_immediate and not (control.edits_light and self._needs_incremental())
 
-    def _must_follow(self) -> bool:
+    def _needs_incremental(self) -> bool:
         """Whether every term shows what is wanted, or will, roughly, with rows; and gains alone do not explain it."""
-        wanted, follow = self._images.light, self._follow
-        unlit = self._unlit()
-        reached = all(p.live.lacks_only_light() and follow.reaches(p, wanted) for p in unlit)
-        is_moved = any(not self._mix.reaches(place, wanted) for place in unlit)
-        return bool(unlit) and reached and is_moved and follow.has_room()
+        target_light, incremental = self._images.light, self._incremental
+        unconverged = self._unconverged_targets()
+        is_reached = all(p.live.needs_only_light() and incremental.applicable(p, target_light) for p in unconverged)
+        is_moved = any(not self._linear_mix.applicable(target, target_light) for target in unconverged)
+        return bool(unconverged) and is_reached and is_moved and incremental.fits_budget()
 
-    def _elements_wanted(self, hand: Hand) -> Job | None:
+    def _element_job(self, control: ActiveControl) -> Job | None:
         """The image of a source that is lacking to mix a term, of a material with few samples first."""
-        unlit = (place for place in self._places() if place.live.lacks_only_light())
-        return _first_lacking(self._mix, unlit, self._images.light)
+        unconverged = (target for target in self._targets() if target.live.needs_only_light())
+        return _first_missing_job(self._linear_mix, unconverged, self._images.light)
 
-    def _lacking(self, hand: Hand) -> Job | None:
+    def _missing_image_job(self, control: ActiveControl) -> Job | None:
         """One job for each term whose image is not what is wanted and follows no operator towards it; those first of
         which something is to be seen that is not exact; of them those of the touched material, and cheap ones."""
-        candidates, region = list(self._bases_lacking(hand)), self._images.region
+        candidates, region = list(self._missing_bases(control)), self._images.region
         if not candidates:
             return None
 
-        def rank(item: tuple[Place, EditBasis | None]) -> tuple[int, ...]:
-            place, basis = item
-            return not is_seen(place, region) or is_exact_in(place, region), *_cost(place, basis, hand)
+        def rank(item: tuple[TermTarget, EditBasis | None]) -> tuple[int, ...]:
+            target, basis = item
+            return not is_visible(target, region) or is_exact_within(target, region), *_cost(target, basis, control)
 
-        place, basis = min(candidates, key=rank)
-        form = None if basis is None else self._form(place, basis)
+        target, basis = min(candidates, key=rank)
+        form = None if basis is None else self._form(target, basis)
         if basis is not None and form is not None:
-            return self._freeze(place, basis, form)
+            return self._operator_job(target, basis, form)
         # where no operator fits, an image that shows older curves stands until the hand rests
-        whole = Shade.of(place, self._images.light, refines=place.live.is_firm or place.live.is_seen())
-        return self._sooner(whole, [other for other, basis in candidates if basis is None]) or whole
+        whole = Shade.for_target(
+            target, self._images.light, is_refinement=target.live.is_converged or target.live.has_preview()
+        )
+        return self._early_job(whole, [candidate for candidate, basis in candidates if basis is None]) or whole
 
-    def _sooner(self, whole: Shade, lacking: Sequence[Place]) -> Job | None:
+    def _early_job(self, whole: Shade, candidates: Sequence[TermTarget]) -> Job | None:
         """What is seen sooner than the whole image of a term, where many samples are to be shaded: what of it is in
         sight, or all that is lacking in more detail. lacking: terms that are to be shaded, this one among them."""
-        part = region_first(whole, lacking, self._images.region)
-        of_place = whole.place
-        detail = of_place.live.ready.detail
-        if of_place.live.ready.fidelity != Fidelity.PREVIEW or of_place.live.ready.light != whole.light:
-            return part
-        dear = [place for place in lacking if _needs_angles(place) and place.live.ready.detail == detail]
-        if of_place not in dear:
-            return part
-        left = sum(place.material.num_samples for place in dear)
-        if part is not None:
-            left = sum(np.count_nonzero(p.material.lies_in(part.region)) for p in dear)
-        if not is_worth_finer(left, detail):
-            return part
-        return Preview.of(self._images, dear, "a preview").finer(detail + 1, refines=whole.refines)
+        region_job = make_region_job(whole, candidates, self._images.region)
+        own_target = whole.target
+        detail = own_target.live.ready.detail
+        if own_target.live.ready.fidelity != Fidelity.PREVIEW or own_target.live.ready.light != whole.light:
+            return region_job
+        costly = [target for target in candidates if _needs_angles(target) and target.live.ready.detail == detail]
+        if own_target not in costly:
+            return region_job
+        num_left = sum(target.material.num_samples for target in costly)
+        if region_job is not None:
+            num_left = sum(np.count_nonzero(p.material.lies_in(region_job.region)) for p in costly)
+        if not should_refine(num_left, detail):
+            return region_job
+        return SparsePreview.for_targets(self._images, costly, "a preview").with_detail(
+            detail + 1, is_refinement=whole.is_refinement
+        )
 
-    def _bases_lacking(self, hand: Hand) -> Iterator[tuple[Place, EditBasis | None]]:
-        for place in self._places():
-            live = place.live
-            differing = set(live.differing())
-            basis = hand.basis_of(live, differing)
-            if not live.is_firm:
+    def _missing_bases(self, control: ActiveControl) -> Iterator[tuple[TermTarget, EditBasis | None]]:
+        for target in self._targets():
+            live = target.live
+            changed = set(live.changed_curves())
+            basis = control.edit_basis(live, changed)
+            if not live.is_converged:
                 # its operator along a curve gives the image as well, and exactly
-                is_whole = basis is not None and basis.is_complete and self._form(place, basis) == EXACT
-                yield place, basis if is_whole else None
-            elif differing and not self._follows(place, basis):
-                first = next(name for name in live.target if name in differing)
-                wanted = basis or CurveBasis.of(live.term.curve(first))
-                yield place, wanted if self._serves(place, wanted, differing) else None
+                is_whole = basis is not None and basis.is_complete and self._form(target, basis) == EXACT
+                yield target, basis if is_whole else None
+            elif changed and not self._continues_with_operator(target, basis):
+                first = next(name for name in live.target_bands if name in changed)
+                new_basis = basis or CurveBasis.from_curve(live.term.curve(first))
+                yield target, new_basis if self._reaches_target(target, new_basis, changed) else None
 
-    def _form(self, place: Place, basis: EditBasis) -> Form | None:
+    def _form(self, target: TermTarget, basis: EditBasis) -> OperatorForm | None:
         """What the memory may hold an operator of; where of nothing, the term is shaded."""
-        return form_for(place.material, basis.num_columns, self._images.cache.budget_bytes)
+        return operator_form(target.material, basis.num_columns, self._images.cache.budget_bytes)
 
-    def _serves(self, place: Place, basis: EditBasis, differing: set[str]) -> bool:
+    def _reaches_target(self, target: TermTarget, basis: EditBasis, changed: set[str]) -> bool:
         """Whether an operator would bring an image to its target; one of some samples does not sum others' curves."""
-        form = self._form(place, basis)
-        return form is not None and (form.step == 1 or goes_on_from(place.live.ready, differing, basis))
+        form = self._form(target, basis)
+        return form is not None and (form.step == 1 or can_resume_from(target.live.ready, changed, basis))
 
-    def _follows(self, place: Place, basis: EditBasis | None) -> bool:
+    def _continues_with_operator(self, target: TermTarget, basis: EditBasis | None) -> bool:
         """Whether the operator in use is the one to go on with: what differs is free in it, or some of it, and no other
         is better."""
-        live = place.live
-        active, differing = live.ready.basis, set(live.differing())
-        if active is None or differing.isdisjoint(active.moves):
+        live = target.live
+        active, changed = live.ready.basis, set(live.changed_curves())
+        if active is None or changed.isdisjoint(active.affected_curves):
             return False
-        if self._images.operator(place.material, live) is None:
+        if self._images.operator(target.material, live) is None:
             return False
-        return differing <= set(active.moves) or basis is None or not differing <= set(basis.moves)
+        return changed <= set(active.affected_curves) or basis is None or not changed <= set(basis.affected_curves)
 
-    def _touched(self, hand: Hand) -> Job | None:
+    def _prepared_job(self, control: ActiveControl) -> Job | None:
         """The operator that a hand must wait for before it can move what it has touched.
 
         A parameter whose only curve is free in all its wavelets needs no nodes: that curve's operator is there, exact.
         """
-        touched = hand.touched
-        if touched is None or not touched.place.material.num_samples:
+        prepared = control.prepared_control
+        if prepared is None or not prepared.target.material.num_samples:
             return None
-        if touched.basis is None:
-            return textures.job_for(touched.place)
-        live, basis, active = touched.place.live, touched.basis, touched.place.live.ready.basis
-        form = self._form(touched.place, basis)
-        if live.differing() or form is None:
+        if prepared.basis is None:
+            return textures.job_for(prepared.target)
+        live, basis, active = prepared.target.live, prepared.basis, prepared.target.live.ready.basis
+        form = self._form(prepared.target, basis)
+        if live.changed_curves() or form is None:
             return None
-        has_operator = active is not None and self._images.operator(touched.place.material, live) is not None
-        is_enough = active is not None and (active == basis or (active.is_complete and active.moves == basis.moves))
-        return None if has_operator and is_enough else self._freeze(touched.place, basis, form)
+        has_operator = active is not None and self._images.operator(prepared.target.material, live) is not None
+        is_enough = active is not None and (
+            active == basis or (active.is_complete and active.affected_curves == basis.affected_curves)
+        )
+        return None if has_operator and is_enough else self._operator_job(prepared.target, basis, form)
 
-    def _awaited(self, hand: Hand) -> Job | None:
+    def _exact_operator_job(self, control: ActiveControl) -> Job | None:
         """The exact operator of what is followed by a rough one; frames go on meanwhile."""
-        for place in self._places():
-            basis = place.live.ready.basis
-            if basis is not None and isinstance(self._images.operator(place.material, place.live), Rough):
-                return Freeze.of(place, basis, EXACT)
+        for target in self._targets():
+            basis = target.live.ready.basis
+            if basis is not None and isinstance(
+                self._images.operator(target.material, target.live), MergedLightOperator
+            ):
+                return PrecomputeOperator.for_target(target, basis, EXACT)
         return None
 
-    def _freeze(self, place: Place, basis: EditBasis, form: Form) -> Freeze:
+    def _operator_job(self, target: TermTarget, basis: EditBasis, form: OperatorForm) -> PrecomputeOperator:
         """An operator; the rough one first, where a hand would wait long for the exact one, and can go on by it."""
-        images, (_, material, live) = self._images, place
-        if form != EXACT or images.cache.holds(images.key_of_operator(material, live, basis, live.target)):
-            return Freeze.of(place, basis, form)
-        lights = images.transfer.num_lights if live.light.shows_sky else 0
-        is_first = comes_roughly(material, basis.num_columns, lights, images.cache.budget_bytes)
-        can_go_on = goes_on_from(live.ready, live.differing(), basis)
-        return Freeze.of(place, basis, ROUGH if is_first and can_go_on else form)
+        images, (_, material, live) = self._images, target
+        if form != EXACT or images.cache.contains(images.operator_key(material, live, basis, live.target_bands)):
+            return PrecomputeOperator.for_target(target, basis, form)
+        lights = images.transfer.num_lights if live.light.has_direct_environment else 0
+        is_merged_first = use_coarse(material, basis.num_columns, lights, images.cache.budget_bytes)
+        can_go_on = can_resume_from(live.ready, live.changed_curves(), basis)
+        return PrecomputeOperator.for_target(target, basis, MERGED_LIGHT if is_merged_first and can_go_on else form)
 
-    def _refining(self) -> Job | None:
+    def _refinement_job(self) -> Job | None:
         """What makes an image exact that is near it already."""
-        for place in self._places():
-            live = place.live
-            if live.is_firm and not live.differing():
-                found = self._settling(place) if live.ready.rounding > 0 else None
-                if found is None and live.ready.fidelity < Fidelity.EXACT:
-                    found = Shade.of(place, self._images.light, refines=True)
-                if found is not None:
-                    return found
+        for target in self._targets():
+            live = target.live
+            if live.is_converged and not live.changed_curves():
+                job = self._resum_job(target) if live.ready.rounding > 0 else None
+                if job is None and live.ready.fidelity < Fidelity.EXACT:
+                    job = Shade.for_target(target, self._images.light, is_refinement=True)
+                if job is not None:
+                    return job
         return None
 
-    def _settling(self, place: Place) -> Job | None:
+    def _resum_job(self, target: TermTarget) -> Job | None:
         """What sums an image once that was summed from steps, from where they came."""
-        return self._mix.settle_job(place) if place.live.ready.basis is None else operator.settle_job(place)
+        return self._linear_mix.resum_job(target) if target.live.ready.basis is None else operator.resum_job(target)
 
-    def _ahead(self, hand: Hand, look: Look) -> Job | None:
+    def _prefetch_job(self, control: ActiveControl, look: Look) -> Job | None:
         """What can be made ahead for what a hand is on, when nothing else is lacking."""
-        if hand.moves_light and self._follow.has_room():
-            rows = self._rows()
-            if rows is not None:
-                return rows
-        return self._elements_of_held(hand, look)
+        if control.edits_light and self._incremental.fits_budget():
+            rows_job = self._rows_job()
+            if rows_job is not None:
+                return rows_job
+        return self._dragged_light_job(control, look)
 
-    def _rows(self) -> Job | None:
+    def _rows_job(self) -> Job | None:
         """The next rows to be made, those of few samples first; None where there are all.
 
         A term whose own curve moves would want other rows after every edit, and could not add them to anything.
         """
-        able = (p for p in self._places() if p.live.is_firm or p.live.lacks_only_light())
-        return _first_lacking(self._follow, able, self._images.light)
+        extensible = (p for p in self._targets() if p.live.is_converged or p.live.needs_only_light())
+        return _first_missing_job(self._incremental, extensible, self._images.light)
 
-    def _elements_of_held(self, hand: Hand, look: Look) -> Job | None:
+    def _dragged_light_job(self, control: ActiveControl, look: Look) -> Job | None:
         """An image of the light that a hand is on, of a material with few samples first; it can wait for all else.
 
         What comes straight from it is taken off as soon as it moves; all that comes from it is what it is dimmed by.
         None where that light is elsewhere by now, or where the memory has no room to spare.
         """
         images = self._images
-        held = hand.held_light(look)
-        if held is None or all(source.geometry != held for source in images.light.local):
+        dragged = control.dragged_light(look)
+        if dragged is None or all(source.geometry != dragged for source in images.light.local):
             return None
-        elements = list(vector_of(of_source(images.light, held)))  # what comes straight is first
-        places = list(self._places())
-        lacking = [(e, p) for e in elements for p in places if images.image_in(p.material, p.live, e) is None]
-        num_bytes = sum(shaded_bytes(place.material.num_samples) for _, place in lacking)
-        if not lacking or num_bytes > images.cache.budget_bytes - images.cache.used_bytes:
+        elements = list(element_gains(single_source(images.light, dragged)))  # what comes straight is first
+        targets = list(self._targets())
+        missing = [(e, p) for e in elements for p in targets if images.image_in(p.material, p.live, e) is None]
+        num_bytes = sum(shaded_bytes(target.material.num_samples) for _, target in missing)
+        if not missing or num_bytes > images.cache.budget_bytes - images.cache.used_bytes:
             return None
-        element, place = min(lacking, key=lambda item: (elements.index(item[0]), item[1].material.num_samples))
-        return Shade.of(place, element, refines=True)
+        element, target = min(missing, key=lambda item: (elements.index(item[0]), item[1].material.num_samples))
+        return Shade.for_target(target, element, is_refinement=True)
 
-    def _places(self) -> Iterator[Place]:
+    def _targets(self) -> Iterator[TermTarget]:
         """All terms that this view sees anything of."""
-        return (Place(self._images, material, live) for material, live in self._images.terms())
+        return (TermTarget(self._images, material, live) for material, live in self._images.terms())
 
-    def _unlit(self) -> list[Place]:
+    def _unconverged_targets(self) -> list[TermTarget]:
         """Those that show nothing firm in the light that is wanted."""
-        return [place for place in self._places() if not place.live.is_firm]
+        return [target for target in self._targets() if not target.live.is_converged]
 
 
-def _first_lacking(route: LightRoute, places: Iterable[Place], light: Light) -> Job | None:
+def _first_missing_job(strategy: LightStrategy, targets: Iterable[TermTarget], light: Illumination) -> Job | None:
     """The first thing that a route lacks to bring places to a light, of a material with few samples first."""
-    lacking = [(place, jobs[0]) for place in places if (jobs := route.needs(place, light))]
-    return min(lacking, key=lambda item: item[0].material.num_samples)[1] if lacking else None
+    missing = [(target, jobs[0]) for target in targets if (jobs := strategy.prepare(target, light))]
+    return min(missing, key=lambda item: item[0].material.num_samples)[1] if missing else None
 
 
-def _cost(place: Place, basis: EditBasis | None, hand: Hand) -> tuple[bool, bool, int]:
+def _cost(target: TermTarget, basis: EditBasis | None, control: ActiveControl) -> tuple[bool, bool, int]:
     """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
-    touched = hand.touched
-    is_other = touched is None or touched.place.material is not place.material
-    return is_other, basis is not None or _needs_angles(place), place.material.num_samples
+    prepared = control.prepared_control
+    is_other_material = prepared is None or prepared.target.material is not target.material
+    return is_other_material, basis is not None or _needs_angles(target), target.material.num_samples
 
 
-def _needs_angles(place: Place) -> bool:
+def _needs_angles(target: TermTarget) -> bool:
     """Whether any curve of a term is not flat."""
-    return any(c.kinds.size for c in contract_levels(place.live.term, place.live.target, None))
+    return any(c.kinds.size for c in contract_levels(target.live.term, target.live.target_bands, None))

@@ -11,38 +11,38 @@ from numpy.typing import NDArray
 
 from relume.brdf.channels import roughness_image
 from relume.brdf.document import complete_term
-from relume.brdf.levels import follows_map
+from relume.brdf.levels import uses_roughness_map
 from relume.errors import ParameterError
 from relume.light.triangles import TriangleLights
 from relume.look import Look, TermLook, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.nodes import linearise
+from relume.operators.nodes import linearize
 from relume.operators.operator import Operator
-from relume.operators.shade import Shaded, shaded_bytes
-from relume.picture.light import Light, Solo, emission_of, gain_of, is_solo, light_of
+from relume.operators.shade import ShadedTerm, shaded_bytes
+from relume.picture.light import Illumination, Solo, illumination_from_look, is_solo, material_emission, picture_gain
 from relume.picture.live_term import LiveTerm
 from relume.picture.material_image import MaterialImage
-from relume.picture.mirrors import Mirrors
+from relume.picture.mirrors import MirrorFactors
 from relume.picture.pointer import CurvePointer, ParameterPointer
-from relume.picture.transfer import Axis, Transfer
-from relume.project.receivers import Receivers
+from relume.picture.transfer import EditAxis, FixedViewTransfer
+from relume.project.receivers import ShadingPoints
 from relume.views.view import Tile
-from relume.views.worn import Maps, worn
+from relume.views.worn import MapOverrides, with_overrides
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-ROUGHLY = "roughly"
+MERGED_LIGHT_SUFFIX = "roughly"
 """Ends the names of operators of merged lights."""
 
 _WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None)
 
 
-def documents_of(look: Look, material: str) -> Sequence[TermLook]:
+def material_documents(look: Look, material: str) -> Sequence[TermLook]:
     """The terms whose images make a material's picture; of a catcher what arrives at it, as a white surface has it."""
-    chosen = look.materials[material]
-    return (cast(TermLook, _WHITE),) if chosen.catcher else chosen.terms
+    material_look = look.materials[material]
+    return (cast(TermLook, _WHITE),) if material_look.catcher else material_look.terms
 
 
 class ViewImages:
@@ -55,54 +55,58 @@ class ViewImages:
         region: pixels that are seen of the picture: x, y, width, height; None: all.
     """
 
-    def __init__(self, transfer: Transfer, view_name: str, cache: Memory) -> None:
+    def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache) -> None:
         self.transfer, self.cache = transfer, cache
         self.view = transfer.views[view_name]
         self.default = validate(transfer.default_look, transfer.default_look)
-        self.light = self.default_light = self._light_of(self.default)
+        self.light = self.default_light = self._illumination_from_look(self.default)
         self.by_name = {
-            name: MaterialImage(self.view, index, documents_of(self.default, name), self.light)
+            name: MaterialImage(self.view, index, material_documents(self.default, name), self.light)
             for index, name in enumerate(transfer.material_names)
         }
-        self.gain = gain_of(self.default)
-        self.mirrors = Mirrors(self.view)
+        self.gain = picture_gain(self.default)
+        self.mirrors = MirrorFactors(self.view)
         self.region: Tile | None = None
 
-    def following(self, look: Look) -> ViewImages:
+    def view_with_overrides(self, look: Look) -> ViewImages:
         """The images of the view whose samples wear the images that a look names in the place of maps of roughness and
         of normals; the same where none is named that was not before. Materials whose images are others go on showing
         what they do; others are shared.
 
         Raises what `relume.views.worn.worn` raises; then nothing has changed.
         """
-        maps = tuple(self._maps_of(look, name) for name in self.transfer.material_names)
+        maps = tuple(self._map_overrides(look, name) for name in self.transfer.material_names)
         if maps == (self.view.maps or (None,) * len(maps)):
             return self
-        changed, view = copy(self), worn(self.transfer.views[self.view.name], maps, self.transfer.tracer)
-        changed.view, changed.mirrors, changed.by_name = view, Mirrors(view), {}
-        place = np.empty(view.num_surface_samples, np.int64)
-        place[self.view.as_baked()] = np.arange(len(place))  # of the samples as they were baked, in this view
+        changed, view = copy(self), with_overrides(self.transfer.views[self.view.name], maps, self.transfer.tracer)
+        changed.view, changed.mirrors, changed.by_name = view, MirrorFactors(view), {}
+        baked_to_view = np.empty(view.num_surface_samples, np.int64)
+        baked_to_view[self.view.unmodified()] = np.arange(
+            len(baked_to_view)
+        )  # of the samples as they were baked, in this view
         for index, (name, before) in enumerate(self.by_name.items()):
             image = before
-            if view.place(index) != self.view.place(index):
+            if view.sample_key(index) != self.view.sample_key(index):
                 rows = view.rows(index)
                 image = MaterialImage(view, index, before.documents, self.light)
-                image.go_on_showing(before, place[view.as_baked()[rows]] - rows.start)
+                image.keep_displayed(before, baked_to_view[view.unmodified()[rows]] - rows.start)
             changed.by_name[name] = image
         return changed
 
-    def _maps_of(self, look: Look, material: str) -> Maps | None:
+    def _map_overrides(self, look: Look, material: str) -> MapOverrides | None:
         """What a look names in the place of a material's maps; None for nothing."""
-        documents, normals = documents_of(look, material), look.materials[material].normals
+        documents, normals = material_documents(look, material), look.materials[material].normals
         roughness = roughness_image(documents)
         if roughness is None and normals is None:
             return None
-        return Maps(roughness, normals, self._widening_base(material) if any(map(follows_map, documents)) else None)
+        return MapOverrides(
+            roughness, normals, self._base_roughness(material) if any(map(uses_roughness_map, documents)) else None
+        )
 
-    def _widening_base(self, material: str) -> float | None:
+    def _base_roughness(self, material: str) -> float | None:
         """The roughness of a material's terms in the scene, that bumps below a pixel widen."""
-        given = (term["params"].get("roughness") for term in documents_of(self.default, material))
-        return next((float(np.mean(value)) for value in given if value is not None), None)
+        values = (term["params"].get("roughness") for term in material_documents(self.default, material))
+        return next((float(np.mean(value)) for value in values if value is not None), None)
 
     def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
         """All that this view sees anything of."""
@@ -116,70 +120,76 @@ class ViewImages:
     def set_look(self, look: Look, solo: Solo = None) -> None:
         """A new target for every term, in the light of some sources alone where `solo` names them.
 
-        Raises what `Transfer.radiance_of` raises; then nothing has changed.
+        Raises what `FixedViewTransfer.radiance_of` raises; then nothing has changed.
         """
-        light = self._light_of(look, solo)
+        light = self._illumination_from_look(look, solo)
         if light != self.light:
             if light.environment.map is not None:
-                self.transfer.radiance_of(light.environment.map)
+                self.transfer.environment_radiance(light.environment.map)
             self.light = light
             for material in self.by_name.values():
                 material.set_light(light, is_solo=is_solo(look, solo))
         for name, material in self.by_name.items():
-            material.set_documents(documents_of(look, name))
-        self.gain = gain_of(look, solo)
+            material.set_documents(material_documents(look, name))
+        self.gain = picture_gain(look, solo)
 
-    def shine_in(self, light: Light) -> None:
+    def set_emission(self, light: Illumination) -> None:
         """Surfaces send out themselves what they do in this light."""
         for name, material in self.by_name.items():
-            material.set_emission(emission_of(light, name), self._shines)
+            material.set_emission(material_emission(light, name), self._emission_pattern)
 
-    def follow_mirrors(self, look: Look) -> list[int]:
+    def update_mirrors(self, look: Look) -> list[int]:
         """Bring mirrors to a look, as far as their materials are shown in it; returns the materials that send on
         something else than before."""
         names = {index: self.transfer.material_names[index] for index in self.mirrors.materials}
-        shown = {k: None if look.materials[name].catcher else self.by_name[name].mirrors for k, name in names.items()}
-        return self.mirrors.follow(shown)
+        documents = {
+            k: None if look.materials[name].catcher else self.by_name[name].mirrors for k, name in names.items()
+        }
+        return self.mirrors.update_emission(documents)
 
-    def arriving(
-        self, material: MaterialImage, light: Light, cancelled: Callable[[], bool]
-    ) -> tuple[TriangleLights, Receivers]:
+    def incident_light(
+        self, material: MaterialImage, light: Illumination, is_canceled: Callable[[], bool]
+    ) -> tuple[TriangleLights, ShadingPoints]:
         """What arrives at the samples of a material in a light; what the memory lacks is traced.
 
         Args:
-            material: of these. light: what arrives. cancelled: asked now and then.
+            material: of these. light: what arrives. is_canceled: asked now and then.
         Raises:
-            CancelledError: `cancelled` said so.
+            CancelledError: `is_canceled` said so.
         """
-        if light.paths.reflect and material.num_samples:
-            self.view.trace_gather_rays(material.index, cancelled)
-            self.transfer.trace_cells(light, cancelled)
-        return self.transfer.arriving(self.view, material.index, light, self.cache)
+        if light.paths.has_indirect and material.num_samples:
+            self.view.trace_gather_rays(material.index, is_canceled)
+            self.transfer.solve_indirect_cache(light, is_canceled)
+        return self.transfer.incident_light(self.view, material.index, light, self.cache)
 
-    def unlit(self, material: MaterialImage) -> Receivers:
+    def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """The samples of a material, without what arrives at them."""
 
-        def read() -> Receivers:
+        def read() -> ShadingPoints:
             return self.view.receivers(material.index, is_lit=False)
 
-        key = self.transfer.key, "receivers", *self.view.place(material.index)
-        return self.cache.keep(key, read)
+        key = self.transfer.key, "receivers", *self.view.sample_key(material.index)
+        return self.cache.get_value(key, read)
 
-    def is_default(self, material: MaterialImage, live: LiveTerm, light: Light) -> bool:
+    def is_default(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> bool:
         """Whether a material's live term in some light is of the scene's own look: its image stays beside the store."""
         name = self.transfer.material_names[material.index]
-        is_own = not any(self.view.maps[material.index : material.index + 1])
-        return is_own and light == self.default_light and live.document in documents_of(self.default, name)
+        is_without_overrides = not any(self.view.maps[material.index : material.index + 1])
+        return (
+            is_without_overrides
+            and light == self.default_light
+            and live.document in material_documents(self.default, name)
+        )
 
-    def _light_of(self, look: Look, solo: Solo = None) -> Light:
-        has_bounces = Axis.BOUNCES in self.transfer.axes
-        return light_of(look, self.transfer.material_names, has_bounces=has_bounces, solo=solo)
+    def _illumination_from_look(self, look: Look, solo: Solo = None) -> Illumination:
+        has_bounces = EditAxis.BOUNCES in self.transfer.axes
+        return illumination_from_look(look, self.transfer.material_names, has_bounces=has_bounces, solo=solo)
 
-    def _shines(self, material: int) -> F32:
+    def _emission_pattern(self, material: int) -> F32:
         """How brightly the samples of a material shine, over its mean; nothing on sides that do not. (n, 1 or 3)"""
-        return self.transfer.shines_at(self.view, material)[:, None] * self.view.shining(material)
+        return self.transfer.is_emissive_at(self.view, material)[:, None] * self.view.emissive(material)
 
-    def find(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, LiveTerm]:
+    def material_term(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, LiveTerm]:
         """The material and the term of a pointer in the look as it is now.
 
         Raises:
@@ -201,49 +211,56 @@ class ViewImages:
         Raises:
             ParameterError: there is no such curve or parameter.
         """
-        _, term = self.find(pointer)
+        _, term = self.material_term(pointer)
         if isinstance(pointer, ParameterPointer):
-            return linearise(term.document, pointer.name)
+            return linearize(term.document, pointer.name)
         curve = term.term.curve(pointer.name)
-        return None if curve.outgoing else CurveBasis.of(curve)
+        return None if curve.depends_on_view else CurveBasis.from_curve(curve)
 
-    def _place(self, material: MaterialImage) -> tuple[Hashable, ...]:
-        return self.transfer.key, *self.view.place(material.index)  # the store comes first: a memory asks whose it is
+    def _sample_key(self, material: MaterialImage) -> tuple[Hashable, ...]:
+        return self.transfer.key, *self.view.sample_key(
+            material.index
+        )  # the store comes first: a memory asks whose it is
 
-    def key_of_operator(
+    def operator_key(
         self,
         material: MaterialImage,
         live: LiveTerm,
         basis: EditBasis,
         bands: Mapping[str, F64],
         *,
-        is_rough: bool = False,
+        is_merged_light: bool = False,
     ) -> tuple[Hashable, ...]:
         """Name of the operator of a material's live term along a basis in the memory.
 
         Args:
-            bands: of the term's curves, (3, J) each; those that it moves are free. is_rough: of that of merged lights.
+            bands: of the term's curves, (3, J) each; those that it moves are free. is_merged_light: of that of merged
+                lights.
         """
-        return *self._place(material), live.key_of_operator(basis, bands), *((ROUGHLY,) if is_rough else ())
+        return (
+            *self._sample_key(material),
+            live.operator_key(basis, bands),
+            *((MERGED_LIGHT_SUFFIX,) if is_merged_light else ()),
+        )
 
-    def key_of_image(self, material: MaterialImage, live: LiveTerm, light: Light) -> tuple[Hashable, ...]:
+    def image_key(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> tuple[Hashable, ...]:
         """Name of the image of a material's live term, of its target in some light."""
-        return *self._place(material), live.key_of_image(light)
+        return *self._sample_key(material), live.image_key(light)
 
-    def image_in(self, material: MaterialImage, live: LiveTerm, light: Light) -> Shaded | None:
+    def image_in(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> ShadedTerm | None:
         """The image of a material's live term, of its target in some light, where the memory has it."""
-        return self.cache.find(self.key_of_image(material, live, light), Shaded)
+        return self.cache.get_cached(self.image_key(material, live, light), ShadedTerm)
 
-    def is_at_hand(self, material: MaterialImage, live: LiveTerm) -> bool:
+    def is_cached(self, material: MaterialImage, live: LiveTerm) -> bool:
         """Whether the image of a term's target need not be made: it is in the memory, or was kept with the store."""
-        key = self.key_of_image(material, live, self.light)
-        return self.cache.find(key, Shaded) is not None or self.transfer.has_image(key[1:])
+        key = self.image_key(material, live, self.light)
+        return self.cache.get_cached(key, ShadedTerm) is not None or self.transfer.has_image(key[1:])
 
     def operator(self, material: MaterialImage, live: LiveTerm) -> Operator | None:
         """The operator that a term follows now, a rough one until the other is there; none if the memory dropped it."""
         ready = live.ready
-        if ready.basis is None or not live.is_firm:
+        if ready.basis is None or not live.is_converged:
             return None
-        key = self.key_of_operator(material, live, ready.basis, ready.bands)
-        found = (self.cache.find(name, Operator) for name in (key, (*key, ROUGHLY)))  # type: ignore[type-abstract]
-        return next((operator for operator in found if operator is not None), None)
+        key = self.operator_key(material, live, ready.basis, ready.bands)
+        candidates = (self.cache.get_cached(name, Operator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))  # type: ignore[type-abstract]
+        return next((operator for operator in candidates if operator is not None), None)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.levels import PLAIN, Levels, level_bands, level_values
+from relume.brdf.levels import NO_LEVELS, RoughnessLevels, level_bands, level_values
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Term
 
@@ -18,7 +18,7 @@ F64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Wanted:
+class TargetTerm:
     """A term as it should be shown.
 
     Attributes:
@@ -26,17 +26,19 @@ class Wanted:
         model: what tells it from other models.
         bands: of each curve that depends on where light comes from. (3, J) float64 each, or (L, 3, J) where a map of
             roughness makes it differ from level to level
-        outgoing: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
+        view_factor: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
     """
 
     document: Mapping[str, Any]
     term: Term
     model: Hashable
     bands: Mapping[str, F64]
-    outgoing: F32 | None
+    view_factor: F32 | None
 
     @classmethod
-    def of(cls, document: Mapping[str, Any], theta_o: Callable[[], F64], levels: Levels = PLAIN) -> Wanted:
+    def from_document(
+        cls, document: Mapping[str, Any], theta_o: Callable[[], F64], levels: RoughnessLevels = NO_LEVELS
+    ) -> TargetTerm:
         """Read a term document.
 
         Args:
@@ -44,8 +46,10 @@ class Wanted:
             levels: of roughness, of the samples.
         """
         declared = TERMS[document["model"]]
-        term = declared.settled(document)
-        bands = {c.name: level_bands(document, c, levels) for c in term.curves if not c.outgoing}
-        values = [level_values(document, c, theta_o(), levels) for c in term.curves_in(document) if c.outgoing]
-        outgoing = np.asarray(np.prod(values, axis=0), np.float32) if values else None
-        return cls(document, term, (document["model"], declared.fixed_values(document)), bands, outgoing)
+        term = declared.normalized(document)
+        bands = {c.name: level_bands(document, c, levels) for c in term.curves if not c.depends_on_view}
+        values = [
+            level_values(document, c, theta_o(), levels) for c in term.active_curves(document) if c.depends_on_view
+        ]
+        view_factor = np.asarray(np.prod(values, axis=0), np.float32) if values else None
+        return cls(document, term, (document["model"], declared.fixed_values(document)), bands, view_factor)

@@ -14,24 +14,24 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.terms.btf import Texels
-from relume.btf.rings import Rings, taps
+from relume.brdf.terms.btf import BtfRef
+from relume.btf.rings import DirectionGrid, interpolation_weights
 from relume.light.triangles import TriangleLights
-from relume.project.receivers import Rays, Receivers, listed
+from relume.project.receivers import RayList, ShadingPoints, build_ray_lists
 
 F32 = NDArray[np.float32]
 
-_LEAST_COSINE = np.float32(1e-3)  # of rays, whose light was weighed by it
+_MIN_COSINE = np.float32(1e-3)  # of rays, whose light was weighed by it
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def into_texture(x, y, axis):  # type: ignore[no-untyped-def]
+def to_texture_frame(x, y, axis):  # type: ignore[no-untyped-def]
     """Bring a direction of a shading frame into the texture's, whose x and y axes are there axis[:2] and axis[2:]."""
     return axis[0] * x + axis[1] * y, axis[2] * x + axis[3] * y
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _from_triangles(rings, normal, tangent, axes, visible, direction, irradiance, out):  # type: ignore[no-untyped-def]
+def _from_triangles(grid, normal, tangent, axes, visible, direction, irradiance, out):  # type: ignore[no-untyped-def]
     """Add light triangles that n points see. out: (n, 3, L)"""
     index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
     for p in range(out.shape[0]):
@@ -44,34 +44,34 @@ def _from_triangles(rings, normal, tangent, axes, visible, direction, irradiance
             up = n[0] * x + n[1] * y + n[2] * z
             if up <= 0:
                 continue
-            lx, ly = into_texture(t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z, axes[p])
-            left = taps(rings, lx, ly, up, index, weight)
+            lx, ly = to_texture_frame(t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z, axes[p])
+            scale = interpolation_weights(grid, lx, ly, up, index, weight)
             for k in range(4):
                 for channel in range(3):
-                    out[p, channel, index[k]] += left * weight[k] * irradiance[m, channel]
+                    out[p, channel, index[k]] += scale * weight[k] * irradiance[m, channel]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _from_listed(rings, axes, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
+def _from_listed(grid, axes, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
     """Add listed rays, whose light has been weighed by the cosine, to their points. out: (n, 3, L)"""
     index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
     for p in range(out.shape[0]):
         for ray in range(first[p], first[p + 1]):
             up = wi[2, ray]
-            lx, ly = into_texture(wi[0, ray], wi[1, ray], axes[p])
-            left = taps(rings, lx, ly, up, index, weight) / max(up, _LEAST_COSINE)
+            lx, ly = to_texture_frame(wi[0, ray], wi[1, ray], axes[p])
+            scale = interpolation_weights(grid, lx, ly, up, index, weight) / max(up, _MIN_COSINE)
             for k in range(4):
                 for channel in range(3):
-                    out[p, channel, index[k]] += left * weight[k] * irradiance[channel, ray]
+                    out[p, channel, index[k]] += scale * weight[k] * irradiance[channel, ray]
 
 
 def texture_axes(rotation: float, uv: F32) -> F32:
     """Axes of a texture in the shading frames of points that are covered with it.
 
     Args:
-        rotation: of the texture, radians. uv: of the points, see `Receivers`. (n, 5)
+        rotation: of the texture, radians. uv: of the points, see `ShadingPoints`. (n, 5)
     Returns:
-        (n, 4) float32, as `into_texture` wants them
+        (n, 4) float32, as `to_texture_frame` wants them
     """
     cosine, sine = math.cos(rotation), math.sin(rotation)
     x = np.stack([np.cos(uv[:, 3]), np.sin(uv[:, 3])], axis=1)
@@ -80,48 +80,52 @@ def texture_axes(rotation: float, uv: F32) -> F32:
     return np.asarray(axes, np.float32)
 
 
-def arrived_rows(texels: Texels, lights: TriangleLights | None, receivers: Receivers, start: int, stop: int) -> F32:
+def texture_light_rows(
+    btf_ref: BtfRef, lights: TriangleLights | None, receivers: ShadingPoints, start: int, stop: int
+) -> F32:
     """Share light out to directions in the frames of a texture.
 
     Args:
-        texels: how points are covered. lights: of the environment, None for rays alone.
+        btf_ref: how points are covered. lights: of the environment, None for rays alone.
         receivers: all points; `uv` says where they are.
         start, stop: those that are asked about.
     Returns:
         a of each point, channel and direction. (stop - start, 3, L) float32
     """
     assert receivers.uv is not None
-    rows, rings = slice(start, stop), texels.btf.rings
-    axes = texture_axes(texels.rotation, receivers.uv[rows])
-    arriving = np.zeros((stop - start, 3, rings.num_directions), np.float32)
+    rows, grid = slice(start, stop), btf_ref.btf.grid
+    axes = texture_axes(btf_ref.rotation, receivers.uv[rows])
+    incident = np.zeros((stop - start, 3, grid.num_directions), np.float32)
     if lights is not None and lights.num_lights and receivers.visible.shape[1]:
         n, t = (np.ascontiguousarray(a[rows], np.float32) for a in (receivers.normal, receivers.tangent))
-        seen = np.ascontiguousarray(receivers.visible[rows])
-        _from_triangles(rings, n, t, axes, seen, lights.direction, lights.irradiance, arriving)
+        visible = np.ascontiguousarray(receivers.visible[rows])
+        _from_triangles(grid, n, t, axes, visible, lights.direction, lights.irradiance, incident)
     for rays in receivers.rays:
-        _add_rays(rings, rays, receivers, axes, start, stop, arriving)
-    return arriving
+        _add_rays(grid, rays, receivers, axes, start, stop, incident)
+    return incident
 
 
-def _add_rays(rings: Rings, rays: Rays, receivers: Receivers, axes: F32, start: int, stop: int, out: F32) -> None:
-    found = listed(rays, receivers, start, stop)
-    _from_listed(rings, axes, found.first, found.wi, found.irradiance, out)
+def _add_rays(
+    grid: DirectionGrid, rays: RayList, receivers: ShadingPoints, axes: F32, start: int, stop: int, out: F32
+) -> None:
+    ray_list = build_ray_lists(rays, receivers, start, stop)
+    _from_listed(grid, axes, ray_list.first, ray_list.wi, ray_list.irradiance, out)
 
 
-def turned_tables(rings: Rings, tables: F32, angle: float) -> F32:
+def rotated_tables(grid: DirectionGrid, tables: F32, angle: float) -> F32:
     """Tables for a texture that is turned further than light was shared out for.
 
     On each ring a direction takes the mean of the two that were where it is now: light is spread by up to a step of
     the ring. (..., L) as `tables`
 
     Args:
-        rings: of the BTF. tables: see `EigenBtf.tables`. (..., L). angle: by which it is turned, radians.
+        grid: of the BTF. tables: see `LocalPcaBtf.tables`. (..., L). angle: by which it is turned, radians.
     """
-    shares = np.zeros((rings.num_directions, rings.num_directions), np.float32)
-    for first, stop in zip(rings.first[:-1], rings.first[1:], strict=True):
+    rotation = np.zeros((grid.num_directions, grid.num_directions), np.float32)
+    for first, stop in zip(grid.first[:-1], grid.first[1:], strict=True):
         count = stop - first
         steps = angle / (2 * math.pi) * count
-        low, here = math.floor(steps), np.arange(count)
-        shares[first + here, first + (here + low) % count] += low + 1 - steps
-        shares[first + here, first + (here + low + 1) % count] += steps - low
-    return np.asarray(tables @ shares)
+        low, azimuths = math.floor(steps), np.arange(count)
+        rotation[first + azimuths, first + (azimuths + low) % count] += low + 1 - steps
+        rotation[first + azimuths, first + (azimuths + low + 1) % count] += steps - low
+    return np.asarray(tables @ rotation)

@@ -16,7 +16,7 @@ from relume.vector_code import NUM as EIGHT
 F32 = NDArray[np.float32]
 
 _NOTHING = 1e-9
-_LEAST_STEP = 1e-30  # of a curve; with numbers near the smallest float32 a processor is several times slower
+_MIN_STEP = 1e-30  # of a curve; with numbers near the smallest float32 a processor is several times slower
 _FLAT = 1e-12  # band averages of a constant differ by rounding
 
 
@@ -47,7 +47,7 @@ class Contraction:
         num_rows: 1 where a curve is the same in all channels, else 3. (C,) int64
         settings: the curves that have several, settings last: N, padded with zeros to a multiple of eight, or three
             times as many where channels differ. (V, max J + 8, 8 n or 24 n) float32
-        setting_of: row of each curve in `settings`, -1 for none. (C,) int64
+        setting_index: row of each curve in `settings`, -1 for none. (C,) int64
         support: bands beyond which a dormant curve is nothing; infinite for the free one. (C,) float32
         constant: product of the curves, where all are flat and none is listed. (3,) float32
         active: index of the free curve, -1 for none.
@@ -60,7 +60,7 @@ class Contraction:
     bands: F32
     num_rows: NDArray[np.int64]
     settings: F32
-    setting_of: NDArray[np.int64]
+    setting_index: NDArray[np.int64]
     support: F32
     constant: F32
     active: int
@@ -72,7 +72,7 @@ class Contraction:
         return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
 
     @cached_property
-    def falls(self) -> F32:
+    def decrements(self) -> F32:
         """By how much each band is less than the one before it. (C, 3, max J + 8) float32"""
         bands = self.bands.astype(np.float64)
         return -np.diff(bands, axis=2, prepend=bands[:, :, :1]).astype(np.float32)
@@ -81,19 +81,19 @@ class Contraction:
     def whole(self) -> WholeCurves:
         """Its curves where none is free and each has one setting."""
         steps = np.zeros((*self.bands.shape, 3), np.float32)
-        for of_curve, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
+        for curve_steps, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
             values = bands[:, :num][:, ::-1]
-            varies = np.abs(np.diff(values, axis=1, prepend=values[:, :1]))
-            of_curve[:, :num] = np.stack([values, values.cumsum(axis=1), varies.cumsum(axis=1)], axis=2)[:, ::-1]
-        steps[np.abs(steps) < _LEAST_STEP] = 0
+            variation = np.abs(np.diff(values, axis=1, prepend=values[:, :1]))
+            curve_steps[:, :num] = np.stack([values, values.cumsum(axis=1), variation.cumsum(axis=1)], axis=2)[:, ::-1]
+        steps[np.abs(steps) < _MIN_STEP] = 0
         return WholeCurves(self.kinds, steps, self.num_rows, self.num_bands)
 
 
 def _support(rows: NDArray[np.float64]) -> float:
     """Count the bands after which each of a curve's rows (..., J) stays below a billionth of its own peak."""
     above = rows > _NOTHING * rows.max(axis=-1, keepdims=True)
-    seen = np.nonzero(above.reshape(-1, rows.shape[-1]).any(axis=0))[0]
-    return float(seen[-1] + 1) if len(seen) else 0.0
+    nonzero_bands = np.nonzero(above.reshape(-1, rows.shape[-1]).any(axis=0))[0]
+    return float(nonzero_bands[-1] + 1) if len(nonzero_bands) else 0.0
 
 
 def _is_flat(bands: NDArray[np.float64]) -> bool:
@@ -101,16 +101,16 @@ def _is_flat(bands: NDArray[np.float64]) -> bool:
     return bands.ndim == 2 and bool(np.all(np.ptp(bands, axis=1) <= _FLAT * np.abs(bands[:, 0])))
 
 
-def _settings(several: Sequence[NDArray[np.float64]], widest: int) -> F32:
+def _settings(curves: Sequence[NDArray[np.float64]], widest: int) -> F32:
     """Lay out curves (3, N, J) as `Contraction.settings`. widest: bands of the widest curve, padded"""
-    if not several:
+    if not curves:
         return np.empty((0, widest, 0), np.float32)
-    num_channels = 1 if all(np.all(bands == bands[0]) for bands in several) else 3
-    num_padded = -(-several[0].shape[1] // EIGHT) * EIGHT
-    laid_out = np.zeros((len(several), widest, num_channels, num_padded), np.float32)
-    for rows, bands in zip(laid_out, several, strict=True):
+    num_channels = 1 if all(np.all(bands == bands[0]) for bands in curves) else 3
+    num_padded = -(-curves[0].shape[1] // EIGHT) * EIGHT
+    table = np.zeros((len(curves), widest, num_channels, num_padded), np.float32)
+    for rows, bands in zip(table, curves, strict=True):
         rows[: bands.shape[2], :, : bands.shape[1]] = bands[:num_channels].transpose(2, 0, 1)
-    return laid_out.reshape(len(several), widest, -1)
+    return table.reshape(len(curves), widest, -1)
 
 
 def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str | None) -> Contraction:
@@ -121,30 +121,30 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
         bands: of each curve by name. (3, J) float64, or (3, N, J) for N settings of it at once
         active: the curve that stays free, None to contract all.
     """
-    curves = [curve for curve in term.curves if not curve.outgoing]
+    curves = [curve for curve in term.curves if not curve.depends_on_view]
     constant = np.ones(3)
     if active is None and all(_is_flat(bands[curve.name]) for curve in curves):
         # nothing depends on an angle; with any other curve flat ones stay, for every angle decides where triangles are
         # divided, and a curve that becomes flat must not change that
         constant = np.prod([constant, *(bands[curve.name].mean(axis=1) for curve in curves)], axis=0)
         curves = []
-    given = [bands[curve.name] for curve in curves]
-    several = [rows for rows in given if rows.ndim == 3]
+    all_bands = [bands[curve.name] for curve in curves]
+    multiple_settings = [rows for rows in all_bands if rows.ndim == 3]
     free = next((k for k, curve in enumerate(curves) if curve.name == active), -1)
-    widest = max((rows.shape[-1] for rows in given), default=1) + EIGHT
-    alone = [rows if rows.ndim == 2 else np.zeros((3, rows.shape[2])) for rows in given]
-    padded = [np.pad(rows, ((0, 0), (0, widest - rows.shape[1])), mode="edge") for rows in alone]
-    varies = np.array([rows.ndim == 3 for rows in given], bool)
+    widest = max((rows.shape[-1] for rows in all_bands), default=1) + EIGHT
+    single_setting = [rows if rows.ndim == 2 else np.zeros((3, rows.shape[2])) for rows in all_bands]
+    padded = [np.pad(rows, ((0, 0), (0, widest - rows.shape[1])), mode="edge") for rows in single_setting]
+    has_settings = np.array([rows.ndim == 3 for rows in all_bands], bool)
     return Contraction(
         kinds=np.array([int(curve.angle) for curve in curves], np.int64),
         axes=np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
-        num_bands=np.array([rows.shape[-1] for rows in given], np.int64),
+        num_bands=np.array([rows.shape[-1] for rows in all_bands], np.int64),
         bands=np.array(padded, np.float32).reshape(len(curves), 3, widest),
-        num_rows=np.array([1 if np.all(rows == rows[0]) else 3 for rows in alone], np.int64),
-        settings=_settings(several, widest),
-        setting_of=np.where(varies, np.cumsum(varies) - 1, -1),
-        support=np.array([np.inf if k == free else _support(rows) for k, rows in enumerate(given)], np.float32),
+        num_rows=np.array([1 if np.all(rows == rows[0]) else 3 for rows in single_setting], np.int64),
+        settings=_settings(multiple_settings, widest),
+        setting_index=np.where(has_settings, np.cumsum(has_settings) - 1, -1),
+        support=np.array([np.inf if k == free else _support(rows) for k, rows in enumerate(all_bands)], np.float32),
         constant=constant.astype(np.float32),
         active=free,
-        num_settings=several[0].shape[1] if several else 1,
+        num_settings=multiple_settings[0].shape[1] if multiple_settings else 1,
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
-from relume.project.receivers import Receivers
+from relume.project.receivers import ShadingPoints
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
@@ -21,21 +21,21 @@ F32 = NDArray[np.float32]
 _ZERO = np.float32(0)
 
 
-def uprights(term: Term, points: Receivers, start: int, stop: int) -> F32:
+def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: int) -> F32:
     """Evaluate the quotients of a Lambertian term, which know of no direction but above and below.
 
     Args:
-        term: the term. points: of which [start, stop) are asked.
+        term: the term. receivers: of which [start, stop) are asked.
     Returns:
         (stop - start,) float32
     """
-    cos_theta_o = np.einsum("nc,nc->n", points.normal[start:stop], points.wo[start:stop])
-    nothing = np.zeros_like(cos_theta_o)
-    return np.asarray(term.quotients(nothing, nothing, nothing + 1, nothing, nothing, cos_theta_o)[0])
+    cos_theta_o = np.einsum("nc,nc->n", receivers.normal[start:stop], receivers.wo[start:stop])
+    zeros = np.zeros_like(cos_theta_o)
+    return np.asarray(term.quotients(zeros, zeros, zeros + 1, zeros, zeros, cos_theta_o)[0])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _sum_of_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # type: ignore[no-untyped-def]
+def _sum_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # type: ignore[no-untyped-def]
     """Sum the lights of a point: a function of its own, whose loops are vectors. weight: scratch. (M,)"""
     for m in range(weight.shape[0]):
         weight[m] = np.float32((np.int32(bits[m >> 3]) >> np.int32(m & 7)) & np.int32(1))
@@ -56,7 +56,7 @@ def sum_lights(normal, visible, direction, irradiance, start, stop, out):  # typ
     """Sum the lights that points [start, stop) see.
 
     Args:
-        normal: of all points. (n, 3) float32. visible: as in `Receivers`. (n, bytes) uint8
+        normal: of all points. (n, 3) float32. visible: as in `ShadingPoints`. (n, bytes) uint8
         direction, irradiance: of the lights. (3, M) float32
         out: Σ V L Ω cos θi, written. (stop - start, 3) float32
     """
@@ -69,12 +69,12 @@ def _sum(normal, visible, direction, irradiance, start, stop, weight, out):  # t
     x, y, z = direction[0], direction[1], direction[2]
     red, green, blue = irradiance[0], irradiance[1], irradiance[2]
     for p in range(start, stop):
-        _sum_of_point(
+        _sum_point(
             normal[p, 0], normal[p, 1], normal[p, 2], visible[p], x, y, z, red, green, blue, weight, out[p - start]
         )
 
 
-class EvenShader:
+class DiffuseProjector:
     """Shades points of a Lambertian term whose curves are flat.
 
     Args:
@@ -86,9 +86,9 @@ class EvenShader:
         self._direction = np.ascontiguousarray(lights.direction.T)
         self._irradiance = np.ascontiguousarray((lights.irradiance * constant).T)
 
-    def shade(self, points: Receivers, start: int, stop: int) -> F32:
+    def shade(self, receivers: ShadingPoints, start: int, stop: int) -> F32:
         """Shade points [start, stop). (stop - start, 3) float32"""
         out = np.zeros((stop - start, 3), np.float32)
         if self._direction.shape[1]:  # else no bits were read
-            sum_lights(points.normal, points.visible, self._direction, self._irradiance, start, stop, out)
-        return out * uprights(self._term, points, start, stop)[:, None]
+            sum_lights(receivers.normal, receivers.visible, self._direction, self._irradiance, start, stop, out)
+        return out * diffuse_quotients(self._term, receivers, start, stop)[:, None]

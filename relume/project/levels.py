@@ -12,14 +12,14 @@ from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction, contract
 from relume.project.projector import Projector
-from relume.project.receivers import Receivers
+from relume.project.receivers import ShadingPoints
 from relume.project.shading.shader import Shader
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
-def at_level(bands: Mapping[str, F64], level: int) -> dict[str, F64]:
+def at_roughness(bands: Mapping[str, F64], level: int) -> dict[str, F64]:
     """The curves at one level: those that do not differ from level to level are the same. (3, J) each
 
     Args:
@@ -28,13 +28,13 @@ def at_level(bands: Mapping[str, F64], level: int) -> dict[str, F64]:
     return {name: rows[level] if rows.ndim == 3 else rows for name, rows in bands.items()}
 
 
-def freed(bands: Mapping[str, F64], free: Iterable[str]) -> dict[str, F64]:
+def without_free_curves(bands: Mapping[str, F64], free: Iterable[str]) -> dict[str, F64]:
     """The same curves, the free ones as at the first level: their values do not matter, and they need no levels.
 
     Args:
-        bands: as `at_level` takes them. free: names of the curves.
+        bands: as `at_roughness` takes them. free: names of the curves.
     """
-    return {**bands, **at_level({name: bands[name] for name in free}, 0)}
+    return {**bands, **at_roughness({name: bands[name] for name in free}, 0)}
 
 
 def num_levels(bands: Mapping[str, F64]) -> int:
@@ -46,12 +46,12 @@ def contract_levels(term: Term, bands: Mapping[str, F64], active: str | None) ->
     """`relume.project.contraction.contract` at each level.
 
     Args:
-        term: whose curves these are. bands: as `at_level` takes them. active: the curve that stays free, if any.
+        term: whose curves these are. bands: as `at_roughness` takes them. active: the curve that stays free, if any.
     """
-    return tuple(contract(term, at_level(bands, level), active) for level in range(num_levels(bands)))
+    return tuple(contract(term, at_roughness(bands, level), active) for level in range(num_levels(bands)))
 
 
-def runs(level: NDArray[np.uint8] | None, num: int, start: int, stop: int) -> Iterator[tuple[int, int, int]]:
+def split_by_level(level: NDArray[np.uint8] | None, num: int, start: int, stop: int) -> Iterator[tuple[int, int, int]]:
     """Cut points [start, stop) into ranges of one level each.
 
     Args:
@@ -72,10 +72,10 @@ def project_levels(
     term: Term,
     contractions: Sequence[Contraction],
     lights: TriangleLights,
-    receivers: Receivers,
+    receivers: ShadingPoints,
     start: int,
     stop: int,
-    projector: Callable[[Term, Contraction, TriangleLights, Receivers], Projector | Shader] = Projector,
+    projector: Callable[[Term, Contraction, TriangleLights, ShadingPoints], Projector | Shader] = Projector,
 ) -> F32:
     """`Projector.project`, or that of another projector, with the curves of each point's level.
 
@@ -83,8 +83,8 @@ def project_levels(
         term, lights, receivers: as `Projector` takes them. contractions: from `contract_levels`.
         start, stop: of the points. projector: which one.
     """
-    parts = [
+    projected = [
         projector(term, contractions[level], lights, receivers).project(first, last)
-        for level, first, last in runs(receivers.level, len(contractions), start, stop)
+        for level, first, last in split_by_level(receivers.level, len(contractions), start, stop)
     ]
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    return projected[0] if len(projected) == 1 else np.concatenate(projected)

@@ -34,13 +34,13 @@ def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untype
 
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
-def has_bound(kind):  # type: ignore[no-untyped-def]
-    """Whether `nearest_into` bounds an angle."""
+def is_bounded(kind):  # type: ignore[no-untyped-def]
+    """Whether `angle_lower_bounds` bounds an angle."""
     return kind in (THETA_I, THETA_R, THETA_D, THETA_H)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def nearest_into(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
+def angle_lower_bounds(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """Bound γ(wi', wo) from below over all wi' within `radius` of wi; zero for angles without a bound.
 
     Args:
@@ -68,7 +68,7 @@ def nearest_into(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
+def cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
     """Drop those of the lights [begin, end) that a dormant curve does not see at all; returns the new end.
 
     Args:
@@ -78,24 +78,24 @@ def keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, 
     """
     for k in range(kinds.shape[0]):
         limit = support[k] + _SLACK
-        if limit > np.float32(math.pi / 2) or not has_bound(kinds[k]):
+        if limit > np.float32(math.pi / 2) or not is_bounded(kinds[k]):
             continue
         num = end - begin
         for n in range(num):
             reach[n] = radius[light[begin + n]]
         x, y, z = wi[0, begin:end], wi[1, begin:end], wi[2, begin:end]
-        nearest_into(kinds[k], reach[:num], x, y, z, ox, oy, oz, nearest)
+        angle_lower_bounds(kinds[k], reach[:num], x, y, z, ox, oy, oz, nearest)
         farthest = _ZERO
         for n in range(num):
             farthest = max(farthest, nearest[n])
         if farthest <= limit:
             continue
-        kept = begin
+        write_index = begin
         for n in range(num):
-            light[kept] = light[begin + n]
-            wi[0, kept], wi[1, kept], wi[2, kept] = x[n], y[n], z[n]
-            kept += nearest[n] <= limit
-        end = kept
+            light[write_index] = light[begin + n]
+            wi[0, write_index], wi[1, write_index], wi[2, write_index] = x[n], y[n], z[n]
+            write_index += nearest[n] <= limit
+        end = write_index
     return end
 
 
@@ -129,7 +129,7 @@ def list_lights(  # type: ignore[no-untyped-def]
 def _list(  # type: ignore[no-untyped-def]
     normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, scratch, first, light, wi, out
 ):
-    """Do what `list_lights` is for. scratch: of `keep_near`. (M,) each"""
+    """Do what `list_lights` is for. scratch: of `cull`. (M,) each"""
     num_lights, (reach, nearest) = directions.shape[0], scratch
     end = np.int64(0)
     for p in range(start, stop):
@@ -146,15 +146,15 @@ def _list(  # type: ignore[no-untyped-def]
         tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]
         bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
         for n in range(begin, end):
-            of_light = np.uint64(light[n])
-            x, y, z = directions[of_light, 0], directions[of_light, 1], directions[of_light, 2]
+            light_index = np.uint64(light[n])
+            x, y, z = directions[light_index, 0], directions[light_index, 1], directions[light_index, 2]
             wi[0, n] = tx * x + ty * y + tz * z
             wi[1, n] = bx * x + by * y + bz * z
             wi[2, n] = nx * x + ny * y + nz * z
         ox = tx * wo[p, 0] + ty * wo[p, 1] + tz * wo[p, 2]
         oy = bx * wo[p, 0] + by * wo[p, 1] + bz * wo[p, 2]
         oz = nx * wo[p, 0] + ny * wo[p, 1] + nz * wo[p, 2]
-        end = keep_near(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest)
+        end = cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest)
         out[0, begin:end], out[1, begin:end], out[2, begin:end] = ox, oy, oz
     first[stop - start] = end
     return end

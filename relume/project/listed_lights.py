@@ -11,24 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Angle, Term
-from relume.light.merged import see_parts, weigh_by_parts
-from relume.light.triangles import Parts, TriangleLights
+from relume.light.merged import visible_fraction, weight_by_visibility
+from relume.light.triangles import TriangleLights, TriangleSubset
 from relume.project.contraction import Contraction
-from relume.project.lamp_kernel import list_lamp
+from relume.project.lamp_kernel import list_area_light
 from relume.project.light_culling import list_lights
-from relume.project.receivers import LocalRays, Receivers, is_lamp
+from relume.project.receivers import LocalRays, ShadingPoints, is_area_light
 
 F32 = NDArray[np.float32]
 Bits = NDArray[np.uint8]
 
-_TRIANGLES_A_BLOCK = 4096  # of lamps, at least those of one point
-POINTS_A_BLOCK = 48  # directions of a block stay in a core's second-level cache
+_TRIANGLES_PER_BLOCK = 4096  # of lamps, at least those of one point
+POINTS_PER_BLOCK = 48  # directions of a block stay in a core's second-level cache
 
 _HALF_PI = np.float32(np.pi / 2)
 
 
 def with_half_angle(kinds: NDArray[np.int64], support: F32) -> tuple[NDArray[np.int64], F32]:
-    """Bound the half angle where only two other angles of the half vector are bounded: `nearest_into` knows it alone.
+    """Bound the half angle where only two other angles of the half vector are bounded. See `angle_lower_bounds`.
 
     cos θh = cos α cos β, and tan² θh = tan² x + tan² y of the two tilts.
 
@@ -47,20 +47,20 @@ def with_half_angle(kinds: NDArray[np.int64], support: F32) -> tuple[NDArray[np.
     return np.append(kinds, Angle.THETA_H), np.append(support, np.float32(bound))
 
 
-def _support_of(contraction: Contraction) -> tuple[NDArray[np.int64], F32]:
+def _curve_support(contraction: Contraction) -> tuple[NDArray[np.int64], F32]:
     """Angles of curves, and radians beyond which each is nothing."""
     radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
     return with_half_angle(contraction.kinds, radians)
 
 
-def _weighed(term: Term, wi: F32, wo: F32) -> F32:
+def _weighted_quotients(term: Term, wi: F32, wo: F32) -> F32:
     """q cos θi of entries. (1 or 3, K). wi, wo: local. (3, K)"""
     shading = term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
     shading *= wi[2]
     return shading
 
 
-class ListedLights:
+class LightList:
     """Lists the lights of blocks of receivers; holds the scratch memory of one thread.
 
     Args:
@@ -73,18 +73,20 @@ class ListedLights:
         first, light: written by `list`, see `list_lights`.
     """
 
-    def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
+    def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: ShadingPoints) -> None:
         self._term, self._lights, self._receivers = term, lights, receivers
         self.irradiance = lights.irradiance * contraction.constant
-        self._kinds, self._support = _support_of(contraction)
-        capacity = POINTS_A_BLOCK * lights.num_lights
-        self._seen = np.empty((lights.num_lights if lights.parts is not None else 0, POINTS_A_BLOCK), np.float32)
-        self.first = np.empty(POINTS_A_BLOCK + 1, np.int64)
+        self._kinds, self._support = _curve_support(contraction)
+        capacity = POINTS_PER_BLOCK * lights.num_lights
+        self._visible_fraction = np.empty(
+            (lights.num_lights if lights.parts is not None else 0, POINTS_PER_BLOCK), np.float32
+        )
+        self.first = np.empty(POINTS_PER_BLOCK + 1, np.int64)
         self.light = np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
 
     @cached_property
-    def brings(self) -> F32:
+    def irradiance_radius(self) -> F32:
         """What the lights bring, and how wide they are: irradiance and radius. (M, 4)"""
         return np.concatenate([self.irradiance, self._lights.radius[:, None]], axis=1)
 
@@ -92,30 +94,31 @@ class ListedLights:
         """List the lights of points [start, stop), a block of them at most.
 
         Args:
-            visible: which of the lights, or of their parts, these points see, as in `Receivers`. (stop - start, bytes)
+            visible: which of the lights, or of their parts, these points see, as in `ShadingPoints`. (stop - start,
+                bytes)
         Returns:
             q cos θi of each entry (1 or 3, K), and the local wo (3, ≥ K) that it belongs to: all the room there is, for
             kernels are compiled anew for what is cut off.
         """
-        r, lights, some = self._receivers, self._lights, slice(start, stop)
+        r, lights, rows = self._receivers, self._lights, slice(start, stop)
         if lights.parts is not None:
-            visible = self._see_parts(lights.parts, visible)
+            visible = self._visible_clusters(lights.parts, visible)
         num = list_lights(
-            r.normal[some], r.tangent[some], r.wo[some], visible, lights.direction, lights.radius, self._kinds,
+            r.normal[rows], r.tangent[rows], r.wo[rows], visible, lights.direction, lights.radius, self._kinds,
             self._support, 0, stop - start, self.first, self.light, self._wi, self._wo,
         )  # fmt: skip
-        shading = _weighed(self._term, self._wi[:, :num], self._wo[:, :num])
+        shading = _weighted_quotients(self._term, self._wi[:, :num], self._wo[:, :num])
         if lights.parts is not None:
-            weigh_by_parts(self.first[: stop - start + 1], self.light, self._seen, shading)
+            weight_by_visibility(self.first[: stop - start + 1], self.light, self._visible_fraction, shading)
         return shading, self._wo
 
-    def _see_parts(self, parts: Parts, visible: Bits) -> Bits:
+    def _visible_clusters(self, subset: TriangleSubset, visible: Bits) -> Bits:
         """Find which merged lights points see anything of, as bits; how much of each is in `_seen`."""
-        see_parts(visible, parts.group, parts.share, 0, len(visible), self._seen)
-        return np.packbits(self._seen[:, : len(visible)].T > 0, axis=1, bitorder="little")
+        visible_fraction(visible, subset.group, subset.fraction, 0, len(visible), self._visible_fraction)
+        return np.packbits(self._visible_fraction[:, : len(visible)].T > 0, axis=1, bitorder="little")
 
 
-class ListedLamp:
+class AreaLightList:
     """Lists the parts of a lamp that blocks of receivers see; holds the scratch memory of one thread.
 
     Args:
@@ -123,20 +126,23 @@ class ListedLamp:
         receivers: all points. rays: from a light that has a surface.
 
     Attributes:
-        triangles_a_point, points_a_block: the most of both that are listed at once.
-        first, light: written by `list`, see `list_lamp`.
+        max_triangles_per_point, points_per_block: the most of both that are listed at once.
+        first, light: written by `list`, see `list_area_light`.
     """
 
-    def __init__(self, term: Term, contraction: Contraction, receivers: Receivers, rays: LocalRays) -> None:
+    def __init__(self, term: Term, contraction: Contraction, receivers: ShadingPoints, rays: LocalRays) -> None:
         self._term, self._receivers, self._rays = term, receivers, rays
-        self._kinds, self._support = _support_of(contraction)
+        self._kinds, self._support = _curve_support(contraction)
         self._gain = np.asarray(rays.gain * contraction.constant, np.float32)
-        self.triangles_a_point = 2 * len(rays.strata.uv)
-        self.points_a_block = max(1, _TRIANGLES_A_BLOCK // self.triangles_a_point)
-        capacity = self.points_a_block * self.triangles_a_point
-        self.first, self.light = np.empty(self.points_a_block + 1, np.int64), np.empty(capacity + 1, np.int32)
+        self.max_triangles_per_point = 2 * len(rays.strata.uv)
+        self.points_per_block = max(1, _TRIANGLES_PER_BLOCK // self.max_triangles_per_point)
+        capacity = self.points_per_block * self.max_triangles_per_point
+        self.first, self.light = np.empty(self.points_per_block + 1, np.int64), np.empty(capacity + 1, np.int32)
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
-        self._nodes, self._brings = np.empty((capacity, 6, 3), np.float32), np.empty((capacity, 4), np.float32)
+        self._nodes, self._irradiance_radius = (
+            np.empty((capacity, 6, 3), np.float32),
+            np.empty((capacity, 4), np.float32),
+        )
 
     def list(self, start: int, stop: int) -> tuple[F32, F32, F32, F32]:
         """List the triangles of points [start, stop), a block of them at most.
@@ -146,23 +152,24 @@ class ListedLamp:
             and what they bring and how wide they are (M, 4).
         """
         r, rays = self._receivers, self._rays
-        num, num_triangles = list_lamp(
-            r.points, r.wo, (rays.light, rays.strata, rays.parts, self._gain), rays.visible, self._kinds,
-            self._support, start, stop, self.first, self.light, self._wi, self._wo, self._nodes, self._brings,
+        num, num_triangles = list_area_light(
+            r.points, r.wo, (rays.light, rays.strata, rays.emitter_parts, self._gain), rays.visible, self._kinds,
+            self._support, start, stop, self.first, self.light, self._wi, self._wo, self._nodes,
+            self._irradiance_radius,
         )  # fmt: skip
         return (
-            _weighed(self._term, self._wi[:, :num], self._wo[:, :num]),
+            _weighted_quotients(self._term, self._wi[:, :num], self._wo[:, :num]),
             self._wo,
             self._nodes[:num_triangles],
-            self._brings[:num_triangles],
+            self._irradiance_radius[:num_triangles],
         )
 
 
-def listed_lamps(term: Term, contraction: Contraction, receivers: Receivers) -> list[ListedLamp]:
+def area_light_lists(term: Term, contraction: Contraction, receivers: ShadingPoints) -> list[AreaLightList]:
     """Make room for all lamps that are listed as triangles: those with an extent, where any curve asks for it.
 
     Args:
         term: that is sent. contraction: its curves. receivers: points, and rays from them to lamps.
     """
-    lamps = [rays for rays in receivers.rays if is_lamp(rays, contraction.kinds.size)]
-    return [ListedLamp(term, contraction, receivers, rays) for rays in lamps]
+    area_lights = [rays for rays in receivers.rays if is_area_light(rays, contraction.kinds.size)]
+    return [AreaLightList(term, contraction, receivers, rays) for rays in area_lights]

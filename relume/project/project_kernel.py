@@ -13,8 +13,8 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.brdf.angles import ALPHA, BETA, alpha_and_beta_into, angles_into
-from relume.project.leaf_kernel import spend, weigh_leaves
+from relume.brdf.angles import ALPHA, BETA, compute_alpha_beta, compute_angles
+from relume.project.leaf_kernel import add_subtriangles, weight_subtriangles
 from relume.uncounted import UNCOUNTED
 
 _QUARTER = np.float32(0.25)
@@ -23,10 +23,10 @@ _THIRD = np.float32(1 / 3)
 # An angle counts as linear over a triangle when it is this close to linear at the midpoints of the edges, in bands;
 # away from the pole, where curves are wider, a share of the angle more.
 _TOLERANCE_BANDS = np.float32(0.04)
-_TOLERANCE_SHARE = np.float32(0.015)
+_TOLERANCE_FRACTION = np.float32(0.015)
 _QUARTERED_BEND = np.float32(4)  # division in four quarters the bend, so that up to here one division is enough
 _MAX_DEPTH = 6
-FINE, ROUGH = (np.float32(1), _MAX_DEPTH - 1), (np.float32(8), 2)
+FINE, COARSE = (np.float32(1), _MAX_DEPTH - 1), (np.float32(8), 2)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)
@@ -36,9 +36,9 @@ _BATCH = 16  # lights divided together
 # Loops run to a multiple of this many triangles: the compiler's vector code rounds otherwise than its code for the
 # rest, and what a triangle gives must not depend on which others are left out.
 _LANES = 32
-_MOST_DIVIDED = _BATCH * 4 ** (_MAX_DEPTH - 1)
-_MOST_LEAVES = _BATCH * 4**_MAX_DEPTH
-_LEAVES_AT_ONCE = 64  # multiplied by the settings of a curve
+_MAX_DIVIDED = _BATCH * 4 ** (_MAX_DEPTH - 1)
+_MAX_SUBTRIANGLES = _BATCH * 4**_MAX_DEPTH
+_SUBTRIANGLES_PER_BATCH = 64  # multiplied by the settings of a curve
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
@@ -48,14 +48,14 @@ def _padded(num):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _bend_of(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
+def _relative_bend(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
     """Compute how far an angle at the edges' midpoints is from linear between the corners, over what is tolerated."""
     bend = max(abs(ab - _HALF * (a + b)), max(abs(bc - _HALF * (b + c)), abs(ca - _HALF * (c + a))))
-    return bend / (_TOLERANCE_BANDS + _TOLERANCE_SHARE * min(a, min(b, c)))
+    return bend / (_TOLERANCE_BANDS + _TOLERANCE_FRACTION * min(a, min(b, c)))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _turn_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
+def _rotate_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
     """Turn the nodes of the listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     for node in range(6):
@@ -79,46 +79,61 @@ def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
         a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
         limit = support[k]
         for e in range(num):
-            of_curve = _bend_of(a[e], b[e], c[e], ab[e], bc[e], ca[e])
+            curve_bend = _relative_bend(a[e], b[e], c[e], ab[e], bc[e], ca[e])
             low = min(a[e], min(b[e], min(c[e], min(ab[e], min(bc[e], ca[e])))))
             high = max(a[e], max(b[e], max(c[e], max(ab[e], max(bc[e], ca[e])))))
             # a pole may lie inside by as much as the nodes are apart
-            is_nothing = low - (high - low) > limit or bend[e] < 0
-            bend[e] = _CULLED if is_nothing else max(bend[e], of_curve)
+            is_zero = low - (high - low) > limit or bend[e] < 0
+            bend[e] = _CULLED if is_zero else max(bend[e], curve_bend)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _bows(gamma, num, bow):  # type: ignore[no-untyped-def]
+def _sum_bends(gamma, num, bend_sum):  # type: ignore[no-untyped-def]
     """Sum how far each angle bends at the edges' midpoints. bow: (C, …), written."""
     num = _padded(num)
     for k in range(gamma.shape[0]):
         a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
-        of_curve = bow[k]
+        curve_bend_sum = bend_sum[k]
         for e in range(num):
-            of_curve[e] = ab[e] + bc[e] + ca[e] - (a[e] + b[e] + c[e])
+            curve_bend_sum[e] = ab[e] + bc[e] + ca[e] - (a[e] + b[e] + c[e])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _append(gamma, bow, which, count, nodes, bent, origin, share, leaves, shares, of_entry, num):  # type: ignore[no-untyped-def]
+def _append(  # type: ignore[no-untyped-def]
+    gamma,
+    bend_sum,
+    triangle_index,
+    count,
+    nodes,
+    bent,
+    origin,
+    area_fraction,
+    subtriangles,
+    area_fractions,
+    entry_index,
+    num,
+):
     """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves.
 
     Corners move by `bent` times as much as angles bend, which is nearly always one way (docs/method.md, "Overlap").
     """
     for k in range(gamma.shape[0]):
-        moved = bow[k]
+        curve_bend_sum = bend_sum[k]
         for corner in range(3):
-            angle, leaf = gamma[k, nodes[corner]], leaves[k, corner]
+            angle, corner_angles = gamma[k, nodes[corner]], subtriangles[k, corner]
             for n in range(count):
-                w = np.uint64(which[n])
-                leaf[num + n] = max(angle[w] + bent * moved[w], np.float32(0))
+                w = np.uint64(triangle_index[n])
+                corner_angles[num + n] = max(angle[w] + bent * curve_bend_sum[w], np.float32(0))
     for n in range(count):
-        of_entry[num + n] = origin[np.uint64(which[n])]
-    shares[num : num + count] = share
+        entry_index[num + n] = origin[np.uint64(triangle_index[n])]
+    area_fractions[num : num + count] = area_fraction
     return num + count
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _sort_out(gamma, bend, bow, num_triangles, level, fine, origin, leaves, shares, of_entry, num, lists):  # type: ignore[no-untyped-def]
+def _classify_triangles(  # type: ignore[no-untyped-def]
+    gamma, bend, bend_sum, num_triangles, level, fine, origin, subtriangles, area_fractions, entry_index, num, lists
+):
     """Make leaves of the triangles over which all angles are linear, four of those that one division straightens.
 
     Args:
@@ -128,51 +143,77 @@ def _sort_out(gamma, bend, bow, num_triangles, level, fine, origin, leaves, shar
         The new number of leaves, and how many must be divided.
     """
     num_whole = num_quartered = num_divided = 0
-    bend_of_whole, last_level = fine
-    bend_of_quartered, is_last = _QUARTERED_BEND * bend_of_whole, level == last_level
+    max_whole_bend, last_level = fine
+    max_quartered_bend, is_last = _QUARTERED_BEND * max_whole_bend, level == last_level
     for n in range(num_triangles):
         lists[0, num_whole] = n
         lists[1, num_quartered] = n
         lists[2, num_divided] = n
-        is_whole, is_simple = bend[n] <= bend_of_whole, bend[n] <= bend_of_quartered or is_last
+        is_whole, is_simple = bend[n] <= max_whole_bend, bend[n] <= max_quartered_bend or is_last
         num_whole += (bend[n] >= 0) & is_whole
         num_quartered += is_simple & (not is_whole)
         num_divided += (not is_simple) & (not is_whole)
-    share = _QUARTER**level
-    _bows(gamma, num_triangles, bow)
-    num = _append(gamma, bow, lists[0], num_whole, _WHOLE, _THIRD, origin, share, leaves, shares, of_entry, num)
+    area_fraction = _QUARTER**level
+    _sum_bends(gamma, num_triangles, bend_sum)
+    num = _append(
+        gamma,
+        bend_sum,
+        lists[0],
+        num_whole,
+        _WHOLE,
+        _THIRD,
+        origin,
+        area_fraction,
+        subtriangles,
+        area_fractions,
+        entry_index,
+        num,
+    )
     for child in range(4):
         nodes = (_CHILDREN[child, 0], _CHILDREN[child, 1], _CHILDREN[child, 2])
-        part = _QUARTER * share
+        child_fraction = _QUARTER * area_fraction
         # a quarter of a triangle bends a quarter as much
         bent = _QUARTER * _THIRD
-        num = _append(gamma, bow, lists[1], num_quartered, nodes, bent, origin, part, leaves, shares, of_entry, num)
+        num = _append(
+            gamma,
+            bend_sum,
+            lists[1],
+            num_quartered,
+            nodes,
+            bent,
+            origin,
+            child_fraction,
+            subtriangles,
+            area_fractions,
+            entry_index,
+            num,
+        )
     return num, num_divided
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _children(local, gamma, origin, which, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
+def _children(local, gamma, origin, triangle_index, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
     """Make the four children of the listed triangles: corners, and midpoints of edges. Returns their number."""
     for child in range(4):
         begin = child * count
         for corner in range(3):
             node = _CHILDREN[child, corner]
             for axis in range(3):
-                of_parent, of_child = local[axis, node], child_local[axis, corner]
+                parent_values, child_values = local[axis, node], child_local[axis, corner]
                 for n in range(count):
-                    of_child[begin + n] = of_parent[np.uint64(which[n])]
+                    child_values[begin + n] = parent_values[np.uint64(triangle_index[n])]
             for k in range(gamma.shape[0]):
-                of_parent, of_child = gamma[k, node], child_gamma[k, corner]
+                parent_values, child_values = gamma[k, node], child_gamma[k, corner]
                 for n in range(count):
-                    of_child[begin + n] = of_parent[np.uint64(which[n])]
+                    child_values[begin + n] = parent_values[np.uint64(triangle_index[n])]
         for n in range(count):
-            child_origin[begin + n] = origin[np.uint64(which[n])]
+            child_origin[begin + n] = origin[np.uint64(triangle_index[n])]
     for edge in range(3):
-        following = (edge + 1) % 3
+        next_edge = (edge + 1) % 3
         for n in range(_padded(4 * count)):
-            x = child_local[0, edge, n] + child_local[0, following, n]
-            y = child_local[1, edge, n] + child_local[1, following, n]
-            z = child_local[2, edge, n] + child_local[2, following, n]
+            x = child_local[0, edge, n] + child_local[0, next_edge, n]
+            y = child_local[1, edge, n] + child_local[1, next_edge, n]
+            z = child_local[2, edge, n] + child_local[2, next_edge, n]
             inverse = np.float32(1) / math.sqrt(x * x + y * y + z * z)
             child_local[0, 3 + edge, n] = x * inverse
             child_local[1, 3 + edge, n] = y * inverse
@@ -196,77 +237,90 @@ def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no
         for node in range(first_node, 6):
             x, y, z = local[0, node, :num], local[1, node, :num], local[2, node, :num]
             if is_pair:
-                alpha_and_beta_into(
+                compute_alpha_beta(
                     scale[k : k + 2], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node], gamma[k + 1, node]
                 )
             else:
-                angles_into(kinds[k], scale[k], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node])
+                compute_angles(kinds[k], scale[k], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _divide(  # type: ignore[no-untyped-def]
-    kinds, scale, wo, support, fine, local, gamma, origin, count, parts, lists, bend, bow, leaves, shares, of_entry, num
+    kinds, scale, wo, support, fine, local, gamma, origin, count, generations, lists, bend, bend_sum, subtriangles,
+    area_fractions, entry_index, num
 ):  # fmt: skip
     """Divide the first `count` triangles of lists[2], and what comes of them, until every angle is linear over each.
 
     Args:
-        parts: local, gamma and origin of two generations of divided triangles, written in turns.
+        generations: local, gamma and origin of two generations of divided triangles, written in turns.
     Returns:
         The new number of leaves.
     """
-    part_local, part_gamma, part_origin = parts
+    all_local, all_gamma, all_origin = generations
     for level in range(1, fine[1] + 1):
-        to_local, to_gamma, to_origin = part_local[level & 1], part_gamma[level & 1], part_origin[level & 1]
-        num_parts = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
-        _angles(kinds, scale, wo, to_local, _MIDDLES, num_parts, to_gamma)
-        _bends(to_gamma, support, num_parts, bend)
-        num, count = _sort_out(
-            to_gamma, bend, bow, num_parts, level, fine, to_origin, leaves, shares, of_entry, num, lists
+        to_local, to_gamma, to_origin = all_local[level & 1], all_gamma[level & 1], all_origin[level & 1]
+        num_children = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
+        _angles(kinds, scale, wo, to_local, _MIDDLES, num_children, to_gamma)
+        _bends(to_gamma, support, num_children, bend)
+        num, count = _classify_triangles(
+            to_gamma,
+            bend,
+            bend_sum,
+            num_children,
+            level,
+            fine,
+            to_origin,
+            subtriangles,
+            area_fractions,
+            entry_index,
+            num,
+            lists,
         )
         local, gamma, origin = to_local, to_gamma, to_origin
     return num
 
 
 @nb.njit(nogil=True, cache=True)
-def scratch_of(num_curves, num_lights, num_settings):  # type: ignore[no-untyped-def]
+def make_scratch(num_curves, num_lights, num_settings):  # type: ignore[no-untyped-def]
     """Make room for what `project_points` is in the middle of: it need not be made, and zeroed, for every few points.
 
     Args:
         num_curves: C. num_lights: the most that it is asked to list triangles of. num_settings: see `Contraction`.
     """
-    capacity = 4 * num_lights + _MOST_LEAVES
-    return _scratch_of_lights(num_curves, num_lights), _scratch_of_leaves(num_curves, capacity, num_settings)
+    capacity = 4 * num_lights + _MAX_SUBTRIANGLES
+    return _make_light_scratch(num_curves, num_lights), _make_subtriangle_scratch(num_curves, capacity, num_settings)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _scratch_of_lights(num_curves, num_lights):  # type: ignore[no-untyped-def]
+def _make_light_scratch(num_curves, num_lights):  # type: ignore[no-untyped-def]
     """Make room for lights and parts: local nodes, angles, generations, which light each is of, lists, bends, bows."""
-    room = _padded(num_lights)
-    widest = max(room, _MOST_DIVIDED)
-    local, gamma = np.zeros((3, 6, room), np.float32), np.empty((num_curves, 6, room), np.float32)
-    parts = (
-        np.zeros((2, 3, 6, _MOST_DIVIDED), np.float32),
-        np.zeros((2, num_curves, 6, _MOST_DIVIDED), np.float32),
-        np.empty((2, _MOST_DIVIDED), np.int64),
+    capacity = _padded(num_lights)
+    widest = max(capacity, _MAX_DIVIDED)
+    local, gamma = np.zeros((3, 6, capacity), np.float32), np.empty((num_curves, 6, capacity), np.float32)
+    generations = (
+        np.zeros((2, 3, 6, _MAX_DIVIDED), np.float32),
+        np.zeros((2, num_curves, 6, _MAX_DIVIDED), np.float32),
+        np.empty((2, _MAX_DIVIDED), np.int64),
     )
     lists, bend = np.empty((3, widest + 1), np.int64), np.empty(widest, np.float32)
-    bow = np.empty((num_curves, widest), np.float32)
-    return local, gamma, parts, np.arange(widest), lists, bend, bow, np.empty(num_lights, np.int64)
+    bend_sum = np.empty((num_curves, widest), np.float32)
+    return local, gamma, generations, np.arange(widest), lists, bend, bend_sum, np.empty(num_lights, np.int64)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _scratch_of_leaves(num_curves, capacity, num_settings):  # type: ignore[no-untyped-def]
+def _make_subtriangle_scratch(num_curves, capacity, num_settings):  # type: ignore[no-untyped-def]
     """Make room for leaves: corners, shares, entries, overlaps, weights, and means and products of settings."""
-    leaves, shares = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
-    overlap, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
-    mean, product = np.empty(num_settings, np.float32), np.empty((_LEAVES_AT_ONCE, num_settings), np.float32)
-    return leaves, shares, np.empty(capacity, np.int64), overlap, weight, mean, product
+    subtriangles, area_fractions = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
+    overlaps, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
+    mean, product = np.empty(num_settings, np.float32), np.empty((_SUBTRIANGLES_PER_BATCH, num_settings), np.float32)
+    return subtriangles, area_fractions, np.empty(capacity, np.int64), overlaps, weight, mean, product
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, irradiance,
-    kinds, axes, num_bands, bands, falls, num_rows, settings, setting_of, support, active, fine, start, stop, scratch,
+    kinds, axes, num_bands, bands, decrements, num_rows, settings, setting_index, support, active, fine, start, stop,
+    scratch,
     out,
 ):  # fmt: skip
     """Project the listed lights of points [start, stop).
@@ -276,10 +330,11 @@ def project_points(  # type: ignore[no-untyped-def]
         first, light, local_wo: from `list_lights`.
         shading: q · cos θi of each entry, one row for all channels, or three. (1 or 3, K) float32
         nodes: of the lights. (3 axes, 6, M) float32. irradiance: of the lights, per channel. (M, 3) float32
-        kinds, axes, num_bands, bands, falls, num_rows, settings, setting_of, support, active: see `Contraction`.
+        kinds, axes, num_bands, bands, decrements, num_rows, settings, setting_index, support, active: see
+        `Contraction`.
         fine: how far angles may bend over a leaf, times what is tolerated of exact operators; the last level of
             division. `FINE` or `ROUGH`.
-        scratch: from `scratch_of`.
+        scratch: from `make_scratch`.
         out: added to. (points, 3, J padded by 8) float32; with no free curve (points, 3, N) for N settings of the
             others.
     """
@@ -287,9 +342,9 @@ def project_points(  # type: ignore[no-untyped-def]
     scale = np.empty(num_curves, np.float32)
     for k in range(num_curves):
         scale[k] = num_bands[k] / (np.pi / 2)
-    local, gamma, parts, origin, lists, bend, bow, divided = scratch[0]
-    leaves, shares, of_entry, overlap, weight, mean, product = scratch[1]
-    capacity = shares.shape[0]
+    local, gamma, generations, origin, lists, bend, bend_sum, divided = scratch[0]
+    subtriangles, area_fractions, entry_index, overlaps, weight, mean, product = scratch[1]
+    capacity = area_fractions.shape[0]
     scaled_wo = np.empty((num_curves, 3), np.float32)
     for p in range(start, stop):
         row = p - start
@@ -300,29 +355,40 @@ def project_points(  # type: ignore[no-untyped-def]
             for axis in range(3):
                 scaled_wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
         if num_curves > 0:
-            _turn_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
+            _rotate_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
         _angles(kinds, scale, scaled_wo, local, _BEGIN, num_entries, gamma)
         _bends(gamma, support, num_entries, bend)
-        num, num_divided = _sort_out(
-            gamma, bend, bow, num_entries, _BEGIN, fine, origin, leaves, shares, of_entry, _BEGIN, lists
+        num, num_divided = _classify_triangles(
+            gamma,
+            bend,
+            bend_sum,
+            num_entries,
+            _BEGIN,
+            fine,
+            origin,
+            subtriangles,
+            area_fractions,
+            entry_index,
+            _BEGIN,
+            lists,
         )
         divided[:num_divided] = lists[2, :num_divided]
         for batch in range(0, num_divided, _BATCH):
-            if num + _MOST_LEAVES > capacity:
-                weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weight)
-                spend(
-                    leaves, num, num_bands, bands, falls, num_rows, settings, setting_of, active,
-                    overlap, weight, mean, product, out[row],
+            if num + _MAX_SUBTRIANGLES > capacity:
+                weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fractions, num, weight)
+                add_subtriangles(
+                    subtriangles, num, num_bands, bands, decrements, num_rows, settings, setting_index, active,
+                    overlaps, weight, mean, product, out[row],
                 )  # fmt: skip
                 num = 0
             count = min(_BATCH, num_divided - batch)
             lists[2, :count] = divided[batch : batch + count]
             num = _divide(
-                kinds, scale, scaled_wo, support, fine, local, gamma, origin, count, parts, lists, bend, bow,
-                leaves, shares, of_entry, num,
+                kinds, scale, scaled_wo, support, fine, local, gamma, origin, count, generations, lists, bend, bend_sum,
+                subtriangles, area_fractions, entry_index, num,
             )  # fmt: skip
-        weigh_leaves(irradiance, light, shading, begin, of_entry, shares, num, weight)
-        spend(
-            leaves, num, num_bands, bands, falls, num_rows, settings, setting_of, active,
-            overlap, weight, mean, product, out[row],
+        weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fractions, num, weight)
+        add_subtriangles(
+            subtriangles, num, num_bands, bands, decrements, num_rows, settings, setting_index, active,
+            overlaps, weight, mean, product, out[row],
         )  # fmt: skip

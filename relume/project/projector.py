@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.light.triangles import TriangleLights
 from relume.project.contraction import Contraction
-from relume.project.listed_lights import POINTS_A_BLOCK, ListedLamp, ListedLights, listed_lamps
-from relume.project.project_kernel import FINE, ROUGH, project_points, scratch_of
+from relume.project.listed_lights import POINTS_PER_BLOCK, AreaLightList, LightList, area_light_lists
+from relume.project.project_kernel import COARSE, FINE, make_scratch, project_points
 from relume.project.ray_projector import RayProjector
-from relume.project.receivers import Receivers
+from relume.project.receivers import ShadingPoints
 from relume.vector_code import NUM as EIGHT
 
 F32 = NDArray[np.float32]
-_Listed = tuple[NDArray[np.int64], NDArray[np.int32], F32, F32, F32, F32]
+_LightArrays = tuple[NDArray[np.int64], NDArray[np.int32], F32, F32, F32, F32]
 
 
 class Projector:
@@ -33,14 +33,14 @@ class Projector:
         receivers: all points, and what arrives at them.
     """
 
-    def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: Receivers) -> None:
+    def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: ShadingPoints) -> None:
         self._contraction, self._lights, self._receivers = contraction, lights, receivers
-        self._listed = ListedLights(term, contraction, lights, receivers)
-        self._rays = RayProjector(term, contraction, receivers, POINTS_A_BLOCK)
-        self._lamps = listed_lamps(term, contraction, receivers)
-        most = max([lights.num_lights, *(lamp.triangles_a_point for lamp in self._lamps)])
-        self._fine = FINE if lights.parts is None else ROUGH
-        self._scratch = scratch_of(contraction.kinds.size, most, contraction.settings.shape[2])
+        self._light_list = LightList(term, contraction, lights, receivers)
+        self._rays = RayProjector(term, contraction, receivers, POINTS_PER_BLOCK)
+        self._area_lights = area_light_lists(term, contraction, receivers)
+        max_lights = max([lights.num_lights, *(area_light.max_triangles_per_point for area_light in self._area_lights)])
+        self._fine = FINE if lights.parts is None else COARSE
+        self._scratch = make_scratch(contraction.kinds.size, max_lights, contraction.settings.shape[2])
 
     def project(self, start: int, stop: int) -> F32:
         """Project points [start, stop): their transport along the free curve, in its bands.
@@ -51,33 +51,37 @@ class Projector:
         c = self._contraction
         num_padded = c.num_columns + EIGHT if c.active >= 0 else -(-c.num_settings // EIGHT) * EIGHT
         out = np.zeros((stop - start, 3, num_padded), np.float32)
-        for block in range(start, stop, POINTS_A_BLOCK):
-            end = min(block + POINTS_A_BLOCK, stop)
+        for block in range(start, stop, POINTS_PER_BLOCK):
+            end = min(block + POINTS_PER_BLOCK, stop)
             self._block(block, end, out[block - start : end - start])
         self._rays.add(start, stop, out)
-        for lamp in self._lamps:
-            self._add_lamp(lamp, start, stop, out)
+        for area_light in self._area_lights:
+            self._add_area_light(area_light, start, stop, out)
         return out[:, :, : c.num_columns].transpose(0, 2, 1)
 
-    def _add_lamp(self, lamp: ListedLamp, start: int, stop: int, out: F32) -> None:
-        for block in range(start, stop, lamp.points_a_block):
-            end = min(block + lamp.points_a_block, stop)
-            shading, wo, nodes, brings = lamp.list(block, end)
-            by_axis, irradiance = np.ascontiguousarray(nodes.transpose(2, 1, 0)), np.ascontiguousarray(brings[:, :3])
-            listed = lamp.first, lamp.light, shading, wo, by_axis, irradiance
-            self._project(listed, block, end, out[block - start : end - start])
+    def _add_area_light(self, area_light: AreaLightList, start: int, stop: int, out: F32) -> None:
+        for block in range(start, stop, area_light.points_per_block):
+            end = min(block + area_light.points_per_block, stop)
+            shading, wo, nodes, irradiance_radius = area_light.list(block, end)
+            by_axis, irradiance = (
+                np.ascontiguousarray(nodes.transpose(2, 1, 0)),
+                np.ascontiguousarray(irradiance_radius[:, :3]),
+            )
+            light_arrays = area_light.first, area_light.light, shading, wo, by_axis, irradiance
+            self._project(light_arrays, block, end, out[block - start : end - start])
 
     def _block(self, start: int, stop: int, out: F32) -> None:
-        its = self._listed
-        shading, wo = its.list(start, stop, self._receivers.visible[start:stop])
-        listed = its.first, its.light, shading, wo, self._lights.nodes, its.irradiance
-        self._project(listed, start, stop, out)
+        light_list = self._light_list
+        shading, wo = light_list.list(start, stop, self._receivers.visible[start:stop])
+        light_arrays = light_list.first, light_list.light, shading, wo, self._lights.nodes, light_list.irradiance
+        self._project(light_arrays, start, stop, out)
 
-    def _project(self, listed: _Listed, start: int, stop: int, out: F32) -> None:
+    def _project(self, light_arrays: _LightArrays, start: int, stop: int, out: F32) -> None:
         """Project a block. listed: of its points, `first` to `irradiance` of `project_points`."""
         r, c = self._receivers, self._contraction
         project_points(
-            r.normal, r.tangent, *listed,
-            c.kinds, c.axes, c.num_bands, c.bands, c.falls, c.num_rows, c.settings, c.setting_of, c.support, c.active,
+            r.normal, r.tangent, *light_arrays,
+            c.kinds, c.axes, c.num_bands, c.bands, c.decrements, c.num_rows, c.settings, c.setting_index, c.support,
+            c.active,
             self._fine, start, stop, self._scratch, out,
         )  # fmt: skip

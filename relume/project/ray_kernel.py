@@ -11,8 +11,8 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.brdf.angles import angles_into
-from relume.light.gather_rays import shift_of
+from relume.brdf.angles import compute_angles
+from relume.light.gather_rays import cranley_patterson_offset
 from relume.light.local import light_sample
 from relume.project.gathered_kernel import in_frame
 from relume.uncounted import UNCOUNTED
@@ -21,7 +21,7 @@ _NONE = np.int64(-1)  # no curve is free
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def list_local(  # type: ignore[no-untyped-def]
+def list_local_rays(  # type: ignore[no-untyped-def]
     points, wo, light, strata, gain, visible, start, stop, first, wi, out, irradiance
 ):
     """List the samples of a local light that points [start, stop) see.
@@ -30,7 +30,8 @@ def list_local(  # type: ignore[no-untyped-def]
         points: `Points`. wo: towards the viewer. (n, 3) float32
         light, strata, gain, visible: as in `LocalRays`.
         start, stop: the points.
-        first, wi, out, irradiance: written, as by `relume.project.gathered_kernel.list_gathered`; the irradiance of a
+        first, wi, out, irradiance: written, as by `relume.project.gathered_kernel.list_gather_rays`; the irradiance of
+        a
             ray is w · cos θi · gain.
     Returns:
         K, the number of rays.
@@ -41,7 +42,7 @@ def list_local(  # type: ignore[no-untyped-def]
         first[p - start] = end
         n, t = normal[p], tangent[p]
         (bx, by, bz), (ox, oy, oz) = in_frame(n, t, wo[p])
-        shift_u, shift_v = shift_of(strata, seed[p])
+        shift_u, shift_v = cranley_patterson_offset(strata, seed[p])
         for sample in range(strata.uv.shape[0]):
             if not (visible[p, sample >> 3] >> (sample & 7)) & 1:
                 continue
@@ -62,14 +63,14 @@ def list_local(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def list_thrown(  # type: ignore[no-untyped-def]
-    points, wo, direction, across, visible, start, stop, first, wi, out, irradiance
+def list_mirror_lights(  # type: ignore[no-untyped-def]
+    points, wo, direction, normal_irradiance, visible, start, stop, first, wi, out, irradiance
 ):
     """List the lights that points [start, stop) see in flat mirrors.
 
     Args:
-        points, wo, start, stop: as of `list_local`. direction, across, visible: as in `ThrownRays`.
-        first, wi, out, irradiance: written, as there; the irradiance of a ray is cos θi · `across`.
+        points, wo, start, stop: as of `list_local_rays`. direction, normal_irradiance, visible: as in `MirrorRays`.
+        first, wi, out, irradiance: written, as there; the irradiance of a ray is cos θi · `normal_irradiance`.
     Returns:
         K, the number of rays.
     """
@@ -89,7 +90,7 @@ def list_thrown(  # type: ignore[no-untyped-def]
             wi[0, end], wi[1, end], wi[2, end] = t[0] * dx + t[1] * dy + t[2] * dz, bx * dx + by * dy + bz * dz, z
             out[0, end], out[1, end], out[2, end] = ox, oy, oz
             for channel in range(3):
-                irradiance[channel, end] = z * across[k, channel]
+                irradiance[channel, end] = z * normal_irradiance[k, channel]
             end += 1
     first[stop - start] = end
     return end
@@ -105,7 +106,7 @@ def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-de
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _spread(settings, setting_of, band, weight, num, product, out):  # type: ignore[no-untyped-def]
+def _add_settings(settings, setting_index, band, weight, num, product, out):  # type: ignore[no-untyped-def]
     """Add rays to all settings of the curves that have several.
 
     Args:
@@ -115,20 +116,20 @@ def _spread(settings, setting_of, band, weight, num, product, out):  # type: ign
     blue = settings.shape[2] // num_padded - 1
     for n in range(num):
         product[:] = 1
-        for k in range(setting_of.shape[0]):
-            if setting_of[k] >= 0:
-                values = settings[setting_of[k], band[k, n]]
+        for k in range(setting_index.shape[0]):
+            if setting_index[k] >= 0:
+                values = settings[setting_index[k], band[k, n]]
                 for j in range(product.shape[0]):
                     product[j] *= values[j]
         for channel in range(3):
-            begin, of_channel, brought = (blue * channel // 2) * num_padded, out[channel], weight[channel, n]
+            begin, channel_out, ray_weight = (blue * channel // 2) * num_padded, out[channel], weight[channel, n]
             for j in range(num_padded):
-                of_channel[j] += brought * product[begin + j]
+                channel_out[j] += ray_weight * product[begin + j]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _contract(  # type: ignore[no-untyped-def]
-    begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, active,
+    begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, active,
     gamma, band, weight,
 ):  # fmt: skip
     """Weigh rays [begin, end) of a point by all its curves but the free one and those with several settings.
@@ -137,37 +138,38 @@ def _contract(  # type: ignore[no-untyped-def]
     """
     num, blue_row = end - begin, shading.shape[0] - 1
     for channel in range(3):
-        of_channel, quotient, weighed = irradiance[channel], shading[blue_row * channel // 2], weight[channel]
+        channel_irradiance, quotient, weighted = irradiance[channel], shading[blue_row * channel // 2], weight[channel]
         for n in range(num):
-            weighed[n] = of_channel[begin + n] * quotient[begin + n]
+            weighted[n] = channel_irradiance[begin + n] * quotient[begin + n]
     for k in range(kinds.shape[0]):
         scale = np.float32(num_bands[k] / (math.pi / 2))
-        angles_into(
+        compute_angles(
             kinds[k], scale, wi[0, begin:end], wi[1, begin:end], wi[2, begin:end],
             axes[k, 0] * wo[0, begin], axes[k, 1] * wo[1, begin], axes[k, 2] * wo[2, begin], gamma[:num],
         )  # fmt: skip
         for n in range(num):
             band[k, n] = min(np.int64(gamma[n]), num_bands[k] - 1)
-        if k != active and setting_of[k] < 0:
+        if k != active and setting_index[k] < 0:
             _multiply(bands[k], num_rows[k], band[k], weight, num)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def weigh_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, out):  # type: ignore[no-untyped-def]
+def weight_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, out):  # type: ignore[no-untyped-def]
     """Weigh what each listed ray brings to its point, all curves contracted.
 
     Args:
-        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of: as in `project_rays`.
+        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index: as in
+        `project_rays`.
         out: written. (3, K) float32
     """
-    most = np.diff(first).max()
-    gamma, weight = np.empty(most, np.float32), np.empty((3, most), np.float32)
-    band = np.empty((kinds.shape[0], most), np.int64)
+    max_rays = np.diff(first).max()
+    gamma, weight = np.empty(max_rays, np.float32), np.empty((3, max_rays), np.float32)
+    band = np.empty((kinds.shape[0], max_rays), np.int64)
     for p in range(first.shape[0] - 1):
         begin, end = first[p], first[p + 1]
         if end > begin:
             _contract(
-                begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, _NONE,
+                begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, _NONE,
                 gamma, band, weight,
             )  # fmt: skip
             for channel in range(3):
@@ -190,31 +192,31 @@ def sum_rays(first, irradiance, shading, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def project_rays(  # type: ignore[no-untyped-def]
-    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active, out
+    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active, out
 ):
     """Add listed rays to their points.
 
     Args:
-        first, wi, wo, irradiance: from `list_gathered` or `list_local`; wo is their `out`.
+        first, wi, wo, irradiance: from `list_gather_rays` or `list_local_rays`; wo is their `out`.
         shading: quotients, one row for all channels, or three. (1 or 3, K) float32
-        kinds, axes, num_bands, bands, num_rows, settings, setting_of, active: see `Contraction`.
+        kinds, axes, num_bands, bands, num_rows, settings, setting_index, active: see `Contraction`.
         out: added to: bands of the free curve, or settings; padded. (points, 3, ≥ J or N) float32
     """
-    most = np.diff(first[: out.shape[0] + 1]).max()
-    gamma, weight = np.empty(most, np.float32), np.empty((3, most), np.float32)
-    band, product = np.zeros((kinds.shape[0], most), np.int64), np.empty(settings.shape[2], np.float32)
+    max_rays = np.diff(first[: out.shape[0] + 1]).max()
+    gamma, weight = np.empty(max_rays, np.float32), np.empty((3, max_rays), np.float32)
+    band, product = np.zeros((kinds.shape[0], max_rays), np.int64), np.empty(settings.shape[2], np.float32)
     _project(
-        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active,
+        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active,
         (gamma, weight, band, product), out,
     )  # fmt: skip
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _project(  # type: ignore[no-untyped-def]
-    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_of, active,
+    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active,
     scratch, out,
 ):  # fmt: skip
-    """Do what `project_rays` is for. scratch: `gamma`, `weight` and `band` of `_contract`, `product` of `_spread`."""
+    """Do what `project_rays` is for. scratch: `gamma`, `weight` and `band` of `_contract`, `multiply` of `_spread`."""
     gamma, weight, band, product = scratch
     for p in range(out.shape[0]):
         begin, end = first[p], first[p + 1]
@@ -222,7 +224,7 @@ def _project(  # type: ignore[no-untyped-def]
         if num == 0:
             continue
         _contract(
-            begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_of, active,
+            begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, active,
             gamma, band, weight,
         )  # fmt: skip
         if active >= 0:
@@ -230,10 +232,10 @@ def _project(  # type: ignore[no-untyped-def]
                 for channel in range(3):
                     out[p, channel, band[active, n]] += weight[channel, n]
         elif settings.shape[0] > 0:
-            _spread(settings, setting_of, band, weight, num, product, out[p])
+            _add_settings(settings, setting_index, band, weight, num, product, out[p])
         else:
             for channel in range(3):
-                of_channel, brought = weight[channel], np.float32(0)
+                channel_weight, total = weight[channel], np.float32(0)
                 for n in range(num):
-                    brought += of_channel[n]
-                out[p, channel, 0] += brought
+                    total += channel_weight[n]
+                out[p, channel, 0] += total

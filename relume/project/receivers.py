@@ -10,19 +10,19 @@ from typing import NamedTuple, Protocol, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.gather_rays import Pattern
-from relume.light.local import SURFACE, LocalLight, parts_of
-from relume.light.strata import LampParts, Strata
-from relume.points import Points
-from relume.project.gathered_kernel import list_gathered, sum_gathered
-from relume.project.ray_kernel import list_local, list_thrown
-from relume.project.sent import Sent
-from relume.sharing import Sharing
+from relume.light.gather_rays import RayPattern
+from relume.light.local import SURFACE, LocalLight, make_emitter_parts
+from relume.light.strata import EmitterParts, LightStrata
+from relume.points import SurfacePoints
+from relume.project.gathered_kernel import list_gather_rays, sum_gather_rays
+from relume.project.ray_kernel import list_local_rays, list_mirror_lights
+from relume.project.sent import OutgoingLight
+from relume.sharing import NeighborFilter
 
 F32 = NDArray[np.float32]
 
 
-class Listed(NamedTuple):
+class ReceiverList(NamedTuple):
     """Memory that rays of a range of points are listed in; see `relume.project.ray_kernel`."""
 
     first: NDArray[np.int64]
@@ -31,38 +31,40 @@ class Listed(NamedTuple):
     irradiance: F32
 
 
-class Rays(Protocol):
+class RayList(Protocol):
     """Rays of n points, at most the same number for each."""
 
     @property
-    def rays_a_point(self) -> int:
+    def max_rays_per_point(self) -> int:
         """The most rays that any point has."""
         ...
 
-    def alone(self, chosen: NDArray[np.integer]) -> Rays:
+    def unshared(self, rows: NDArray[np.integer]) -> RayList:
         """Choose those of some points, which do not share them."""
         ...
 
-    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
+    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
         """List the rays of points [start, stop) that bring light; returns their number.
 
         Args:
-            listed: memory for them, written. receivers: all points that the rays belong to.
+            receiver_list: memory for them, written. receivers: all points that the rays belong to.
             start, stop: those whose rays are listed.
         """
         ...
 
 
-def listed(rays: Rays, receivers: Receivers, start: int, stop: int) -> Listed:
+def build_ray_lists(rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> ReceiverList:
     """List rays in memory of their own.
 
     Args:
         rays: that are listed. receivers, start, stop: as of `Rays.list_into`.
     """
-    most = (stop - start) * rays.rays_a_point
-    into = Listed(np.empty(stop - start + 1, np.int64), *(np.empty((3, most), np.float32) for _ in range(3)))
-    rays.list_into(into, receivers, start, stop)
-    return into
+    max_rays = (stop - start) * rays.max_rays_per_point
+    receiver_list = ReceiverList(
+        np.empty(stop - start + 1, np.int64), *(np.empty((3, max_rays), np.float32) for _ in range(3))
+    )
+    rays.list_into(receiver_list, receivers, start, stop)
+    return receiver_list
 
 
 @dataclass(frozen=True)
@@ -70,35 +72,37 @@ class GatherRays:
     """Rays that bring the light of cells.
 
     Attributes:
-        links: cell that each hits. (n, rays) uint16. pattern: their directions, shifted by the points' seeds.
-        sent: by cells.
+        gather_hits: cell that each hits. (n, rays) uint16. pattern: their directions, shifted by the points' seeds.
+        outgoing: by cells.
         sharing: among the points; None: each alone.
     """
 
-    links: NDArray[np.uint16]
-    pattern: Pattern
-    sent: Sent
-    sharing: Sharing | None = None
+    gather_hits: NDArray[np.uint16]
+    pattern: RayPattern
+    outgoing: OutgoingLight
+    sharing: NeighborFilter | None = None
 
     @property
-    def rays_a_point(self) -> int:
+    def max_rays_per_point(self) -> int:
         """The most rays that any point has."""
-        return int(self.links.shape[1])
+        return int(self.gather_hits.shape[1])
 
-    def alone(self, chosen: NDArray[np.integer]) -> GatherRays:
+    def unshared(self, rows: NDArray[np.integer]) -> GatherRays:
         """Choose those of some points, which do not share them."""
-        return replace(self, links=self.links[chosen], sharing=None)
+        return replace(self, gather_hits=self.gather_hits[rows], sharing=None)
 
-    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
-        arriving = self.links, self.pattern, self.sent
-        return int(list_gathered(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `receiver_list`; see `Rays`."""
+        ray_arrays = self.gather_hits, self.pattern, self.outgoing
+        return int(list_gather_rays(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
 
-    def sum(self, receivers: Receivers, start: int, stop: int) -> F32:
+    def sum(self, receivers: ShadingPoints, start: int, stop: int) -> F32:
         """Sum the light of the rays of `receivers` [start, stop), wherever it comes from. (stop - start, 3)"""
-        found = np.empty((stop - start, 3), np.float32)
-        sum_gathered(receivers.points, receivers.wo, self.links, self.pattern, self.sent, start, stop, found)
-        return found
+        total = np.empty((stop - start, 3), np.float32)
+        sum_gather_rays(
+            receivers.points, receivers.wo, self.gather_hits, self.pattern, self.outgoing, start, stop, total
+        )
+        return total
 
 
 @dataclass(frozen=True)
@@ -112,60 +116,60 @@ class LocalRays:
     """
 
     light: LocalLight
-    strata: Strata
+    strata: LightStrata
     gain: F32
     visible: NDArray[np.uint8]
 
     @cached_property
-    def parts(self) -> LampParts:
+    def emitter_parts(self) -> EmitterParts:
         """LampParts of that surface."""
-        return parts_of(self.light, self.strata)
+        return make_emitter_parts(self.light, self.strata)
 
     @property
-    def rays_a_point(self) -> int:
+    def max_rays_per_point(self) -> int:
         """The most rays that any point has."""
         return len(self.strata.uv)
 
-    def alone(self, chosen: NDArray[np.integer]) -> LocalRays:
+    def unshared(self, rows: NDArray[np.integer]) -> LocalRays:
         """Choose those of some points; see `Rays`."""
-        return replace(self, visible=self.visible[chosen])
+        return replace(self, visible=self.visible[rows])
 
-    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
-        arriving = self.light, self.strata, self.gain, self.visible
-        return int(list_local(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `receiver_list`; see `Rays`."""
+        ray_arrays = self.light, self.strata, self.gain, self.visible
+        return int(list_local_rays(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
 
 
 @dataclass(frozen=True)
-class ThrownRays:
+class MirrorRays:
     """Rays that bring what flat mirrors throw: one from each light that is seen in them.
 
     Attributes:
         direction: in which each is seen, unit. (K, 3) float32
-        across: what each brings to a surface across its way. (K, 3) float32
+        normal_irradiance: what each brings to a surface across its way. (K, 3) float32
         visible: light k of a point in bit k & 7 of byte k >> 3. (n, bytes) uint8
     """
 
     direction: F32
-    across: F32
+    normal_irradiance: F32
     visible: NDArray[np.uint8]
 
     @property
-    def rays_a_point(self) -> int:
+    def max_rays_per_point(self) -> int:
         """The most rays that any point has."""
         return len(self.direction)
 
-    def alone(self, chosen: NDArray[np.integer]) -> ThrownRays:
+    def unshared(self, rows: NDArray[np.integer]) -> MirrorRays:
         """Choose those of some points; see `Rays`."""
-        return replace(self, visible=self.visible[chosen])
+        return replace(self, visible=self.visible[rows])
 
-    def list_into(self, listed: Listed, receivers: Receivers, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `listed`; see `Rays`."""
-        arriving = self.direction, self.across, self.visible
-        return int(list_thrown(receivers.points, receivers.wo, *arriving, start, stop, *listed))
+    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `receiver_list`; see `Rays`."""
+        ray_arrays = self.direction, self.normal_irradiance, self.visible
+        return int(list_mirror_lights(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
 
 
-def is_lamp(rays: Rays, num_curves: int) -> TypeGuard[LocalRays]:
+def is_area_light(rays: RayList, num_curves: int) -> TypeGuard[LocalRays]:
     """Whether rays come from a surface of which a term with so many curves lists parts as triangles.
 
     Where no curve asks where light comes from, its samples are rays as others are.
@@ -174,22 +178,22 @@ def is_lamp(rays: Rays, num_curves: int) -> TypeGuard[LocalRays]:
 
 
 @dataclass(frozen=True)
-class Receivers:
+class ShadingPoints:
     """Points that light arrives at, each seen from one direction.
 
     Attributes:
         points: where it arrives. wo: towards the viewer, unit, world space. (n, 3) float32
         visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon. (n, bytes) uint8
         rays: light that arrives along rays; none where only the environment's triangles are meant.
-        uv: where they lie in textures, see `relume.trace.surface.Surface`; None where that is not known.
+        uv: where they lie in textures, see `relume.trace.stored_scene.Surface`; None where that is not known.
             (n, 5) float32
         level: of roughness, see `relume.project.levels`; None where all are alike. (n,) uint8
     """
 
-    points: Points
+    points: SurfacePoints
     wo: F32
     visible: NDArray[np.uint8]
-    rays: Sequence[Rays] = ()
+    rays: Sequence[RayList] = ()
     uv: F32 | None = None
     level: NDArray[np.uint8] | None = None
 
@@ -203,14 +207,14 @@ class Receivers:
         """The points' tangents. (n, 3) float32"""
         return self.points.tangent
 
-    def places(self, chosen: NDArray[np.integer]) -> Receivers:
+    def without_light(self, rows: NDArray[np.integer]) -> ShadingPoints:
         """Choose some of them, without their light."""
-        uv = None if self.uv is None else self.uv[chosen]
-        level = None if self.level is None else self.level[chosen]
-        nothing = np.empty((len(chosen), 0), np.uint8)
-        return Receivers(self.points.rows(chosen), self.wo[chosen], nothing, uv=uv, level=level)
+        uv = None if self.uv is None else self.uv[rows]
+        level = None if self.level is None else self.level[rows]
+        no_visibility = np.empty((len(rows), 0), np.uint8)
+        return ShadingPoints(self.points.rows(rows), self.wo[rows], no_visibility, uv=uv, level=level)
 
-    def some(self, chosen: NDArray[np.integer]) -> Receivers:
+    def subset(self, rows: NDArray[np.integer]) -> ShadingPoints:
         """Choose some of them, with the light of each alone."""
-        rays = tuple(rays.alone(chosen) for rays in self.rays)
-        return replace(self.places(chosen), visible=self.visible[chosen], rays=rays)
+        rays = tuple(rays.unshared(rows) for rays in self.rays)
+        return replace(self.without_light(rows), visible=self.visible[rows], rays=rays)

@@ -8,34 +8,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.channels import TEXTURES, images_of, roughness_image
-from relume.brdf.levels import follows_map
-from relume.images.shelf import mean_roughness, normals_of, roughness_of, texture_of
+from relume.brdf.channels import TEXTURES, roughness_image, user_images
+from relume.brdf.levels import uses_roughness_map
+from relume.images.shelf import load_normal_map, load_roughness_map, load_texture, mean_roughness
 from relume.look import Look
-from relume.scene.gltf.uvs import made_tangents
+from relume.scene.gltf.uvs import compute_tangents
 from relume.scene.model import Material, Mesh, Scene
-from relume.scene.roughness import widened
-from relume.trace.surface import Surface, projected_axes
+from relume.scene.roughness import rougher
+from relume.trace.surface import SurfaceInteraction, triplanar_axes
 from relume.trace.texture import sample_image
 
 F32 = NDArray[np.float32]
 
 
-def wearing(scene: Scene, look: Look) -> Scene:
+def with_overrides(scene: Scene, look: Look) -> Scene:
     """The scene whose materials have the normal maps that a look names, as if its file had them.
 
     Args:
         scene: any. look: that is shown.
     """
-    normals = [look.materials[own.name].normals for own in scene.materials]
+    normals = [look.materials[material.name].normals for material in scene.materials]
     if not any(normals):
         return scene
     materials = tuple(
-        own if map_ is None else replace(own, normal_map=normals_of(map_), terms=_following(own, look))
-        for own, map_ in zip(scene.materials, normals, strict=True)
+        material
+        if normal_map is None
+        else replace(material, normal_map=load_normal_map(normal_map), terms=_terms_with_roughness_map(material, look))
+        for material, normal_map in zip(scene.materials, normals, strict=True)
     )
     meshes = tuple(
-        mesh if normals[mesh.material] is None or mesh.tangents.any() else _with_tangents(_with_places(mesh))
+        mesh if normals[mesh.material] is None or mesh.tangents.any() else _with_tangents(_with_uvs(mesh))
         for mesh in scene.meshes
     )
     return replace(scene, materials=materials, meshes=meshes)
@@ -43,16 +45,16 @@ def wearing(scene: Scene, look: Look) -> Scene:
 
 def _with_tangents(mesh: Mesh) -> Mesh:
     """A mesh with tangents along u, as imports make them for normal maps."""
-    return replace(mesh, tangents=made_tangents(mesh.positions, mesh.normals, mesh.uvs, mesh.faces))
+    return replace(mesh, tangents=compute_tangents(mesh.positions, mesh.normals, mesh.uvs, mesh.faces))
 
 
-def _with_places(mesh: Mesh) -> Mesh:
-    """A mesh with places in textures; where there are none, those of a projection, as `relume.trace.surface` has it."""
+def _with_uvs(mesh: Mesh) -> Mesh:
+    """A mesh with texture coordinates; where there are none, those of a projection, as in `StoredScene`."""
     if mesh.uvs.any():
         return mesh
     corners = mesh.positions[mesh.faces]
-    across, up = projected_axes(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    u, v = np.einsum("fkc,fc->fk", corners, across), -np.einsum("fkc,fc->fk", corners, up)
+    u_axis, v_axis = triplanar_axes(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    u, v = np.einsum("fkc,fc->fk", corners, u_axis), -np.einsum("fkc,fc->fk", corners, v_axis)
     order = mesh.faces.ravel()
     return replace(
         mesh,
@@ -64,16 +66,18 @@ def _with_places(mesh: Mesh) -> Mesh:
     )
 
 
-def _following(own: Material, look: Look) -> tuple[dict[str, Any], ...]:
+def _terms_with_roughness_map(material: Material, look: Look) -> tuple[dict[str, Any], ...]:
     """A material's own terms, which bumps widen where those of a look follow a map."""
-    shown = look.materials[own.name].terms
-    follows = [k < len(shown) and follows_map(shown[k]) for k in range(len(own.terms))]
+    look_terms = look.materials[material.name].terms
+    uses_map = [k < len(look_terms) and uses_roughness_map(look_terms[k]) for k in range(len(material.terms))]
     return tuple(
-        {**term, "roughness_map": True} if f else dict(term) for term, f in zip(own.terms, follows, strict=True)
+        {**term, "roughness_map": True} if f else dict(term) for term, f in zip(material.terms, uses_map, strict=True)
     )
 
 
-def textures_of(scene: Scene, look: Look, surface: Surface, material: NDArray[np.integer]) -> dict[str, F32]:
+def surface_textures(
+    scene: Scene, look: Look, surface: SurfaceInteraction, material: NDArray[np.integer]
+) -> dict[str, F32]:
     """What multiplies terms by their channel, at places on surfaces.
 
     Args:
@@ -82,17 +86,17 @@ def textures_of(scene: Scene, look: Look, surface: Surface, material: NDArray[np
     Returns:
         (n, 3) float32 each
     """
-    found = {"diffuse": surface.diffuse, "specular": surface.specular}
-    for index, own in enumerate(scene.materials):
-        for channel, name in zip(TEXTURES, images_of(look.materials[own.name].terms), strict=True):
+    textures = {"diffuse": surface.diffuse, "specular": surface.specular}
+    for index, scene_material in enumerate(scene.materials):
+        for channel, name in zip(TEXTURES, user_images(look.materials[scene_material.name].terms), strict=True):
             if name is not None:
                 rows = np.flatnonzero(material == index)
-                found[channel] = found[channel].copy()
-                found[channel][rows] = sample_image(texture_of(name), surface.uv[rows])
-    return found
+                textures[channel] = textures[channel].copy()
+                textures[channel][rows] = sample_image(load_texture(name), surface.uv[rows])
+    return textures
 
 
-def roughness_at(scene: Scene, look: Look, surface: Surface, material: NDArray[np.integer]) -> F32:
+def surface_roughness(scene: Scene, look: Look, surface: SurfaceInteraction, material: NDArray[np.integer]) -> F32:
     """How rough places on surfaces are, over what terms say.
 
     Args:
@@ -100,13 +104,13 @@ def roughness_at(scene: Scene, look: Look, surface: Surface, material: NDArray[n
     Returns:
         (n,) float32
     """
-    found = surface.roughness
-    for index, own in enumerate(scene.materials):
-        name = roughness_image(look.materials[own.name].terms)
+    roughness = surface.roughness
+    for index, scene_material in enumerate(scene.materials):
+        name = roughness_image(look.materials[scene_material.name].terms)
         if name is not None:
             rows = np.flatnonzero(material == index)
-            found = found.copy()
-            found[rows] = sample_image(roughness_of(name), surface.uv[rows])[:, 0]
-            if own.normal_map is not None and (mean := mean_roughness(name)):
-                found[rows] = widened(found[rows], surface.normal_length[rows], mean)
-    return found
+            roughness = roughness.copy()
+            roughness[rows] = sample_image(load_roughness_map(name), surface.uv[rows])[:, 0]
+            if scene_material.normal_map is not None and (mean := mean_roughness(name)):
+                roughness[rows] = rougher(roughness[rows], surface.normal_length[rows], mean)
+    return roughness

@@ -18,34 +18,34 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.channels import channel_of
+from relume.brdf.channels import texture_channel
 from relume.brdf.evaluate import eval_brdf
-from relume.eye.mirrors import MOST_MIRRORS
-from relume.look import Look, Paths
-from relume.reference.covers import Cover
-from relume.reference.images import roughness_at, textures_of
-from relume.reference.kinds import Kinds, kinds_of
+from relume.eye.mirrors import MAX_MIRROR_BOUNCES
+from relume.look import LightPaths, Look
+from relume.reference.covers import BtfSurface
+from relume.reference.images import surface_roughness, surface_textures
+from relume.reference.kinds import RoughnessClasses, roughness_classes
 from relume.reference.lobes import Lobe
-from relume.reference.local import lamps_of
-from relume.reference.paths import MOST_BOUNCES
-from relume.reference.radiance import Points, lobes_of, reference_radiance
-from relume.reference.texels import Texels
+from relume.reference.local import emitters
+from relume.reference.paths import MAX_BOUNCES
+from relume.reference.radiance import ReferencePoints, material_lobes, reference_radiance
+from relume.reference.texels import EnvironmentSamples
 from relume.scene.model import Scene
-from relume.trace.geometry import Geometry
-from relume.trace.primary import Hits, trace_from
+from relume.trace.geometry import SceneBuffers
+from relume.trace.primary import Hits, trace_rays
 from relume.trace.surface import surface_at
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _TEXTURE_ANGLE = 1e-3
-Covers = dict[tuple[int, int], Cover]  # by kinds of surfaces, and terms of these
+BtfSurfaces = dict[tuple[int, int], BtfSurface]  # by kinds of surfaces, and terms of these
 
-_LEAST_CHANCE = 0.05
-_LEAST_DENSITY = 1e-12
+_MIN_SURVIVAL_PROBABILITY = 0.05
+_MIN_PDF = 1e-12
 
 
-class Reflected(NamedTuple):
+class IndirectReference(NamedTuple):
     """Radiance of points by light that surfaces have reflected.
 
     Attributes:
@@ -58,16 +58,16 @@ class Reflected(NamedTuple):
 
 def reference_indirect(
     scene: Scene,
-    geometry: Geometry,
-    texels: Texels,
+    geometry: SceneBuffers,
+    texels: EnvironmentSamples,
     look: Look,
-    points: Points,
+    points: ReferencePoints,
     material: NDArray[np.integer],
-    wanted: Sequence[Paths],
+    light_paths: Sequence[LightPaths],
     num_paths: int,
     spp: int,
     seed: int = 0,
-) -> Reflected:
+) -> IndirectReference:
     """Radiance of points by light that surfaces have reflected onto them, by several choices of paths at once.
 
     Args:
@@ -76,132 +76,143 @@ def reference_indirect(
         texels: of the environment, its gain in the look included.
         look: terms and lights as they are shown.
         points: n of them, seen from one direction each. material: index into the scene's materials. (n,)
-        wanted: which paths count; direct ones are those that are seen in mirrors.
+        light_paths: which paths count; direct ones are those that are seen in mirrors.
         num_paths: for each point. spp: texels drawn for each place that a path visits.
         seed: of the paths; other seeds are independent of this one.
     Cost: O(n · num_paths · bounces · spp) shadow rays, bounces as many as any choice has.
     """
-    kinds, lamps = kinds_of(scene, look), lamps_of(scene, look)
-    lobes = [lobes_of(of_material) for of_material in kinds.terms]
-    total, squares = np.zeros((2, len(wanted), points.num_points, 3))
-    seen = kinds.of(np.asarray(material), points.roughness)
-    covers = _covers(kinds, points, seen, seed)
+    classes, local_lights = roughness_classes(scene, look), emitters(scene, look)
+    lobes = [material_lobes(class_terms) for class_terms in classes.terms]
+    total, sum_squares = np.zeros((2, len(light_paths), points.num_points, 3))
+    first_classes = classes.classify(np.asarray(material), points.roughness)
+    btf_surfaces = _sample_btf_surfaces(classes, points, first_classes, seed)
     for path in range(num_paths):
         rng = np.random.default_rng((seed, path, points.num_points))
-        here, of = points, seen
+        path_points, path_classes = points, first_classes
         rows, weight = np.arange(points.num_points), np.zeros((_STATES, points.num_points, 3))
         weight[_IN_MIRRORS] = 1.0
-        found = np.zeros((len(wanted), points.num_points, 3))
-        for bounce in range(min(MOST_BOUNCES, max(map(_longest, wanted)))):
-            directions, share, mirrored = _scattered(kinds, lobes, here, of, covers if bounce == 0 else {}, rng)
-            weight = _reflected(weight, share, mirrored, bounce)
-            hits = trace_from(geometry.embree, here.position, directions, here.chance)
+        path_radiance = np.zeros((len(light_paths), points.num_points, 3))
+        for bounce in range(min(MAX_BOUNCES, max(map(_max_reflections, light_paths)))):
+            directions, bounce_weight, specular_weight = _sample_directions(
+                classes, lobes, path_points, path_classes, btf_surfaces if bounce == 0 else {}, rng
+            )
+            weight = _reflect_weights(weight, bounce_weight, specular_weight, bounce)
+            hits = trace_rays(geometry.embree, path_points.position, directions, path_points.alpha_sample)
             hit = np.nonzero(hits.face >= 0)[0]
-            chance = here.chance if len(here.chance) == 1 else here.chance[hit]
-            here, hit_material = _places(scene, geometry, look, hits, directions, hit)
-            here = replace(here, chance=chance)
-            of = kinds.of(hit_material, here.roughness)
+            alpha_sample = (
+                path_points.alpha_sample if len(path_points.alpha_sample) == 1 else path_points.alpha_sample[hit]
+            )
+            path_points, hit_material = _hit_points(scene, geometry, look, hits, directions, hit)
+            path_points = replace(path_points, alpha_sample=alpha_sample)
+            path_classes = classes.classify(hit_material, path_points.roughness)
             rows, weight = rows[hit], weight[:, hit]
-            counts = np.array([_counting(paths, bounce + 1) for paths in wanted])
-            here, of, rows, weight = _survivors(here, of, rows, weight * _may_count(wanted, bounce + 1), rng)
+            counts = np.array([_counted_states(paths, bounce + 1) for paths in light_paths])
+            path_points, path_classes, rows, weight = _russian_roulette(
+                path_points, path_classes, rows, weight * _countable_states(light_paths, bounce + 1), rng
+            )
             if not len(rows):
                 break
             if not counts.any():
                 continue
-            drawn = (seed * num_paths + path) * MOST_BOUNCES + bounce
-            arriving = np.zeros((len(rows), 3))
-            for index, of_material in enumerate(kinds.terms):
-                at = np.nonzero(of == index)[0]
-                if len(at):
-                    arriving[at] = reference_radiance(
-                        geometry, texels, here.rows(at), [of_material], spp, pass_index=drawn, lamps=lamps
+            draw_index = (seed * num_paths + path) * MAX_BOUNCES + bounce
+            direct_radiance = np.zeros((len(rows), 3))
+            for index, class_terms in enumerate(classes.terms):
+                class_rows = np.nonzero(path_classes == index)[0]
+                if len(class_rows):
+                    direct_radiance[class_rows] = reference_radiance(
+                        geometry, texels, path_points.samples_of(class_rows), [class_terms], spp,
+                        pass_index=draw_index, local_lights=local_lights
                     )[0]  # fmt: skip
-            found[:, rows] += np.einsum("ps,snc->pnc", counts, weight) * arriving
-        total += found
-        squares += found**2
+            path_radiance[:, rows] += np.einsum("ps,snc->pnc", counts, weight) * direct_radiance
+        total += path_radiance
+        sum_squares += path_radiance**2
     mean = total / num_paths
-    return Reflected(mean, np.maximum(squares / num_paths - mean**2, 0) / max(1, num_paths - 1))
+    return IndirectReference(mean, np.maximum(sum_squares / num_paths - mean**2, 0) / max(1, num_paths - 1))
 
 
 # A path's weight is told apart by how it began: all of it in mirrors so far, or after so many of them by a lobe.
-_IN_MIRRORS, _STATES = 0, MOST_MIRRORS + 2
+_IN_MIRRORS, _STATES = 0, MAX_MIRROR_BOUNCES + 2
 
 
-def _longest(paths: Paths) -> int:
+def _max_reflections(paths: LightPaths) -> int:
     """Reflections of the longest path that counts, those in mirrors included."""
-    return MOST_MIRRORS + paths.last if paths.reflect else MOST_MIRRORS * paths.direct
+    return MAX_MIRROR_BOUNCES + paths.last if paths.has_indirect else MAX_MIRROR_BOUNCES * paths.direct
 
 
-def _counting(paths: Paths, num: int) -> F64:
+def _counted_states(paths: LightPaths, num: int) -> F64:
     """Which states count at the end of `num` reflections. (states,) of 0 and 1"""
-    between = num - np.arange(MOST_MIRRORS + 1)
-    return np.concatenate([[paths.direct], (paths.first <= between) & (between <= paths.last)]).astype(np.float64)
+    num_bounces = num - np.arange(MAX_MIRROR_BOUNCES + 1)
+    return np.concatenate([[paths.direct], (paths.first <= num_bounces) & (num_bounces <= paths.last)]).astype(
+        np.float64
+    )
 
 
-def _may_count(wanted: Sequence[Paths], num: int) -> F64:
+def _countable_states(light_paths: Sequence[LightPaths], num: int) -> F64:
     """Which states count after `num` reflections, or may after more: paths in others end. (states, 1, 1) of 0 and 1"""
-    last = max(paths.last if paths.reflect else 0 for paths in wanted)
-    may = [num <= MOST_MIRRORS, *(num - mirrors <= last for mirrors in range(MOST_MIRRORS + 1))]
-    return np.array(may, np.float64)[:, None, None]
+    last = max(paths.last if paths.has_indirect else 0 for paths in light_paths)
+    is_countable = [num <= MAX_MIRROR_BOUNCES, *(num - mirrors <= last for mirrors in range(MAX_MIRROR_BOUNCES + 1))]
+    return np.array(is_countable, np.float64)[:, None, None]
 
 
-def _reflected(weight: F64, share: F64, mirrored: F64, bounce: int) -> F64:
+def _reflect_weights(weight: F64, bounce_weight: F64, specular_weight: F64, bounce: int) -> F64:
     """Weights after one more reflection. weight: (states, n, 3). share, of it mirrored: (n, 3)"""
-    after = weight * share
-    if bounce < MOST_MIRRORS:
-        after[1 + bounce] = weight[_IN_MIRRORS] * (share - mirrored)
-        after[_IN_MIRRORS] = weight[_IN_MIRRORS] * mirrored
-    elif bounce == MOST_MIRRORS:
+    after = weight * bounce_weight
+    if bounce < MAX_MIRROR_BOUNCES:
+        after[1 + bounce] = weight[_IN_MIRRORS] * (bounce_weight - specular_weight)
+        after[_IN_MIRRORS] = weight[_IN_MIRRORS] * specular_weight
+    elif bounce == MAX_MIRROR_BOUNCES:
         after[1 + bounce], after[_IN_MIRRORS] = after[_IN_MIRRORS], 0.0
     return after
 
 
-def _survivors(
-    here: Points, of: NDArray[np.int64], rows: NDArray[np.intp], weight: F64, rng: np.random.Generator
-) -> tuple[Points, NDArray[np.int64], NDArray[np.intp], F64]:
+def _russian_roulette(
+    points: ReferencePoints, classes: NDArray[np.int64], rows: NDArray[np.intp], weight: F64, rng: np.random.Generator
+) -> tuple[ReferencePoints, NDArray[np.int64], NDArray[np.intp], F64]:
     """Russian roulette: dim paths end early, and those that go on stand for them. weight: (states, n, 3)"""
     size = weight.sum(axis=0).max(axis=1, initial=0.0)
-    chance = np.where(size > 0, np.clip(size, _LEAST_CHANCE, 1.0), 0.0)
-    alive = np.nonzero(rng.random(len(rows)) < chance)[0]
-    return here.rows(alive), of[alive], rows[alive], weight[:, alive] / chance[alive, None]
+    survival_probability = np.where(size > 0, np.clip(size, _MIN_SURVIVAL_PROBABILITY, 1.0), 0.0)
+    alive = np.nonzero(rng.random(len(rows)) < survival_probability)[0]
+    return points.samples_of(alive), classes[alive], rows[alive], weight[:, alive] / survival_probability[alive, None]
 
 
-def _places(
-    scene: Scene, geometry: Geometry, look: Look, hits: Hits, directions: F32, hit: NDArray[np.intp]
-) -> tuple[Points, NDArray[np.int32]]:
+def _hit_points(
+    scene: Scene, geometry: SceneBuffers, look: Look, hits: Hits, directions: F32, hit: NDArray[np.intp]
+) -> tuple[ReferencePoints, NDArray[np.int32]]:
     """What some of the rays have hit, seen from where they come, and its materials."""
-    some = hits.rows(hit)
-    surface = surface_at(geometry, some, directions[hit], scene.materials, _TEXTURE_ANGLE)
-    material = geometry.face_material[some.face]
-    textures = textures_of(scene, look, surface, material)
-    roughness = roughness_at(scene, look, surface, material)
-    return Points(*surface.points[:3], -directions[hit], textures, roughness), material
+    surface_hits = hits.rows(hit)
+    surface = surface_at(geometry, surface_hits, directions[hit], scene.materials, _TEXTURE_ANGLE)
+    material = geometry.face_material[surface_hits.face]
+    textures = surface_textures(scene, look, surface, material)
+    roughness = surface_roughness(scene, look, surface, material)
+    return ReferencePoints(*surface.points[:3], -directions[hit], textures, roughness), material
 
 
-def _covers(kinds: Kinds, points: Points, kind: NDArray[np.integer], seed: int) -> Covers:
+def _sample_btf_surfaces(
+    classes: RoughnessClasses, points: ReferencePoints, class_index: NDArray[np.integer], seed: int
+) -> BtfSurfaces:
     """What covers the points that are seen, by their kinds and the terms of these."""
-    rng, found = np.random.default_rng((seed, points.num_points)), {}
-    for index, of_material in enumerate(kinds.terms):
-        rows = points.rows(np.nonzero(kind == index)[0])
-        for k, one in enumerate(rows.covers(of_material, rng) if rows.num_points else ()):
-            if one is not None:
-                found[index, k] = one
-    return found
+    rng, btf_surfaces = np.random.default_rng((seed, points.num_points)), {}
+    for index, class_terms in enumerate(classes.terms):
+        class_points = points.samples_of(np.nonzero(class_index == index)[0])
+        for k, btf_surface in enumerate(class_points.btf_surfaces(class_terms, rng) if class_points.num_points else ()):
+            if btf_surface is not None:
+                btf_surfaces[index, k] = btf_surface
+    return btf_surfaces
 
 
-def _scattered(
-    kinds: Kinds,
+def _sample_directions(
+    classes: RoughnessClasses,
     lobes: Sequence[Sequence[Lobe]],
-    points: Points,
-    kind: NDArray[np.integer],
-    covers: Covers,
+    points: ReferencePoints,
+    class_index: NDArray[np.integer],
+    btf_surfaces: BtfSurfaces,
     rng: np.random.Generator,
 ) -> tuple[F32, F64, F64]:
     """Draw a direction for each point by one of its material's lobes.
 
     Args:
-        kinds: there are. lobes: of each. points: n of them. kind: of each. (n,)
-        covers: of points that are all there are of their kind.
+        classes: there are. lobes: of each. points: n of them. class_index: of each. (n,)
+        btf_surfaces: of points that are all there are of their kind.
         rng: draws.
     Returns:
         World space, unit (n, 3); f cos θi over the density of all lobes together (n, 3), nothing below the horizon; and
@@ -209,26 +220,26 @@ def _scattered(
     """
     frames = points.frames()
     wo = np.einsum("nij,nj->ni", frames, points.wo.astype(np.float64))
-    wi, share, mirrored = np.zeros((3, points.num_points, 3))
-    for index, (of_material, of_lobes) in enumerate(zip(kinds.terms, lobes, strict=True)):
-        at = np.nonzero(kind == index)[0]
-        if not len(at):
+    wi, bounce_weight, specular_weight = np.zeros((3, points.num_points, 3))
+    for index, (class_terms, class_lobes) in enumerate(zip(classes.terms, lobes, strict=True)):
+        class_rows = np.nonzero(class_index == index)[0]
+        if not len(class_rows):
             continue
-        chosen = rng.integers(len(of_lobes), size=len(at))
-        for k, lobe in enumerate(of_lobes):
-            some = at[chosen == k]
-            wi[some] = lobe.draw(wo[some], 1, rng)[:, 0]
-        density = np.mean([lobe.density_of(wi[at, None], wo[at])[:, 0] for lobe in of_lobes], axis=0)
-        cosine = np.where((wi[at, 2] > 0) & (wo[at, 2] > 0), wi[at, 2], 0.0)
-        for k, (term, mirror) in enumerate(zip(of_material, kinds.mirrors[index], strict=True)):
-            channel = channel_of(term)
-            texture = 1.0 if channel is None else points.textures[channel][at]
-            if (covered := covers.get((index, k))) is None:
-                value = eval_brdf(term, wi[at], wo[at]) * cosine[:, None]
+        lobe_index = rng.integers(len(class_lobes), size=len(class_rows))
+        for k, lobe in enumerate(class_lobes):
+            lobe_rows = class_rows[lobe_index == k]
+            wi[lobe_rows] = lobe.draw(wo[lobe_rows], 1, rng)[:, 0]
+        pdf = np.mean([lobe.pdf(wi[class_rows, None], wo[class_rows])[:, 0] for lobe in class_lobes], axis=0)
+        cosine = np.where((wi[class_rows, 2] > 0) & (wo[class_rows, 2] > 0), wi[class_rows, 2], 0.0)
+        for k, (term, mirror) in enumerate(zip(class_terms, classes.mirrors[index], strict=True)):
+            channel = texture_channel(term)
+            texture = 1.0 if channel is None else points.textures[channel][class_rows]
+            if (btf_surface := btf_surfaces.get((index, k))) is None:
+                value = eval_brdf(term, wi[class_rows], wo[class_rows]) * cosine[:, None]
             else:
-                sent = covered.sent(np.arange(len(at)), wi[at])
-                value = np.where(cosine[:, None] > 0, sent, 0.0) * np.asarray(term["color"])
-            of_term = texture * value / np.maximum(density, _LEAST_DENSITY)[:, None]
-            share[at] += of_term
-            mirrored[at] += of_term * mirror
-    return np.einsum("nji,nj->ni", frames, wi).astype(np.float32), share, mirrored
+                outgoing = btf_surface.evaluate(np.arange(len(class_rows)), wi[class_rows])
+                value = np.where(cosine[:, None] > 0, outgoing, 0.0) * np.asarray(term["color"])
+            term_weight = texture * value / np.maximum(pdf, _MIN_PDF)[:, None]
+            bounce_weight[class_rows] += term_weight
+            specular_weight[class_rows] += term_weight * mirror
+    return np.einsum("nji,nj->ni", frames, wi).astype(np.float32), bounce_weight, specular_weight

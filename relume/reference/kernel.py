@@ -85,11 +85,11 @@ def _read(table, position, is_stepped):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def add_lights(kinds, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, shading, power, out):  # type: ignore[no-untyped-def]
+def add_lights(angles, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, shading, power, out):  # type: ignore[no-untyped-def]
     """Σ power · shading · Π curves over the listed lights, per channel, added to out (3,).
 
     Args:
-        kinds, axes: `Curve.angle` and `Curve.axes` of each curve. (C,) int64, (C, 3) float64
+        angles, axes: `Curve.angle` and `Curve.axes` of each curve. (C,) int64, (C, 3) float64
         tables: each curve at equal steps over [0, π/2]. (C, 3, steps + 1) float64
         is_stepped: the curve is constant from entry to entry, else linear. (C, 3) bool
         is_gray: the curve is the same in all channels. (C,) bool
@@ -105,9 +105,9 @@ def add_lights(kinds, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy,
         r, g, b = shading[0, n], shading[blue_row // 2, n], shading[blue_row, n]
         if r == 0.0 and g == 0.0 and b == 0.0:
             continue
-        for k in range(kinds.shape[0]):
+        for k in range(angles.shape[0]):
             x, y, z = axes[k, 0] * ox, axes[k, 1] * oy, axes[k, 2] * oz
-            position = _angle(kinds[k], wi[0, n], wi[1, n], wi[2, n], x, y, z) * scale
+            position = _angle(angles[k], wi[0, n], wi[1, n], wi[2, n], x, y, z) * scale
             value = _read(tables[k, 0], position, is_stepped[k, 0])
             r *= value
             g *= value if is_gray[k] else _read(tables[k, 1], position, is_stepped[k, 1])

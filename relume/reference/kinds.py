@@ -10,22 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.channels import roughness_image
-from relume.brdf.levels import at_ratio, follows_map
-from relume.brdf.mirror import is_mirror, mirrored_share
-from relume.images.shelf import mean_roughness, roughness_of
+from relume.brdf.levels import scaled_roughness, uses_roughness_map
+from relume.brdf.mirror import is_mirror, specular_albedo
+from relume.images.shelf import load_roughness_map, mean_roughness
 from relume.look import Look
 from relume.scene.model import Material, Scene
-from relume.scene.roughness import level_of, levels_between, levels_of, shortest_normal
+from relume.scene.roughness import levels_of_material, levels_of_texture, min_mean_normal_length, select_level
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Terms = Sequence[Mapping[str, Any]]
 
-_EACH, _ALL = 48, 96  # kinds of a material, and of a scene: far finer than pictures tell apart
+_MAX_CLASSES_PER_MATERIAL, _MAX_CLASSES = (
+    48,
+    96,
+)  # kinds of a material, and of a scene: far finer than pictures tell apart
 
 
 @dataclass(frozen=True)
-class Kinds:
+class RoughnessClasses:
     """What the surfaces of a scene are made of.
 
     Attributes:
@@ -39,43 +42,49 @@ class Kinds:
     first: list[int]
     ratios: list[tuple[float, ...]]
 
-    def of(self, material: NDArray[np.integer], roughness: F32) -> NDArray[np.int64]:
+    def classify(self, material: NDArray[np.integer], roughness: F32) -> NDArray[np.int64]:
         """The kinds of points.
 
         Args:
             material: index into the scene's materials. (n,) roughness: over the material's, see
-                `relume.trace.surface.Surface`. (n,)
+                `relume.trace.stored_scene.Surface`. (n,)
         """
-        kind: NDArray[np.int64] = np.array(self.first, np.int64)[material]
+        class_index: NDArray[np.int64] = np.array(self.first, np.int64)[material]
         for index, ratios in enumerate(self.ratios):
             if ratios:
                 rows = np.flatnonzero(material == index)
-                kind[rows] += level_of(ratios, roughness[rows])
-        return kind
+                class_index[rows] += select_level(ratios, roughness[rows])
+        return class_index
 
 
-def _levels(material: Material, terms: Terms) -> tuple[float, ...]:
+def _roughness_levels(material: Material, terms: Terms) -> tuple[float, ...]:
     """Of the map that terms of a material follow."""
     name = roughness_image(terms)
     if name is None:
-        return levels_of(material)
-    return levels_between(roughness_of(name), mean_roughness(name) or None, shortest_normal(material.normal_map))
+        return levels_of_material(material)
+    return levels_of_texture(
+        load_roughness_map(name), mean_roughness(name) or None, min_mean_normal_length(material.normal_map)
+    )
 
 
-def kinds_of(scene: Scene, look: Look) -> Kinds:
+def roughness_classes(scene: Scene, look: Look) -> RoughnessClasses:
     """Find the kinds of a scene's surfaces under a look."""
-    of_materials = [look.materials[material.name].terms for material in scene.materials]
-    ends = [
-        _levels(m, terms) if any(map(follows_map, terms)) else ()
-        for m, terms in zip(scene.materials, of_materials, strict=True)
+    material_terms = [look.materials[material.name].terms for material in scene.materials]
+    level_ranges = [
+        _roughness_levels(m, terms) if any(map(uses_roughness_map, terms)) else ()
+        for m, terms in zip(scene.materials, material_terms, strict=True)
     ]
-    num = min(_EACH, max(2, _ALL // max(1, sum(map(bool, ends)))))
-    kinds = Kinds([], [], [], [])
-    for material, terms, levels in zip(scene.materials, of_materials, ends, strict=True):
-        ratios = tuple(np.square(np.linspace(levels[0] ** 0.5, levels[-1] ** 0.5, num)).tolist()) if levels else ()
-        kinds.first.append(len(kinds.terms))
-        kinds.ratios.append(ratios)
-        kinds.terms.extend([at_ratio(term, ratio) for term in terms] for ratio in ratios or (1.0,))
-        mirrors = [mirrored_share(term) * is_mirror(material.terms) for term in terms]
-        kinds.mirrors.extend(mirrors for _ in ratios or (1.0,))
-    return kinds
+    num = min(_MAX_CLASSES_PER_MATERIAL, max(2, _MAX_CLASSES // max(1, sum(map(bool, level_ranges)))))
+    classes = RoughnessClasses([], [], [], [])
+    for material, terms, material_levels in zip(scene.materials, material_terms, level_ranges, strict=True):
+        ratios = (
+            tuple(np.square(np.linspace(material_levels[0] ** 0.5, material_levels[-1] ** 0.5, num)).tolist())
+            if material_levels
+            else ()
+        )
+        classes.first.append(len(classes.terms))
+        classes.ratios.append(ratios)
+        classes.terms.extend([scaled_roughness(term, ratio) for term in terms] for ratio in ratios or (1.0,))
+        mirrors = [specular_albedo(term) * is_mirror(material.terms) for term in terms]
+        classes.mirrors.extend(mirrors for _ in ratios or (1.0,))
+    return classes

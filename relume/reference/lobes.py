@@ -18,7 +18,7 @@ F64 = NDArray[np.float64]
 
 _HALF_ANGLES = (Angle.THETA_H, Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
 _MIRRORED = (-1.0, -1.0, 1.0)
-_NEVER = 1e-300
+_MIN_LENGTH = 1e-300
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class Lobe:
     Attributes:
         axes: what multiplies wo, axis by axis, to make the axis; None: the normal.
         is_half: half vectors are drawn and wo is mirrored by them.
-        share: running sum over equal steps of the angle from the axis, 0 first, 1 last. (steps + 1,) float64
-        density: within each step, per steradian. (steps,) float64
+        cdf: running sum over equal steps of the angle from the axis, 0 first, 1 last. (steps + 1,) float64
+        pdf_table: within each step, per steradian. (steps,) float64
     """
 
     axes: tuple[float, float, float] | None
     is_half: bool
-    share: F64
-    density: F64
+    cdf: F64
+    pdf_table: F64
 
     def draw(self, wo: F64, num: int, rng: np.random.Generator) -> F64:
         """Directions about a lobe, some of them below the horizon.
@@ -48,35 +48,35 @@ class Lobe:
             Towards the light, local frame, unit. (n, num, 3) float64
         """
         strata = (np.arange(num) + rng.random((len(wo), num))) / num
-        step = np.minimum(np.searchsorted(self.share, strata, side="right") - 1, len(self.density) - 1)
-        low, high = (np.cos(edge * 0.5 * np.pi / len(self.density)) for edge in (step, step + 1))
+        step = np.minimum(np.searchsorted(self.cdf, strata, side="right") - 1, len(self.pdf_table) - 1)
+        low, high = (np.cos(edge * 0.5 * np.pi / len(self.pdf_table)) for edge in (step, step + 1))
         cosine = low + rng.random(step.shape) * (high - low)
         sine, phi = np.sqrt(np.maximum(0.0, 1 - cosine**2)), 2 * np.pi * rng.random(step.shape)
-        around = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+        directions = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
         if self.axes is not None:
-            return _turned(around, self._axis(wo))
+            return _rotate(directions, self._axis(wo))
         if not self.is_half:
-            return np.asarray(around)
-        return np.asarray(2 * np.einsum("nmc,nc->nm", around, wo)[..., None] * around - wo[:, None])
+            return np.asarray(directions)
+        return np.asarray(2 * np.einsum("nmc,nc->nm", directions, wo)[..., None] * directions - wo[:, None])
 
-    def density_of(self, wi: F64, wo: F64) -> F64:
+    def pdf(self, wi: F64, wo: F64) -> F64:
         """Per steradian, of directions wi (n, m, 3) for wo (n, 3). (n, m)"""
         if not self.is_half:
             cosine = wi[..., 2] if self.axes is None else np.einsum("nmc,nc->nm", wi, self._axis(wo))
-            return self._at(cosine)
+            return self._pdf_at(cosine)
         half = wi + wo[:, None]
         length = np.maximum(np.linalg.norm(half, axis=-1), 1e-12)
-        return np.asarray(self._at(half[..., 2] / length) / (2 * length))  # |wi + wo| = 2 cos θd
+        return np.asarray(self._pdf_at(half[..., 2] / length) / (2 * length))  # |wi + wo| = 2 cos θd
 
     def _axis(self, wo: F64) -> F64:
         axis = wo * np.array(self.axes)
-        return np.asarray(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), _NEVER))
+        return np.asarray(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), _MIN_LENGTH))
 
-    def _at(self, cosine: F64) -> F64:
+    def _pdf_at(self, cosine: F64) -> F64:
         """The density at an angle from the axis; none beyond 90°."""
         angle = np.arccos(np.clip(cosine, 0.0, 1.0))
-        step = np.minimum((angle * (len(self.density) / (0.5 * np.pi))).astype(np.intp), len(self.density) - 1)
-        return np.asarray(np.where(cosine > 0, self.density[step], 0.0))
+        step = np.minimum((angle * (len(self.pdf_table) / (0.5 * np.pi))).astype(np.intp), len(self.pdf_table) - 1)
+        return np.asarray(np.where(cosine > 0, self.pdf_table[step], 0.0))
 
 
 def cosine_lobe(steps: int = 1024) -> Lobe:
@@ -85,19 +85,19 @@ def cosine_lobe(steps: int = 1024) -> Lobe:
     return _lobe(0.5 * (edges[1:] + edges[:-1]), None, is_half=False)  # type: ignore[return-value]
 
 
-def lobe_of(angle: Angle, axes: tuple[float, float, float], values: F64) -> Lobe | None:
+def curve_lobe(angle: Angle, axes: tuple[float, float, float], values: F64) -> Lobe | None:
     """The lobe of a curve; None where it turns with no direction that has a lobe, or is nothing.
 
     Args:
         angle: that the curve is a function of.
         axes: of the curve. values: at equal steps over [0, π/2], the mean of the channels. (steps + 1,)
     """
-    between = 0.5 * (values[1:] + values[:-1])
+    midpoints = 0.5 * (values[1:] + values[:-1])
     if angle in _HALF_ANGLES:
         edges = np.cos(np.linspace(0.0, 0.5 * np.pi, len(values)))
-        return _lobe(between * 0.5 * (edges[1:] + edges[:-1]), None, is_half=True)
+        return _lobe(midpoints * 0.5 * (edges[1:] + edges[:-1]), None, is_half=True)
     if angle in (Angle.THETA_R, Angle.LOBE):
-        return _lobe(between, _MIRRORED if angle is Angle.THETA_R else axes, is_half=False)
+        return _lobe(midpoints, _MIRRORED if angle is Angle.THETA_R else axes, is_half=False)
     return None
 
 
@@ -107,13 +107,13 @@ def _lobe(values: F64, axes: tuple[float, float, float] | None, *, is_half: bool
     total = float(weight.sum())
     if not total > 0:
         return None
-    share = np.concatenate([[0.0], np.cumsum(weight) / total])
-    return Lobe(axes, is_half, share / share[-1], values / total)
+    cdf = np.concatenate([[0.0], np.cumsum(weight) / total])
+    return Lobe(axes, is_half, cdf / cdf[-1], values / total)
 
 
-def _turned(around: F64, axis: F64) -> F64:
+def _rotate(directions: F64, axis: F64) -> F64:
     """Directions about +z (n, m, 3) turned to be about unit axes (n, 3)."""
-    other = np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    x = np.cross(other, axis)
+    helper_axis = np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    x = np.cross(helper_axis, axis)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
-    return np.asarray(np.einsum("nmc,ncd->nmd", around, np.stack([x, np.cross(axis, x), axis], axis=1)))
+    return np.asarray(np.einsum("nmc,ncd->nmd", directions, np.stack([x, np.cross(axis, x), axis], axis=1)))

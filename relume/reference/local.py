@@ -13,22 +13,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from relume.look import LightLook, Look
 from relume.look.model import DirectionalLook, MeshLook, RectangleLook, SpotLook
-from relume.points import ALIKE
+from relume.points import FIXED_ALPHA_SAMPLE
 from relume.scene.model import Scene, Texture
-from relume.trace.geometry import Geometry
-from relume.trace.primary import trace_from
+from relume.trace.geometry import SceneBuffers
+from relume.trace.primary import trace_rays
 from relume.trace.texture import MipMap
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_BEHIND = 1e9  # metres: where directional light comes from
-_RAYS_AT_ONCE = 8192  # more would be shared out to threads that wait for this one already
+_DIRECTIONAL_DISTANCE = 1e9  # metres: where directional light comes from
+_RAYS_PER_BATCH = 8192  # more would be shared out to threads that wait for this one already
 _SLACK = 4.0  # times the geometry's epsilon: a ray that ends on a surface may find it so much sooner
 
 
 @dataclass(frozen=True)
-class Arriving:
+class LocalLightSamples:
     """Light of one lamp at points. direction: unit, (n, m, 3). power: irradiance across it, 0 if hidden, (n, m, 3)"""
 
     direction: F64
@@ -36,7 +36,7 @@ class Arriving:
 
 
 @dataclass(frozen=True)
-class LocalLamp:
+class ReferenceEmitter:
     """A light of a look in a scene.
 
     Attributes:
@@ -50,9 +50,14 @@ class LocalLamp:
     uvs: F64
     image: Texture | None
 
-    def arriving(
-        self, geometry: Geometry, position: F64, num: int, rng: np.random.Generator, chance: F32 = ALIKE
-    ) -> Arriving:
+    def sample(
+        self,
+        geometry: SceneBuffers,
+        position: F64,
+        num: int,
+        rng: np.random.Generator,
+        alpha_sample: F32 = FIXED_ALPHA_SAMPLE,
+    ) -> LocalLightSamples:
         """Light that arrives at points from places of the lamp's surface, or from the one place that it has.
 
         Args:
@@ -60,50 +65,50 @@ class LocalLamp:
             position: of the points, metres. (n, 3) float64
             num: places that are drawn for each point.
             rng: where they are drawn from.
-            chance: of the rays of each point, or of all; see `relume.points.Points`. (n,) or (1,)
+            alpha_sample: of the rays of each point, or of all; see `relume.points.Points`. (n,) or (1,)
         """
-        away, factor = self._towards(position, num, rng)
-        distance = np.linalg.norm(away, axis=2)
-        direction = away / distance[..., None]
+        to_light, factor = self._sample_vectors(position, num, rng)
+        distance = np.linalg.norm(to_light, axis=2)
+        direction = to_light / distance[..., None]
         flat = direction.reshape(-1, 3).astype(np.float32)
         start = np.repeat(position, direction.shape[1], axis=0).astype(np.float32)
-        of_rays = chance if len(chance) == 1 else np.repeat(chance, direction.shape[1])
-        free = free_distance(geometry, start, flat, of_rays).reshape(distance.shape)
-        is_seen = free > distance - _SLACK * geometry.epsilon - 1e-5 * distance
-        return Arriving(direction, factor * is_seen[..., None] * np.array(self.look.gain))
+        ray_alpha_sample = alpha_sample if len(alpha_sample) == 1 else np.repeat(alpha_sample, direction.shape[1])
+        ray_length = hit_distance(geometry, start, flat, ray_alpha_sample).reshape(distance.shape)
+        is_visible = ray_length > distance - _SLACK * geometry.epsilon - 1e-5 * distance
+        return LocalLightSamples(direction, factor * is_visible[..., None] * np.array(self.look.gain))
 
-    def _towards(self, position: F64, num: int, rng: np.random.Generator) -> tuple[F64, F64]:
+    def _sample_vectors(self, position: F64, num: int, rng: np.random.Generator) -> tuple[F64, F64]:
         """Vectors to places of the lamp (n, m, 3), and what a unit of emission gives from there. (n, m, 1 or 3)"""
         light = self.look
         if isinstance(light, DirectionalLook):
-            away = np.broadcast_to(-_BEHIND * _unit(light.direction), (len(position), 1, 3))
-            return away, np.ones((len(position), 1, 1))
+            to_light = np.broadcast_to(-_DIRECTIONAL_DISTANCE * _unit(light.direction), (len(position), 1, 3))
+            return to_light, np.ones((len(position), 1, 1))
         if isinstance(light, RectangleLook):
-            return self._from_surface(position, *_places_of_rectangle(light, len(position), num, rng))
+            return self._surface_factor(position, *_sample_rectangle(light, len(position), num, rng))
         if isinstance(light, MeshLook):
-            places = _places_of_triangles(self.triangles, self.uvs, len(position), num, rng)
-            away, factor = self._from_surface(position, *places[:3])
-            return away, factor if self.image is None else factor * _looked_up(self.image, places[3])
-        away = (np.array(light.position) - position)[:, None]
-        squared = (away**2).sum(axis=2)
+            light_samples = _sample_triangles(self.triangles, self.uvs, len(position), num, rng)
+            to_light, factor = self._surface_factor(position, *light_samples[:3])
+            return to_light, factor if self.image is None else factor * _sample_texels(self.image, light_samples[3])
+        to_light = (np.array(light.position) - position)[:, None]
+        distance_squared = (to_light**2).sum(axis=2)
         if not isinstance(light, SpotLook):
-            return away, 1 / squared[..., None]
+            return to_light, 1 / distance_squared[..., None]
         inner, outer = np.cos(np.radians(light.cone))
-        cosine = -(away @ _unit(light.direction)) / np.sqrt(squared)
+        cosine = -(to_light @ _unit(light.direction)) / np.sqrt(distance_squared)
         falloff = np.clip((cosine - outer) / max(1e-3, inner - outer), 0, 1)
-        return away, (falloff**2 / squared)[..., None]
+        return to_light, (falloff**2 / distance_squared)[..., None]
 
-    def _from_surface(self, position: F64, place: F64, normal: F64, area: float) -> tuple[F64, F64]:
-        away = place - position[:, None]
-        squared = np.maximum((away**2).sum(axis=2), 1e-20)
-        cosine = -(away * normal).sum(axis=2) / np.sqrt(squared)
+    def _surface_factor(self, position: F64, light_position: F64, normal: F64, area: float) -> tuple[F64, F64]:
+        to_light = light_position - position[:, None]
+        distance_squared = np.maximum((to_light**2).sum(axis=2), 1e-20)
+        cosine = -(to_light * normal).sum(axis=2) / np.sqrt(distance_squared)
         facing = np.abs(cosine) if self.is_two_sided else np.maximum(cosine, 0)
-        return away, (area * facing / squared / place.shape[1])[..., None]
+        return to_light, (area * facing / distance_squared / light_position.shape[1])[..., None]
 
 
-def lamps_of(scene: Scene, look: Look) -> list[LocalLamp]:
+def emitters(scene: Scene, look: Look) -> list[ReferenceEmitter]:
     """The local lights of a look that give any light."""
-    lamps = []
+    local_lights = []
     for light in look.lights.values():
         triangles, uvs, is_two_sided, image = np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), False, None
         if isinstance(light, MeshLook):
@@ -115,33 +120,38 @@ def lamps_of(scene: Scene, look: Look) -> list[LocalLamp]:
             image = scene.materials[material].textures.get("emission")
         is_dark = isinstance(light, MeshLook) and not _areas(triangles).any()
         if any(light.gain) and not is_dark:
-            lamps.append(LocalLamp(light, triangles, is_two_sided, uvs, image))
-    return lamps
+            local_lights.append(ReferenceEmitter(light, triangles, is_two_sided, uvs, image))
+    return local_lights
 
 
-def free_distance(geometry: Geometry, start: F32, direction: F32, chance: F32 = ALIKE) -> F32:
+def hit_distance(geometry: SceneBuffers, start: F32, direction: F32, alpha_sample: F32 = FIXED_ALPHA_SAMPLE) -> F32:
     """How far rays fly until they hit anything.
 
     Args:
         geometry: that is traced.
         start: origins, metres. (n, 3) float32
         direction: unit vectors. (n, 3) float32
-        chance: of the rays at surfaces that blend; see `relume.points.Points`. (n,) or (1,) float32
+        alpha_sample: of the rays at surfaces that blend; see `relume.points.Points`. (n,) or (1,) float32
     Returns:
         Metres, infinite where nothing is hit. (n,) float32
     """
-    some = (slice(k, k + _RAYS_AT_ONCE) for k in range(0, len(direction), _RAYS_AT_ONCE))
+    batches = (slice(k, k + _RAYS_PER_BATCH) for k in range(0, len(direction), _RAYS_PER_BATCH))
     return np.concatenate([
-        trace_from(
-            geometry.embree, start[rows], direction[rows], chance if len(chance) == 1 else chance[rows]
+        trace_rays(
+            geometry.embree, start[rows], direction[rows],
+            alpha_sample if len(alpha_sample) == 1 else alpha_sample[rows]
         ).distance
-        for rows in some
+        for rows in batches
     ])  # fmt: skip
 
 
-def emission_of(lamps: Sequence[LocalLamp], material: str) -> F64:
+def emitted_radiance(local_lights: Sequence[ReferenceEmitter], material: str) -> F64:
     """Radiance that the surfaces of a material send out themselves. (3,)"""
-    gains = [lamp.look.gain for lamp in lamps if isinstance(lamp.look, MeshLook) and lamp.look.material == material]
+    gains = [
+        local_light.look.gain
+        for local_light in local_lights
+        if isinstance(local_light.look, MeshLook) and local_light.look.material == material
+    ]
     return np.asarray(np.array(gains, np.float64).reshape(-1, 3).sum(axis=0))
 
 
@@ -155,43 +165,45 @@ def _areas(triangles: F64) -> F64:
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
-def _places_of_rectangle(
+def _sample_rectangle(
     light: RectangleLook, num_points: int, num: int, rng: np.random.Generator
 ) -> tuple[F64, F64, float]:
     """Places (n, m, 3), one in each cell of a grid; normals; the area."""
-    facing, turn = _unit(light.direction), np.radians(light.rotation)
+    facing, rotation = _unit(light.direction), np.radians(light.rotation)
     reference = (0.0, 1.0, 0.0) if np.hypot(facing[0], facing[2]) > 1e-3 else (0.0, 0.0, 1.0)
     across = _unit(np.cross(reference, facing))
     up = np.cross(facing, across)
-    width = np.cos(turn) * across + np.sin(turn) * up
-    height = np.cos(turn) * up - np.sin(turn) * across
+    width = np.cos(rotation) * across + np.sin(rotation) * up
+    height = np.cos(rotation) * up - np.sin(rotation) * across
     side = max(1, round(np.sqrt(num)))
-    cell = np.arange(side * side)
-    u, v = (np.stack([cell % side, cell // side]) + rng.random((num_points, 2, side * side))).transpose(1, 0, 2) / side
+    stratum = np.arange(side * side)
+    u, v = (np.stack([stratum % side, stratum // side]) + rng.random((num_points, 2, side * side))).transpose(
+        1, 0, 2
+    ) / side
     offset = light.size[0] * (u - 0.5)[..., None] * width + light.size[1] * (v - 0.5)[..., None] * height
     return np.array(light.position) + offset, facing, light.size[0] * light.size[1]
 
 
-def _looked_up(image: Texture, uv: F64) -> F64:
+def _sample_texels(image: Texture, uv: F64) -> F64:
     """The texels of an image at places (n, m, 2), unfiltered but for the nearest four. (n, m, 3)"""
     flat = uv.reshape(-1, 2).astype(np.float32)
-    found = MipMap.of(image).sample(flat, np.zeros(len(flat), np.float32))
-    return np.asarray(found.reshape(*uv.shape[:2], 3), np.float64)
+    texels = MipMap.for_texture(image).sample(flat, np.zeros(len(flat), np.float32))
+    return np.asarray(texels.reshape(*uv.shape[:2], 3), np.float64)
 
 
-def _places_of_triangles(
+def _sample_triangles(
     triangles: F64, uvs: F64, num_points: int, num: int, rng: np.random.Generator
 ) -> tuple[F64, F64, float, F64]:
     """Places (n, m, 3), evenly by area; their normals (n, m, 3); the area; their places in images (n, m, 2)."""
     areas = _areas(triangles)
     strata = (np.arange(num) + rng.random((num_points, num))) / num
-    chosen = np.minimum(np.searchsorted(np.cumsum(areas) / areas.sum(), strata, side="right"), len(areas) - 1)
+    triangle_index = np.minimum(np.searchsorted(np.cumsum(areas) / areas.sum(), strata, side="right"), len(areas) - 1)
     u, v = rng.random((2, num_points, num, 1))
     root = np.sqrt(u)
-    a, b, c = triangles[chosen].transpose(2, 0, 1, 3)
+    a, b, c = triangles[triangle_index].transpose(2, 0, 1, 3)
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-300)
     weights = 1 - root, root * (1 - v), root * v
-    place = sum(weight * corner for weight, corner in zip(weights, (a, b, c), strict=True))
-    uv = sum(weight * uvs[chosen][:, :, k] for k, weight in enumerate(weights))
-    return np.asarray(place), normal, float(areas.sum()), np.asarray(uv)
+    position = sum(weight * corner for weight, corner in zip(weights, (a, b, c), strict=True))
+    uv = sum(weight * uvs[triangle_index][:, :, k] for k, weight in enumerate(weights))
+    return np.asarray(position), normal, float(areas.sum()), np.asarray(uv)

@@ -2,36 +2,36 @@
 
 from __future__ import annotations
 
-from relume.look import Look, Paths
+from relume.look import LightPaths, Look
 from relume.scene.model import Scene
 
-MOST_BOUNCES = 64  # between surfaces, of which Russian roulette leaves few
+MAX_BOUNCES = 64  # between surfaces, of which Russian roulette leaves few
 
 
-def whole_paths(look: Look) -> Paths:
+def unlimited_paths(look: Look) -> LightPaths:
     """All light paths of the kind that a look shows, however many surfaces they have on their way.
 
     Args:
-        look: whose `transport` names the kind.
+        look: whose `edit_transport` names the kind.
     """
-    return look.transport.model_copy(update={"bounces": MOST_BOUNCES}).paths
+    return look.transport.model_copy(update={"bounces": MAX_BOUNCES}).paths
 
 
-def left_out(look: Look, *, reflects: bool) -> tuple[str, ...]:
+def omitted_paths(look: Look, *, reflects: bool) -> tuple[str, ...]:
     """What a method leaves out of the paths of a look, in sentences.
 
     Args:
-        look: whose `transport` names them. reflects: whether the method has light between surfaces.
+        look: whose `edit_transport` names them. reflects: whether the method has light between surfaces.
     """
-    whole, followed = whole_paths(look), look.transport.followed(reflects=reflects)
-    if not whole.reflect or followed.last >= whole.last:
+    unlimited, supported = unlimited_paths(look), look.transport.supported_by(has_indirect=reflects)
+    if not unlimited.has_indirect or supported.last >= unlimited.last:
         return ()
-    if not followed.reflect:
+    if not supported.has_indirect:
         return ("Light that surfaces reflect onto each other, but for what is seen in mirrors.",)
-    return (f"Light that more than {followed.last} surfaces have reflected.",)
+    return (f"Light that more than {supported.last} surfaces have reflected.",)
 
 
-def untraced(scene: Scene) -> tuple[str, ...]:
+def unsupported_paths(scene: Scene) -> tuple[str, ...]:
     """What brute force leaves out of a scene's light as every method does, in sentences.
 
     Args:

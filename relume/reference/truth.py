@@ -4,8 +4,8 @@ Passes of the reference are independent, but their noise has heavy tails: that a
 and bright. So nothing here trusts a table of Student's t. Passes are added up in batches, and the batches say by
 themselves how far noise alone carries their mean: with the signs of half of them turned, the truth cancels and noise of
 the same spread is left. What a frame differs by, over its own noise, is compared with what such turned batches give,
-over pixels and over blocks of them, and the largest set is called different of which at most `CHANCE` is so by chance
-(the false discovery rate of Benjamini and Hochberg 1995, counted as with decoys, Elias and Gygi 2007).
+over pixels and over blocks of them, and the largest set is called different of which at most `FALSE_DISCOVERY_RATE` is
+so by chance (the false discovery rate of Benjamini and Hochberg 1995, counted as with decoys, Elias and Gygi 2007).
 
 All that is said of a frame follows from that set: where it is empty no error was found, however large the differences.
 """
@@ -24,15 +24,15 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-CHANCE = 0.01  # of what is called different, at most
+FALSE_DISCOVERY_RATE = 0.01  # of what is called different, at most
 _BLOCKS = (1, 4, 16)  # pixels across
-_TURNS = 16  # of the batches' signs
+_NUM_SIGN_FLIPS = 16  # of the batches' signs
 _SEED = 1995
-_MOST_BATCHES, _FEWEST_BATCHES, _BATCH_BYTES = 16, 4, 256 << 20
+_MAX_BATCHES, _MIN_BATCHES, _BATCH_BYTES = 16, 4, 256 << 20
 _ROUNDING = 1e-6  # of float32, relative: no difference
-_FULL_COLOUR_STOPS = 0.25
+_FULL_COLOR_STOPS = 0.25
 _DARK = 0.01  # of the picture's mean: darker than that, stops say nothing
-_GREY, _TOO_BRIGHT, _TOO_DARK = (np.array(c, float) for c in ((56, 56, 56), (235, 94, 52), (66, 135, 245)))
+_GRAY, _TOO_BRIGHT, _TOO_DARK = (np.array(c, float) for c in ((56, 56, 56), (235, 94, 52), (66, 135, 245)))
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ class Estimate:
     passes: int
 
     @classmethod
-    def nothing(cls, height: int, width: int) -> Estimate:
+    def empty(cls, height: int, width: int) -> Estimate:
         """No pass yet; so many batches that they take a bounded part of the memory."""
-        fitting = _BATCH_BYTES // max(1, 12 * height * width)
-        num = min(max(fitting, _FEWEST_BATCHES), _MOST_BATCHES)
+        num_fitting = _BATCH_BYTES // max(1, 12 * height * width)
+        num = min(max(num_fitting, _MIN_BATCHES), _MAX_BATCHES)
         return cls(np.zeros((num, height, width, 3), np.float32), 0)
 
     def add(self, picture: F32) -> Estimate:
@@ -81,7 +81,8 @@ class Comparison:
         error: of the frame, noise taken off; None where that cannot be told from the noise.
         standard_error: of `error`, one standard deviation of what other passes would make of it; None where that is.
         limit: what the error is very likely below.
-        significant: share of pixels that differ by more than noise explains; at most `CHANCE` of these by chance.
+        significant: share of pixels that differ by more than noise explains; at most `FALSE_DISCOVERY_RATE` of these by
+            chance.
     """
 
     rmse: float
@@ -99,17 +100,17 @@ def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
         The figures, and which pixels differ. (height, width)
     """
     means = estimate.means
-    differs = _different(frame, means)
+    differs = _differing_pixels(frame, means)
     num = len(means)
-    mean_square = float(np.mean(means.mean(axis=0, dtype=np.float64) ** 2))
-    gram = _gram(frame, means) / max(mean_square, 1e-300)
-    square = float(gram.mean())
-    noise = max(0.0, (float(np.trace(gram)) / num - square) / (num - 1))
+    reference_power = float(np.mean(means.mean(axis=0, dtype=np.float64) ** 2))
+    gram = _gram(frame, means) / max(reference_power, 1e-300)
+    mean_squared_difference = float(gram.mean())
+    noise = max(0.0, (float(np.trace(gram)) / num - mean_squared_difference) / (num - 1))
     error, deviation = _error_squared(gram)
-    is_told = bool(differs.any()) and error > 2 * deviation
-    root = float(np.sqrt(error)) if is_told else None
+    is_significant = bool(differs.any()) and error > 2 * deviation
+    root = float(np.sqrt(error)) if is_significant else None
     figures = Comparison(
-        rmse=float(np.sqrt(square)),
+        rmse=float(np.sqrt(mean_squared_difference)),
         noise=float(np.sqrt(noise)),
         error=root,
         standard_error=None if root is None else deviation / (2 * root),
@@ -143,9 +144,9 @@ def error_map(frame: F32, estimate: Estimate, differs: Mask) -> NDArray[np.uint8
     mean = luminance(estimate.mean).astype(np.float64)
     floor = _DARK * max(float(mean.mean()), 1e-300)
     stops = np.log2((luminance(frame).astype(np.float64) + floor) / (mean + floor))
-    amount = np.clip(np.abs(stops) / _FULL_COLOUR_STOPS, 0.0, 1.0) * differs
-    colour = np.where(stops[..., None] > 0, _TOO_BRIGHT, _TOO_DARK)
-    return np.asarray(_GREY + amount[..., None] * (colour - _GREY) + 0.5, np.uint8)
+    amount = np.clip(np.abs(stops) / _FULL_COLOR_STOPS, 0.0, 1.0) * differs
+    color = np.where(stops[..., None] > 0, _TOO_BRIGHT, _TOO_DARK)
+    return np.asarray(_GRAY + amount[..., None] * (color - _GRAY) + 0.5, np.uint8)
 
 
 def _gram(frame: NDArray[np.floating], means: F32) -> F64:
@@ -153,8 +154,8 @@ def _gram(frame: NDArray[np.floating], means: F32) -> F64:
     differences = (frame[None] - means).reshape(len(means), -1)
     step, total = 1 << 20, np.zeros((len(means), len(means)))
     for start in range(0, differences.shape[1], step):
-        some = differences[:, start : start + step].astype(np.float64)
-        total += some @ some.T
+        block = differences[:, start : start + step].astype(np.float64)
+        total += block @ block.T
     return total / differences.shape[1]
 
 
@@ -170,75 +171,81 @@ def _error_squared(gram: F64) -> tuple[float, float]:
     return error, float(np.sqrt((num - 1) * np.mean((without - without.mean()) ** 2)))
 
 
-def _different(frame: F32, means: F32) -> Mask:
+def _differing_pixels(frame: F32, means: F32) -> Mask:
     """Pixels that differ by themselves, or else as part of a block of such as do not. (height, width)"""
     height, width = frame.shape[:2]
-    batches, shown = luminance(means), luminance(frame)
-    found = np.zeros((height, width), np.bool_)
+    batches, frame_luminance = luminance(means), luminance(frame)
+    differs = np.zeros((height, width), np.bool_)
     for size in _BLOCKS:
-        of = (~found).astype(np.float64)
-        blocks = _discovered(_block_means(shown, of, size), np.stack([_block_means(b, of, size) for b in batches]))
-        found |= np.repeat(np.repeat(blocks, size, axis=0), size, axis=1)[:height, :width]
-    return found
+        pixel_weights = (~differs).astype(np.float64)
+        blocks = _differing_blocks(
+            _block_means(frame_luminance, pixel_weights, size),
+            np.stack([_block_means(b, pixel_weights, size) for b in batches]),
+        )
+        differs |= np.repeat(np.repeat(blocks, size, axis=0), size, axis=1)[:height, :width]
+    return differs
 
 
-def _block_means(values: F32, of: F64, size: int) -> F64:
-    """Means over blocks of size × size, weighted by `of`; 0 where that is. values, of: (h, w). Returns: (rows, cols)"""
+def _block_means(values: F32, pixel_weights: F64, size: int) -> F64:
+    """Means over blocks of size × size, by `pixel_weights`; 0 where that is. values: (h, w). Returns: (rows, cols)"""
     rows, columns = (np.arange(0, length, size) for length in values.shape)
     sums, weights = (
-        np.add.reduceat(np.add.reduceat(each, rows, axis=0), columns, axis=1) for each in (values * of, of)
+        np.add.reduceat(np.add.reduceat(array, rows, axis=0), columns, axis=1)
+        for array in (values * pixel_weights, pixel_weights)
     )
     return np.asarray(sums / np.maximum(weights, 1e-300))
 
 
-def _discovered(shown: F64, batches: F64) -> Mask:
+def _differing_blocks(frame_means: F64, batches: F64) -> Mask:
     """Blocks that differ; none where there are too few batches. shown: (rows, columns). batches: (n, rows, columns)"""
     num = len(batches)
-    if num < _FEWEST_BATCHES:
-        return np.zeros(shown.shape, np.bool_)
+    if num < _MIN_BATCHES:
+        return np.zeros(frame_means.shape, np.bool_)
     mean = batches.mean(axis=0)
-    around = batches - mean
-    squares = (around**2).sum(axis=0)
-    found = _over_noise(shown - mean, squares / (num * (num - 1)), mean)
-    by_chance = []
-    for turn in _turns(num):
-        noise = np.tensordot(turn, around, 1)
-        rest = np.maximum(squares - num * noise**2, 0.0)  # what is left of the spread does not depend on this noise
-        by_chance.append(_over_noise(noise, rest / (num * (num - 2)), mean))
-    return found >= _threshold(found.ravel(), np.concatenate(by_chance, axis=None))
+    deviations = batches - mean
+    sum_squares = (deviations**2).sum(axis=0)
+    noise_ratios = _noise_ratio(frame_means - mean, sum_squares / (num * (num - 1)), mean)
+    null_ratios = []
+    for batch_weights in _sign_flips(num):
+        noise = np.tensordot(batch_weights, deviations, 1)
+        residual = np.maximum(
+            sum_squares - num * noise**2, 0.0
+        )  # what is left of the spread does not depend on this noise
+        null_ratios.append(_noise_ratio(noise, residual / (num * (num - 2)), mean))
+    return noise_ratios >= _threshold(noise_ratios.ravel(), np.concatenate(null_ratios, axis=None))
 
 
-def _over_noise(difference: F64, variance: F64, mean: F64) -> F64:
+def _noise_ratio(difference: F64, variance: F64, mean: F64) -> F64:
     """How many standard deviations a difference is; 0 where it is rounding. Arguments: (rows, columns)
 
     An event that neighbours have seen may have been missed here: their variance counts too, scaled to this brightness.
     """
-    square = mean**2 + 1e-300
-    around = square * uniform_filter(variance / square, 3, mode="nearest")
-    least = _ROUNDING * np.abs(mean) + 1e-300
-    size, deviation = np.abs(difference), np.sqrt(np.maximum(variance, around))
-    return np.asarray(np.where(size > least, size / np.maximum(deviation, least), 0.0))
+    brightness_squared = mean**2 + 1e-300
+    smoothed_variance = brightness_squared * uniform_filter(variance / brightness_squared, 3, mode="nearest")
+    floor = _ROUNDING * np.abs(mean) + 1e-300
+    size, deviation = np.abs(difference), np.sqrt(np.maximum(variance, smoothed_variance))
+    return np.asarray(np.where(size > floor, size / np.maximum(deviation, floor), 0.0))
 
 
-def _turns(num: int) -> list[F64]:
+def _sign_flips(num: int) -> list[F64]:
     """Weights of batches by which their means cancel and their noise has that of the mean of all. (num,) each"""
     rng = np.random.default_rng((_SEED, num))
-    turns = []
-    for _ in range(_TURNS):
+    flips = []
+    for _ in range(_NUM_SIGN_FLIPS):
         signs = rng.permutation(np.where(np.arange(num) % 2 == 0, 1.0, -1.0))
         signs -= signs.mean()
-        turns.append(signs / np.sqrt(num * (signs**2).sum()))
-    return turns
+        flips.append(signs / np.sqrt(num * (signs**2).sum()))
+    return flips
 
 
-def _threshold(found: F64, by_chance: F64) -> float:
-    """The least value from which on at most `CHANCE` of those found are expected by chance; infinite if there is none.
+def _threshold(noise_ratios: F64, null_ratios: F64) -> float:
+    """The least value from which on at most `FALSE_DISCOVERY_RATE` are expected by chance; infinite if there is none.
 
     Args:
-        by_chance: of so many trials as `_turns` has.
+        null_ratios: of so many trials as `_turns` has.
     """
-    values = np.sort(found[found > 0])
-    num_found = len(values) - np.arange(len(values))
-    num_by_chance = len(by_chance) - np.searchsorted(np.sort(by_chance), values, side="left")
-    fitting = np.nonzero((num_by_chance + 1) / _TURNS <= CHANCE * num_found)[0]
-    return float(values[fitting[0]]) if len(fitting) else np.inf
+    values = np.sort(noise_ratios[noise_ratios > 0])
+    num_discoveries = len(values) - np.arange(len(values))
+    num_false = len(null_ratios) - np.searchsorted(np.sort(null_ratios), values, side="left")
+    passing = np.nonzero((num_false + 1) / _NUM_SIGN_FLIPS <= FALSE_DISCOVERY_RATE * num_discoveries)[0]
+    return float(values[passing[0]]) if len(passing) else np.inf

@@ -9,27 +9,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import is_diffuse, reflectances_of, shares_in
-from relume.brdf.channels import TEXTURES, images_of
+from relume.brdf.albedo import pack_reflectance, scatters_diffusely, unpack_reflectance
+from relume.brdf.channels import TEXTURES, user_images
 from relume.color import srgb_encode
-from relume.images.shelf import texture_of
+from relume.images.shelf import load_texture
 from relume.look import default_look
-from relume.scene.coding import mean_of
+from relume.scene.coding import mean_value
 from relume.scene.gltf.cameras import framing_camera
 from relume.scene.model import Camera, Material, Scene, Texture
-from relume.trace.geometry import Geometry, merge
-from relume.trace.primary import Hits, camera_directions, trace_from
+from relume.trace.geometry import SceneBuffers, build_scene_buffers
+from relume.trace.primary import Hits, camera_directions, trace_rays
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_AMBIENT, _HEADLIGHT, _SKY = 0.25, 0.45, 0.4  # shares of what a surface shows at most
-_DARKEST = 0.04  # linear; black surfaces would show no shape
+_AMBIENT, _HEADLIGHT, _SKYLIGHT = 0.25, 0.45, 0.4  # shares of what a surface shows at most
+_MIN_COLOR = 0.04  # linear; black surfaces would show no shape
 _BACKGROUND = 0.03
 
 
 @dataclass(frozen=True)
-class Finder:
+class Viewport:
     """A scene as cameras are placed in it.
 
     Attributes:
@@ -37,16 +37,16 @@ class Finder:
         framing: a camera that sees all of it. lowest, highest: its corners, metres. (3,)
     """
 
-    geometry: Geometry
+    geometry: SceneBuffers
     colors: F32
     framing: Camera
     lowest: F64
     highest: F64
 
     @classmethod
-    def of(cls, scene: Scene) -> Finder:
+    def from_scene(cls, scene: Scene) -> Viewport:
         """Build the search tree, and find out what is where."""
-        geometry = merge(scene)
+        geometry = build_scene_buffers(scene)
         terms = default_look(scene.materials, scene.lights)["materials"]
         colors = [_color(material, terms[material.name]["terms"]) for material in scene.materials]
         corners = geometry.positions[geometry.faces.ravel()]
@@ -69,23 +69,23 @@ class Finder:
         width, height = size
         y, x = np.divmod(np.arange(width * height, dtype=np.int64), width)
         directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-        hits = self._hits(camera, directions)
-        seen = np.flatnonzero(hits.face >= 0)
-        shown = np.full((width * height, 3), _BACKGROUND, np.float32)
-        shown[seen] = self._shown(hits.face[seen], hits.uv[seen], directions[seen])
-        return np.asarray(np.rint(255 * srgb_encode(shown)), np.uint8).reshape(height, width, 3)
+        hits = self._trace(camera, directions)
+        visible = np.flatnonzero(hits.face >= 0)
+        colors = np.full((width * height, 3), _BACKGROUND, np.float32)
+        colors[visible] = self._shade(hits.face[visible], hits.uv[visible], directions[visible])
+        return np.asarray(np.rint(255 * srgb_encode(colors)), np.uint8).reshape(height, width, 3)
 
-    def _shown(self, face: NDArray[np.int32], uv: F32, directions: F32) -> F32:
+    def _shade(self, face: NDArray[np.int32], uv: F32, directions: F32) -> F32:
         """Shade hits by their normals alone; `surface_at` finds more, and takes several times as long. (n, 3)"""
         corners, (u, v) = self.geometry.normals[self.geometry.faces[face]], uv.T[:, :, None]
         normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        facing = -np.einsum("nc,nc->n", normal, directions)
-        upward = normal[:, 1] * np.sign(facing)  # of the side that is seen
-        share = _AMBIENT + _HEADLIGHT * np.abs(facing) + _SKY * (0.5 + 0.5 * upward)
-        return np.asarray(self.colors[self.geometry.face_material[face]] * share[:, None], np.float32)
+        cosine = -np.einsum("nc,nc->n", normal, directions)
+        upward = normal[:, 1] * np.sign(cosine)  # of the side that is seen
+        shading = _AMBIENT + _HEADLIGHT * np.abs(cosine) + _SKYLIGHT * (0.5 + 0.5 * upward)
+        return np.asarray(self.colors[self.geometry.face_material[face]] * shading[:, None], np.float32)
 
-    def place_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> F64 | None:
+    def point_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> F64 | None:
         """Find the place that a position of the picture shows; None where that is the background.
 
         Args:
@@ -94,25 +94,29 @@ class Finder:
             World space, metres. (3,)
         """
         directions = camera_directions(camera, size, np.array([x], np.float32), np.array([y], np.float32))
-        hits = self._hits(camera, directions)
+        hits = self._trace(camera, directions)
         if hits.face[0] < 0:
             return None
         return np.asarray(camera.to_world[:3, 3] + float(hits.distance[0]) * directions[0].astype(np.float64))
 
-    def _hits(self, camera: Camera, directions: F32) -> Hits:
-        return trace_from(self.geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+    def _trace(self, camera: Camera, directions: F32) -> Hits:
+        return trace_rays(self.geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
 
 
 def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:
     """About what a material looks like: its diffuse colour, else that of its highlights. (3,)"""
-    plain, *textured = shares_in(reflectances_of(list(filter(is_diffuse, terms))))[..., 0].astype(np.float64)
-    own = [material.textures.get(channel) for channel in TEXTURES]
-    shown = [own[k] if name is None else texture_of(name) for k, name in enumerate(images_of(terms))]
-    color = plain + sum(part * _mean(texture) for texture, part in zip(shown, textured, strict=True))
-    if color.max() < _DARKEST:
+    constant, *textured_reflectances = unpack_reflectance(pack_reflectance(list(filter(scatters_diffusely, terms))))[
+        ..., 0
+    ].astype(np.float64)
+    scene_textures = [material.textures.get(channel) for channel in TEXTURES]
+    textures = [scene_textures[k] if name is None else load_texture(name) for k, name in enumerate(user_images(terms))]
+    color = constant + sum(
+        reflectance * _mean(texture) for texture, reflectance in zip(textures, textured_reflectances, strict=True)
+    )
+    if color.max() < _MIN_COLOR:
         color = np.max([np.asarray(term["color"], np.float64) for term in terms], axis=0)
-    return np.asarray(np.clip(color, _DARKEST, 1.0))
+    return np.asarray(np.clip(color, _MIN_COLOR, 1.0))
 
 
 def _mean(texture: Texture | None) -> F64:
-    return np.ones(3) if texture is None else mean_of(texture)
+    return np.ones(3) if texture is None else mean_value(texture)

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from relume.environments.model import Environment
 from relume.errors import NotFoundError, SceneError
-from relume.remarks import Remark, remark_of
-from relume.replacing import replacing
+from relume.remarks import ImportRemark, warning_of
+from relume.replacing import atomic_write
 from relume.scene.checks import check_scene
-from relume.scene.model import Camera, Coding, Glass, Light, Material, Mesh, Opacity, Scene, Texture
+from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture, TextureEncoding
 
 FORMAT_VERSION = 1
 MAX_JSON_BYTES = 64 << 20
@@ -38,7 +38,7 @@ def make_scene(
     materials: Sequence[Material],
     cameras: Sequence[Camera],
     environment: Environment,
-    warnings: Sequence[Remark] = (),
+    warnings: Sequence[ImportRemark] = (),
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
@@ -55,9 +55,9 @@ def make_scene(
         SceneError: the parts do not make a scene (see `relume.scene.checks`).
     """
     check_scene(meshes, materials, cameras, environment, lights)
-    parts = (tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings), dict(variants or {}))
-    scene = Scene("", name, *parts, tuple(lights))
-    document, arrays = _describe(scene)
+    contents = (tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings), dict(variants or {}))
+    scene = Scene("", name, *contents, tuple(lights))
+    document, arrays = _to_document(scene)
     return replace(scene, id=scene_id(document, arrays))
 
 
@@ -86,21 +86,21 @@ def save_scene(scene: Scene, folder: str | Path) -> None:
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    document, arrays = _describe(scene)
+    document, arrays = _to_document(scene)
     document |= {"id": scene.id, "sha256": scene_digest(document, arrays)}
     if _digest_in(folder, scene.id) not in (None, document["sha256"]):  # made for that: it takes billions of tries
         raise SceneError(f"another scene is here as {scene.id}; delete that one first, if it is not yours")
-    with replacing(folder / "arrays.npz") as unfinished:
+    with atomic_write(folder / "arrays.npz") as unfinished:
         np.savez(unfinished, allow_pickle=False, **arrays)
-    with replacing(folder / "scene.json") as unfinished:
+    with atomic_write(folder / "scene.json") as unfinished:
         unfinished.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
 
 
-def _digest_in(folder: Path, identity: str) -> str | None:
+def _digest_in(folder: Path, scene_id: str) -> str | None:
     """Of the scene of that id in a folder; None where there is none, it cannot be read, or it was saved without."""
     try:
         document = _read_document(folder / "scene.json")
-        return document.get("sha256") if document.get("id") == identity else None
+        return document.get("sha256") if document.get("id") == scene_id else None
     except (OSError, ValueError, RecursionError, AttributeError):
         return None
 
@@ -115,7 +115,7 @@ def load_scene(folder: str | Path) -> Scene:
     try:
         document = _read_document(folder / "scene.json")
         arrays = _read_arrays(folder / "arrays.npz")
-        scene = _assemble(document, arrays)
+        scene = _from_document(document, arrays)
     except FileNotFoundError:
         raise SceneError(f"there is no scene in {folder.name!r}; {REMEDY}") from None
     except SceneError:
@@ -124,7 +124,7 @@ def load_scene(folder: str | Path) -> Scene:
         detail = str(problem).partition("\n")[0] or type(problem).__name__
         raise SceneError(f"the scene in {folder.name!r} is damaged ({detail}); {REMEDY}") from None
     check_scene(scene.meshes, scene.materials, scene.cameras, scene.environment, scene.lights)
-    if scene_id(*_describe(scene)) != scene.id:
+    if scene_id(*_to_document(scene)) != scene.id:
         raise SceneError(f"the scene in {folder.name!r} is not the one that was saved there; {REMEDY}")
     return scene
 
@@ -160,7 +160,7 @@ def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
         yield "normal_map", material.normal_map
 
 
-def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
+def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     """The scene as a JSON document and named arrays, one to one."""
     arrays: Arrays = {"environment": scene.environment.radiance}
     for i, mesh in enumerate(scene.meshes):
@@ -180,16 +180,16 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
                 "textures": {channel: list(texture.wrap) for channel, texture in _textures(material)},
                 "double_sided": material.double_sided,
                 # ids of scenes without these stay what they were
-                **_described_codings(material),
-                **({"catcher": True} if material.catcher else {}),
-                **({"opacity": _described_opacity(material.opacity)} if material.opacity else {}),
+                **_encoding_documents(material),
+                **({"catcher": True} if material.shadow_catcher else {}),
+                **({"opacity": _opacity_document(material.opacity)} if material.opacity else {}),
                 **({"glass": asdict(material.glass)} if material.glass else {}),
             }
             for material in scene.materials
         ],
         "cameras": [{"name": c.name, "to_world": c.to_world.tolist(), "yfov": c.yfov} for c in scene.cameras],
         "environment": {"name": scene.environment.name},
-        "warnings": [remark.document() for remark in scene.warnings],
+        "warnings": [warning.document() for warning in scene.warnings],
     }
     if any(camera.aspect is not None for camera in scene.cameras):
         document["aspects"] = [camera.aspect for camera in scene.cameras]
@@ -200,17 +200,17 @@ def _describe(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     return document, arrays
 
 
-def _described_codings(material: Material) -> dict[str, Any]:
-    codings = {channel: asdict(texture.coding) for channel, texture in _textures(material) if texture.coding}
-    return {"codings": codings} if codings else {}
+def _encoding_documents(material: Material) -> dict[str, Any]:
+    encodings = {channel: asdict(texture.encoding) for channel, texture in _textures(material) if texture.encoding}
+    return {"codings": encodings} if encodings else {}
 
 
-def _described_opacity(opacity: Opacity) -> dict[str, Any]:
+def _opacity_document(opacity: Opacity) -> dict[str, Any]:
     return {"wrap": list(opacity.wrap), "cutoff": opacity.cutoff}
 
 
-def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
-    """The inverse of `_describe`; raises what Python raises where something is missing or of the wrong kind."""
+def _from_document(document: dict[str, Any], arrays: Arrays) -> Scene:
+    """The inverse of `_to_document`; raises what Python raises where something is missing or of the wrong kind."""
     meshes = [
         Mesh(name=str(m["name"]), material=int(m["material"]), **{k: arrays[f"mesh{i}_{k}"] for k in MESH_ARRAYS})
         for i, m in enumerate(document["meshes"])
@@ -223,7 +223,7 @@ def _assemble(document: dict[str, Any], arrays: Arrays) -> Scene:
         tuple(_assemble_material(i, m, arrays) for i, m in enumerate(document["materials"])),
         tuple(cameras),
         Environment(str(document["environment"]["name"]), arrays["environment"]),
-        tuple(remark_of(warning) for warning in document["warnings"]),
+        tuple(warning_of(warning) for warning in document["warnings"]),
         {str(name): dict(look) for name, look in document.get("variants", {}).items()},
         tuple(Light(str(light["name"]), dict(light["fields"])) for light in document.get("lights", ())),
     )
@@ -236,10 +236,10 @@ def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Mate
     }
     normal_map = textures.pop("normal_map", None)
     terms = tuple(dict(term) for term in document["terms"])
-    double_sided, catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
+    double_sided, shadow_catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
     opacity = _assemble_opacity(document["opacity"], arrays[f"material{i}_opacity"]) if "opacity" in document else None
     glass = _assemble_glass(document["glass"]) if "glass" in document else None
-    return Material(str(document["name"]), terms, textures, normal_map, double_sided, catcher, opacity, glass)
+    return Material(str(document["name"]), terms, textures, normal_map, double_sided, shadow_catcher, opacity, glass)
 
 
 def _assemble_glass(document: dict[str, Any]) -> Glass:
@@ -248,18 +248,20 @@ def _assemble_glass(document: dict[str, Any]) -> Glass:
     return Glass(tint, float(document["ior"]), float(document["thickness"]), absorbed)
 
 
-def _assemble_texture(pixels: NDArray[Any], wrap: list[Any], coding: dict[str, Any] | None) -> Texture:
-    channels = 1 if coding is not None and coding["kind"] == "share" else 3
+def _assemble_texture(pixels: NDArray[Any], wrap: list[Any], encoding: dict[str, Any] | None) -> Texture:
+    channels = 1 if encoding is not None and encoding["kind"] == "share" else 3
     is_image = pixels.ndim == 3 and pixels.shape[2] == channels and pixels.size > 0
-    if not is_image or pixels.dtype != (np.float32 if coding is None else np.uint8):
+    if not is_image or pixels.dtype != (np.float32 if encoding is None else np.uint8):
         raise SceneError(f"a texture of the scene has the wrong shape or type; {REMEDY}")
     wrap_u, wrap_v = map(str, wrap)
-    if coding is None:
+    if encoding is None:
         return Texture(pixels, (wrap_u, wrap_v))
-    red, green, blue = map(float, coding["scale"])
-    if coding["kind"] not in ("srgb", "normal", "share"):
+    red, green, blue = map(float, encoding["scale"])
+    if encoding["kind"] not in ("srgb", "normal", "share"):
         raise SceneError(f"a texture of the scene has a coding that is not known; {REMEDY}")
-    return Texture(pixels, (wrap_u, wrap_v), Coding(str(coding["kind"]), (red, green, blue), float(coding["turn"])))
+    return Texture(
+        pixels, (wrap_u, wrap_v), TextureEncoding(str(encoding["kind"]), (red, green, blue), float(encoding["turn"]))
+    )
 
 
 def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:
@@ -269,11 +271,11 @@ def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:
 
 
 def _cameras(document: dict[str, Any]) -> list[Camera]:
-    found = document["cameras"]
-    aspects = document.get("aspects") or [None] * len(found)
+    camera_documents = document["cameras"]
+    aspects = document.get("aspects") or [None] * len(camera_documents)
     return [
         Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"]), None if a is None else float(a))
-        for c, a in zip(found, aspects, strict=True)
+        for c, a in zip(camera_documents, aspects, strict=True)
     ]
 
 

@@ -14,7 +14,7 @@ MAX_TRIANGLES = 20_000_000
 MAX_MATERIALS = 1_000
 MAX_LIGHTS, MAX_LIGHT_NAME = 64, 80
 MAX_IOR = 4.0
-MAX_EMISSION, MAX_METRES = 1e6, 1e6  # of lights, in a scene and in a look
+MAX_EMISSION, MAX_METERS = 1e6, 1e6  # of lights, in a scene and in a look
 
 
 def check_mesh(mesh: Mesh, num_materials: int) -> None:
@@ -52,18 +52,20 @@ def check_glass(material: Material) -> None:
     glass = material.glass
     if glass is None:
         return
-    shares = all(0 <= share <= 1 for share in glass.tint) and all(0 <= rate < np.inf for rate in glass.absorbed)
-    sizes = 1 <= glass.ior <= MAX_IOR and 0 <= glass.thickness <= MAX_METRES
-    if not (shares and sizes and len(glass.tint) == len(glass.absorbed) == 3):
+    are_fractions_valid = all(0 <= fraction <= 1 for fraction in glass.tint) and all(
+        0 <= rate < np.inf for rate in glass.absorbed
+    )
+    are_sizes_valid = 1 <= glass.ior <= MAX_IOR and 0 <= glass.thickness <= MAX_METERS
+    if not (are_fractions_valid and are_sizes_valid and len(glass.tint) == len(glass.absorbed) == 3):
         raise SceneError(f"the glass of material {material.name!r} is out of range; import the scene again")
 
 
 def check_maps(material: Material) -> None:
     """Raises SceneError where a texture is not of bytes that its channel stands for, or its scale is no number."""
     for channel, texture in material.textures.items():
-        kind = None if texture.coding is None else texture.coding.kind
+        kind = None if texture.encoding is None else texture.encoding.kind
         fits = kind == "share" if channel == "roughness" else kind in ("srgb", None)
-        scale = (1.0,) if texture.coding is None else texture.coding.scale
+        scale = (1.0,) if texture.encoding is None else texture.encoding.scale
         if not fits or not all(0 <= value < np.inf for value in scale):
             raise SceneError(
                 f"the {channel} texture of material {material.name!r} is of no use; import the scene again"

@@ -18,7 +18,7 @@ Entry = TypeVar("Entry")
 class Companions(Protocol):
     """Reads the files that a scene file names."""
 
-    def read(self, name: str, what: str) -> bytes | None:
+    def read(self, name: str, label: str) -> bytes | None:
         """The content of a companion; None where there is no such file.
 
         Raises:
@@ -26,7 +26,7 @@ class Companions(Protocol):
         """
 
 
-def inside(name: str, what: str) -> str:
+def relative_path(name: str, label: str) -> str:
     """The name as a plain relative path with forward slashes.
 
     Raises:
@@ -34,17 +34,17 @@ def inside(name: str, what: str) -> str:
     """
     plain = posixpath.normpath(name.replace("\\", "/"))
     if plain.startswith(("/", "../")) or plain in ("..", ".") or ":" in plain or not plain.isprintable():
-        shown = name[:60].encode("ascii", "replace").decode()
-        raise SceneError(f"{what} lies outside the folder of the scene ({shown!r}); put it beside the scene file")
+        printable = name[:60].encode("ascii", "replace").decode()
+        raise SceneError(f"{label} lies outside the folder of the scene ({printable!r}); put it beside the scene file")
     return plain
 
 
-class Alone:
+class NoFiles:
     """A scene file without companions, such as a single upload."""
 
-    def read(self, name: str, what: str) -> bytes | None:
+    def read(self, name: str, label: str) -> bytes | None:
         """Nothing, whatever the name; one that points elsewhere is refused all the same."""
-        inside(unquote(name), what)
+        relative_path(unquote(name), label)
         return None
 
 
@@ -53,30 +53,30 @@ class Folder:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder.resolve()
-        self._bytes_left = MAX_BYTES
+        self._remaining_bytes = MAX_BYTES
 
-    def read(self, name: str, what: str) -> bytes | None:
+    def read(self, name: str, label: str) -> bytes | None:
         """As `Companions.read`; links are followed only where they stay in the folder."""
         for spelling in dict.fromkeys((unquote(name), name)):
-            plain = inside(spelling, what)
+            plain = relative_path(spelling, label)
             try:
                 path = (self._folder / plain).resolve()
                 if not path.is_relative_to(self._folder):
-                    raise SceneError(f"{what} is a link out of the folder of the scene; put the file there")
+                    raise SceneError(f"{label} is a link out of the folder of the scene; put the file there")
                 if not path.is_file():
                     continue
-                self._bytes_left -= path.stat().st_size
-                if self._bytes_left < 0:
+                self._remaining_bytes -= path.stat().st_size
+                if self._remaining_bytes < 0:
                     raise SceneError(f"the files beside the scene have over {MAX_BYTES >> 20} MB; scale them down")
                 return path.read_bytes()
             except (OSError, ValueError) as problem:
                 if isinstance(problem, SceneError):
                     raise
-                raise SceneError(f"{what} cannot be read; check the file beside the scene") from None
+                raise SceneError(f"{label} cannot be read; check the file beside the scene") from None
         return None
 
 
-class Listed(Generic[Entry]):
+class NamedFiles(Generic[Entry]):
     """Files known by their names, folders included, none of which is a path on this disk."""
 
     def __init__(self, entries: Mapping[str, Entry], folder: str, read: Callable[[Entry], bytes]) -> None:
@@ -87,17 +87,17 @@ class Listed(Generic[Entry]):
         self._entries = {posixpath.normpath(name.replace("\\", "/")).lower(): entry for name, entry in entries.items()}
         self._folder, self._read = folder, read
 
-    def read(self, name: str, what: str) -> bytes | None:
+    def read(self, name: str, label: str) -> bytes | None:
         """Read a file as `Companions.read` does; upper and lower case are the same."""
         for spelling in dict.fromkeys((unquote(name), name)):
             plain = posixpath.normpath(posixpath.join(self._folder, spelling.replace("\\", "/")))
-            entry = self._entries.get(inside(plain, what).lower())
+            entry = self._entries.get(relative_path(plain, label).lower())
             if entry is not None:
                 return self._read(entry)
         return None
 
 
-class Archive(Listed[zipfile.ZipInfo]):
+class Archive(NamedFiles[zipfile.ZipInfo]):
     """The other entries of a .zip file, read in memory; nothing is ever unpacked to the disk."""
 
     def __init__(self, archive: zipfile.ZipFile, folder: str) -> None:
@@ -105,7 +105,7 @@ class Archive(Listed[zipfile.ZipInfo]):
         super().__init__(entries, folder, lambda entry: read_entry(archive, entry))
 
 
-class Sent(Listed[Path]):
+class UploadedFiles(NamedFiles[Path]):
     """The files that were uploaded with a scene."""
 
     def __init__(self, files: Mapping[str, Path], scene: str) -> None:

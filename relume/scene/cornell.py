@@ -14,7 +14,7 @@ from relume.environments.equirect import texel_directions
 from relume.environments.model import Environment
 from relume.scene.archive import make_scene
 from relume.scene.demo.still_life import look_at
-from relume.scene.demo.surfaces import Surface, merged, turn_y
+from relume.scene.demo.surfaces import GridSurface, merge_surfaces, rotation_y
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 
 F64 = NDArray[np.float64]
@@ -26,8 +26,8 @@ GLOSSY_FLOOR: tuple[dict[str, Any], ...] = (
     {"model": "lambert", "color": [0.36, 0.35, 0.33]},
     {"model": "blinn_phong", "color": [0.12, 0.12, 0.12], "params": {"exponent": 100.0}},
 )
-LAMP, LAMP_SIZE, LAMP_GAP = (18.0, 13.5, 8.5), (0.5, 0.4), 2e-3  # radiance; metres, the gap to the ceiling
-SUN = np.array([0.22, 1.0, 0.12])
+LAMP_RADIANCE, LAMP_SIZE, LAMP_GAP = (18.0, 13.5, 8.5), (0.5, 0.4), 2e-3  # radiance; metres, the gap to the ceiling
+SUN_DIRECTION = np.array([0.22, 1.0, 0.12])
 SUN_RADIUS = np.radians(4.0)
 
 
@@ -50,28 +50,28 @@ def lamplit_cornell_box() -> Scene:
     meshes, materials = _room(rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2)))
     x, z = LAMP_SIZE[0] / 2, LAMP_SIZE[1] / 2
     plate = rectangle((-x, 2 - LAMP_GAP, -z), (2 * x, 0, 0), (0, 0, 2 * z))
-    shine = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": list(LAMP)})
+    area_light = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": list(LAMP_RADIANCE)})
     return make_scene(
         "Cornell box by lamplight",
         [*meshes, plate.mesh("Lamp", len(materials))],
         [*materials, Material("Lamp", ({"model": "lambert", "color": list(WHITE)},), double_sided=False)],
         [_camera()],
         Environment("night", np.full((4, 8, 3), 1e-6, np.float32)),
-        lights=[shine],
+        lights=[area_light],
     )
 
 
-def _room(roof: Surface) -> tuple[list[Mesh], list[Material]]:
-    parts: list[tuple[str, Surface, Sequence[float]]] = [
+def _room(roof: GridSurface) -> tuple[list[Mesh], list[Material]]:
+    objects: list[tuple[str, GridSurface, Sequence[float]]] = [
         ("Floor", rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2)), WHITE),
-        ("Walls", merged([rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), roof]), WHITE),
+        ("Walls", merge_surfaces([rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0)), roof]), WHITE),
         ("Red wall", rectangle((-1, 0, 1), (0, 0, -2), (0, 2, 0)), RED),
         ("Green wall", rectangle((1, 0, -1), (0, 0, 2), (0, 2, 0)), GREEN),
-        ("Tall block", block(0.3, 1.2, 0.3).moved(turn_y(18.0), (-0.33, 0.0, -0.28)), WHITE),
-        ("Short block", block(0.3, 0.6, 0.3).moved(turn_y(-17.0), (0.34, 0.0, 0.38)), WHITE),
+        ("Tall block", block(0.3, 1.2, 0.3).transform(rotation_y(18.0), (-0.33, 0.0, -0.28)), WHITE),
+        ("Short block", block(0.3, 0.6, 0.3).transform(rotation_y(-17.0), (0.34, 0.0, 0.38)), WHITE),
     ]
-    meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(parts)]
-    materials = [Material(name, ({"model": "lambert", "color": list(color)},)) for name, _, color in parts]
+    meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(objects)]
+    materials = [Material(name, ({"model": "lambert", "color": list(color)},)) for name, _, color in objects]
     return meshes, materials
 
 
@@ -79,24 +79,24 @@ def _camera() -> Camera:
     return look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
 
 
-def sunny_sky(sun: F64 = SUN, rows: int = 256, radius: float = SUN_RADIUS) -> Environment:
+def sunny_sky(sun_direction: F64 = SUN_DIRECTION, rows: int = 256, radius: float = SUN_RADIUS) -> Environment:
     """A sun, soft as through haze unless told otherwise, in a blue sky; nothing from below.
 
     Args:
-        sun: towards it. (3,). rows: of the map, which is twice as wide.
+        sun_direction: towards it. (3,). rows: of the map, which is twice as wide.
         radius: of the sun, radians; the smaller, the brighter.
     """
-    towards = texel_directions(rows, 2 * rows).astype(np.float64)
-    cosine = towards @ (sun / np.linalg.norm(sun))
+    directions = texel_directions(rows, 2 * rows).astype(np.float64)
+    cosine = directions @ (sun_direction / np.linalg.norm(sun_direction))
     edge = np.clip((cosine - np.cos(1.2 * radius)) / (np.cos(0.8 * radius) - np.cos(1.2 * radius)), 0, 1)
-    height = towards[..., 1:2]
+    height = directions[..., 1:2]
     sky = np.where(height > 0, 0.25 + 0.55 * height, 0.0) * [0.55, 0.75, 1.0]
     disc = np.array([1350.0, 1230.0, 1050.0]) * (SUN_RADIUS / radius) ** 2
     radiance = sky + (edge**2 * (3 - 2 * edge))[..., None] * disc
     return Environment("sunny sky", radiance.astype(np.float32))
 
 
-def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> Surface:
+def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> GridSurface:
     """The rectangle corner + [0, 1] u + [0, 1] v, which faces u × v.
 
     Args:
@@ -105,7 +105,7 @@ def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -
     """
     start, along, up = (np.asarray(a, np.float64) for a in (corner, u, v))
     normal = np.cross(along, up)
-    return Surface(
+    return GridSurface(
         start + np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) @ np.stack([along, up]),
         np.tile(normal / np.linalg.norm(normal), (4, 1)),
         np.tile(along / np.linalg.norm(along), (4, 1)),
@@ -114,10 +114,10 @@ def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -
     )
 
 
-def _roof() -> Surface:
+def _roof() -> GridSurface:
     """Four strips round the skylight, facing down."""
     s, strip = SKYLIGHT, 1 - SKYLIGHT
-    return merged(
+    return merge_surfaces(
         [
             rectangle((-1, 2, -1), (2, 0, 0), (0, 0, strip)),
             rectangle((-1, 2, s), (2, 0, 0), (0, 0, strip)),
@@ -127,7 +127,7 @@ def _roof() -> Surface:
     )
 
 
-def block(half_width: float, height: float, half_depth: float) -> Surface:
+def block(half_width: float, height: float, half_depth: float) -> GridSurface:
     """A block on y = 0 about the y axis, without its underside, which nothing sees.
 
     Args:
@@ -141,4 +141,4 @@ def block(half_width: float, height: float, half_depth: float) -> Surface:
         rectangle((a[0], 0, a[1]), (b[0] - a[0], 0, b[1] - a[1]), (0, height, 0))
         for a, b in zip(corners, corners[1:] + corners[:1], strict=True)
     ]
-    return merged([*sides, rectangle((-x, height, z), (2 * x, 0, 0), (0, 0, -2 * z))])
+    return merge_surfaces([*sides, rectangle((-x, height, z), (2 * x, 0, 0), (0, 0, -2 * z))])

@@ -6,20 +6,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from relume.environments.model import Environment
-from relume.remarks import EFFECTS, Remark
+from relume.remarks import EFFECTS, ImportRemark
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 
 MAX_WARNINGS = 200
 
 
-def finished_scene(
+def finalize(
     name: str,
     meshes: Sequence[Mesh],
     materials: Sequence[Material],
     cameras: Sequence[Camera],
     environment: Environment,
-    warnings: Sequence[Remark],
+    warnings: Sequence[ImportRemark],
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
@@ -35,8 +35,12 @@ def finished_scene(
     Raises:
         SceneError: the parts do not make a scene (see `relume.scene.checks`).
     """
-    found = [*environment.warnings, *warnings]
-    listed = sorted(found, key=lambda remark: EFFECTS.index(remark.effect))[:MAX_WARNINGS]
-    if len(found) > len(listed):
-        listed.append(Remark(f"and {len(found) - len(listed):,} more of the kind", listed[-1].effect))
-    return make_scene(name, meshes, materials, cameras, environment, listed, variants, lights)
+    all_warnings = [*environment.warnings, *warnings]
+    sorted_warnings = sorted(all_warnings, key=lambda remark: EFFECTS.index(remark.effect))[:MAX_WARNINGS]
+    if len(all_warnings) > len(sorted_warnings):
+        sorted_warnings.append(
+            ImportRemark(
+                f"and {len(all_warnings) - len(sorted_warnings):,} more of the kind", sorted_warnings[-1].effect
+            )
+        )
+    return make_scene(name, meshes, materials, cameras, environment, sorted_warnings, variants, lights)

@@ -12,10 +12,10 @@ from relume.scene.model import Material, Mesh, Scene
 
 F64 = NDArray[np.float64]
 
-_TIMES_LARGER = 10.0  # than the ball about the scene: there a shadow is less than a thousandth
+_RADIUS_FACTOR = 10.0  # than the ball about the scene: there a shadow is less than a thousandth
 _CORNERS = 96
-_BELOW = 1e-4  # of the ball's radius: surfaces that lie flat on it do not lie in it
-_GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5], "texture": None}
+_RELATIVE_DEPTH = 1e-4  # of the ball's radius: surfaces that lie flat on it do not lie in it
+_GRAY = {"model": "lambert", "color": [0.5, 0.5, 0.5], "texture": None}
 
 
 def with_ground(scene: Scene, name: str | None = None) -> Scene:
@@ -26,11 +26,11 @@ def with_ground(scene: Scene, name: str | None = None) -> Scene:
     Raises:
         SceneError: it has a ground already, or no room for another material.
     """
-    if any(material.catcher for material in scene.materials):
+    if any(material.shadow_catcher for material in scene.materials):
         raise SceneError("the scene stands on a ground already; use it as it is")
-    called = unique_name("Ground", {material.name: 1 for material in scene.materials})
-    material = Material(called, (_GREY,), catcher=True)
-    mesh = _disc(called, *_ball(scene), material=len(scene.materials))
+    ground_name = unique_name("Ground", {material.name: 1 for material in scene.materials})
+    material = Material(ground_name, (_GRAY,), shadow_catcher=True)
+    mesh = _disc(ground_name, *_ball(scene), material=len(scene.materials))
     return make_scene(
         name or scene.name,
         (*scene.meshes, mesh),
@@ -51,13 +51,13 @@ def _ball(scene: Scene) -> tuple[F64, float]:
     return np.array([middle[0], low[1], middle[2]]), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
 
 
-def _disc(name: str, centre: F64, radius: float, *, material: int) -> Mesh:
+def _disc(name: str, center: F64, radius: float, *, material: int) -> Mesh:
     """A disc that faces up, triangles about its middle."""
     angle = 2 * np.pi * np.arange(_CORNERS) / _CORNERS
-    rim = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1) * _TIMES_LARGER * radius
-    positions = np.concatenate([[[0.0, 0.0, 0.0]], rim]) + centre - [0.0, _BELOW * radius, 0.0]
-    here = np.arange(_CORNERS)
-    faces = np.stack([0 * here, 1 + here, 1 + (here + 1) % _CORNERS], axis=1)
+    boundary = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1) * _RADIUS_FACTOR * radius
+    positions = np.concatenate([[[0.0, 0.0, 0.0]], boundary]) + center - [0.0, _RELATIVE_DEPTH * radius, 0.0]
+    index = np.arange(_CORNERS)
+    faces = np.stack([0 * index, 1 + index, 1 + (index + 1) % _CORNERS], axis=1)
     up, along = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0, 1.0])
     return Mesh(
         name,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
-from relume.scene.companions import Alone, Companions, Folder
+from relume.scene.companions import Companions, Folder, NoFiles
 from relume.scene.gltf import import_gltf
 from relume.scene.mesh_files import import_obj, import_ply
 from relume.scene.model import Scene
@@ -38,7 +38,7 @@ def import_scene(
     if not data:
         raise SceneError("the scene file is empty: 0 bytes; export or download it again")
     if companions is None:
-        companions = Alone() if isinstance(source, bytes) else Folder(Path(source).parent)
+        companions = NoFiles() if isinstance(source, bytes) else Folder(Path(source).parent)
     if data.startswith(b"PK"):
         data, companions = open_zip(data)
     if data.startswith(b"ply"):

@@ -10,19 +10,19 @@ import numpy as np
 from relume.scene.model import Mesh
 
 
-def joined(meshes: Iterable[Mesh]) -> list[Mesh]:
+def merge_by_material(meshes: Iterable[Mesh]) -> list[Mesh]:
     """Make one mesh of all meshes of each material, under the name of the first."""
-    of_material: dict[int, list[Mesh]] = {}
+    groups: dict[int, list[Mesh]] = {}
     for mesh in meshes:
-        of_material.setdefault(mesh.material, []).append(mesh)
-    return [as_one(parts) for parts in of_material.values()]
+        groups.setdefault(mesh.material, []).append(mesh)
+    return [merge_meshes(group) for group in groups.values()]
 
 
-def as_one(parts: Sequence[Mesh]) -> Mesh:
+def merge_meshes(meshes: Sequence[Mesh]) -> Mesh:
     """All triangles of some meshes, under the name and with the material of the first."""
-    starts = accumulate((len(part.positions) for part in parts[:-1]), initial=0)
+    starts = accumulate((len(mesh.positions) for mesh in meshes[:-1]), initial=0)
     positions, normals, tangents, uvs = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("positions", "normals", "tangents", "uvs")
+        np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in ("positions", "normals", "tangents", "uvs")
     )
-    faces = np.concatenate([part.faces + np.uint32(start) for part, start in zip(parts, starts, strict=True)])
-    return Mesh(parts[0].name, positions, normals, tangents, uvs, faces, parts[0].material)
+    faces = np.concatenate([mesh.faces + np.uint32(start) for mesh, start in zip(meshes, starts, strict=True)])
+    return Mesh(meshes[0].name, positions, normals, tangents, uvs, faces, meshes[0].material)

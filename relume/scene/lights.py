@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
-from relume.remarks import Remark, simplified, unused
+from relume.remarks import ImportRemark, approximated, ignored
 from relume.scene.checks import MAX_EMISSION, MAX_LIGHTS
-from relume.scene.emission import lit_surfaces
+from relume.scene.emission import normalize_emission
 from relume.scene.gltf.names import unique_name
 from relume.scene.model import Light, Material, Mesh
 
@@ -21,14 +21,14 @@ F64 = NDArray[np.float64]
 class LightCollector:
     """Collects the lights of one file, whatever its format."""
 
-    def __init__(self, warnings: list[Remark]) -> None:
+    def __init__(self, warnings: list[ImportRemark]) -> None:
         self._warnings = warnings
         self._names: dict[str, int] = {}
         self.lights: list[Light] = []
 
-    def name(self, wanted: str) -> str:
+    def name(self, preferred: str) -> str:
         """A name that no other light of the file has."""
-        return unique_name(wanted, self._names)
+        return unique_name(preferred, self._names)
 
     def add(self, name: str, fields: Mapping[str, Any], emission: F64) -> None:
         """A light of the file, its emission held to what a look may have.
@@ -46,10 +46,10 @@ class LightCollector:
                 "matter least, or light it by an environment"
             )
         if emission.max() > MAX_EMISSION:
-            self._warnings.append(simplified(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that"))
+            self._warnings.append(approximated(f"light {name!r} is brighter than {MAX_EMISSION:g}; it is held to that"))
         self.lights.append(Light(name, {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}))
 
-    def shine(
+    def emissive_light(
         self, materials: Sequence[Material], emissions: Sequence[F64], meshes: Sequence[Mesh]
     ) -> tuple[Material, ...]:
         """A light for each material with an emission, which is radiance as it stands: files mean by 1 what a white
@@ -64,17 +64,19 @@ class LightCollector:
         Raises:
             SceneError: there are more lights than a look may have.
         """
-        found = []
-        for number, (given, factor) in enumerate(zip(materials, emissions, strict=True)):
-            worn = [mesh for mesh in meshes if mesh.material == number]
-            has_image = "emission" in given.textures
-            material, emission = lit_surfaces(given, factor, worn) if has_image else (given, factor)
-            found.append(material)
+        lit_materials = []
+        for number, (original, factor) in enumerate(zip(materials, emissions, strict=True)):
+            emitting_meshes = [mesh for mesh in meshes if mesh.material == number]
+            has_image = "emission" in original.textures
+            material, emission = (
+                normalize_emission(original, factor, emitting_meshes) if has_image else (original, factor)
+            )
+            lit_materials.append(material)
             if factor.max() <= 0:
                 continue
-            if worn and emission.max() > 0:
+            if emitting_meshes and emission.max() > 0:
                 self.add(self.name(material.name), {"kind": "mesh", "material": material.name}, emission)
             else:
-                why = "its image is black on all of them" if worn else "no surface is left of it"
-                self._warnings.append(unused(f"material {material.name!r} shines, but {why}"))
-        return tuple(found)
+                reason = "its image is black on all of them" if emitting_meshes else "no surface is left of it"
+                self._warnings.append(ignored(f"material {material.name!r} shines, but {reason}"))
+        return tuple(lit_materials)

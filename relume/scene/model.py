@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.environments.model import Environment
-from relume.remarks import Remark
+from relume.remarks import ImportRemark
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
@@ -23,8 +23,8 @@ WRAPS = ("repeat", "mirror", "clamp")
 
 
 @dataclass(frozen=True)
-class Coding:
-    """What the bytes of a texture stand for: see `relume.scene.coding.decode`.
+class TextureEncoding:
+    """What the bytes of a texture stand for: see `relume.scene.encoding.decode`.
 
     Attributes:
         kind: "srgb", display values of colours; "normal", normals of tangent space; or "share", one number of [0, 1].
@@ -44,12 +44,12 @@ class Texture:
         pixels: top row first. (height, width, 3) uint8 where it has a coding, else float32, the values themselves;
             (height, width, 1) of shares
         wrap: how u and v continue outside [0, 1): "repeat", "mirror" or "clamp" each.
-        coding: what bytes stand for; None where pixels are linear RGB, or normals.
+        encoding: what bytes stand for; None where pixels are linear RGB, or normals.
     """
 
     pixels: NDArray[Any]
     wrap: tuple[str, str] = ("repeat", "repeat")
-    coding: Coding | None = None
+    encoding: TextureEncoding | None = None
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Material:
             what the material's surfaces shine.
         normal_map: tangent-space normals in [-1, 1]; None where there is none.
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
-        catcher: it is a ground that looks may show by its shadows alone, and the default look does.
+        shadow_catcher: it is a ground that looks may show by its shadows alone, and the default look does.
         opacity: where it has holes; None where it is whole.
         glass: how light passes it; None where none does.
     """
@@ -128,12 +128,12 @@ class Material:
     textures: dict[str, Texture] = field(default_factory=dict)
     normal_map: Texture | None = None
     double_sided: bool = True
-    catcher: bool = False
+    shadow_catcher: bool = False
     opacity: Opacity | None = None
     glass: Glass | None = None
 
     @property
-    def lets_pass(self) -> bool:
+    def is_alpha_tested(self) -> bool:
         """Whether rays may pass it, by holes or as glass."""
         return self.opacity is not None or self.glass is not None
 
@@ -181,6 +181,6 @@ class Scene:
     materials: tuple[Material, ...]
     cameras: tuple[Camera, ...]
     environment: Environment
-    warnings: tuple[Remark, ...] = ()
+    warnings: tuple[ImportRemark, ...] = ()
     variants: dict[str, dict[str, Any]] = field(default_factory=dict)
     lights: tuple[Light, ...] = ()

@@ -7,13 +7,13 @@ import numpy as np
 from relume.scene.model import Scene
 
 
-def are_projected(scene: Scene) -> list[bool]:
+def find_triplanar(scene: Scene) -> list[bool]:
     """Tell, of each material, whether most of its triangles have no place in textures."""
-    faces, without = np.zeros((2, len(scene.materials)), np.int64)
+    num_faces, num_without_uvs = np.zeros((2, len(scene.materials)), np.int64)
     for mesh in scene.meshes:
         corners = mesh.uvs[mesh.faces]
         along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
-        faces[mesh.material] += len(area)
-        without[mesh.material] += np.count_nonzero(area == 0)
-    return [bool(one) for one in 2 * without > faces]
+        num_faces[mesh.material] += len(area)
+        num_without_uvs[mesh.material] += np.count_nonzero(area == 0)
+    return [bool(is_triplanar) for is_triplanar in 2 * num_without_uvs > num_faces]

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene.coding import decode, rows_of
+from relume.scene.coding import decode, decode_rows
 from relume.scene.model import Material, Texture
 
 F32 = NDArray[np.float32]
@@ -24,88 +24,91 @@ MAX_LEVELS = 24
 # Levels are even in the root of the roughness: evenly rough ones would be told apart where they are smooth, and even
 # ratios where they are rough.
 _STEP = 0.02
-_STRAYS = 1e-3  # share of texels at each end that no level is made for
+_OUTLIER_FRACTION = 1e-3  # share of texels at each end that no level is made for
 _BLOCKS = (8, 64)  # texels across, whose normals are taken together
-_LEAST_LENGTH = 0.2  # of a mean of normals: rougher than anything is
+_MIN_LENGTH = 0.2  # of a mean of normals: rougher than anything is
 
 
-def levels_of(material: Material) -> tuple[float, ...]:
+def levels_of_material(material: Material) -> tuple[float, ...]:
     """The levels of a material: roughness over what its terms say, rising. None where it has no map, or a plain one."""
-    texture, own = material.textures.get("roughness"), widening_base(material)
-    return levels_between(texture, own, 1.0 if own is None else shortest_normal(material.normal_map))
+    texture, base = material.textures.get("roughness"), base_roughness(material)
+    return levels_of_texture(texture, base, 1.0 if base is None else min_mean_normal_length(material.normal_map))
 
 
-def levels_between(texture: Texture | None, own: float | None, shortest: float) -> tuple[float, ...]:
+def levels_of_texture(texture: Texture | None, base: float | None, min_length: float) -> tuple[float, ...]:
     """The levels between the ends of a map, as `levels_of` has them.
 
     Args:
-        texture: roughness over its mean, of bytes; None: one everywhere. own: that mean, see `widened`; None: bumps
-            widen nothing. shortest: from `shortest_normal`.
+        texture: roughness over its mean, of bytes; None: one everywhere. base: that mean, see `widened`; None: bumps
+            widen nothing. min_length: from `min_mean_normal_length`.
     """
-    return levels_over(*ends_of(texture), own, shortest)
+    return levels_in_range(*ratio_range(texture), base, min_length)
 
 
-def ends_of(texture: Texture | None) -> tuple[float, float]:
+def ratio_range(texture: Texture | None) -> tuple[float, float]:
     """The ratios between which a map of roughness lies, but for strays. texture: it; None: one everywhere."""
     if texture is None:
         return 1.0, 1.0
     roots, count = _histogram(texture)
-    share = np.cumsum(count) / count.sum()
-    low, high = roots[np.searchsorted(share, _STRAYS)], roots[np.searchsorted(share, 1 - _STRAYS)]
+    cumulative = np.cumsum(count) / count.sum()
+    low, high = (
+        roots[np.searchsorted(cumulative, _OUTLIER_FRACTION)],
+        roots[np.searchsorted(cumulative, 1 - _OUTLIER_FRACTION)],
+    )
     return float(low**2), float(high**2)
 
 
-def levels_over(lowest: float, highest: float, own: float | None, shortest: float) -> tuple[float, ...]:
+def levels_in_range(lowest: float, highest: float, base: float | None, min_length: float) -> tuple[float, ...]:
     """The levels between two ratios, `lowest` and `highest`, where bumps widen what they stand for.
 
-    own, shortest: see `levels_between`.
+    own, shortest: see `levels_of_texture`.
     """
-    if own is not None and shortest < 1:
-        highest = float(widened(np.array([highest], np.float32), np.array([shortest], np.float32), own)[0])
+    if base is not None and min_length < 1:
+        highest = float(rougher(np.array([highest], np.float32), np.array([min_length], np.float32), base)[0])
     low, high = np.sqrt(lowest), np.sqrt(highest)
-    num = 1 + min(MAX_LEVELS - 1, int(np.ceil((high - low) / _STEP)))
-    if num < 3:
+    num_levels = 1 + min(MAX_LEVELS - 1, int(np.ceil((high - low) / _STEP)))
+    if num_levels < 3:
         return ()
-    return tuple(np.round(np.square(np.linspace(low, high, num)), 6).tolist())
+    return tuple(np.round(np.square(np.linspace(low, high, num_levels)), 6).tolist())
 
 
-def widening_base(material: Material) -> float | None:
+def base_roughness(material: Material) -> float | None:
     """The roughness r of the terms that a material's normal map widens; None where none follows a map, or there is no
     normal map."""
     if material.normal_map is None:
         return None
-    followed = (term for term in material.terms if term.get("roughness_map"))
-    given = (term.get("params", {}).get("roughness") for term in followed)
-    return next((float(np.mean(value)) for value in given if value is not None), None)
+    mapped_terms = (term for term in material.terms if term.get("roughness_map"))
+    roughness_values = (term.get("params", {}).get("roughness") for term in mapped_terms)
+    return next((float(np.mean(value)) for value in roughness_values if value is not None), None)
 
 
-def widened(ratio: F32, length: F32, own: float) -> F32:
-    """Roughness over `own`, of what covers normals that differ.
+def rougher(ratio: F32, length: F32, base: float) -> F32:
+    """Roughness over `base`, of what covers normals that differ.
 
     Args:
         ratio: of a map of roughness. (n,) length: of the mean of the normals, at most 1. (n,)
-        own: the roughness of the material's terms.
+        base: the roughness of the material's terms.
     Returns:
         (n,) float32
     """
-    return np.asarray(((own * ratio) ** 4 + 2 * _variance(length)) ** 0.25 / own, np.float32)
+    return np.asarray(((base * ratio) ** 4 + 2 * _variance(length)) ** 0.25 / base, np.float32)
 
 
-def narrowed(ratio: F32, length: F32, own: float) -> F32:
-    """Roughness over `own` without the bumps that widened it: `widened` the other way.
+def smoother(ratio: F32, length: F32, base: float) -> F32:
+    """Roughness over `base` without the bumps that widened it: `widened` the other way.
 
     ratio, length, own: as there. Returns (n,) float32
     """
-    return np.asarray(np.maximum((own * ratio) ** 4 - 2 * _variance(length), 0) ** 0.25 / own, np.float32)
+    return np.asarray(np.maximum((base * ratio) ** 4 - 2 * _variance(length), 0) ** 0.25 / base, np.float32)
 
 
 def _variance(length: F32) -> F32:
     """Of the slopes of normals whose mean is so long, σ². (n,)"""
-    held = np.clip(length, _LEAST_LENGTH, 1)
-    return np.asarray((1 - held) / held, np.float32)
+    clamped = np.clip(length, _MIN_LENGTH, 1)
+    return np.asarray((1 - clamped) / clamped, np.float32)
 
 
-def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5) -> NDArray[np.uint8]:
+def select_level(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5) -> NDArray[np.uint8]:
     """Choose one of the two levels between which each ratio lies.
 
     Args:
@@ -115,29 +118,29 @@ def level_of(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5
     Returns:
         (n,)
     """
-    roots, given = np.sqrt(ratios), np.sqrt(ratio)
-    place = np.interp(given, roots, np.arange(len(roots)))
-    return np.asarray(place + 1 - threshold, np.uint8)
+    roots, root = np.sqrt(ratios), np.sqrt(ratio)
+    level = np.interp(root, roots, np.arange(len(roots)))
+    return np.asarray(level + 1 - threshold, np.uint8)
 
 
-def shortest_normal(normals: Texture | None) -> float:
+def min_mean_normal_length(normals: Texture | None) -> float:
     """About the shortest mean of normals that a pixel covers: of blocks of some sizes, but for strays.
 
     Args:
         normals: a normal map; without one it is 1.
     """
     lengths = [1.0]
-    for rows in () if normals is None else rows_of(normals):
+    for rows in () if normals is None else decode_rows(normals):
         for side in _BLOCKS:
             height, width = (max(1, size // side) for size in rows.shape[:2])
-            cut = rows[: height * side, : width * side]
-            tall, wide = len(cut) // height, cut.shape[1] // width
-            means = cut[: height * tall, : width * wide].reshape(height, tall, width, wide, 3).mean(axis=(1, 3))
-            lengths.append(np.quantile(np.linalg.norm(means, axis=-1), _STRAYS))
+            cropped = rows[: height * side, : width * side]
+            tall, wide = len(cropped) // height, cropped.shape[1] // width
+            means = cropped[: height * tall, : width * wide].reshape(height, tall, width, wide, 3).mean(axis=(1, 3))
+            lengths.append(np.quantile(np.linalg.norm(means, axis=-1), _OUTLIER_FRACTION))
     return float(np.min(lengths))
 
 
 def _histogram(texture: Texture) -> tuple[F64, F64]:
     """The root of the ratio that each byte stands for, rising, and how many texels have it. (256,) each"""
-    values = decode(np.arange(256, dtype=np.uint8)[:, None], texture.coding)[:, 0]
+    values = decode(np.arange(256, dtype=np.uint8)[:, None], texture.encoding)[:, 0]
     return np.sqrt(values, dtype=np.float64), np.bincount(texture.pixels.ravel(), minlength=256).astype(np.float64)

@@ -13,7 +13,7 @@ from relume.scene.companions import MAX_BYTES, Archive, read_entry
 MAX_ENTRIES = 1_000
 MAX_DIRECTORY_BYTES = 1 << 20
 SCENE_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
-TOO_MANY = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
+TOO_MANY_ENTRIES = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
 
 
 def open_zip(data: bytes) -> tuple[bytes, Archive]:
@@ -27,7 +27,7 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
     try:
         archive = open_bounded(io.BytesIO(data), MAX_DIRECTORY_BYTES)
     except LongDirectoryError:
-        raise SceneError(TOO_MANY) from None
+        raise SceneError(TOO_MANY_ENTRIES) from None
     except Exception:  # zipfile raises many kinds for damaged data
         raise SceneError("the .zip file is damaged; pack it again") from None
     entries = [entry for entry in archive.infolist() if not entry.is_dir() and not _is_litter(entry.filename)]
@@ -41,7 +41,7 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
 
 def _check_entries(entries: list[zipfile.ZipInfo]) -> None:
     if len(entries) > MAX_ENTRIES:
-        raise SceneError(TOO_MANY)
+        raise SceneError(TOO_MANY_ENTRIES)
     if sum(entry.file_size for entry in entries) > MAX_BYTES:
         raise SceneError(f"the .zip file unpacks to more than {MAX_BYTES >> 20} MB; scale it down")
     for entry in entries:

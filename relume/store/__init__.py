@@ -1,8 +1,8 @@
 """Transfer stores: chunked, checksummed Zarr v3 on disk. See `relume.store.schema` for the layout."""
 
-from relume.store.fill import bake_here
+from relume.store.fill import bake_in_process
 from relume.store.publish import publish
-from relume.store.reader import Reader, code_of, open_staging, open_store
+from relume.store.reader import Reader, open_staging, open_store, read_code
 from relume.store.schema import SCHEMA_VERSION
 from relume.store.writer import StoreWriter, create_store
 
@@ -10,10 +10,10 @@ __all__ = [
     "SCHEMA_VERSION",
     "Reader",
     "StoreWriter",
-    "bake_here",
-    "code_of",
+    "bake_in_process",
     "create_store",
     "open_staging",
     "open_store",
     "publish",
+    "read_code",
 ]

@@ -1,5 +1,5 @@
 """Runs a transfer method into a store: the stages, their arrays, one task. The worker calls these from its processes;
-`bake_here` calls them one after another, for tests, notebooks and measurements."""
+`bake_in_process` calls them one after another, for tests, notebooks and measurements."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from relume.bake import BakeMethod, Recipe, Task, Written
+from relume.bake import BakeMethod, Recipe, Task, TaskOutput
 from relume.code_version import bake_code
 from relume.errors import StoreError
 from relume.scene.model import Scene
@@ -17,7 +17,7 @@ from relume.store.reader import Reader, open_staging
 from relume.store.writer import StoreWriter, create_store
 
 
-def begin(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path) -> None:
+def create_staging_store(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path) -> None:
     """Create the store of a bake, or keep the unfinished one that is there, which this code must have made.
 
     Args:
@@ -28,7 +28,7 @@ def begin(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path) -> No
     create_store(staging, {**method.attributes(scene, recipe), "code": bake_code()})
 
 
-def begin_stage(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, stage: int) -> Sequence[Task]:
+def create_stage(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, stage: int) -> Sequence[Task]:
     """Create the arrays that a stage announces and return its tasks.
 
     Args:
@@ -44,7 +44,7 @@ def begin_stage(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path,
 
 
 @lru_cache(maxsize=4)
-def reader_of(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reader:
+def open_stage_reader(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reader:
     """One reader for all tasks of a stage that a process does: what they read is complete, and so read only once.
 
     Args:
@@ -54,7 +54,7 @@ def reader_of(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reade
     return open_staging(staging)
 
 
-def run_task(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> Written:
+def run_task(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> TaskOutput:
     """Compute a task and write its rows; doing it twice leaves the same bytes.
 
     Args:
@@ -66,26 +66,26 @@ def run_task(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, ta
     Raises:
         StoreError: the method has computed another number of rows than the task owns.
     """
-    reader = reader_of(staging, task.stage, scene.id, recipe)
-    written = method.compute(scene, recipe, task, reader)
+    reader = open_stage_reader(staging, task.stage, scene.id, recipe)
+    output = method.compute(scene, recipe, task, reader)
     announced = {spec.path for spec in method.arrays(task.stage, scene, recipe, reader)}
     writer = StoreWriter(staging)
-    for path, rows in written.arrays.items():
+    for path, rows in output.arrays.items():
         if path not in announced:
             writer.write_whole(path, rows)
         elif rows.shape[0] != task.stop - task.start:
             raise StoreError(f"task {task} computed {rows.shape[0]} rows of {path}")
         else:
             writer.write(path, rows[:], task.start)
-    return written
+    return output
 
 
-def bake_here(
+def bake_in_process(
     method: BakeMethod,
     scene: Scene,
     recipe: Recipe,
     target: Path,
-    progress: Callable[[Task, Written], None] = lambda task, written: None,
+    progress: Callable[[Task, TaskOutput], None] = lambda task, written: None,
 ) -> Path:
     """Bake in this process and thread, and publish.
 
@@ -94,13 +94,13 @@ def bake_here(
         target: folder of the finished store; an unfinished one beside it is removed before.
         progress: called with each task that is done and what it has written.
     Returns:
-        `target`.
+        `target_bands`.
     """
-    staging, scene = target.with_name(f"{target.name}.staging"), recipe.seen(scene)
+    staging, scene = target.with_name(f"{target.name}.staging"), recipe.add_cameras(scene)
     shutil.rmtree(staging, ignore_errors=True)
-    begin(method, scene, recipe, staging)
+    create_staging_store(method, scene, recipe, staging)
     for stage in range(len(method.stages)):
-        for task in begin_stage(method, scene, recipe, staging, stage):
+        for task in create_stage(method, scene, recipe, staging, stage):
             progress(task, run_task(method, scene, recipe, staging, task))
     publish(staging, target)
     return target

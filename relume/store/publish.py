@@ -12,7 +12,7 @@ import zarr
 from zarr.storage import LocalStore
 
 from relume.errors import ChunkDamagedError, StoreError
-from relume.replacing import UNFINISHED, remove_folder, replacing
+from relume.replacing import UNFINISHED, atomic_write, remove_folder
 from relume.store.files import read_json
 from relume.store.reader import Reader, open_staging, rows_per_shard
 from relume.store.schema import MANIFEST_NAME, SCHEMA_VERSION
@@ -25,7 +25,7 @@ def publish(staging: Path, target: Path, check: Callable[[], object] = lambda: N
     the same files, byte for byte, however often it was interrupted.
 
     Args:
-        staging: the finished store, same file system as `target`.
+        staging: the finished store, same file system as `target_bands`.
         target: where readers look for it; an older store there is replaced.
         check: called after what takes long; raises where the store is not to be published any more.
     Returns:
@@ -72,7 +72,7 @@ def _write_manifest(staging: Path) -> int:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
         files.append({"path": file.relative_to(staging).as_posix(), "bytes": file.stat().st_size, "sha256": digest})
     text = json.dumps({"schema_version": SCHEMA_VERSION, "files": files}, indent=1)
-    with replacing(staging / MANIFEST_NAME) as unfinished:
+    with atomic_write(staging / MANIFEST_NAME) as unfinished:
         unfinished.write_text(text)
     return sum(int(str(entry["bytes"])) for entry in files) + len(text)
 

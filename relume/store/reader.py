@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from zarr.storage import LocalStore
 
 from relume.bake import ArraySpec
-from relume.errors import ChunkDamagedError, StoreError, StoreGoneError, StoreNotFoundError
+from relume.errors import ChunkDamagedError, StoreDeletedError, StoreError, StoreNotFoundError
 from relume.folders import folder_bytes
 from relume.store.files import read_json
 from relume.store.room import scratch_file
@@ -71,7 +71,7 @@ class Reader:
             return self._rows(path, start, stop)
         except StoreError as error:
             if not (self.path / "zarr.json").is_file():
-                raise StoreGoneError from error
+                raise StoreDeletedError from error
             raise
 
     def scratch(self) -> IO[bytes]:
@@ -124,7 +124,7 @@ def open_staging(path: Path) -> Reader:
     return Reader(path, attributes)
 
 
-def code_of(path: Path) -> str | None:
+def read_code(path: Path) -> str | None:
     """Names the code that makes or made a store, see `relume.code_version.bake_code`; None where that is not known."""
     try:
         code = open_staging(path).attributes.get("code")

@@ -33,7 +33,7 @@ MAX_DIMENSIONS = 5
 
 # What a task creates without announcing it is read whole or in long runs: chunks of about this size suit both.
 UNANNOUNCED_CHUNK_BYTES = 512 << 10
-UNANNOUNCED_CHUNKS_A_SHARD = 32  # a shard is in memory while it is written, as it is and compressed
+UNANNOUNCED_CHUNKS_PER_SHARD = 32  # a shard is in memory while it is written, as it is and compressed
 
 # Zarr runs whatever codec is named, with what is said of it; a store may come from where others can write.
 CODECS = ("bytes", "zstd", "crc32c")
@@ -61,8 +61,8 @@ def check_spec(spec: ArraySpec) -> ArraySpec:
     if not all(type(n) is int and n >= 0 for n in spec.shape):
         raise StoreError(f"array {spec.path} has an impossible shape {str(spec.shape)[:80]}")
     if not all(type(c) is int and c > 0 and s % c == 0 for c, s in zip(spec.chunks, spec.shards, strict=True)):
-        sizes_shown = f"{str(spec.shards)[:80]} of {str(spec.chunks)[:80]}"
-        raise StoreError(f"array {spec.path}: shards are not whole chunks: {sizes_shown}")
+        sizes_text = f"{str(spec.shards)[:80]} of {str(spec.chunks)[:80]}"
+        raise StoreError(f"array {spec.path}: shards are not whole chunks: {sizes_text}")
     _check_bytes(spec)
     return spec
 
@@ -128,6 +128,6 @@ def default_layout(path: str, shape: tuple[int, ...], dtype: str, item_bytes: in
     row_bytes = max(1, math.prod(shape[1:]) * item_bytes)
     rows = 1 << max(0, (UNANNOUNCED_CHUNK_BYTES // row_bytes).bit_length() - 1)
     rows = max(1, min(rows, shape[0]))
-    rest = tuple(max(1, n) for n in shape[1:])
-    shard_rows = min(max(1, -(-shape[0] // rows)), UNANNOUNCED_CHUNKS_A_SHARD) * rows
-    return check_spec(ArraySpec(path, shape, dtype, (rows, *rest), (shard_rows, *rest)))
+    trailing_shape = tuple(max(1, n) for n in shape[1:])
+    shard_rows = min(max(1, -(-shape[0] // rows)), UNANNOUNCED_CHUNKS_PER_SHARD) * rows
+    return check_spec(ArraySpec(path, shape, dtype, (rows, *trailing_shape), (shard_rows, *trailing_shape)))

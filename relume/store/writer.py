@@ -18,10 +18,10 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.errors import ContainsGroupError
 from zarr.storage import LocalStore
 
-from relume.bake import ArraySpec, Rows
+from relume.bake import ArraySpec, RowSource
 from relume.errors import StoreError
 from relume.store.files import read_json
-from relume.store.room import check_room
+from relume.store.room import check_disk_space
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
 
 # Level 1 keeps up with tracing on one thread; higher levels save little on visibility bits.
@@ -94,16 +94,16 @@ class StoreWriter:
         stop = start + rows.shape[0]
         fits = rows.shape[1:] == spec.shape[1:] and rows.dtype == np.dtype(spec.dtype)
         if not fits or not 0 <= start <= stop <= spec.shape[0]:
-            given, wanted = f"{rows.dtype}{rows.shape}", f"{spec.dtype}{spec.shape}"
-            raise StoreError(f"rows {start}..{stop} {given} do not fit {path} {wanted}")
+            given, expected = f"{rows.dtype}{rows.shape}", f"{spec.dtype}{spec.shape}"
+            raise StoreError(f"rows {start}..{stop} {given} do not fit {path} {expected}")
         if start % spec.shards[0] or (stop % spec.shards[0] and stop != spec.shape[0]):
             raise StoreError(f"rows {start}..{stop} of {path} cut a shard of {spec.shards[0]} rows; write whole shards")
         if rows.size:
-            check_room(self.path)
+            check_disk_space(self.path)
             array = cast("zarr.Array[Any]", self._root[path]).with_config({"write_empty_chunks": True})
             array[start:stop] = rows
 
-    def write_whole(self, path: str, values: Rows) -> None:
+    def write_whole(self, path: str, values: RowSource) -> None:
         """Create an array that nobody announced, as large as `values`, and write it shard by shard."""
         spec = default_layout(path, values.shape, values.dtype.name, values.dtype.itemsize)
         self.create_array(spec)

@@ -37,4 +37,4 @@ def corduroy() -> Tile:
     a = (i * (_STEPS + 1) + j).ravel()
     b, c, d = a + 1, a + _STEPS + 1, a + _STEPS + 2
     faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
-    return Tile.of_one(positions.reshape(-1, 3), normals.reshape(-1, 3), faces, TERMS)
+    return Tile.with_single_material(positions.reshape(-1, 3), normals.reshape(-1, 3), faces, TERMS)

@@ -13,38 +13,38 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from relume.btf.begun import Begun
-from relume.btf.compress import MOST_TEXELS, compress
-from relume.btf.eigen import EigenBtf
-from relume.btf.rings import ubo_rings
-from relume.btf.shelf import BtfRecord, keep
-from relume.btf.values import Values
+from relume.btf.begun import PartialCompression
+from relume.btf.compress import MAX_TEXELS, compress
+from relume.btf.eigen import LocalPcaBtf
+from relume.btf.rings import ubo_grid
+from relume.btf.shelf import BtfRecord, store_btf
+from relume.btf.values import ValueFile
 from relume.errors import ParameterError
 from relume.synthetic.corduroy import corduroy
-from relume.synthetic.mesh import tile_of
+from relume.synthetic.mesh import read_tile
 from relume.synthetic.pebbles import pebbles
-from relume.synthetic.render import SmallGeometry
+from relume.synthetic.render import TileGeometry
 from relume.synthetic.tile import Tile
 from relume.synthetic.weave import weave
 
 GEOMETRIES = {"weave": weave, "pebbles": pebbles, "corduroy": corduroy}
 MESH: Final = "mesh"
 """Geometry that a file holds."""
-LEAST_SIZE = 8
-MOST_GRID = 8
+MIN_SIZE = 8
+MAX_GRID = 8
 _SEED = 1
 _LIGHT = "fitted"  # what values tell of it, see `relume.synthetic.render`: others are other BTFs
-_OF_RENDERING = 0.8  # of the time, about
+_RENDER_PROGRESS = 0.8  # of the time, about
 
 
-class Made(NamedTuple):
+class SyntheticBtf(NamedTuple):
     """What is to be made.
 
     Attributes:
         geometry: one of `GEOMETRIES`, or `MESH`. size: texels along each side.
         grid: places along each side of a texel that are looked at, each in light from other directions.
         bound: relative RMS that compression may miss.
-        file: of a mesh. period: of it, see `tile_of`.
+        file: of a mesh. period: of it, see `read_tile`.
     """
 
     geometry: str
@@ -58,65 +58,73 @@ class Made(NamedTuple):
         """Raise ParameterError where it cannot be made."""
         if self.geometry not in GEOMETRIES and self.file is None:
             raise ParameterError("geometry", self.geometry, f"one of {', '.join(GEOMETRIES)}")
-        if not (self.size >= LEAST_SIZE and self.size**2 <= MOST_TEXELS):
-            raise ParameterError("--size", self.size, f"{LEAST_SIZE} to {int(MOST_TEXELS**0.5)} texels")
-        if not 1 <= self.grid <= MOST_GRID:
-            raise ParameterError("--grid", self.grid, f"1 to {MOST_GRID}")
+        if not (self.size >= MIN_SIZE and self.size**2 <= MAX_TEXELS):
+            raise ParameterError("--size", self.size, f"{MIN_SIZE} to {int(MAX_TEXELS**0.5)} texels")
+        if not 1 <= self.grid <= MAX_GRID:
+            raise ParameterError("--grid", self.grid, f"1 to {MAX_GRID}")
         if not 1e-4 <= self.bound <= 0.5:
             raise ParameterError("--error", self.bound, "0.0001 to 0.5")
 
     def tile(self) -> Tile:
         """The geometry. Raises SceneError, ParameterError where a file holds none."""
-        return GEOMETRIES[self.geometry]() if self.file is None else tile_of(self.file, self.period)
+        return GEOMETRIES[self.geometry]() if self.file is None else read_tile(self.file, self.period)
 
     def recipe(self, tile: Tile) -> dict[str, Any]:
         """What it is made from, all of it: the same is the same BTF."""
-        made = {name: getattr(self, name) for name in ("geometry", "size", "grid", "bound")}
+        fields = {name: getattr(self, name) for name in ("geometry", "size", "grid", "bound")}
         if self.file is not None:
             hashed = hashlib.sha256(json.dumps(tile.materials, sort_keys=True).encode())
             for array in tile[:-1]:
                 hashed.update(array.tobytes())
-            made["tile"] = hashed.hexdigest()
-        return {"synthetic": made, "seed": _SEED, "light": _LIGHT}
+            fields["tile"] = hashed.hexdigest()
+        return {"synthetic": fields, "seed": _SEED, "light": _LIGHT}
 
 
-def make_btf(
+def synthesize_btf(
     folder: Path,
-    wanted: Made,
+    request: SyntheticBtf,
     name: str,
     progress: Callable[[float], object],
-    cancelled: Callable[[], bool],
-    making: Path | None = None,
+    is_canceled: Callable[[], bool],
+    partial_folder: Path | None = None,
 ) -> BtfRecord:
     """Render and compress; the same again is the same BTF, and one that was begun goes on.
 
     Args:
-        folder: of the asset store. wanted: what. name: what people call it.
-        progress: called with the share done. cancelled: asked now and then.
-        making: folder of what was rendered so far; by default in `folder`, by what is wanted.
+        folder: of the asset store. request: what. name: what people call it.
+        progress: called with the share done. is_canceled: asked now and then.
+        partial_folder: folder of what was rendered so far; by default in `folder`, by what is wanted.
     Raises:
-        ParameterError: it cannot be made. CancelledError: `cancelled` said so; what was rendered stays.
+        ParameterError: it cannot be made. CancelledError: `is_canceled` said so; what was rendered stays.
         MaterialError: the store is full. SceneError: the mesh cannot be used.
     """
-    wanted.check()
-    tile = wanted.tile()
-    from_all = wanted.recipe(tile)
-    parts = *wanted[:3], _LIGHT, from_all["synthetic"].get("tile", "")[:16]
-    making = making or folder / "making" / "-".join(str(part) for part in parts if part)
-    making.mkdir(parents=True, exist_ok=True)
-    recipe = making / "recipe.json"
-    recipe.write_text(json.dumps(from_all, sort_keys=True))
+    request.check()
+    tile = request.tile()
+    recipe_document = request.recipe(tile)
+    key_fields = *request[:3], _LIGHT, recipe_document["synthetic"].get("tile", "")[:16]
+    partial_folder = partial_folder or folder / "making" / "-".join(
+        str(key_field) for key_field in key_fields if key_field
+    )
+    partial_folder.mkdir(parents=True, exist_ok=True)
+    recipe = partial_folder / "recipe.json"
+    recipe.write_text(json.dumps(recipe_document, sort_keys=True))
 
-    def make() -> EigenBtf:
-        size = wanted.size, wanted.size
-        values = Values(making, ubo_rings(), size)
-        small = SmallGeometry(tile, ubo_rings(), size, wanted.grid, _SEED)
-        values.fill(small.seen_from, lambda share: progress(_OF_RENDERING * share), cancelled)
-        rest = 1 - _OF_RENDERING
-        begun = Begun(making / "compressed", {"bound": wanted.bound})
-        kept = compress(values, wanted.bound, lambda share: progress(_OF_RENDERING + rest * share), cancelled, begun)
-        return replace(kept, height=small.height())
+    def render_and_compress() -> LocalPcaBtf:
+        size = request.size, request.size
+        values = ValueFile(partial_folder, ubo_grid(), size)
+        geometry = TileGeometry(tile, ubo_grid(), size, request.grid, _SEED)
+        values.fill(geometry.get_view, lambda share: progress(_RENDER_PROGRESS * share), is_canceled)
+        compress_progress = 1 - _RENDER_PROGRESS
+        partial_compression = PartialCompression(partial_folder / "compressed", {"bound": request.bound})
+        btf = compress(
+            values,
+            request.bound,
+            lambda share: progress(_RENDER_PROGRESS + compress_progress * share),
+            is_canceled,
+            partial_compression,
+        )
+        return replace(btf, height=geometry.height())
 
-    record = keep(folder, recipe, name, wanted.geometry, make)
-    shutil.rmtree(making)
+    record = store_btf(folder, recipe, name, request.geometry, render_and_compress)
+    shutil.rmtree(partial_folder)
     return record

@@ -16,15 +16,15 @@ from relume.scene.importer import import_scene
 from relume.scene.model import Material, Scene
 from relume.synthetic.tile import F64, Terms, Tile
 
-MOST_FACES = 60_000
+MAX_FACES = 60_000
 """Light between faces takes two kilobytes of each, several times."""
-_SQUARE = 0.02  # share by which sides of a box may differ that is taken for the square
-_MOST_REACH = 2.0  # periods that it covers, along each side
-_MOST_HEIGHT = 1.0  # periods
-_TURNED = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # the scene's (x, y, z) to the texture's (x, −z, y)
+_SQUARE_TOLERANCE = 0.02  # share by which sides of a box may differ that is taken for the square
+_MAX_EXTENT = 2.0  # periods that it covers, along each side
+_MAX_HEIGHT = 1.0  # periods
+_SCENE_TO_TEXTURE = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # the scene's (x, y, z) to the texture's (x, −z, y)
 
 
-def tile_of(file: Path, period: float | None) -> Tile:
+def read_tile(file: Path, period: float | None) -> Tile:
     """Read one period of a small geometry.
 
     Args:
@@ -34,46 +34,54 @@ def tile_of(file: Path, period: float | None) -> Tile:
         SceneError: the file cannot be used. ParameterError: the period does not fit it.
     """
     scene = import_scene(file, file.stem)
-    positions = np.concatenate([mesh.positions for mesh in scene.meshes]).astype(np.float64) @ _TURNED.T
-    normals = np.concatenate([mesh.normals for mesh in scene.meshes]).astype(np.float64) @ _TURNED.T
+    positions = np.concatenate([mesh.positions for mesh in scene.meshes]).astype(np.float64) @ _SCENE_TO_TEXTURE.T
+    normals = np.concatenate([mesh.normals for mesh in scene.meshes]).astype(np.float64) @ _SCENE_TO_TEXTURE.T
     counts = [len(mesh.faces) for mesh in scene.meshes]
-    if sum(counts) > MOST_FACES:
-        raise SceneError(f"a small geometry has at most {MOST_FACES:,} triangles, not {sum(counts):,}; simplify it")
+    if sum(counts) > MAX_FACES:
+        raise SceneError(f"a small geometry has at most {MAX_FACES:,} triangles, not {sum(counts):,}; simplify it")
     starts = np.cumsum([0, *(len(mesh.positions) for mesh in scene.meshes)])
     faces = np.concatenate(
         [mesh.faces.astype(np.int64) + start for mesh, start in zip(scene.meshes, starts, strict=False)]
     )
     material = np.repeat([mesh.material for mesh in scene.meshes], counts)
-    return Tile(_in_periods(positions, period), normals, faces, material, tuple(map(_terms_of, _used(scene))))
+    return Tile(
+        _to_unit_square(positions, period),
+        normals,
+        faces,
+        material,
+        tuple(map(_isotropic_terms, _materials_in_use(scene))),
+    )
 
 
-def _in_periods(positions: F64, period: float | None) -> F64:
+def _to_unit_square(positions: F64, period: float | None) -> F64:
     """Bring what repeats to the unit square, its middle to the square's."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     width, depth, height = high - low
     if period is None:
-        if abs(width - depth) > _SQUARE * max(width, depth):
+        if abs(width - depth) > _SQUARE_TOLERANCE * max(width, depth):
             raise ParameterError(
                 "period", "not given", f"side of the square that repeats: the mesh is {width:g} × {depth:g} metres"
             )
         period = float(max(width, depth))
-    if not (period > 0 and max(width, depth) <= _MOST_REACH * period and height <= _MOST_HEIGHT * period):
+    if not (period > 0 and max(width, depth) <= _MAX_EXTENT * period and height <= _MAX_HEIGHT * period):
         raise ParameterError(
             "period", period, f"metres, at least the height of the mesh, {height:g}, and half its width, "
-            f"{max(width, depth) / _MOST_REACH:g}"
+            f"{max(width, depth) / _MAX_EXTENT:g}"
         )  # fmt: skip
     return np.asarray((positions - [*(0.5 * (low + high))[:2], 0.0]) / period + [0.5, 0.5, 0.0])
 
 
-def _used(scene: Scene) -> list[Material]:
+def _materials_in_use(scene: Scene) -> list[Material]:
     """All materials, where those that are not on it are nothing that has to be kept to."""
-    seen = {mesh.material for mesh in scene.meshes}
-    return [one if k in seen else Material(one.name, ()) for k, one in enumerate(scene.materials)]
+    used_indices = {mesh.material for mesh in scene.meshes}
+    return [
+        material if k in used_indices else Material(material.name, ()) for k, material in enumerate(scene.materials)
+    ]
 
 
-def _terms_of(material: Material) -> Terms:
+def _isotropic_terms(material: Material) -> Terms:
     """Terms of a material that looks the same from all around, everywhere. Raises SceneError."""
-    if material.textures or material.normal_map is not None or material.lets_pass:
+    if material.textures or material.normal_map is not None or material.is_alpha_tested:
         raise SceneError(
             f"material {material.name[:80]!r} has images or lets light pass; a small geometry's has plain colours alone"
         )

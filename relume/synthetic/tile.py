@@ -31,7 +31,7 @@ class Tile(NamedTuple):
     materials: tuple[Terms, ...]
 
     @classmethod
-    def of_one(cls, positions: F64, normals: F64, faces: I64, terms: Terms) -> Self:
+    def with_single_material(cls, positions: F64, normals: F64, faces: I64, terms: Terms) -> Self:
         """One whose faces all have the same material.
 
         Args:
@@ -40,16 +40,16 @@ class Tile(NamedTuple):
         return cls(positions, normals, faces, np.zeros(len(faces), np.int64), (terms,))
 
 
-def levelled(tile: Tile) -> Tile:
+def centered_height(tile: Tile) -> Tile:
     """Put the middle of its heights to z = 0."""
     z = tile.positions[:, 2]
     shift = np.array([0, 0, 0.5 * (z.min() + z.max())])
     return tile._replace(positions=tile.positions - shift)
 
 
-def repeated(tile: Tile, times: int) -> Tile:
+def repeat_tile(tile: Tile, num_repeats: int) -> Tile:
     """Put as many periods beside it, on each side."""
-    offsets = [(x, y, 0) for y in range(-times, times + 1) for x in range(-times, times + 1)]
+    offsets = [(x, y, 0) for y in range(-num_repeats, num_repeats + 1) for x in range(-num_repeats, num_repeats + 1)]
     count = len(tile.positions)
     return tile._replace(
         positions=np.concatenate([tile.positions + offset for offset in offsets]),
@@ -59,26 +59,28 @@ def repeated(tile: Tile, times: int) -> Tile:
     )
 
 
-def swept(path: F64, radius: float, around: int, flat: float = 1.0) -> tuple[F64, F64, I64]:
+def extruded(path: F64, radius: float, num_corners: int, flat: float = 1.0) -> tuple[F64, F64, I64]:
     """A yarn along a path: its positions, normals and faces.
 
     Args:
         path: of its middle, in a plane that z lies in; the yarn lacks its first and its last place, which say how it
             goes on. (n, 3). radius: across z.
-        around: corners of its cross-section. flat: its height over its width.
+        num_corners: corners of its cross-section. flat: its height over its width.
     """
     along, path = path[2:] - path[:-2], path[1:-1]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     side = np.cross([0, 0, 1.0], along)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     up = np.cross(along, side)
-    turn = np.arange(around) * (2 * np.pi / around)
-    cosine, sine = np.cos(turn)[None, :, None], np.sin(turn)[None, :, None]
+    angle = np.arange(num_corners) * (2 * np.pi / num_corners)
+    cosine, sine = np.cos(angle)[None, :, None], np.sin(angle)[None, :, None]
     offset = radius * (cosine * side[:, None] + flat * sine * up[:, None])
     normal = flat * cosine * side[:, None] + sine * up[:, None]
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     positions = path[:, None] + offset
-    i, j = np.meshgrid(np.arange(len(path) - 1), np.arange(around), indexing="ij")
-    a, b = i * around + j, i * around + (j + 1) % around
-    faces = np.concatenate([np.stack([a, b, a + around], -1), np.stack([b, b + around, a + around], -1)]).reshape(-1, 3)
+    i, j = np.meshgrid(np.arange(len(path) - 1), np.arange(num_corners), indexing="ij")
+    a, b = i * num_corners + j, i * num_corners + (j + 1) % num_corners
+    faces = np.concatenate(
+        [np.stack([a, b, a + num_corners], -1), np.stack([b, b + num_corners, a + num_corners], -1)]
+    ).reshape(-1, 3)
     return positions.reshape(-1, 3), normal.reshape(-1, 3), faces

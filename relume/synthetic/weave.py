@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.synthetic.tile import Tile, swept
+from relume.synthetic.tile import Tile, extruded
 
 _YARNS = 16  # a period, in each direction; even
 _STEPS, _AROUND = 8, 10  # of a yarn's path a crossing, and of its cross-section
 _WIDTH, _FLAT, _LIFT = 0.43, 0.45, 0.42  # radius and lift in shares of the spacing
-_UNEVEN = 0.12  # of these
+_UNEVENNESS = 0.12  # of these
 _WAVES = 3  # of a yarn that lies unevenly, a period
 _SEED = 5
 
@@ -23,16 +23,16 @@ def weave() -> Tile:
     """One period of it."""
     spacing, rng = 1 / _YARNS, np.random.default_rng(_SEED)
     s = np.arange(-1, _YARNS * _STEPS + 2) / (_YARNS * _STEPS)
-    parts = []
+    yarn_meshes = []
     for direction in range(2):
         for yarn in range(_YARNS):
-            wide, lift = 1 + _UNEVEN * rng.normal(size=2).clip(-1.5, 1.5)
-            wave = _UNEVEN * spacing * np.cos(2 * np.pi * (_WAVES * s + rng.random()))
+            width_scale, lift = 1 + _UNEVENNESS * rng.normal(size=2).clip(-1.5, 1.5)
+            wave = _UNEVENNESS * spacing * np.cos(2 * np.pi * (_WAVES * s + rng.random()))
             across = (yarn + 0.5) * spacing + wave
             height = lift * _LIFT * spacing * np.cos(np.pi * (s / spacing - 0.5 + yarn + direction))
             path = np.stack([s, across, height] if direction == 0 else [across, s, height], axis=1)
-            parts.append(swept(path, min(wide, 1.12) * _WIDTH * spacing, _AROUND, _FLAT))
-    counts = np.cumsum([0, *(len(part[0]) for part in parts)])
-    positions, normals = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-    faces = np.concatenate([part[2] + start for part, start in zip(parts, counts, strict=False)])
-    return Tile.of_one(positions, normals, faces, TERMS)
+            yarn_meshes.append(extruded(path, min(width_scale, 1.12) * _WIDTH * spacing, _AROUND, _FLAT))
+    counts = np.cumsum([0, *(len(yarn_mesh[0]) for yarn_mesh in yarn_meshes)])
+    positions, normals = (np.concatenate([yarn_mesh[k] for yarn_mesh in yarn_meshes]) for k in (0, 1))
+    faces = np.concatenate([yarn_mesh[2] + start for yarn_mesh, start in zip(yarn_meshes, counts, strict=False)])
+    return Tile.with_single_material(positions, normals, faces, TERMS)

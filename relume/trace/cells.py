@@ -13,36 +13,36 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.points import Points
+from relume.points import SurfacePoints
 from relume.scene.model import Scene
-from relume.trace.cell_tree import MAX_CELLS, CellTree, grow_tree
-from relume.trace.geometry import Geometry
+from relume.trace.cell_tree import MAX_PATCHES, PatchTree, grow_tree
+from relume.trace.geometry import SceneBuffers
 from relume.trace.photons import shoot_photons
 from relume.trace.surface import surface_at
-from relume.trace.tangents import any_tangent, turn_between
+from relume.trace.tangents import any_tangent, rotation_between
 
 F32 = NDArray[np.float32]
 
-POINTS_A_CELL = 4
-_PHOTONS_A_CELL = 16
+POINTS_PER_PATCH = 4
+_PHOTONS_PER_PATCH = 16
 _TEXTURE_ANGLE = 0.02  # textures are read blurred, as cells blur them
 
 
 @dataclass(frozen=True)
-class Cells:
+class Patches:
     """Cells in the order of their tree.
 
     Attributes:
-        position: of the points that stand for a cell, off the surface. (C, `POINTS_A_CELL`, 3) float32
-        normal: shading normals there. (C, `POINTS_A_CELL`, 3) float32
+        position: of the points that stand for a cell, off the surface. (C, `POINTS_PER_PATCH`, 3) float32
+        normal: shading normals there. (C, `POINTS_PER_PATCH`, 3) float32
         diffuse, specular: texture channels, their means over the cell's points. (C, 3) float32
         material: index into the scene's materials. (C,) uint16
         uv: where points lie in textures, the side of what is read about them, and how textures are turned there, as
-            `relume.trace.surface.Surface` has it. (C, `POINTS_A_CELL`, 5) float32
-        surface_normal: normals there without bumps. (C, `POINTS_A_CELL`, 3) float32
+            `relume.trace.stored_scene.Surface` has it. (C, `POINTS_PER_PATCH`, 5) float32
+        surface_normal: normals there without bumps. (C, `POINTS_PER_PATCH`, 3) float32
     """
 
-    tree: CellTree
+    tree: PatchTree
     position: F32
     normal: F32
     diffuse: F32
@@ -52,68 +52,72 @@ class Cells:
     surface_normal: F32
 
     @property
-    def num_cells(self) -> int:
+    def num_patches(self) -> int:
         """Their number C."""
         return len(self.material)
 
     @property
-    def gather_samples(self) -> Points:
+    def sample_points(self) -> SurfacePoints:
         """The points that stand for all cells, those of a cell one after another."""
-        return gather_samples_of(self.position, self.normal)
+        return patch_sample_points(self.position, self.normal)
 
 
-def gather_samples_of(position: F32, normal: F32, first_cell: int = 0) -> Points:
+def patch_sample_points(position: F32, normal: F32, first_patch: int = 0) -> SurfacePoints:
     """Make the points that stand for cells, where direct light arrives at them; any tangent does.
 
     Args:
-        position, normal: as in `Cells`. (cells, `POINTS_A_CELL`, 3) float32
-        first_cell: number of the first of these cells among all.
+        position, normal: as in `Patches`. (cells, `POINTS_PER_PATCH`, 3) float32
+        first_patch: number of the first of these cells among all.
     """
     position, normal = position.reshape(-1, 3), normal.reshape(-1, 3)
-    first = POINTS_A_CELL * first_cell
-    return Points(position, normal, any_tangent(normal), np.arange(first, first + len(position), dtype=np.uint32))
+    first_seed = POINTS_PER_PATCH * first_patch
+    return SurfacePoints(
+        position, normal, any_tangent(normal), np.arange(first_seed, first_seed + len(position), dtype=np.uint32)
+    )
 
 
-def choose_cells(
-    scene: Scene, geometry: Geometry, views: Sequence[str], size: tuple[int, int], num_cells: int
-) -> Cells:
-    """Place about `num_cells` cells where gather rays of these views go; nothing but the scene seeds it.
+def choose_patches(
+    scene: Scene, geometry: SceneBuffers, views: Sequence[str], size: tuple[int, int], num_patches: int
+) -> Patches:
+    """Place about `num_patches` cells where gather rays of these views go; nothing but the scene seeds it.
 
     Args:
         scene: what is seen. geometry: its triangles.
         views: names of the cameras. size: width and height of their pictures, pixels.
-        num_cells: about so many; held to `MAX_CELLS` less two for each mesh.
+        num_patches: about so many; held to `MAX_PATCHES` less two for each mesh.
     """
-    most = min(num_cells, MAX_CELLS - 2 * len(scene.meshes))
-    photons = shoot_photons(scene, geometry, views, size, _PHOTONS_A_CELL * most)
+    max_patches = min(num_patches, MAX_PATCHES - 2 * len(scene.meshes))
+    photons = shoot_photons(scene, geometry, views, size, _PHOTONS_PER_PATCH * max_patches)
     hits, directions = photons.hits, photons.directions
     normal = geometry.face_normals[hits.face]
-    is_behind = np.einsum("nc,nc->n", normal, directions) > 0
-    normal[is_behind] *= -1
-    place = surface_at(geometry, hits, directions).points.position
-    side = 2 * geometry.face_mesh[hits.face] + is_behind.astype(np.int32)
-    tree, members = grow_tree(
-        np.concatenate([place, normal], axis=1),
+    is_back_face = np.einsum("nc,nc->n", normal, directions) > 0
+    normal[is_back_face] *= -1
+    position = surface_at(geometry, hits, directions).points.position
+    side = 2 * geometry.face_mesh[hits.face] + is_back_face.astype(np.int32)
+    tree, patch_rows = grow_tree(
+        np.concatenate([position, normal], axis=1),
         photons.width * hits.distance,
         side.astype(np.int32),
         2 * len(scene.meshes),
-        most,
+        max_patches,
     )
     # a cell's photons are in order along the axis that divided it last: every so many are far apart
-    evenly = (np.arange(POINTS_A_CELL) + 0.5) / POINTS_A_CELL
-    chosen = np.array([rows[(evenly * len(rows)).astype(np.int64)] for rows in members], np.int64).reshape(-1)
-    some = hits.rows(chosen)
-    surface = surface_at(geometry, some, directions[chosen], scene.materials, _TEXTURE_ANGLE)
-    points, shape = surface.points, (len(members), POINTS_A_CELL, 3)
+    fractions = (np.arange(POINTS_PER_PATCH) + 0.5) / POINTS_PER_PATCH
+    point_rows = np.array(
+        [photon_rows[(fractions * len(photon_rows)).astype(np.int64)] for photon_rows in patch_rows], np.int64
+    ).reshape(-1)
+    point_hits = hits.rows(point_rows)
+    surface = surface_at(geometry, point_hits, directions[point_rows], scene.materials, _TEXTURE_ANGLE)
+    points, shape = surface.points, (len(patch_rows), POINTS_PER_PATCH, 3)
     uv = surface.uv.copy()
-    uv[:, 3] += turn_between(points.normal, any_tangent(points.normal), points.tangent)
-    return Cells(
+    uv[:, 3] += rotation_between(points.normal, any_tangent(points.normal), points.tangent)
+    return Patches(
         tree,
         points.position.reshape(shape),
         points.normal.reshape(shape),
         surface.diffuse.reshape(shape).mean(axis=1),
         surface.specular.reshape(shape).mean(axis=1),
-        geometry.face_material[some.face].reshape(shape[:2])[:, 0].astype(np.uint16),
+        geometry.face_material[point_hits.face].reshape(shape[:2])[:, 0].astype(np.uint16),
         uv.reshape(*shape[:2], uv.shape[1]),
         surface.surface_normal.reshape(shape),
     )

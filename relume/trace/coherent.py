@@ -16,16 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.color import luminance
-from relume.light.neighbours import neighbours_of
+from relume.light.neighbours import find_neighbors
 from relume.parallel import for_ranges
-from relume.points import ALIKE
+from relume.points import FIXED_ALPHA_SAMPLE
 from relume.trace.coherent_kernel import BLOCK, trace_blocks
 from relume.trace.embree import EmbreeScene, occluded, packet_arguments
 
 F32 = NDArray[np.float32]
 
-_SAMPLES_A_RANGE = 8 * BLOCK
-_STRONG_SHARE = 5e-3  # of all the light; a triangle with more is not predicted: one wrong bit of it could be seen
+_SAMPLES_PER_RANGE = 8 * BLOCK
+_STRONG_LIGHT_FRACTION = (
+    5e-3  # of all the light; a triangle with more is not predicted: one wrong bit of it could be seen
+)
 
 
 @dataclass(frozen=True)
@@ -33,23 +35,24 @@ class RayCounts:
     """What prediction saved, and how far it can be believed.
 
     Attributes:
-        traced: shadow rays. full: those that a full trace takes, all pairs above the horizon.
-        checked: predicted bits that were traced all the same, spread evenly. wrong: those of them that were wrong.
+        num_traced: shadow rays. num_full: those that a full trace takes, all pairs above the horizon.
+        num_checked: predicted bits that were traced all the same, spread evenly. num_wrong: those of them that were
+            wrong.
     """
 
-    traced: int
-    full: int
-    checked: int
-    wrong: int
+    num_traced: int
+    num_full: int
+    num_checked: int
+    num_wrong: int
 
     @property
-    def wrong_share(self) -> float:
+    def error_rate(self) -> float:
         """The wrong share of checked bits times the share of predicted ones: an estimate of all wrong bits."""
-        return self.wrong / max(1, self.checked) * (1 - self.traced / max(1, self.full))
+        return self.num_wrong / max(1, self.num_checked) * (1 - self.num_traced / max(1, self.num_full))
 
 
 @dataclass(frozen=True)
-class Coherent:
+class VisibilityMasks:
     """What n view samples see, and what it cost to find out.
 
     Attributes:
@@ -62,65 +65,67 @@ class Coherent:
     trace_s: float
 
 
-class Targets(NamedTuple):
+class LightTargets(NamedTuple):
     """What shadow rays are sent to.
 
     Attributes:
         directions: unit, towards the lights. (m, 3) float32
-        first, beside: `relume.light.neighbours.Neighbours` of them.
+        first, neighbors: `relume.light.enclosing_keyframes.LightNeighbors` of them.
         is_strong: so much of the light that nothing is predicted. (m,)
     """
 
     directions: F32
     first: NDArray[np.int32]
-    beside: NDArray[np.int32]
+    neighbors: NDArray[np.int32]
     is_strong: NDArray[np.bool_]
 
 
-def targets_of(directions: F32, irradiance: F32) -> Targets:
-    """Make lights what `trace_coherent` wants.
+def make_light_targets(directions: F32, irradiance: F32) -> LightTargets:
+    """Make lights what `trace_visibility_masks` wants.
 
     Args:
         directions: unit, towards the lights. (m, 3) float32. irradiance: of each light, per channel. (m, 3) float32
     """
     luminous = luminance(irradiance)
-    return Targets(directions, *neighbours_of(directions), luminous > _STRONG_SHARE * luminous.sum())
+    return LightTargets(directions, *find_neighbors(directions), luminous > _STRONG_LIGHT_FRACTION * luminous.sum())
 
 
-def trace_coherent(scene: EmbreeScene, origins: F32, normals: F32, targets: Targets, chance: F32 = ALIKE) -> Coherent:
+def trace_visibility_masks(
+    scene: EmbreeScene, origins: F32, normals: F32, targets: LightTargets, alpha_sample: F32 = FIXED_ALPHA_SAMPLE
+) -> VisibilityMasks:
     """Find what samples see, tracing where it changes and predicting where it does not.
 
     Args:
         scene: the triangles that may be in the way.
         origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
-        targets: the lights, from `targets_of`.
-        chance: of the rays of each sample, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
+        targets: the lights, from `make_light_targets`.
+        alpha_sample: of the rays of each sample, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
-    few, all_of_a_light = (packet_arguments(coherent=is_coherent) for is_coherent in (False, True))
-    found = [np.zeros(4, np.int64)]
+    mixed_arguments, single_light_arguments = (packet_arguments(coherent=is_coherent) for is_coherent in (False, True))
+    range_counts = [np.zeros(4, np.int64)]
 
     def kernel(start: int, stop: int) -> None:
         counts = np.zeros(4, np.int64)
         trace_blocks(
             occluded,
             scene.handle,
-            few.ctypes.data,
-            all_of_a_light.ctypes.data,
+            mixed_arguments.ctypes.data,
+            single_light_arguments.ctypes.data,
             origins,
             normals,
-            chance,
+            alpha_sample,
             targets,
             start,
             stop,
             bits,
             counts,
         )
-        found.append(counts)
+        range_counts.append(counts)
 
-    began = time.perf_counter()
-    for_ranges(kernel, len(origins), _SAMPLES_A_RANGE)
-    trace_s = time.perf_counter() - began
-    return Coherent(bits, RayCounts(*(int(count) for count in np.sum(found, axis=0))), trace_s)
+    start_time = time.perf_counter()
+    for_ranges(kernel, len(origins), _SAMPLES_PER_RANGE)
+    trace_s = time.perf_counter() - start_time
+    return VisibilityMasks(bits, RayCounts(*(int(count) for count in np.sum(range_counts, axis=0))), trace_s)

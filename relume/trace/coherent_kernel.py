@@ -19,23 +19,33 @@ import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 from numpy.typing import NDArray
 
-from relume.bits import WORD, into_rows
-from relume.trace.packet import FAR, LANES, aim, ask_first, is_free, new_packet, set_origin, take_chance, trace_shadows
+from relume.bits import WORD_BITS, words_to_rows
+from relume.trace.packet import (
+    FAR,
+    LANES,
+    enable_first_lanes,
+    enable_stochastic_alpha,
+    is_unoccluded,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_shadows,
+)
 from relume.uncounted import UNCOUNTED
 
 U64 = NDArray[np.uint64]
 
-BLOCK = WORD
+BLOCK = WORD_BITS
 _BLOCK_BITS = 6
 _QUARTER = BLOCK // 4
-_ENOUGH = LANES * 3 // 4  # rays to one light from which on they do not wait for the next light's
+_MIN_FULL_LANES = LANES * 3 // 4  # rays to one light from which on they do not wait for the next light's
 # predictions: what a region's untraced samples are held to see of a light
 _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
 # of the predicted bits, one in this many is traced all the same; a power of two from the size of a quarter up
 _CHECK_EVERY = 128
 # times eight bytes of one bit each: those bits in the highest byte, the first lowest; and the sum of eight bytes there
-_GATHERED, _EACH_BYTE = np.uint64(0x0102040810204080), np.uint64(0x0101010101010101)
-_BEGIN = np.int64(0)  # of NumPy: a kernel that is called with an int of Python is compiled anew for it
+_GATHER_BITS, _SUM_BYTES = np.uint64(0x0102040810204080), np.uint64(0x0101010101010101)
+_ZERO = np.int64(0)  # of NumPy: a kernel that is called with an int of Python is compiled anew for it
 _HASH = 2_654_435_761  # Knuth's multiplicative hash: 2^32 divided by the golden ratio
 
 
@@ -43,14 +53,14 @@ class _Block(NamedTuple):
     """A block against all lights; bit k of a word is the k-th sample.
 
     Attributes:
-        facing, known, seen: above the horizon; traced; unoccluded. (num_lights,) uint64
-        chance: of the rays of each sample at surfaces that blend. (`BLOCK`,) float32
+        facing_bits, traced_bits, visibility_bits: above the horizon; traced; unoccluded. (num_lights,) uint64
+        alpha_sample: of the rays of each sample at surfaces that blend. (`BLOCK`,) float32
     """
 
-    facing: U64
-    known: U64
-    seen: U64
-    chance: NDArray[np.float32]
+    facing_bits: U64
+    traced_bits: U64
+    visibility_bits: U64
+    alpha_sample: NDArray[np.float32]
 
 
 class _Level(NamedTuple):
@@ -58,13 +68,13 @@ class _Level(NamedTuple):
 
     Attributes:
         prediction: of what was not traced. (num_lights,)
-        queued: whether the light was traced here. doubted: whether the next level traces it. (num_lights,)
+        is_queued: whether the light was traced here. is_doubtful: whether the next level traces it. (num_lights,)
         queue, samples: lights in the order in which they are traced, and against which samples. (num_lights,)
     """
 
     prediction: NDArray[np.uint8]
-    queued: NDArray[np.bool_]
-    doubted: NDArray[np.bool_]
+    is_queued: NDArray[np.bool_]
+    is_doubtful: NDArray[np.bool_]
     queue: NDArray[np.int64]
     samples: U64
 
@@ -82,45 +92,45 @@ def _new_level(num_lights):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _flush(occluded, packet, block, waiting):  # type: ignore[no-untyped-def]
+def _flush(occluded, packet, block, num_waiting):  # type: ignore[no-untyped-def]
     """Trace the rays of the first lanes. A lane's owner: its light, then its sample in the lowest six bits."""
-    if waiting == 0:
+    if num_waiting == 0:
         return
-    ask_first(packet, waiting)
+    enable_first_lanes(packet, num_waiting)
     trace_shadows(occluded, packet)
-    for lane in range(waiting):
-        if is_free(packet, lane):
+    for lane in range(num_waiting):
+        if is_unoccluded(packet, lane):
             owner = packet.owner[lane]
-            block.seen[owner >> _BLOCK_BITS] |= np.uint64(1) << np.uint64(owner & (BLOCK - 1))
+            block.visibility_bits[owner >> _BLOCK_BITS] |= np.uint64(1) << np.uint64(owner & (BLOCK - 1))
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
     """Trace lights against the samples of a mask each, those above the horizon and not yet traced; counts the rays."""
-    facing, known = block.facing, block.known
-    rays, lane = 0, _BEGIN
-    for at in range(lights.shape[0]):
-        light = lights[at]
-        wanted = samples[at] & facing[light] & ~known[light]
-        known[light] |= wanted
+    facing, traced = block.facing_bits, block.traced_bits
+    num_rays, lane = 0, _ZERO
+    for entry in range(lights.shape[0]):
+        light = lights[entry]
+        pending = samples[entry] & facing[light] & ~traced[light]
+        traced[light] |= pending
         x, y, z = directions[light, 0], directions[light, 1], directions[light, 2]
-        while wanted:
-            k = trailing_zeros(wanted)  # type: ignore[call-arg, var-annotated]
-            wanted &= wanted - np.uint64(1)
+        while pending:
+            k = trailing_zeros(pending)  # type: ignore[call-arg, var-annotated]
+            pending &= pending - np.uint64(1)
             packet.owner[lane] = light << _BLOCK_BITS | k
             set_origin(packet, lane, origins[k, 0], origins[k, 1], origins[k, 2])
-            take_chance(packet, lane, block.chance[k])
-            aim(packet, lane, x, y, z, FAR)
-            rays += 1
+            enable_stochastic_alpha(packet, lane, block.alpha_sample[k])
+            set_direction(packet, lane, x, y, z, FAR)
+            num_rays += 1
             lane += 1
             if lane == LANES:
                 _flush(occluded, packet, block, lane)
-                lane = _BEGIN
-        if lane >= _ENOUGH:
+                lane = _ZERO
+        if lane >= _MIN_FULL_LANES:
             _flush(occluded, packet, block, lane)
-            lane = _BEGIN
+            lane = _ZERO
     _flush(occluded, packet, block, lane)
-    return rays
+    return num_rays
 
 
 @nb.njit(nogil=True, cache=True)
@@ -130,52 +140,52 @@ def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
     by_axis[:, : normals.shape[0]] = normals.T
     nx, ny, nz = by_axis[0], by_axis[1], by_axis[2]
     is_above = np.empty(BLOCK, np.uint8)
-    eights = is_above.view(np.uint64)
+    bytes_as_words = is_above.view(np.uint64)
     count = np.uint64(0)
     for light in range(directions.shape[0]):
         x, y, z = directions[light, 0], directions[light, 1], directions[light, 2]
         for k in range(BLOCK):
             is_above[k] = nx[k] * x + ny[k] * y + nz[k] * z > 0
         facing, in_bytes = np.uint64(0), np.uint64(0)
-        for eight in range(BLOCK // 8):
-            in_bytes += eights[eight]
-            facing |= (eights[eight] * _GATHERED >> np.uint64(56)) << np.uint64(8 * eight)
-        count += in_bytes * _EACH_BYTE >> np.uint64(56)
-        block.facing[light] = facing
-        block.known[light] = block.seen[light] = 0
+        for byte in range(BLOCK // 8):
+            in_bytes += bytes_as_words[byte]
+            facing |= (bytes_as_words[byte] * _GATHER_BITS >> np.uint64(56)) << np.uint64(8 * byte)
+        count += in_bytes * _SUM_BYTES >> np.uint64(56)
+        block.facing_bits[light] = facing
+        block.traced_bits[light] = block.visibility_bits[light] = 0
     return np.int64(count)
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _farthest(origins, start, stop, x, y, z):  # type: ignore[no-untyped-def]
     """Find the sample of [start, stop) that is farthest from a point."""
-    best, at = np.float32(-1), start
+    max_squared, farthest = np.float32(-1), start
     for k in range(start, stop):
         squared = (origins[k, 0] - x) ** 2 + (origins[k, 1] - y) ** 2 + (origins[k, 2] - z) ** 2
-        if squared > best:
-            best, at = squared, k
-    return at
+        if squared > max_squared:
+            max_squared, farthest = squared, k
+    return farthest
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _centre(origins, start, stop):  # type: ignore[no-untyped-def]
+def _center(origins, start, stop):  # type: ignore[no-untyped-def]
     """Average the positions [start, stop)."""
     x, y, z = np.float32(0), np.float32(0), np.float32(0)
     for k in range(start, stop):
         x += origins[k, 0]
         y += origins[k, 1]
         z += origins[k, 2]
-    share = np.float32(1) / np.float32(stop - start)
-    return x * share, y * share, z * share
+    inverse_count = np.float32(1) / np.float32(stop - start)
+    return x * inverse_count, y * inverse_count, z * inverse_count
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _ends(origins, start, stop):  # type: ignore[no-untyped-def]
+def _far_samples(origins, start, stop):  # type: ignore[no-untyped-def]
     """Choose two samples of [start, stop) far apart, as a mask."""
-    x, y, z = _centre(origins, start, stop)
-    one = _farthest(origins, start, stop, x, y, z)
-    other = _farthest(origins, start, stop, origins[one, 0], origins[one, 1], origins[one, 2])
-    return np.uint64(1) << np.uint64(one) | np.uint64(1) << np.uint64(other)
+    x, y, z = _center(origins, start, stop)
+    first = _farthest(origins, start, stop, x, y, z)
+    second = _farthest(origins, start, stop, origins[first, 0], origins[first, 1], origins[first, 2])
+    return np.uint64(1) << np.uint64(first) | np.uint64(1) << np.uint64(second)
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
@@ -188,169 +198,191 @@ def _mask(start, stop):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _predict(facing, known, seen):  # type: ignore[no-untyped-def]
+def _predict(facing_bits, traced_bits, visible_bits):  # type: ignore[no-untyped-def]
     """Predict what the traced samples of a region agree on."""
-    traced = facing & known
-    if not facing:
+    traced = facing_bits & traced_bits
+    if not facing_bits:
         return _BELOW
-    if not traced or (seen & traced and ~seen & traced):
+    if not traced or (visible_bits & traced and ~visible_bits & traced):
         return _UNKNOWN
-    return _LIT if seen & traced else _HIDDEN
+    return _LIT if visible_bits & traced else _HIDDEN
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _contradicted(traced, seen, prediction):  # type: ignore[no-untyped-def]
+def _is_contradicted(traced_bits, visible_bits, prediction):  # type: ignore[no-untyped-def]
     """Tell whether a traced sample sees what was not predicted."""
-    return (prediction == _LIT and ~seen & traced != 0) or (prediction == _HIDDEN and seen & traced != 0)
+    return (prediction == _LIT and ~visible_bits & traced_bits != 0) or (
+        prediction == _HIDDEN and visible_bits & traced_bits != 0
+    )
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _begin(block, region, before, level):  # type: ignore[no-untyped-def]
+def _init_level(block, region, previous_level, level):  # type: ignore[no-untyped-def]
     """Take over the predictions of the level before, and queue what it doubts. Returns the length of the queue."""
-    end = 0
+    queue_length = 0
     for light in range(level.prediction.shape[0]):
-        below = block.facing[light] & region == 0
-        level.prediction[light] = _BELOW if below else before.prediction[light]
-        level.queued[light] = before.doubted[light] and not below
-        if level.queued[light]:
-            level.queue[end] = light
-            end += 1
-    return end
+        is_below = block.facing_bits[light] & region == 0
+        level.prediction[light] = _BELOW if is_below else previous_level.prediction[light]
+        level.is_queued[light] = previous_level.is_doubtful[light] and not is_below
+        if level.is_queued[light]:
+            level.queue[queue_length] = light
+            queue_length += 1
+    return queue_length
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _judge(block, region, lights, before, level, start, stop):  # type: ignore[no-untyped-def]
+def _update_predictions(block, region, lights, previous_level, level, start, stop):  # type: ignore[no-untyped-def]
     """Predict anew the lights of the queue in [start, stop); the neighbours of wrong predictions join its end."""
     first, index = lights
-    end = stop
-    for at in range(start, stop):
-        light = level.queue[at]
-        facing, known, seen = block.facing[light] & region, block.known[light], block.seen[light]
-        level.prediction[light] = _predict(facing, known, seen)
-        if _contradicted(facing & known, seen, before.prediction[light]):
+    queue_length = stop
+    for entry in range(start, stop):
+        light = level.queue[entry]
+        facing_bits, traced_bits, visible_bits = (
+            block.facing_bits[light] & region,
+            block.traced_bits[light],
+            block.visibility_bits[light],
+        )
+        level.prediction[light] = _predict(facing_bits, traced_bits, visible_bits)
+        if _is_contradicted(facing_bits & traced_bits, visible_bits, previous_level.prediction[light]):
             for j in range(first[light], first[light + 1]):
-                beside = index[j]
-                if not level.queued[beside] and level.prediction[beside] != _BELOW:
-                    level.queued[beside] = True
-                    level.queue[end] = beside
-                    end += 1
-    return end
+                neighbor = index[j]
+                if not level.is_queued[neighbor] and level.prediction[neighbor] != _BELOW:
+                    level.is_queued[neighbor] = True
+                    level.queue[queue_length] = neighbor
+                    queue_length += 1
+    return queue_length
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _flood(occluded, packet, block, points, lights, region, samples, before, level):  # type: ignore[no-untyped-def]
-    """Trace `samples` against the lights that `before` doubts, then against the neighbours of wrong predictions.
+def _flood(occluded, packet, block, positions, lights, region, samples, previous_level, level):  # type: ignore[no-untyped-def]
+    """Trace `samples` against lights that `previous_level` doubts, then against neighbors of wrong predictions.
 
     Returns the number of rays; `level.prediction` is what is held of the region now.
     """
-    origins, (directions, first, index, _) = points, lights
+    origins, (directions, first, index, _) = positions, lights
     level.samples[:] = samples
-    start, stop, rays = _BEGIN, _begin(block, region, before, level), 0
+    start, stop, num_rays = _ZERO, _init_level(block, region, previous_level, level), 0
     while start < stop:
-        lights_here, masks = level.queue[start:stop], level.samples[start:stop]
-        rays += _trace(occluded, packet, block, origins, directions, lights_here, masks)
-        start, stop = stop, _judge(block, region, (first, index), before, level, start, stop)
-    return rays
+        queued_lights, masks = level.queue[start:stop], level.samples[start:stop]
+        num_rays += _trace(occluded, packet, block, origins, directions, queued_lights, masks)
+        start, stop = stop, _update_predictions(block, region, (first, index), previous_level, level, start, stop)
+    return num_rays
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _doubt(level, lights):  # type: ignore[no-untyped-def]
+def _mark_doubtful(level, lights):  # type: ignore[no-untyped-def]
     """Mark the lights that were traced, yet are unknown, strong, or predicted otherwise than a light beside them."""
     _, first, index, strong = lights
     for light in range(level.prediction.shape[0]):
         prediction = level.prediction[light]
-        level.doubted[light] = False
-        if level.queued[light] and prediction != _BELOW:
-            doubted = prediction == _UNKNOWN or strong[light]
+        level.is_doubtful[light] = False
+        if level.is_queued[light] and prediction != _BELOW:
+            is_doubtful = prediction == _UNKNOWN or strong[light]
             for j in range(first[light], first[light + 1]):
-                beside = level.prediction[index[j]]
-                doubted |= beside != _BELOW and beside != prediction
-            level.doubted[light] = doubted
+                neighbor_prediction = level.prediction[index[j]]
+                is_doubtful |= neighbor_prediction != _BELOW and neighbor_prediction != prediction
+            level.is_doubtful[light] = is_doubtful
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _check(occluded, packet, block, points, lights, region, start, salt, level):  # type: ignore[no-untyped-def]
+def _check_predictions(occluded, packet, block, positions, lights, region, start, salt, level):  # type: ignore[no-untyped-def]
     """Trace a few of the predicted samples; lights that are wrong come into doubt. Returns rays and wrong ones."""
-    origins, (directions, _, _, _) = points, lights
-    end, wrong = 0, 0
+    origins, (directions, _, _, _) = positions, lights
+    queue_length, num_wrong = 0, 0
     for light in range(directions.shape[0]):
-        level.doubted[light] = False
-        number = ((light + salt) * _HASH & 0xFFFFFFFF) * _CHECK_EVERY >> 32
-        if number < _QUARTER and level.prediction[light] in (_LIT, _HIDDEN):
-            sample = np.uint64(1) << np.uint64(start + number) & region & block.facing[light] & ~block.known[light]
+        level.is_doubtful[light] = False
+        sample_offset = ((light + salt) * _HASH & 0xFFFFFFFF) * _CHECK_EVERY >> 32
+        if sample_offset < _QUARTER and level.prediction[light] in (_LIT, _HIDDEN):
+            sample = (
+                np.uint64(1) << np.uint64(start + sample_offset)
+                & region
+                & block.facing_bits[light]
+                & ~block.traced_bits[light]
+            )
             if sample:
-                level.queue[end], level.samples[end] = light, sample
-                end += 1
-    rays = _trace(occluded, packet, block, origins, directions, level.queue[:end], level.samples[:end])
-    for at in range(end):
-        light = level.queue[at]
-        level.doubted[light] = _contradicted(level.samples[at], block.seen[light], level.prediction[light])
-        wrong += level.doubted[light]
-    return rays, wrong
+                level.queue[queue_length], level.samples[queue_length] = light, sample
+                queue_length += 1
+    num_rays = _trace(
+        occluded, packet, block, origins, directions, level.queue[:queue_length], level.samples[:queue_length]
+    )
+    for entry in range(queue_length):
+        light = level.queue[entry]
+        level.is_doubtful[light] = _is_contradicted(
+            level.samples[entry], block.visibility_bits[light], level.prediction[light]
+        )
+        num_wrong += level.is_doubtful[light]
+    return num_rays, num_wrong
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _keep(block, region, level):  # type: ignore[no-untyped-def]
+def _accept_predictions(block, region, level):  # type: ignore[no-untyped-def]
     """Believe the predictions of what was not traced."""
     for light in range(level.prediction.shape[0]):
         if level.prediction[light] == _LIT:
-            block.seen[light] |= block.facing[light] & ~block.known[light] & region
+            block.visibility_bits[light] |= block.facing_bits[light] & ~block.traced_bits[light] & region
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _trace_quarter(occluded, packets, block, points, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
+def _trace_quarter(occluded, packets, block, positions, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
     """Trace samples `span` of a block: two of them, then all of them where need be; then check."""
-    (packet, alike), (whole, quarter, each) = packets, levels
+    (packet, coherent_packet), (block_level, quarter_level, sample_level) = packets, levels
     start, stop = span
     region = _mask(start, stop)
-    anchors = _ends(points, start, stop)
-    counts[0] += _flood(occluded, packet, block, points, lights, region, anchors, whole, quarter)
-    _doubt(quarter, lights)
-    counts[0] += _flood(occluded, alike, block, points, lights, region, region, quarter, each)
-    checked, wrong = _check(occluded, packet, block, points, lights, region, start, salt, each)
-    counts[0] += checked
-    counts[2] += checked
-    counts[3] += wrong
-    if wrong:
-        counts[0] += _flood(occluded, alike, block, points, lights, region, region, each, quarter)
-        _keep(block, region, quarter)
+    far_samples = _far_samples(positions, start, stop)
+    counts[0] += _flood(occluded, packet, block, positions, lights, region, far_samples, block_level, quarter_level)
+    _mark_doubtful(quarter_level, lights)
+    counts[0] += _flood(
+        occluded, coherent_packet, block, positions, lights, region, region, quarter_level, sample_level
+    )
+    num_checked, num_wrong = _check_predictions(
+        occluded, packet, block, positions, lights, region, start, salt, sample_level
+    )
+    counts[0] += num_checked
+    counts[2] += num_checked
+    counts[3] += num_wrong
+    if num_wrong:
+        counts[0] += _flood(
+            occluded, coherent_packet, block, positions, lights, region, region, sample_level, quarter_level
+        )
+        _accept_predictions(block, region, quarter_level)
     else:
-        _keep(block, region, each)
+        _accept_predictions(block, region, sample_level)
 
 
 @nb.njit(nogil=True, cache=True)
 def trace_blocks(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, of_alike, origins, normals, chance, lights, start, stop, bits, counts
+    occluded, scene, arguments, coherent_arguments, origins, normals, alpha_sample, lights, start, stop, bits, counts
 ):
     """Trace and predict samples [start, stop) block by block; `start` is a multiple of `BLOCK`.
 
     Args:
         occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
-        of_alike: address of those of rays that go to one light from all samples of a quarter.
+        coherent_arguments: address of those of rays that go to one light from all samples of a quarter.
         origins: off the surface. normals: shading normals. (n, 3) float32
-        chance: of the rays of each sample, or of all, at surfaces that blend. (n,) or (1,) float32
-        lights: directions, the two arrays of `relume.light.neighbours.Neighbours`, and which are always traced.
+        alpha_sample: of the rays of each sample, or of all, at surfaces that blend. (n,) or (1,) float32
+        lights: directions, the two arrays of `relume.light.enclosing_keyframes.LightNeighbors`, and which are always
+            traced.
         start, stop: the samples. bits: written, light m in bit m & 7 of byte m >> 3. (n, bytes) uint8
         counts: rays traced, rays that a full trace would take, predicted bits checked, found wrong: added to. (4,)
     """
     directions = lights[0]
     n = directions.shape[0]
-    packet, alike = new_packet(scene, arguments), new_packet(scene, of_alike)
-    facing, known, seen = np.zeros(n, np.uint64), np.zeros(n, np.uint64), np.zeros(n, np.uint64)
-    block = _Block(facing, known, seen, np.full(BLOCK, chance[0]))
-    nothing, whole = _new_level(n), _new_level(n)
-    levels = (whole, _new_level(n), _new_level(n))
-    nothing.doubted[:] = True
-    for here in range(start, stop, BLOCK):
-        there = min(here + BLOCK, stop)
-        points, width = origins[here:there], there - here
-        if chance.shape[0] > 1:
-            block.chance[:width] = chance[here:there]
-        counts[1] += _find_facing(normals[here:there], directions, block)
-        region, anchors = _mask(_BEGIN, width), _ends(points, _BEGIN, width)
-        counts[0] += _flood(occluded, packet, block, points, lights, region, anchors, nothing, whole)
-        _doubt(whole, lights)
-        for begin in range(0, width, _QUARTER):
-            span, salt = (begin, min(begin + _QUARTER, width)), here + begin
-            _trace_quarter(occluded, (packet, alike), block, points, lights, span, salt, levels, counts)
-        into_rows(block.seen, bits[here:there])
+    packet, coherent_packet = new_packet(scene, arguments), new_packet(scene, coherent_arguments)
+    facing_bits, traced_bits, visible_bits = np.zeros(n, np.uint64), np.zeros(n, np.uint64), np.zeros(n, np.uint64)
+    block = _Block(facing_bits, traced_bits, visible_bits, np.full(BLOCK, alpha_sample[0]))
+    initial_level, block_level = _new_level(n), _new_level(n)
+    levels = (block_level, _new_level(n), _new_level(n))
+    initial_level.is_doubtful[:] = True
+    for block_start in range(start, stop, BLOCK):
+        block_stop = min(block_start + BLOCK, stop)
+        positions, width = origins[block_start:block_stop], block_stop - block_start
+        if alpha_sample.shape[0] > 1:
+            block.alpha_sample[:width] = alpha_sample[block_start:block_stop]
+        counts[1] += _find_facing(normals[block_start:block_stop], directions, block)
+        region, far_samples = _mask(_ZERO, width), _far_samples(positions, _ZERO, width)
+        counts[0] += _flood(occluded, packet, block, positions, lights, region, far_samples, initial_level, block_level)
+        _mark_doubtful(block_level, lights)
+        for quarter_start in range(0, width, _QUARTER):
+            span, salt = (quarter_start, min(quarter_start + _QUARTER, width)), block_start + quarter_start
+            _trace_quarter(occluded, (packet, coherent_packet), block, positions, lights, span, salt, levels, counts)
+        words_to_rows(block.visibility_bits, bits[block_start:block_stop])

@@ -21,7 +21,7 @@ from numba.core import types
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
-from relume.trace.cutout_filter import FILTER, Holes
+from relume.trace.cutout_filter import FILTER, AlphaTest
 
 _POINTER, _WORD = ctypes.c_void_p, ctypes.c_uint64
 _TRIANGLE, _INDEX_BUFFER, _VERTEX_BUFFER, _UINT3, _FLOAT3 = 0, 0, 1, 0x5003, 0x9003
@@ -34,10 +34,10 @@ PacketCall = types.void(types.int64, types.int64, types.int64, types.int64)
 
 def _open_library() -> ctypes.CDLL:
     folder = os.path.join(os.path.dirname(os.path.dirname(embreex.__file__)), "embreex.libs")
-    found = sorted(glob.glob(os.path.join(glob.escape(folder), "libembree4*")))
-    if not found:
+    library_paths = sorted(glob.glob(os.path.join(glob.escape(folder), "libembree4*")))
+    if not library_paths:
         raise ImportError("the embreex wheel bundles no Embree library here; install embreex from a binary wheel")
-    return ctypes.CDLL(found[0])
+    return ctypes.CDLL(library_paths[0])
 
 
 _library = _open_library()
@@ -95,14 +95,16 @@ intersect = _ByAddress(f"rtcIntersect{PACKET_WIDTH}")
 
 def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
     """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three empty pointers. (5,) uint64"""
-    words = np.zeros(5, np.uint64)
-    halves = words.view(np.uint32)
+    arguments = np.zeros(5, np.uint64)
+    halves = arguments.view(np.uint32)
     halves[0] = _COHERENT if coherent else 0
     halves[1] = _FEATURE_TRIANGLE
-    return words
+    return arguments
 
 
-_LEFT_OUT = 0xFFFFFFFF  # a corner that no scene has: Embree passes over the triangle, and others keep their numbers
+_OMITTED_VERTEX = (
+    0xFFFFFFFF  # a corner that no scene has: Embree passes over the triangle, and others keep their numbers
+)
 
 
 @dataclass(frozen=True)
@@ -110,50 +112,52 @@ class EmbreeScene:
     """Committed triangles; `handle` goes to the kernels. Released with the object."""
 
     handle: int
-    holes: Holes | None = None
+    alpha_test: AlphaTest | None = None
 
     @classmethod
     def build(
-        cls, positions: NDArray[np.float32], faces: NDArray[np.uint32], holes: Holes | None = None
+        cls, positions: NDArray[np.float32], faces: NDArray[np.uint32], alpha_test: AlphaTest | None = None
     ) -> EmbreeScene:
         """Build the acceleration structure.
 
         Args:
             positions: (num_vertices, 3) float32, finite. faces: (num_faces, 3) uint32.
-            holes: of triangles that are not everywhere; None where all are.
+            alpha_test: of triangles that are not everywhere; None where all are.
         Raises:
             SceneError: Embree refused the geometry.
         """
         scene = _new_scene(_device)
         _set_quality(scene, _BUILD_QUALITY_MEDIUM)
-        if holes is None:
+        if alpha_test is None:
             _attach(scene, positions, faces)
         else:
-            has_holes = holes.image[:, None] >= 0
-            _attach(scene, positions, np.where(has_holes, np.uint32(_LEFT_OUT), faces))
-            _attach(scene, positions, np.where(has_holes, faces, np.uint32(_LEFT_OUT)), holes)
+            is_alpha_tested = alpha_test.image[:, None] >= 0
+            _attach(scene, positions, np.where(is_alpha_tested, np.uint32(_OMITTED_VERTEX), faces))
+            _attach(scene, positions, np.where(is_alpha_tested, faces, np.uint32(_OMITTED_VERTEX)), alpha_test)
         _commit_scene(scene)
         if error := _device_error(_device):
             raise SceneError(f"Embree could not build the scene (error {error}); check it for broken triangles")
-        return cls(scene, holes)
+        return cls(scene, alpha_test)
 
     def __post_init__(self) -> None:
         weakref.finalize(self, _release_scene, self.handle).atexit = False
 
 
-def _attach(scene: int, positions: NDArray[np.float32], faces: NDArray[np.uint32], holes: Holes | None = None) -> None:
-    """Add triangles to a scene, asking what `holes` says about each hit. Raises SceneError."""
+def _attach(
+    scene: int, positions: NDArray[np.float32], faces: NDArray[np.uint32], alpha_test: AlphaTest | None = None
+) -> None:
+    """Add triangles to a scene, asking what `alpha_test` says about each hit. Raises SceneError."""
     geometry = _new_geometry(_device, _TRIANGLE)
     for kind, layout, rows in (
         (_VERTEX_BUFFER, _FLOAT3, np.ascontiguousarray(positions, np.float32)),
         (_INDEX_BUFFER, _UINT3, np.ascontiguousarray(faces, np.uint32)),
     ):
-        memory = _set_buffer(geometry, kind, 0, layout, 12, len(rows))
-        if not memory:
+        buffer = _set_buffer(geometry, kind, 0, layout, 12, len(rows))
+        if not buffer:
             raise SceneError(f"Embree could not take {len(rows)} rows of geometry; use a smaller scene")
-        ctypes.memmove(memory, rows.ctypes.data, rows.nbytes)
-    if holes is not None:
-        _set_user_data(geometry, holes.addresses.ctypes.data)
+        ctypes.memmove(buffer, rows.ctypes.data, rows.nbytes)
+    if alpha_test is not None:
+        _set_user_data(geometry, alpha_test.addresses.ctypes.data)
         for set_filter in _set_filters:
             set_filter(geometry, FILTER)
     _commit_geometry(geometry)

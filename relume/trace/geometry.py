@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import SceneError
-from relume.scene.joined import as_one
+from relume.scene.joined import merge_meshes
 from relume.scene.model import Scene
-from relume.trace.cutout_filter import PAST_GLASS, Holes
-from relume.trace.cutouts import cutouts_of
+from relume.trace.cutout_filter import IGNORE_GLASS, AlphaTest
+from relume.trace.cutouts import collect_alpha_masks
 from relume.trace.embree import EmbreeScene
-from relume.trace.primary import trace_from
+from relume.trace.primary import trace_rays
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Geometry:
+class SceneBuffers:
     """All meshes of a scene, merged.
 
     Attributes:
@@ -56,40 +56,40 @@ class Geometry:
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
     @cached_property
-    def places(self) -> NDArray[np.intp]:
+    def position_index(self) -> NDArray[np.intp]:
         """Numbers of the vertices' places: those in the same place have one. (num_vertices,)"""
         as_bytes = np.ascontiguousarray(self.positions, np.float32).view("V12").ravel()
         return np.asarray(np.unique(as_bytes, return_inverse=True)[1])
 
-    def is_front(self, eye: F32, points: F32) -> NDArray[np.bool_]:
+    def is_front(self, origin: F32, points: F32) -> NDArray[np.bool_]:
         """Tell which points on surfaces (n, 3) are seen from places, (3,) or (n, 3), on their outer side."""
-        return is_front(self.embree, self.positions, self.faces, eye, points)
+        return is_front(self.embree, self.positions, self.faces, origin, points)
 
 
-def off_surface(positions: F32) -> float:
+def offset_point(positions: F32) -> float:
     """Choose how far ray origins are moved off surfaces with these corners (n, 3), metres."""
     # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
     return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
 
 
 def is_front(
-    embree: EmbreeScene, positions: F32, faces: NDArray[np.uint32], eye: F32, points: F32
+    embree: EmbreeScene, positions: F32, faces: NDArray[np.uint32], origin: F32, points: F32
 ) -> NDArray[np.bool_]:
     """Tell which points on triangles are seen on their outer side.
 
     Args:
         embree: the triangles. positions: their vertices. (num_vertices, 3) float32. faces: (num_faces, 3) uint32
-        eye: where they are seen from. (3,) float32, or (n, 3). points: on the triangles. (n, 3) float32
+        origin: where they are seen from. (3,) float32, or (n, 3). points: on the triangles. (n, 3) float32
     Returns:
         (n,)
     """
-    directions = (points - eye) / np.linalg.norm(points - eye, axis=1, keepdims=True)
-    face = trace_from(embree, eye, directions.astype(np.float32), PAST_GLASS).face
+    directions = (points - origin) / np.linalg.norm(points - origin, axis=1, keepdims=True)
+    face = trace_rays(embree, origin, directions.astype(np.float32), IGNORE_GLASS).face
     a, b, c = positions[faces[np.maximum(face, 0)]].transpose(1, 0, 2)
     return np.asarray(np.einsum("nc,nc->n", np.cross(b - a, c - a), directions) < 0)
 
 
-def merge(scene: Scene) -> Geometry:
+def build_scene_buffers(scene: Scene) -> SceneBuffers:
     """Merge the meshes of a scene and build Embree's tree over them.
 
     Raises:
@@ -97,19 +97,23 @@ def merge(scene: Scene) -> Geometry:
     """
     if not any(len(mesh.faces) for mesh in scene.meshes):
         raise SceneError("the scene has no triangles; add a mesh")
-    whole = as_one(scene.meshes)
+    mesh_buffers = merge_meshes(scene.meshes)
     counts = [len(mesh.faces) for mesh in scene.meshes]
     face_material = np.repeat([mesh.material for mesh in scene.meshes], counts).astype(np.int32)
-    cutouts = cutouts_of(scene.materials)
-    holes = None if cutouts is None else Holes.of(whole.faces, whole.positions, whole.uvs, face_material, cutouts)
-    return Geometry(
-        positions=whole.positions,
-        normals=whole.normals,
-        tangents=whole.tangents,
-        uvs=whole.uvs,
-        faces=whole.faces,
+    alpha_masks = collect_alpha_masks(scene.materials)
+    alpha_test = (
+        None
+        if alpha_masks is None
+        else AlphaTest.build(mesh_buffers.faces, mesh_buffers.positions, mesh_buffers.uvs, face_material, alpha_masks)
+    )
+    return SceneBuffers(
+        positions=mesh_buffers.positions,
+        normals=mesh_buffers.normals,
+        tangents=mesh_buffers.tangents,
+        uvs=mesh_buffers.uvs,
+        faces=mesh_buffers.faces,
         face_material=face_material,
         face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
-        embree=EmbreeScene.build(whole.positions, whole.faces, holes),
-        epsilon=off_surface(whole.positions),
+        embree=EmbreeScene.build(mesh_buffers.positions, mesh_buffers.faces, alpha_test),
+        epsilon=offset_point(mesh_buffers.positions),
     )

@@ -19,27 +19,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import is_diffuse
-from relume.points import Points
+from relume.brdf.albedo import scatters_diffusely
+from relume.points import SurfacePoints
 from relume.scene.model import Camera, Scene
-from relume.trace.geometry import Geometry
-from relume.trace.primary import Hits, camera_directions, trace_from
+from relume.trace.geometry import SceneBuffers
+from relume.trace.primary import Hits, camera_directions, trace_rays
 from relume.trace.surface import surface_at
 from relume.trace.tangents import any_tangent
 
 F32 = NDArray[np.float32]
 
 _BOUNCES = 3
-_PATHS_A_PASS = 1 << 15
+_PATHS_PER_PASS = 1 << 15
 _CONTACT_PIXELS = 12  # flights shorter than this many pixels are split
-_SPLIT, _SPLITS = 8, 3
-_CONTACT_SHARE = 0.25  # of all photons, at most
-_MOST_SPLIT = 1 << 15  # paths of a pass, each time they are split: among leaves all flights are short
-_LOBE = 200.0  # exponent of the mirror lobes
-_MIRROR_SHARE = 1 / 7  # of all photons, at most: a sixth of the others
-_MIRRORED = 4  # from each point that has a highlight
-_MOST_PASSES = 64  # of paths that nearly all leave the scene no more are worth their time
-_FEWEST_PASSES = 2  # after which none are, if all have left it
+_SPLIT_FACTOR, _NUM_SPLITS = 8, 3
+_MAX_CONTACT_FRACTION = 0.25  # of all photons, at most
+_MAX_SPLIT_PATHS = 1 << 15  # paths of a pass, each time they are split: among leaves all flights are short
+_LOBE_EXPONENT = 200.0  # exponent of the mirror lobes
+_MAX_MIRROR_FRACTION = 1 / 7  # of all photons, at most: a sixth of the others
+_MIRROR_RAYS_PER_POINT = 4  # from each point that has a highlight
+_MAX_PASSES = 64  # of paths that nearly all leave the scene no more are worth their time
+_MIN_PASSES = 2  # after which none are, if all have left it
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Photons:
     width: F32
 
     @staticmethod
-    def of_lobe(hits: Hits, directions: F32, exponent: float) -> Photons:
+    def from_lobe(hits: Hits, directions: F32, exponent: float) -> Photons:
         """Photons that left with density ∝ cos^exponent: the root mean square of their sines, √(2 / (e + 3)).
 
         Args:
@@ -65,21 +65,21 @@ class Photons:
         """
         return Photons(hits, directions, np.full(len(directions), math.sqrt(2 / (exponent + 3)), np.float32))
 
-    def rows(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Photons:
+    def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Photons:
         """Choose some of them."""
-        return Photons(self.hits.rows(which), self.directions[which], self.width[which])
+        return Photons(self.hits.rows(rows), self.directions[rows], self.width[rows])
 
 
-class _Found(NamedTuple):
+class _PhotonSets(NamedTuple):
     """Photons of all paths so far, by how they came about."""
 
-    anywhere: list[Photons]
-    at_contacts: list[Photons]
-    in_mirrors: list[Photons]
+    diffuse: list[Photons]
+    contact: list[Photons]
+    mirror: list[Photons]
 
 
 def shoot_photons(
-    scene: Scene, geometry: Geometry, views: Sequence[str], size: tuple[int, int], num_photons: int
+    scene: Scene, geometry: SceneBuffers, views: Sequence[str], size: tuple[int, int], num_photons: int
 ) -> Photons:
     """Shoot photons; they are seeded by the scene's id.
 
@@ -90,91 +90,103 @@ def shoot_photons(
     """
     rng = np.random.default_rng(int(scene.id, 16))
     cameras = [camera for camera in scene.cameras if camera.name in views]
-    num_paths = max(256, _PATHS_A_PASS // len(cameras))
-    shines = np.array([not all(map(is_diffuse, material.terms)) for material in scene.materials])
-    found, num_short = _Found([], [], []), int(_CONTACT_SHARE * num_photons)
-    for done in range(1, _MOST_PASSES + 1):
+    num_paths = max(256, _PATHS_PER_PASS // len(cameras))
+    is_glossy = np.array([not all(map(scatters_diffusely, material.terms)) for material in scene.materials])
+    photon_sets, max_contact = _PhotonSets([], [], []), int(_MAX_CONTACT_FRACTION * num_photons)
+    for num_passes in range(1, _MAX_PASSES + 1):
         for camera in cameras:
-            _walk(geometry, camera, size, num_paths, num_short, shines, rng, found)
-        num_found = [sum(len(photons.directions) for photons in kind) for kind in found]
-        if num_found[0] >= num_photons or (done >= _FEWEST_PASSES and not any(num_found)):
+            _trace_paths(geometry, camera, size, num_paths, max_contact, is_glossy, rng, photon_sets)
+        counts = [sum(len(photons.directions) for photons in batches) for batches in photon_sets]
+        if counts[0] >= num_photons or (num_passes >= _MIN_PASSES and not any(counts)):
             break
-    short = _some(found.at_contacts, num_short, rng)
-    mirrored = _some(found.in_mirrors, int(_MIRROR_SHARE * num_photons), rng)
-    num_others = num_photons - len(short.directions) - len(mirrored.directions)
-    return _joined([short, mirrored, _some(found.anywhere, num_others, rng)])
+    contact_photons = _random_subset(photon_sets.contact, max_contact, rng)
+    mirror_photons = _random_subset(photon_sets.mirror, int(_MAX_MIRROR_FRACTION * num_photons), rng)
+    num_diffuse = num_photons - len(contact_photons.directions) - len(mirror_photons.directions)
+    return _concatenate([contact_photons, mirror_photons, _random_subset(photon_sets.diffuse, num_diffuse, rng)])
 
 
-def _joined(parts: Sequence[Photons]) -> Photons:
+def _concatenate(batches: Sequence[Photons]) -> Photons:
     """Join photons in their order."""
-    directions, width = (np.concatenate([getattr(p, name) for p in parts]) for name in ("directions", "width"))
-    return Photons(Hits.joined([p.hits for p in parts]), directions, width)
+    directions, width = (
+        np.concatenate([getattr(batch, name) for batch in batches]) for name in ("directions", "width")
+    )
+    return Photons(Hits.concatenate([batch.hits for batch in batches]), directions, width)
 
 
-def _some(parts: Sequence[Photons], count: int, rng: np.random.Generator) -> Photons:
+def _random_subset(batches: Sequence[Photons], count: int, rng: np.random.Generator) -> Photons:
     """Choose a random subset of so many, its order kept."""
-    all_of_them = _joined(parts)
-    return all_of_them.rows(np.sort(rng.permutation(len(all_of_them.directions))[:count]))
+    photons = _concatenate(batches)
+    return photons.rows(np.sort(rng.permutation(len(photons.directions))[:count]))
 
 
-def _walk(
-    geometry: Geometry,
+def _trace_paths(
+    geometry: SceneBuffers,
     camera: Camera,
     size: tuple[int, int],
     num_paths: int,
-    num_short: int,
-    shines: NDArray[np.bool_],
+    max_contact: int,
+    is_glossy: NDArray[np.bool_],
     rng: np.random.Generator,
-    found: _Found,
+    photon_sets: _PhotonSets,
 ) -> None:
-    """Follow paths through random positions of a picture; add what they hit, at most `num_short` of it after short
+    """Follow paths through random positions of a picture; add what they hit, at most `max_contact` of it after short
     flights. shines: whether each material does"""
     width, height = size
     x, y = rng.random((2, num_paths), np.float32) * np.array([[width], [height]], np.float32)
-    hits, directions = _hits(geometry, camera.to_world[:3, 3].astype(np.float32), camera_directions(camera, size, x, y))
+    hits, directions = _trace_hits(
+        geometry, camera.to_world[:3, 3].astype(np.float32), camera_directions(camera, size, x, y)
+    )
     surface = surface_at(geometry, hits, directions)
-    pixel = np.float32(2 * math.tan(camera.yfov / 2) / height)
-    reach = _CONTACT_PIXELS * pixel * hits.distance
-    found.at_contacts.append(_some(_split(geometry, surface.points, reach, rng), num_short, rng))
-    is_mirror = shines[geometry.face_material[hits.face]]
-    found.in_mirrors.append(_mirrored(geometry, surface.points.rows(is_mirror), directions[is_mirror], rng))
+    pixel_angle = np.float32(2 * math.tan(camera.yfov / 2) / height)
+    reach = _CONTACT_PIXELS * pixel_angle * hits.distance
+    photon_sets.contact.append(
+        _random_subset(_shoot_short_paths(geometry, surface.points, reach, rng), max_contact, rng)
+    )
+    is_mirror = is_glossy[geometry.face_material[hits.face]]
+    photon_sets.mirror.append(_shoot_mirror_lobes(geometry, surface.points.rows(is_mirror), directions[is_mirror], rng))
     for _ in range(_BOUNCES):
-        hits, directions = _hits(geometry, surface.points.position, lobe_directions(surface.points.normal, 1.0, rng))
-        found.anywhere.append(Photons.of_lobe(hits, directions, 1.0))
+        hits, directions = _trace_hits(
+            geometry, surface.points.position, lobe_directions(surface.points.normal, 1.0, rng)
+        )
+        photon_sets.diffuse.append(Photons.from_lobe(hits, directions, 1.0))
         surface = surface_at(geometry, hits, directions)
 
 
-def _hits(geometry: Geometry, origin: F32, directions: F32) -> tuple[Hits, F32]:
+def _trace_hits(geometry: SceneBuffers, origin: F32, directions: F32) -> tuple[Hits, F32]:
     """Find the hits of the rays that hit anything, and these rays' directions."""
-    hits = trace_from(geometry.embree, origin, directions)
+    hits = trace_rays(geometry.embree, origin, directions)
     is_hit = hits.face >= 0
     return hits.rows(is_hit), directions[is_hit]
 
 
-def _mirrored(geometry: Geometry, points: Points, directions: F32, rng: np.random.Generator) -> Photons:
+def _shoot_mirror_lobes(
+    geometry: SceneBuffers, points: SurfacePoints, directions: F32, rng: np.random.Generator
+) -> Photons:
     """Find what points seen along directions reflect, about the mirror direction: eq. (16), Nguyen 2010."""
-    position, normal = (np.repeat(a, _MIRRORED, axis=0) for a in (points.position, points.normal))
-    directions = np.repeat(directions, _MIRRORED, axis=0)
-    mirrored = directions - 2 * np.einsum("nc,nc->n", directions, normal)[:, None] * normal
-    leaving = lobe_directions(mirrored, _LOBE, rng)
-    is_above = np.einsum("nc,nc->n", leaving, normal) > 0
-    return Photons.of_lobe(*_hits(geometry, position[is_above], leaving[is_above]), _LOBE)
+    position, normal = (np.repeat(a, _MIRROR_RAYS_PER_POINT, axis=0) for a in (points.position, points.normal))
+    directions = np.repeat(directions, _MIRROR_RAYS_PER_POINT, axis=0)
+    mirror_directions = directions - 2 * np.einsum("nc,nc->n", directions, normal)[:, None] * normal
+    lobe_rays = lobe_directions(mirror_directions, _LOBE_EXPONENT, rng)
+    is_above = np.einsum("nc,nc->n", lobe_rays, normal) > 0
+    return Photons.from_lobe(*_trace_hits(geometry, position[is_above], lobe_rays[is_above]), _LOBE_EXPONENT)
 
 
-def _split(geometry: Geometry, points: Points, reach: F32, rng: np.random.Generator) -> list[Photons]:
+def _shoot_short_paths(
+    geometry: SceneBuffers, points: SurfacePoints, reach: F32, rng: np.random.Generator
+) -> list[Photons]:
     """Shoot photons of short flights from points, many from those that have any. reach: what is short, metres. (n,)"""
-    position, normal, found = points.position, points.normal, []
-    for split in range(_SPLITS + 1):
+    position, normal, photons = points.position, points.normal, []
+    for round_index in range(_NUM_SPLITS + 1):
         directions = lobe_directions(normal, 1.0, rng)
-        hits = trace_from(geometry.embree, position, directions)
+        hits = trace_rays(geometry.embree, position, directions)
         is_short = (hits.face >= 0) & (hits.distance < reach)
-        if split > 0:
-            found.append(Photons.of_lobe(hits, directions, 1.0).rows(is_short))
+        if round_index > 0:
+            photons.append(Photons.from_lobe(hits, directions, 1.0).rows(is_short))
             reach = reach * np.float32(0.25)
             is_short &= hits.distance < reach
-        divided = np.sort(rng.permutation(np.flatnonzero(is_short))[:_MOST_SPLIT])
-        position, normal, reach = (np.repeat(a[divided], _SPLIT, axis=0) for a in (position, normal, reach))
-    return found
+        split_rows = np.sort(rng.permutation(np.flatnonzero(is_short))[:_MAX_SPLIT_PATHS])
+        position, normal, reach = (np.repeat(a[split_rows], _SPLIT_FACTOR, axis=0) for a in (position, normal, reach))
+    return photons
 
 
 def lobe_directions(axis: F32, exponent: float, rng: np.random.Generator) -> F32:

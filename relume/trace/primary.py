@@ -11,15 +11,25 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_ranges, for_shares, num_threads
+from relume.parallel import for_ranges, num_threads, parallel_for_chunks
 from relume.scene.model import Camera
 from relume.trace.embree import EmbreeScene, intersect, packet_arguments
-from relume.trace.packet import LANES, aim, ask_first, hit_of, new_packet, set_origin, take_chance, trace_hits, uv_of
+from relume.trace.packet import (
+    LANES,
+    enable_first_lanes,
+    enable_stochastic_alpha,
+    get_hit,
+    get_uv,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_hits,
+)
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
-_RAYS_A_RANGE, _RANGES_A_THREAD = 8192, 4  # at least; at most: to hand a range out takes as long as 700 rays
+_RAYS_PER_RANGE, _RANGES_PER_THREAD = 8192, 4  # at least; at most: to hand a range out takes as long as 700 rays
 _BY_DIRECTION = np.float32(0)  # the chance of rays that are given none
 
 
@@ -42,54 +52,56 @@ class Hits:
         return Hits(self.face[rows], self.uv[rows], self.distance[rows])
 
     @staticmethod
-    def joined(parts: Sequence[Hits]) -> Hits:
+    def concatenate(batches: Sequence[Hits]) -> Hits:
         """Those of several, one after another."""
-        return Hits(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Hits)))
+        return Hits(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Hits)))
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(intersect, scene, arguments, origins, directions, chance, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
+def _trace(intersect, scene, arguments, origins, directions, alpha_sample, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
     """Trace rays [start, stop). origins, chance: of n rays, or one of all."""
-    last_origin, last_chance = origins.shape[0] - 1, chance.shape[0] - 1
+    last_origin, last_alpha_sample = origins.shape[0] - 1, alpha_sample.shape[0] - 1
     packet = new_packet(scene, arguments)
     for k in range(LANES):  # Embree leaves origins as they are
         set_origin(packet, k, origins[0, 0], origins[0, 1], origins[0, 2])
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
-        ask_first(packet, width)
+        enable_first_lanes(packet, width)
         for k in range(LANES):
             r = first + min(k, width - 1)
             if last_origin > 0:
                 set_origin(packet, k, origins[r, 0], origins[r, 1], origins[r, 2])
-            aim(packet, k, directions[r, 0], directions[r, 1], directions[r, 2], np.float32(np.inf))
-            take_chance(packet, k, chance[min(r, last_chance)])
+            set_direction(packet, k, directions[r, 0], directions[r, 1], directions[r, 2], np.float32(np.inf))
+            enable_stochastic_alpha(packet, k, alpha_sample[min(r, last_alpha_sample)])
         trace_hits(intersect, packet)
         for k in range(width):
             r = first + k
-            face[r], distance[r] = hit_of(packet, k)
+            face[r], distance[r] = get_hit(packet, k)
             if face[r] >= 0:  # else there are those of a ray before
-                uv[r, 0], uv[r, 1] = uv_of(packet, k)
+                uv[r, 0], uv[r, 1] = get_uv(packet, k)
 
 
-def trace_from(scene: EmbreeScene, origin: F32, directions: F32, chance: F32 | np.float32 = _BY_DIRECTION) -> Hits:
+def trace_rays(
+    scene: EmbreeScene, origin: F32, directions: F32, alpha_sample: F32 | np.float32 = _BY_DIRECTION
+) -> Hits:
     """Find the first hits of rays from one point, or from a point each.
 
     Args:
         scene: the triangles. origin: (3,) float32, or (n, 3). directions: unit. (n, 3) float32
-        chance: of each ray at surfaces that blend, within (0, 1], or one of all. (n,) float32
+        alpha_sample: of each ray at surfaces that blend, within (0, 1], or one of all. (n,) float32
     """
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
-    is_coherent, chances = len(origins) == 1, np.atleast_1d(chance)
+    is_coherent, alpha_samples = len(origins) == 1, np.atleast_1d(alpha_sample)
     hits = Hits(np.empty(n, np.int32), np.zeros((n, 2), np.float32), np.empty(n, np.float32))
     arguments = packet_arguments(is_coherent)
     for_ranges(
         lambda start, stop: _trace(
-            intersect, scene.handle, arguments.ctypes.data, origins, directions, chances, start, stop,
+            intersect, scene.handle, arguments.ctypes.data, origins, directions, alpha_samples, start, stop,
             hits.face, hits.uv, hits.distance,
         ),
         n,
-        max(_RAYS_A_RANGE, n // (_RANGES_A_THREAD * num_threads())),
+        max(_RAYS_PER_RANGE, n // (_RANGES_PER_THREAD * num_threads())),
     )  # fmt: skip
     return hits
 
@@ -104,10 +116,16 @@ def camera_directions(camera: Camera, size: tuple[int, int], x: F32, y: F32) -> 
         (n, 3) float32
     """
     width, height = size
-    half = np.tan(camera.yfov / 2)
+    half_height = np.tan(camera.yfov / 2)
     out = np.empty((len(x), 3), np.float32)
-    of_camera = np.ascontiguousarray(camera.to_world[:3, :3], np.float64), half * width / height, half, width, height
-    for_shares(lambda start, stop: _aim(*of_camera, x, y, start, stop, out), len(x))
+    camera_arguments = (
+        np.ascontiguousarray(camera.to_world[:3, :3], np.float64),
+        half_height * width / height,
+        half_height,
+        width,
+        height,
+    )
+    parallel_for_chunks(lambda start, stop: _aim(*camera_arguments, x, y, start, stop, out), len(x))
     return out
 
 

@@ -10,24 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_ranges
-from relume.points import Points
+from relume.points import SurfacePoints
 from relume.scene.model import Material
-from relume.scene.roughness import widened, widening_base
-from relume.trace.geometry import Geometry
-from relume.trace.leaning import covered_length, mapped_normal, towards_viewer
-from relume.trace.on_faces import OnFaces
+from relume.scene.roughness import base_roughness, rougher
+from relume.trace.geometry import SceneBuffers
+from relume.trace.leaning import flip_to_viewer, mapped_normal, visible_length
+from relume.trace.on_faces import FacePoints
 from relume.trace.primary import Hits
-from relume.trace.tangents import across
+from relume.trace.tangents import project_to_tangent
 from relume.trace.texture import MipMap
 
 F32 = NDArray[np.float32]
 
-_IMAGES = ("diffuse", "specular", "emission")
-_RAYS_A_RANGE = 16_384
+_TEXTURE_NAMES = ("diffuse", "specular", "emission")
+_RAYS_PER_RANGE = 16_384
 
 
 @dataclass(frozen=True)
-class Surface:
+class SurfaceInteraction:
     """What n rays see: points of surfaces, and the textures there.
 
     Attributes:
@@ -43,7 +43,7 @@ class Surface:
             (n, 3) float32
     """
 
-    points: Points
+    points: SurfacePoints
     diffuse: F32
     specular: F32
     uv: F32
@@ -52,23 +52,23 @@ class Surface:
     emission: F32
     surface_normal: F32
 
-    def rows(self, chosen: NDArray[np.integer]) -> Surface:
+    def rows(self, rows: NDArray[np.integer]) -> SurfaceInteraction:
         """Choose some of them; their seeds are their new numbers."""
-        points = self.points.rows(chosen)._replace(seed=np.arange(len(chosen), dtype=np.uint32))
-        of_surface = (
+        points = self.points.rows(rows)._replace(seed=np.arange(len(rows), dtype=np.uint32))
+        surface_columns = (
             self.diffuse, self.specular, self.uv, self.roughness, self.normal_length, self.emission,
             self.surface_normal,
         )  # fmt: skip
-        return Surface(points, *(each[chosen] for each in of_surface))
+        return SurfaceInteraction(points, *(column[rows] for column in surface_columns))
 
 
 def surface_at(
-    geometry: Geometry,
+    geometry: SceneBuffers,
     hits: Hits,
     directions: F32,
     materials: Sequence[Material] = (),
     pixel_angle: float = 0.0,
-) -> Surface:
+) -> SurfaceInteraction:
     """Interpolate the surface at ray hits.
 
     Args:
@@ -79,17 +79,17 @@ def surface_at(
     Returns:
         Points; where a ray hit nothing the normal faces the viewer and the position is the ray's direction.
     """
-    parts: dict[int, tuple[F32, ...]] = {}
+    ranges: dict[int, tuple[F32, ...]] = {}
 
     def interpolate(start: int, stop: int) -> None:
-        some = slice(start, stop)
-        parts[start] = _surface_at(geometry, hits.rows(some), directions[start:stop], materials, pixel_angle)
+        rows = slice(start, stop)
+        ranges[start] = _interpolate_range(geometry, hits.rows(rows), directions[start:stop], materials, pixel_angle)
 
-    for_ranges(interpolate, max(1, len(directions)), _RAYS_A_RANGE)
-    columns = zip(*(parts[start] for start in sorted(parts)), strict=True)
-    position, normal, tangent, *of_surface = map(np.concatenate, columns)
+    for_ranges(interpolate, max(1, len(directions)), _RAYS_PER_RANGE)
+    columns = zip(*(ranges[start] for start in sorted(ranges)), strict=True)
+    position, normal, tangent, *surface_columns = map(np.concatenate, columns)
     seed = np.arange(len(directions), dtype=np.uint32)
-    return Surface(Points(position, normal, tangent, seed), *of_surface)
+    return SurfaceInteraction(SurfacePoints(position, normal, tangent, seed), *surface_columns)
 
 
 class _Textured(NamedTuple):
@@ -105,65 +105,78 @@ class _Textured(NamedTuple):
     normal: F32
 
     @classmethod
-    def of(cls, on: OnFaces, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32) -> _Textured:
+    def sample(
+        cls, face_points: FacePoints, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32
+    ) -> _Textured:
         """Those of points. material: that each is of, −1 for none. (n,) footprint: of a pixel in textures. (n,)"""
-        channels = dict(zip(_IMAGES, np.ones((3, *on.position.shape), np.float32), strict=True))
-        channels["roughness"] = np.ones((len(on.uv), 1), np.float32)
-        length, normal = np.ones(len(on.uv), np.float32), on.normal
-        for index, m in enumerate(materials):
+        channels = dict(zip(_TEXTURE_NAMES, np.ones((3, *face_points.position.shape), np.float32), strict=True))
+        channels["roughness"] = np.ones((len(face_points.uv), 1), np.float32)
+        length, normal = np.ones(len(face_points.uv), np.float32), face_points.normal
+        for index, scene_material in enumerate(materials):
             rows = np.nonzero(material == index)[0]
             if not len(rows):
                 continue
             for name, out in channels.items():
-                if name in m.textures:
-                    out[rows] = MipMap.of(m.textures[name]).sample(on.uv[rows], footprint[rows])
-            if m.normal_map is not None:
-                pyramid = MipMap.of(m.normal_map)
-                mapped = pyramid.sample(on.uv[rows], footprint[rows])
-                length[rows] = covered_length(mapped, pyramid.texels(footprint[rows]))
-                if (own := widening_base(m)) is not None:
-                    channels["roughness"][rows, 0] = widened(channels["roughness"][rows, 0], length[rows], own)
-                normal = normal.copy() if normal is on.normal else normal
-                normal[rows] = mapped_normal(mapped, normal[rows], on.tangents[rows], on.face_normal[rows])
+                if name in scene_material.textures:
+                    out[rows] = MipMap.for_texture(scene_material.textures[name]).sample(
+                        face_points.uv[rows], footprint[rows]
+                    )
+            if scene_material.normal_map is not None:
+                pyramid = MipMap.for_texture(scene_material.normal_map)
+                mapped = pyramid.sample(face_points.uv[rows], footprint[rows])
+                length[rows] = visible_length(mapped, pyramid.texels(footprint[rows]))
+                if (material_roughness := base_roughness(scene_material)) is not None:
+                    channels["roughness"][rows, 0] = rougher(
+                        channels["roughness"][rows, 0], length[rows], material_roughness
+                    )
+                normal = normal.copy() if normal is face_points.normal else normal
+                normal[rows] = mapped_normal(
+                    mapped, normal[rows], face_points.tangents[rows], face_points.face_normal[rows]
+                )
         return cls(channels, length, normal)
 
 
-def _surface_at(
-    geometry: Geometry,
+def _interpolate_range(
+    geometry: SceneBuffers,
     hits: Hits,
     directions: F32,
     materials: Sequence[Material],
     pixel_angle: float,
 ) -> tuple[F32, ...]:
     """Interpolate a range of `surface_at`: position, normal, tangent, and the others of `Surface` in their order."""
-    on = OnFaces.of(geometry, hits, directions)
-    hit, distance = on.hit, np.where(on.hit, hits.distance, 1.0)
-    footprint = on.footprint(distance, directions, pixel_angle) if materials else np.zeros(len(hit), np.float32)
-    material = np.where(hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
-    channels, length, leant = _Textured.of(on, materials, material, footprint)
-    normal = towards_viewer(leant, directions)
-    tangent = across(on.tangents[:, :3], normal)
-    place = _in_texture(on.p, on.uvs, on.uv, normal, tangent)
-    place[:, 2] = footprint
-    is_flat = place[:, 4] == 0
-    if is_flat.any():
-        of_flat = (each[is_flat] for each in (on.position, on.face_normal, normal, tangent, distance * pixel_angle))
-        place[is_flat] = _projected(*of_flat)
+    face_points = FacePoints.from_hits(geometry, hits, directions)
+    is_hit, distance = face_points.is_hit, np.where(face_points.is_hit, hits.distance, 1.0)
+    footprint = (
+        face_points.footprint(distance, directions, pixel_angle) if materials else np.zeros(len(is_hit), np.float32)
+    )
+    material = np.where(is_hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
+    channels, length, mapped = _Textured.sample(face_points, materials, material, footprint)
+    normal = flip_to_viewer(mapped, directions)
+    tangent = project_to_tangent(face_points.tangents[:, :3], normal)
+    uv_frame = _texture_frame(face_points.p, face_points.uvs, face_points.uv, normal, tangent)
+    uv_frame[:, 2] = footprint
+    lacks_uv = uv_frame[:, 4] == 0
+    if lacks_uv.any():
+        flat_columns = (
+            column[lacks_uv]
+            for column in (face_points.position, face_points.face_normal, normal, tangent, distance * pixel_angle)
+        )
+        uv_frame[lacks_uv] = _triplanar_frame(*flat_columns)
     return (
-        np.where(hit[:, None], on.position, directions).astype(np.float32),
-        np.where(hit[:, None], normal, -directions).astype(np.float32),
+        np.where(is_hit[:, None], face_points.position, directions).astype(np.float32),
+        np.where(is_hit[:, None], normal, -directions).astype(np.float32),
         tangent,
         channels["diffuse"],
         channels["specular"],
-        place.astype(np.float32),
+        uv_frame.astype(np.float32),
         channels["roughness"][:, 0],
         length,
         channels["emission"],
-        on.normal.astype(np.float32, copy=False),
+        face_points.normal.astype(np.float32, copy=False),
     )
 
 
-def _in_texture(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
+def _texture_frame(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
     """Where points lie in textures, but for the footprint, and how textures lie there; see `Surface.uv`.
 
     Args:
@@ -172,18 +185,18 @@ def _in_texture(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
     Returns:
         (n, 5); the last is 0 where a triangle has no area in textures.
     """
-    e, d = p[:, 1:] - p[:, :1], uvs[:, 1:] - uvs[:, :1]
-    area = d[:, 0, 0] * d[:, 1, 1] - d[:, 1, 0] * d[:, 0, 1]
+    position_edges, uv_edges = p[:, 1:] - p[:, :1], uvs[:, 1:] - uvs[:, :1]
+    area = uv_edges[:, 0, 0] * uv_edges[:, 1, 1] - uv_edges[:, 1, 0] * uv_edges[:, 0, 1]
     sign = np.sign(area)[:, None]
-    along_u = sign * (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:])
-    along_v = sign * (e[:, 1] * d[:, 0, :1] - e[:, 0] * d[:, 1, :1])
+    along_u = sign * (position_edges[:, 0] * uv_edges[:, 1, 1:] - position_edges[:, 1] * uv_edges[:, 0, 1:])
+    along_v = sign * (position_edges[:, 1] * uv_edges[:, 0, :1] - position_edges[:, 0] * uv_edges[:, 1, :1])
     x, y = np.einsum("nc,nc->n", along_u, tangent), np.einsum("nc,nc->n", along_u, np.cross(normal, tangent))
     is_upright = np.einsum("nc,nc->n", np.cross(normal, along_u), along_v) < 0  # v runs down
-    turn, none = np.arctan2(y, x), np.zeros(len(uv))
-    return np.asarray(np.column_stack([uv, none, turn, np.where(area == 0, 0, np.where(is_upright, 1, -1))]))
+    angle, zeros = np.arctan2(y, x), np.zeros(len(uv))
+    return np.asarray(np.column_stack([uv, zeros, angle, np.where(area == 0, 0, np.where(is_upright, 1, -1))]))
 
 
-def projected_axes(face_normal: F32) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def triplanar_axes(face_normal: F32) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Axes of a texture that is projected along the axis of the world that faces look along most.
 
     Args:
@@ -193,18 +206,18 @@ def projected_axes(face_normal: F32) -> tuple[NDArray[np.float64], NDArray[np.fl
     """
     axis = np.abs(face_normal).argmax(axis=1)
     sign = np.where(np.take_along_axis(face_normal, axis[:, None], 1)[:, 0] < 0, -1, 1)
-    across = np.eye(3)[np.array([2, 0, 0])[axis]] * np.where(axis == 1, 1, np.where(axis == 0, -sign, sign))[:, None]
-    return across, np.cross(sign[:, None] * np.eye(3)[axis], across)
+    u_axis = np.eye(3)[np.array([2, 0, 0])[axis]] * np.where(axis == 1, 1, np.where(axis == 0, -sign, sign))[:, None]
+    return u_axis, np.cross(sign[:, None] * np.eye(3)[axis], u_axis)
 
 
-def _projected(position: F32, face_normal: F32, normal: F32, tangent: F32, side: F32) -> F32:
+def _triplanar_frame(position: F32, face_normal: F32, normal: F32, tangent: F32, side: F32) -> F32:
     """Places of a texture that is projected along the axes of the world, a metre wide; see `Surface.uv`.
 
     Args:
         position, face_normal, normal, tangent: of n points. (n, 3) each. side: of a pixel there, metres. (n,)
     """
-    across, up = projected_axes(face_normal)
-    u, v = np.einsum("nc,nc->n", position, across), -np.einsum("nc,nc->n", position, up)
-    x = np.einsum("nc,nc->n", across, tangent)
-    y = np.einsum("nc,nc->n", across, np.cross(normal, tangent))
+    u_axis, v_axis = triplanar_axes(face_normal)
+    u, v = np.einsum("nc,nc->n", position, u_axis), -np.einsum("nc,nc->n", position, v_axis)
+    x = np.einsum("nc,nc->n", u_axis, tangent)
+    y = np.einsum("nc,nc->n", u_axis, np.cross(normal, tangent))
     return np.asarray(np.column_stack([u, v, side, np.arctan2(y, x), np.ones(len(u))]))

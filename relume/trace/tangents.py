@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 F32 = NDArray[np.float32]
 
 
-def unit(v: F32, otherwise: F32) -> F32:
+def unit(v: F32, fallback: F32) -> F32:
     """Scale vectors (n, 3) to length one; where they have none, take another."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.where(length > 1e-12, v / np.maximum(length, 1e-12), otherwise).astype(np.float32)
+    return np.where(length > 1e-12, v / np.maximum(length, 1e-12), fallback).astype(np.float32)
 
 
 def any_tangent(normal: F32) -> F32:
@@ -22,13 +22,13 @@ def any_tangent(normal: F32) -> F32:
     return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=-1).astype(np.float32)
 
 
-def across(vector: F32, normal: F32) -> F32:
+def project_to_tangent(vector: F32, normal: F32) -> F32:
     """Take the part of vectors (n, 3) across normals (n, 3), unit; any direction across where there is none."""
-    part = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
-    return unit(part, any_tangent(normal))
+    tangential = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
+    return unit(tangential, any_tangent(normal))
 
 
-def turn_between(normal: F32, start: F32, end: F32) -> F32:
+def rotation_between(normal: F32, start: F32, end: F32) -> F32:
     """Find the angles from some vectors to others about normals, radians.
 
     Args:

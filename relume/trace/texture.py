@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.parallel import for_ranges
-from relume.scene.coding import ROWS_AT_ONCE, decode, wrapped
+from relume.scene.coding import ROWS_PER_BATCH, decode, periodic
 from relume.scene.model import WRAPS, Texture
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
-_LOOKUPS_A_RANGE = 16_384
+_LOOKUPS_PER_RANGE = 16_384
 _REPEAT, _, _CLAMP = range(len(WRAPS))  # as kernels know them
 
 
@@ -25,25 +25,26 @@ class MipMap:
     """A texture and its halvings down to one texel; these are kept in half precision."""
 
     def __init__(self, texture: Texture) -> None:
-        self.wrap, self.coding = texture.wrap, texture.coding
+        self.wrap, self.coding = texture.wrap, texture.encoding
         self.levels: list[NDArray[Any]] = [texture.pixels]
         while max(self.levels[-1].shape[:2]) > 1:
-            self.levels.append(self._halved(len(self.levels) - 1))
+            self.levels.append(self._downsample(len(self.levels) - 1))
 
     def level(self, k: int) -> F32:
         """The values of a level. (height, width, channels) float32"""
         return decode(self.levels[k], self.coding if k == 0 else None)
 
-    def _halved(self, k: int) -> NDArray[np.float16]:
+    def _downsample(self, k: int) -> NDArray[np.float16]:
         """The level after level k, made a few rows at a time."""
         image, coding = self.levels[k], self.coding if k == 0 else None
-        parts = [
-            _halve(decode(image[start : start + ROWS_AT_ONCE], coding)) for start in range(0, len(image), ROWS_AT_ONCE)
+        strips = [
+            _halve(decode(image[start : start + ROWS_PER_BATCH], coding))
+            for start in range(0, len(image), ROWS_PER_BATCH)
         ]
-        return np.concatenate([part.astype(np.float16) for part in parts])
+        return np.concatenate([strip.astype(np.float16) for strip in strips])
 
     @staticmethod
-    def of(texture: Texture) -> MipMap:
+    def for_texture(texture: Texture) -> MipMap:
         """Find or make the pyramid of a texture, kept for as long as the texture is."""
         key = id(texture)
         if key not in _pyramids:
@@ -68,9 +69,9 @@ class MipMap:
         lower = np.floor(level).astype(np.int64)
         out = np.zeros((len(uv), self.levels[0].shape[2]), np.float32)
         for k in np.unique(np.concatenate([lower, np.minimum(lower + 1, len(self.levels) - 1)])):
-            share = np.maximum(1 - np.abs(level - k), 0)
-            rows = np.nonzero(share > 0)[0]
-            out[rows] += (share[rows, None] * self._bilinear(int(k), uv[rows])).astype(np.float32)
+            weight = np.maximum(1 - np.abs(level - k), 0)
+            rows = np.nonzero(weight > 0)[0]
+            out[rows] += (weight[rows, None] * self._bilinear(int(k), uv[rows])).astype(np.float32)
         return out
 
     def _bilinear(self, k: int, uv: F32) -> F32:
@@ -80,10 +81,10 @@ class MipMap:
         y = uv[:, 1].astype(np.float64) * height - 0.5
         x0, y0 = np.floor(x), np.floor(y)
         fx, fy = (x - x0)[:, None], (y - y0)[:, None]
-        columns = [wrapped(x0 + dx, width, self.wrap[0]) for dx in (0, 1)]
-        rows = [wrapped(y0 + dy, height, self.wrap[1]) for dy in (0, 1)]
-        of = [[decode(image[row, column], coding) for column in columns] for row in rows]
-        top, bottom = (left * (1 - fx) + right * fx for left, right in of)
+        columns = [periodic(x0 + dx, width, self.wrap[0]) for dx in (0, 1)]
+        rows = [periodic(y0 + dy, height, self.wrap[1]) for dy in (0, 1)]
+        texel_rows = [[decode(image[row, column], coding) for column in columns] for row in rows]
+        top, bottom = (left * (1 - fx) + right * fx for left, right in texel_rows)
         return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
 
 
@@ -91,17 +92,17 @@ def sample_image(texture: Texture, uv: F32) -> F32:
     """Look a texture up at places, some at once on every thread.
 
     Args:
-        texture: any. uv: u, v, and the side of what a pixel covers there, as `relume.trace.surface.Surface` has them.
-            (n, ≥ 3) float32
+        texture: any. uv: u, v, and the side of what a pixel covers there, as `relume.trace.stored_scene.Surface` has
+            them. (n, ≥ 3) float32
     Returns:
         (n, channels) float32
     """
-    pyramid, out = MipMap.of(texture), np.empty((len(uv), texture.pixels.shape[2]), np.float32)
+    pyramid, out = MipMap.for_texture(texture), np.empty((len(uv), texture.pixels.shape[2]), np.float32)
 
-    def look_up(start: int, stop: int) -> None:
+    def sample_range(start: int, stop: int) -> None:
         out[start:stop] = pyramid.sample(uv[start:stop, :2], uv[start:stop, 2])
 
-    for_ranges(look_up, len(uv), _LOOKUPS_A_RANGE)
+    for_ranges(sample_range, len(uv), _LOOKUPS_PER_RANGE)
     return out
 
 
@@ -129,17 +130,23 @@ def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def two_texels(wrap, place, size):  # type: ignore[no-untyped-def]
+def two_texels(wrap, coordinate, size):  # type: ignore[no-untyped-def]
     """Find the two texels about a place along one side of an image, and the share of the second.
 
     wrap: of `WRAPS`. place: of the image's side. size: texels along it.
     """
     if wrap == _REPEAT:
-        place -= math.floor(place)  # so that what is outside is so by one texel at most, and nothing is divided
-    at = place * np.float32(size) - np.float32(0.5)
-    below = math.floor(at)
+        coordinate -= math.floor(
+            coordinate
+        )  # so that what is outside is so by one texel at most, and nothing is divided
+    texel_coordinate = coordinate * np.float32(size) - np.float32(0.5)
+    below = math.floor(texel_coordinate)
     first: Any = np.int64(below)
     second = first + 1
     if wrap == _REPEAT:
-        return first + size if first < 0 else first, second - size if second >= size else second, np.float32(at - below)
-    return _texel(wrap, first, size), _texel(wrap, second, size), np.float32(at - below)
+        return (
+            first + size if first < 0 else first,
+            second - size if second >= size else second,
+            np.float32(texel_coordinate - below),
+        )
+    return _texel(wrap, first, size), _texel(wrap, second, size), np.float32(texel_coordinate - below)

@@ -6,14 +6,16 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, num, replace, start, stop, radiance):  # type: ignore[no-untyped-def]
+def _add_term_planes(  # type: ignore[no-untyped-def]
+    image, color, texture, outgoing, has_texture, has_outgoing, first, num, replace, start, stop, radiance
+):
     """Add planes [start, stop) of one term, a plane being a channel of a tile, to radiance (3, samples of the view).
 
     first: the material's first sample in the view. num: of its samples.
@@ -21,10 +23,10 @@ def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, num,
     samples = image.shape[2]
     for plane in range(start, stop):
         tile, channel = plane // 3, plane % 3
-        begin = tile * samples
+        tile_start = tile * samples
         c = color[channel]
-        for s in range(min(samples, num - begin)):
-            row = begin + s
+        for s in range(min(samples, num - tile_start)):
+            row = tile_start + s
             value = c * image[tile, channel, s]
             if has_texture:
                 value *= texture[row, channel]
@@ -37,26 +39,26 @@ def _add(image, color, texture, outgoing, has_texture, has_outgoing, first, num,
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _add_even(arriving, factor, start, stop, image):  # type: ignore[no-untyped-def]
+def _add_diffuse(irradiance, factor, start, stop, image):  # type: ignore[no-untyped-def]
     """Add samples [start, stop) in all channels."""
     samples = image.shape[2]
     for tile in range(start // samples, (stop - 1) // samples + 1):
-        first = tile * samples
-        begin, end = max(start, first), min(stop, first + samples)
+        tile_start = tile * samples
+        range_start, range_stop = max(start, tile_start), min(stop, tile_start + samples)
         for channel in range(3):
-            for s in range(begin, end):
-                image[tile, channel, s - first] += factor[channel] * arriving[s]
+            for s in range(range_start, range_stop):
+                image[tile, channel, s - tile_start] += factor[channel] * irradiance[s]
 
 
-def add_even(arriving: F32, factor: NDArray[np.floating], image: F32) -> None:
+def add_diffuse(irradiance: F32, factor: NDArray[np.floating], image: F32) -> None:
     """Add light that a term scatters alike wherever it comes from and goes to.
 
     Args:
-        arriving: E of each sample, of a light of unit emission. (n,) float32
+        irradiance: E of each sample, of a light of unit emission. (n,) float32
         factor: what the term makes of it, per channel. (3,). image: added to. (tiles, 3, samples) float32
     """
-    args = (np.ascontiguousarray(arriving, np.float32), np.asarray(factor, np.float32).reshape(3))
-    for_shares(lambda start, stop: _add_even(*args, start, stop, image), len(arriving))
+    args = (np.ascontiguousarray(irradiance, np.float32), np.asarray(factor, np.float32).reshape(3))
+    parallel_for_chunks(lambda start, stop: _add_diffuse(*args, start, stop, image), len(irradiance))
 
 
 def add_term(
@@ -78,7 +80,17 @@ def add_term(
         first: the material's first sample in the view. num: of its samples. replace: overwrite instead of adding.
         radiance: (3, samples of the view) float32, written.
     """
-    factor = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
-    shown = texture if texture is not None else np.empty((0, 3), np.float32)
-    args = (image, color, shown, factor, texture is not None, outgoing is not None, first, num, replace)
-    for_shares(lambda start, stop: _add(*args, start, stop, radiance), 3 * len(image))
+    outgoing_values = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
+    texture_values = texture if texture is not None else np.empty((0, 3), np.float32)
+    args = (
+        image,
+        color,
+        texture_values,
+        outgoing_values,
+        texture is not None,
+        outgoing is not None,
+        first,
+        num,
+        replace,
+    )
+    parallel_for_chunks(lambda start, stop: _add_term_planes(*args, start, stop, radiance), 3 * len(image))

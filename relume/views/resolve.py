@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from relume.errors import ParameterError
 from relume.imageio.files import to_bytes
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 from relume.views.view import Tile, View
 
@@ -42,40 +42,40 @@ def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _resolve(radiance, gain, first, order, gains, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
+def _resolve_tiles(radiance, gain, first, order, throughput, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the samples of each pixel of tiles [start, stop) into out (pixels, 3)."""
-    middle, last = gains.shape[1] // 2, gains.shape[1] - 1  # columns of green and blue
+    green_column, blue_column = throughput.shape[1] // 2, throughput.shape[1] - 1  # columns of green and blue
     for t in range(start, stop):
         x0, y0, tile_width, tile_height = tiles[t, 0], tiles[t, 1], tiles[t, 2], tiles[t, 3]
-        at = offsets[t]
+        out_row = offsets[t]
         for y in range(y0, y0 + tile_height):
             for x in range(x0, x0 + tile_width):
                 p = y * width + x
                 red = green = blue = np.float32(0)
                 for k in range(first[p], first[p + 1]):
                     s = order[k]
-                    red += gains[k, 0] * radiance[0, s]
-                    green += gains[k, middle] * radiance[1, s]
-                    blue += gains[k, last] * radiance[2, s]
-                out[at, 0], out[at, 1], out[at, 2] = gain[0] * red, gain[1] * green, gain[2] * blue
-                at += 1
+                    red += throughput[k, 0] * radiance[0, s]
+                    green += throughput[k, green_column] * radiance[1, s]
+                    blue += throughput[k, blue_column] * radiance[2, s]
+                out[out_row, 0], out[out_row, 1], out[out_row, 2] = gain[0] * red, gain[1] * green, gain[2] * blue
+                out_row += 1
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
-def _pack(pixels, start, stop, out):  # type: ignore[no-untyped-def]
+def _pack_range(pixels, start, stop, out):  # type: ignore[no-untyped-def]
     """Pack pixels [start, stop) of (pixels, 3) into words (pixels,)."""
     for p in range(start, stop):
         out[p] = pack_rgb9e5(pixels[p, 0], pixels[p, 1], pixels[p, 2])
 
 
-def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike, gains: F32) -> F32:
+def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike, throughput: F32) -> F32:
     """Sum view samples to the pixels of tiles, one tile after another, row-major.
 
     Args:
         view: whose samples they are. tiles: which pixels are wanted.
         radiance: of every view sample. (3, samples) float32
         gain: multiplies each channel, as the environment's scale and colour do: a number or three.
-        gains: multiply the samples, in the view's order; `View.gains`, with those of what is seen in mirrors.
+        throughput: multiply the samples, in the view's order; `View.gains`, with those of what is seen in mirrors.
     Returns:
         (pixels, 3) float32
     """
@@ -84,20 +84,20 @@ def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike, g
     offsets = np.concatenate([[0], np.cumsum(sizes)])
     out = np.empty((int(offsets[-1]), 3), np.float32)
     factors = np.array(np.broadcast_to(np.asarray(gain, np.float32), 3))
-    args = (radiance, factors, view.first, view.order, gains, view.width, table, offsets)
-    for_shares(lambda start, stop: _resolve(*args, start, stop, out), len(table))
+    args = (radiance, factors, view.first, view.order, throughput, view.width, table, offsets)
+    parallel_for_chunks(lambda start, stop: _resolve_tiles(*args, start, stop, out), len(table))
     return out
 
 
-def encode(view: View, radiance: F32, tiles: Sequence[Tile], form: str, gain: ArrayLike, gains: F32) -> bytes:
+def encode(view: View, radiance: F32, tiles: Sequence[Tile], encoding: str, gain: ArrayLike, throughput: F32) -> bytes:
     """Encode pixels of tiles as a frame's payload.
 
     Args:
-        view, radiance, tiles, gain, gains: as in `resolve`. form: "rgb9e5" or "f32" (see docs/api.md).
+        view, radiance, tiles, gain, throughput: as in `resolve`. encoding: "rgb9e5" or "f32" (see docs/api.md).
     Raises:
         ParameterError: another format.
     """
-    return encode_pixels(resolve(view, radiance, tiles, gain, gains), form)
+    return encode_pixels(resolve(view, radiance, tiles, gain, throughput), encoding)
 
 
 def encode_coverage(alpha: F32, tiles: Sequence[Tile]) -> bytes:
@@ -105,23 +105,23 @@ def encode_coverage(alpha: F32, tiles: Sequence[Tile]) -> bytes:
     return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
 
 
-def encode_pixels(pixels: F32, form: str) -> bytes:
+def encode_pixels(pixels: F32, encoding: str) -> bytes:
     """Encode pixels as a frame's payload.
 
     Args:
-        pixels: radiance. (n, 3) float32. form: "rgb9e5" or "f32" (see docs/api.md).
+        pixels: radiance. (n, 3) float32. encoding: "rgb9e5" or "f32" (see docs/api.md).
     Raises:
         ParameterError: another format.
     """
-    if form == "f32":
+    if encoding == "f32":
         return pixels.tobytes()
-    if form != "rgb9e5":
-        raise ParameterError("format", form, "'rgb9e5' or 'f32'")
-    return packed(pixels).tobytes()
+    if encoding != "rgb9e5":
+        raise ParameterError("format", encoding, "'rgb9e5' or 'f32'")
+    return pack_pixels(pixels).tobytes()
 
 
-def packed(pixels: F32) -> NDArray[np.uint32]:
+def pack_pixels(pixels: F32) -> NDArray[np.uint32]:
     """Pack pixels as RGB9_E5. pixels: radiance. (n, 3) float32"""
     out = np.empty(len(pixels), np.uint32)
-    for_shares(lambda start, stop: _pack(pixels, start, stop, out), len(pixels))
+    parallel_for_chunks(lambda start, stop: _pack_range(pixels, start, stop, out), len(pixels))
     return out

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from relume.bake import StoreReader
 from relume.errors import ChunkDamagedError, SceneError, StoreError
-from relume.light.gather_rays import Pattern, make_pattern
-from relume.points import ALIKE, Points
+from relume.light.gather_rays import RayPattern, make_pattern
+from relume.points import FIXED_ALPHA_SAMPLE, SurfacePoints
 from relume.project.receivers import GatherRays
-from relume.project.sent import Sent
+from relume.project.sent import OutgoingLight
 from relume.scene.checks import check_camera
 from relume.scene.model import Camera
 
@@ -21,50 +21,52 @@ F32 = NDArray[np.float32]
 
 
 @runtime_checkable
-class SomeReader(Protocol):
+class TransferReader(Protocol):
     """A store that is asked for rows that do not lie together."""
 
-    def read_some(self, path: str, rows: NDArray[np.int64]) -> NDArray[Any]:
+    def read_rows(self, path: str, rows: NDArray[np.int64]) -> NDArray[Any]:
         """Some rows of an array. path: of the array. rows: in any order"""
         ...
 
 
 @runtime_checkable
-class Tracing(Protocol):
+class RayTracing(Protocol):
     """A store whose gather rays may have to be traced."""
 
-    def trace_links(self, first: int, cancelled: Callable[[], bool]) -> None:
-        """Those of a material. first: row of its first sample. cancelled: asked now and then"""
+    def trace_gather_rays(self, first: int, is_canceled: Callable[[], bool]) -> None:
+        """Those of a material. first: row of its first sample. is_canceled: asked now and then"""
         ...
 
 
 def read_camera(store: StoreReader, k: int) -> Camera:
     """Read the camera of the k-th view. Raises StoreError where there is no usable one."""
     try:
-        found = store.attributes["views"][k]
-        to_world = np.array(found["to_world"], np.float64).reshape(4, 4)
-        camera = Camera(str(found["name"]), to_world, float(found["yfov"]))
+        attributes = store.attributes["views"][k]
+        to_world = np.array(attributes["to_world"], np.float64).reshape(4, 4)
+        camera = Camera(str(attributes["name"]), to_world, float(attributes["yfov"]))
         check_camera(camera)
     except (KeyError, TypeError, ValueError, SceneError) as error:
         raise StoreError(f"view {k} of the store has no camera ({error}); delete the bake, bake again") from error
     return camera
 
 
-def pattern_of_material(store: StoreReader, k: int, material: int) -> Pattern:
+def make_material_pattern(store: StoreReader, k: int, material: int) -> RayPattern:
     """Make the pattern of the gather rays of a material's samples in the k-th view of a store again."""
     num_cosine, num_glossy = store.attributes["gather_rays"][material]
     return make_pattern(num_cosine, num_glossy, int(store.attributes["gather_seed"]) + 1 + k)
 
 
-def read_gather_rays(store: StoreReader, k: int, material: int, start: int, stop: int, sent: Sent) -> GatherRays:
+def read_gather_rays(
+    store: StoreReader, k: int, material: int, start: int, stop: int, outgoing: OutgoingLight
+) -> GatherRays:
     """Read the gather rays of samples of one material.
 
     Args:
         store: an open store. k: number of the view. material: index of the material.
-        start, stop: rows of the view's arrays. sent: by cells.
+        start, stop: rows of the view's arrays. outgoing: by cells.
     """
-    links = store.read(f"views/{k}/links", start, stop)
-    return GatherRays(links, pattern_of_material(store, k, material), sent)
+    gather_hits = store.read(f"views/{k}/links", start, stop)
+    return GatherRays(gather_hits, make_material_pattern(store, k, material), outgoing)
 
 
 def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> NDArray[np.uint32]:
@@ -80,7 +82,7 @@ def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> NDArray[np.
     return np.arange(start, stop, dtype=np.uint32)
 
 
-def read_points(store: StoreReader, k: int, start: int, stop: int, seed: NDArray[np.uint32]) -> Points:
+def read_surface_points(store: StoreReader, k: int, start: int, stop: int, seed: NDArray[np.uint32]) -> SurfacePoints:
     """Read samples of a view on surfaces as points.
 
     Args:
@@ -89,22 +91,22 @@ def read_points(store: StoreReader, k: int, start: int, stop: int, seed: NDArray
     """
     names = "position", "normal", "tangent"
     position, normal, tangent = (store.read(f"views/{k}/{name}", start, stop) for name in names)
-    return Points(position, normal, tangent, seed, read_chance(store, k, start, stop))
+    return SurfacePoints(position, normal, tangent, seed, read_alpha_samples(store, k, start, stop))
 
 
-def read_chance(store: StoreReader, k: int, start: int, stop: int) -> F32:
+def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> F32:
     """Read the chance of the rays of samples at surfaces that blend; see `Points`.
 
     Args:
         store: an open store. k: number of the view. start, stop: rows of its arrays.
     """
     if not store.attributes.get("has_tints"):
-        return ALIKE
-    chance = store.read(f"views/{k}/chance", start, stop)
-    return chance if chance.any() else ALIKE
+        return FIXED_ALPHA_SAMPLE
+    alpha_samples = store.read(f"views/{k}/chance", start, stop)
+    return alpha_samples if alpha_samples.any() else FIXED_ALPHA_SAMPLE
 
 
-def read_eyes(store: StoreReader, k: int, start: int, stop: int) -> F32:
+def read_ray_origins(store: StoreReader, k: int, start: int, stop: int) -> F32:
     """Read where samples are seen from: the camera, or what turned the way to them.
 
     Args:
@@ -117,10 +119,10 @@ def read_eyes(store: StoreReader, k: int, start: int, stop: int) -> F32:
     return read_camera(store, k).to_world[None, :3, 3].astype(np.float32)
 
 
-def towards(eye: F32, position: F32) -> F32:
+def view_directions(origin: F32, position: F32) -> F32:
     """Find the unit directions from places (n, 3) to eyes (n or 1, 3): the wo of what they see. (n, 3) float32"""
-    away = eye - position
-    return np.asarray(away / np.linalg.norm(away, axis=1, keepdims=True), np.float32)
+    offset = origin - position
+    return np.asarray(offset / np.linalg.norm(offset, axis=1, keepdims=True), np.float32)
 
 
 def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
@@ -129,7 +131,7 @@ def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
     Args:
         store: an open store. k: number of the view. start, stop: rows of its arrays.
     Returns:
-        See `relume.trace.surface.Surface`. (stop - start, 5) float32
+        See `relume.trace.stored_scene.Surface`. (stop - start, 5) float32
     """
     try:
         store.shape(f"views/{k}/uv")
@@ -162,42 +164,42 @@ def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, mater
     Returns:
         (stop - start, 3) float32
     """
-    shortest = store.attributes.get("shortest_normals")
-    if shortest is None:
+    shortest_lengths = store.attributes.get("shortest_normals")
+    if shortest_lengths is None:
         return None
     try:
         return np.asarray(store.read(f"views/{k}/surface_normal", start, stop), np.float32)
     except ChunkDamagedError:
         raise
     except StoreError:
-        has_bumps = shortest[material] < 1
-        return None if has_bumps else np.asarray(store.read(f"views/{k}/normal", start, stop), np.float32)
+        has_normal_map = shortest_lengths[material] < 1
+        return None if has_normal_map else np.asarray(store.read(f"views/{k}/normal", start, stop), np.float32)
 
 
 def read_shortest_normals(store: StoreReader) -> list[float]:
-    """Read about the shortest of them for each material, see `relume.scene.roughness.shortest_normal`.
+    """Read about the shortest of them for each material, see `relume.scene.roughness.min_mean_normal_length`.
 
     Args:
         store: an open store.
     """
-    found = store.attributes.get("shortest_normals")
-    return [1.0] * len(store.attributes["materials"]) if found is None else list(map(float, found))
+    lengths = store.attributes.get("shortest_normals")
+    return [1.0] * len(store.attributes["materials"]) if lengths is None else list(map(float, lengths))
 
 
-def read_ratios(store: StoreReader) -> tuple[tuple[float, ...], ...]:
+def read_roughness_ratios(store: StoreReader) -> tuple[tuple[float, ...], ...]:
     """Read the levels of roughness of all materials: each one's roughness over the material's, none without a map."""
-    found = store.attributes.get("roughness_levels")
-    if found is None:
+    ratios = store.attributes.get("roughness_levels")
+    if ratios is None:
         return ((),) * len(store.attributes["materials"])
-    return tuple(tuple(map(float, of_material)) for of_material in found)
+    return tuple(tuple(map(float, material_ratios)) for material_ratios in ratios)
 
 
-def read_levels(store: StoreReader, k: int, num_samples: int) -> NDArray[np.uint8]:
+def read_roughness_levels(store: StoreReader, k: int, num_samples: int) -> NDArray[np.uint8]:
     """Read the level of roughness of each sample on a surface.
 
     Args:
         store: an open store. k: number of the view. num_samples: on surfaces.
     """
-    if not any(read_ratios(store)):
+    if not any(read_roughness_ratios(store)):
         return np.zeros(num_samples, np.uint8)
     return np.asarray(store.read(f"views/{k}/level", 0, num_samples), np.uint8)

@@ -13,40 +13,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.brdf.levels import Levels
+from relume.brdf.levels import RoughnessLevels
 from relume.errors import ChunkDamagedError, StoreError
 from relume.eye.view_samples import BACKGROUND
-from relume.images.shelf import texture_of
-from relume.memory import Memory
-from relume.points import Points
-from relume.project.receivers import GatherRays, LocalRays, Receivers
-from relume.project.sent import Sent
+from relume.images.shelf import load_texture
+from relume.memory import Cache
+from relume.points import SurfacePoints
+from relume.project.receivers import GatherRays, LocalRays, ShadingPoints
+from relume.project.sent import OutgoingLight
 from relume.scene.model import Camera
-from relume.sharing import Sharing
+from relume.sharing import NeighborFilter
 from relume.trace.texture import sample_image
-from relume.views.mirrored import Mirrored, read_mirrored
-from relume.views.sharing import sharing
+from relume.views.mirrored import MirrorSamples, read_mirror_samples
+from relume.views.sharing import make_neighbor_filter
 from relume.views.store_io import (
-    SomeReader,
-    Tracing,
-    pattern_of_material,
+    RayTracing,
+    TransferReader,
+    make_material_pattern,
     read_camera,
-    read_eyes,
     read_gather_rays,
-    read_levels,
-    read_points,
-    read_ratios,
+    read_ray_origins,
+    read_roughness_levels,
+    read_roughness_ratios,
     read_seeds,
+    read_surface_points,
     read_uv,
-    towards,
+    view_directions,
 )
 
 F32 = NDArray[np.float32]
 Tile = tuple[int, int, int, int]
 
 TILE_PIXELS = 64
-_IMAGES = ("diffuse", "specular")
-_ROWS_AT_ONCE = 1 << 18
+_TEXTURE_NAMES = ("diffuse", "specular")
+_ROWS_PER_BATCH = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -55,20 +55,21 @@ class View:
 
     Attributes:
         bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
-        key: of the bake in `memory`.
+        key: of the bake in `cache`.
         first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int32
-        order: (n,) int32. gains: what the radiance of each is multiplied by for its pixel, in that order: its share of
-            it, and what glass lets through that is before it; nothing of samples that are seen in mirrors, for looks
-            say how much these send on. (n, 1) float32, or (n, 3) where there is glass or a mirror
-        eye: where the samples on surfaces are seen from. (surface samples, 3) float32, or (1, 3)
+        order: (n,) int32. throughput: what the radiance of each is multiplied by for its pixel, in that order: its
+            share of it, and what glass lets through that is before it; nothing of samples that are seen in mirrors, for
+            looks say how much these send on. (n, 1) float32, or (n, 3) where there is glass or a mirror
+        origin: where the samples on surfaces are seen from. (surface samples, 3) float32, or (1, 3)
         mirrored: samples that are seen in mirrors; None where none is.
         is_mirrored: which samples on surfaces are mirrors whose picture others have. (surface samples,)
         textures: of each material, the images of the scene in which it is not 1 all over, by their names. (n, 3)
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
         level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
         maps: images in the place of each material's own maps, see `relume.views.worn`; none where nothing is named.
-        sorted: where each sample on surfaces is among those that were baked; None: in that order. (surface samples,)
-        worn: views of the same samples that wear such images, by these, for as long as a picture has them.
+        baked_rows: where each sample on surfaces is among those that were baked; None: in that order. (surface
+            samples,)
+        overridden: views of the same samples that wear such images, by these, for as long as a picture has them.
     """
 
     camera: Camera
@@ -76,33 +77,33 @@ class View:
     width: int
     height: int
     store: StoreReader = field(repr=False)
-    memory: Memory = field(repr=False)
+    cache: Cache = field(repr=False)
     key: str
     bounds: NDArray[np.int64]
     pixel: NDArray[np.uint32]
     first: NDArray[np.int32]
     order: NDArray[np.int32]
-    gains: F32
-    eye: F32
-    mirrored: Mirrored | None
+    throughput: F32
+    origin: F32
+    mirrored: MirrorSamples | None
     is_mirrored: NDArray[np.bool_]
     textures: Sequence[Mapping[str, F32]]
     cos_theta_o: NDArray[np.float64]
     level: NDArray[np.uint8]
     ratios: tuple[tuple[float, ...], ...]
     maps: tuple[Hashable | None, ...] = ()
-    sorted: NDArray[np.int64] | None = field(default=None, repr=False)
-    worn: WeakValueDictionary[tuple[Hashable | None, ...], View] = field(
+    baked_rows: NDArray[np.int64] | None = field(default=None, repr=False)
+    overridden: WeakValueDictionary[tuple[Hashable | None, ...], View] = field(
         default_factory=WeakValueDictionary, repr=False
     )
 
-    def place(self, material: int) -> tuple[Hashable, ...]:
+    def sample_key(self, material: int) -> tuple[Hashable, ...]:
         """Name a material's samples among those of the bake: with the images in the place of its maps, if any."""
         return self.name, material, *filter(None, self.maps[material : material + 1])
 
-    def as_baked(self) -> NDArray[np.int64]:
+    def unmodified(self) -> NDArray[np.int64]:
         """Find where each sample on surfaces is among those that were baked. (surface samples,)"""
-        return np.arange(self.num_surface_samples) if self.sorted is None else self.sorted
+        return np.arange(self.num_surface_samples) if self.baked_rows is None else self.baked_rows
 
     @property
     def name(self) -> str:
@@ -123,15 +124,15 @@ class View:
         """Find the samples of a material."""
         return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
 
-    def lies_in(self, material: int, region: Tile) -> NDArray[np.bool_]:
+    def is_in_region(self, material: int, region: Tile) -> NDArray[np.bool_]:
         """Find which of a material's samples are seen in pixels of a region: x, y, width, height. (n,)"""
         row, column = np.divmod(self.pixel[self.rows(material)].astype(np.int64), self.width)
         x, y, width, height = region
         return (column >= x) & (column < x + width) & (row >= y) & (row < y + height)
 
-    def levels(self, material: int) -> Levels:
+    def roughness_levels(self, material: int) -> RoughnessLevels:
         """Find how rough a material's samples are."""
-        return Levels(self.ratios[material], self.level[self.rows(material)])
+        return RoughnessLevels(self.ratios[material], self.level[self.rows(material)])
 
     def image(self, material: int, name: str) -> F32:
         """Look up what a material's samples show of an image that a look names. (n, 3) float32
@@ -143,113 +144,115 @@ class View:
                 image cannot be had.
         """
 
-        def found() -> F32:
+        def sample() -> F32:
             rows = self.rows(material)
             uv = read_uv(self.store, self.index, rows.start, rows.stop)
             if uv is None:
                 raise StoreError("this bake is too old to show images; bake the scene again")
-            return sample_image(texture_of(name), uv)
+            return sample_image(load_texture(name), uv)
 
-        return self.memory.keep((self.key, "image", *self.place(material), name), found)
+        return self.cache.get_value((self.key, "image", *self.sample_key(material), name), sample)
 
-    def shining(self, material: int) -> F32:
+    def emissive(self, material: int) -> F32:
         """Read how brightly a material's samples shine, over its mean. (n, 1) float32, (n, 3) where images say it"""
         rows = self.rows(material)
         if not self.store.attributes.get("has_emission_images"):
             return np.ones((rows.stop - rows.start, 1), np.float32)
         return np.asarray(self.store.read(f"views/{self.index}/emission", rows.start, rows.stop), np.float32)
 
-    def eyes(self, rows: slice) -> F32:
+    def ray_origins(self, rows: slice) -> F32:
         """Find where samples on surfaces are seen from. (n, 3) float32, or (1, 3)"""
-        return self.eye if len(self.eye) == 1 else self.eye[rows]
+        return self.origin if len(self.origin) == 1 else self.origin[rows]
 
-    def points(self, material: int) -> Points:
+    def surface_points(self, material: int) -> SurfacePoints:
         """Read a material's samples from the store as points."""
-        return self._points(self.rows(material))
+        return self._read_surface_points(self.rows(material))
 
-    def all_points(self) -> Points:
+    def all_surface_points(self) -> SurfacePoints:
         """Read all samples on surfaces from the store as points, material after material."""
-        return self._points(slice(0, self.num_surface_samples))
+        return self._read_surface_points(slice(0, self.num_surface_samples))
 
-    def _points(self, rows: slice) -> Points:
+    def _read_surface_points(self, rows: slice) -> SurfacePoints:
         seed = read_seeds(self.store, self.index, rows.start, rows.stop)
-        return read_points(self.store, self.index, rows.start, rows.stop, seed)
+        return read_surface_points(self.store, self.index, rows.start, rows.stop, seed)
 
     def receivers(
         self,
         material: int,
-        reflected: Sent | None = None,
+        outgoing: OutgoingLight | None = None,
         local: Sequence[LocalRays] = (),
         *,
         is_lit: bool = True,
-    ) -> Receivers:
+    ) -> ShadingPoints:
         """Read a material's samples from the store as points that light arrives at.
 
         Args:
             material: its index.
-            reflected: by gather cells, whose light arrives too; from `Transfer.reflected_in`.
+            outgoing: by gather cells, whose light arrives too; from `FixedViewTransfer.outgoing_patch_light`.
             local: of lights that the samples see.
             is_lit: whether light comes from the environment itself; else no bits are read.
         """
         rows = self.rows(material)
-        visible = self._visible(material) if is_lit else np.empty((rows.stop - rows.start, 0), np.uint8)
-        points = self.points(material)
-        gathered = () if reflected is None else (self.gather_rays(material, reflected),)
+        visible = self._read_visibility(material) if is_lit else np.empty((rows.stop - rows.start, 0), np.uint8)
+        surface_points = self.surface_points(material)
+        gather_rays = () if outgoing is None else (self.gather_rays(material, outgoing),)
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
         level = self.level[rows] if self.ratios[material] else None
-        wo = towards(self.eyes(rows), points.position)
-        return Receivers(points, wo, visible, (*gathered, *local), uv, level)
+        wo = view_directions(self.ray_origins(rows), surface_points.position)
+        return ShadingPoints(surface_points, wo, visible, (*gather_rays, *local), uv, level)
 
-    def _visible(self, material: int) -> NDArray[np.uint8]:
+    def _read_visibility(self, material: int) -> NDArray[np.uint8]:
         """Read the bits of a material's samples, kept for a while: unpacking them takes longer than many a use."""
         rows = self.rows(material)
 
         def read() -> NDArray[np.uint8]:
             return self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
 
-        return self.memory.passing.keep((self.key, "visibility", *self.place(material)), read)
+        return self.cache.transient.get_value((self.key, "visibility", *self.sample_key(material)), read)
 
-    def read_some(self, name: str, material: int, chosen: NDArray[np.integer]) -> NDArray[Any]:
+    def read_rows(self, name: str, material: int, sample_indices: NDArray[np.integer]) -> NDArray[Any]:
         """Read an array of the view at some of a material's samples; where rays are traced for it, for these alone.
 
         Args:
-            name: of the array. material: its index. chosen: counted from the material's first. (k,)
+            name: of the array. material: its index. sample_indices: counted from the material's first. (k,)
         """
         rows, path = self.rows(material), f"views/{self.index}/{name}"
-        if isinstance(self.store, SomeReader):
-            return np.asarray(self.store.read_some(path, rows.start + chosen))
+        if isinstance(self.store, TransferReader):
+            return np.asarray(self.store.read_rows(path, rows.start + sample_indices))
         if name == "visibility":
-            return np.asarray(self._visible(material)[chosen])
-        return np.asarray(self.store.read(path, rows.start, rows.stop)[chosen])
+            return np.asarray(self._read_visibility(material)[sample_indices])
+        return np.asarray(self.store.read(path, rows.start, rows.stop)[sample_indices])
 
-    def some_gather_rays(self, material: int, chosen: NDArray[np.integer], reflected: Sent) -> GatherRays:
-        """Read the rays of some of a material's samples, which do not share them. See `read_some`, `gather_rays`."""
-        links = np.asarray(self.read_some("links", material, chosen), np.uint16)
-        return GatherRays(links, pattern_of_material(self.store, self.index, material), reflected)
+    def subset_rays(self, material: int, sample_indices: NDArray[np.integer], outgoing: OutgoingLight) -> GatherRays:
+        """Read the rays of some of a material's samples, which do not share them. See `read_rows`, `gather_rays`."""
+        gather_hits = np.asarray(self.read_rows("links", material, sample_indices), np.uint16)
+        return GatherRays(gather_hits, make_material_pattern(self.store, self.index, material), outgoing)
 
-    def gather_rays(self, material: int, reflected: Sent) -> GatherRays:
+    def gather_rays(self, material: int, outgoing: OutgoingLight) -> GatherRays:
         """Read from the store the rays of a material's samples that bring what gather cells send."""
         rows = self.rows(material)
-        alone = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, reflected)
-        return replace(alone, sharing=self._sharing(material))
+        unfiltered = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, outgoing)
+        return replace(unfiltered, sharing=self._neighbor_filter(material))
 
-    def trace_gather_rays(self, material: int, cancelled: Callable[[], bool]) -> None:
+    def trace_gather_rays(self, material: int, is_canceled: Callable[[], bool]) -> None:
         """Trace those that were not baked, as where an image leans the material; then reading them takes no time.
 
         Args:
-            material: its index. cancelled: asked now and then.
+            material: its index. is_canceled: asked now and then.
         Raises:
-            CancelledError: `cancelled` said so.
+            CancelledError: `is_canceled` said so.
         """
-        if isinstance(self.store, Tracing):
-            self.store.trace_links(self.rows(material).start, cancelled)
+        if isinstance(self.store, RayTracing):
+            self.store.trace_gather_rays(self.rows(material).start, is_canceled)
 
-    def _sharing(self, material: int) -> Sharing:
-        def found() -> Sharing:
-            tents = int(self.store.attributes.get("gather_tents", 1))
-            return sharing(self.pixel[self.rows(material)], self.width, self.points(material), tents)
+    def _neighbor_filter(self, material: int) -> NeighborFilter:
+        def build_filter() -> NeighborFilter:
+            num_passes = int(self.store.attributes.get("gather_tents", 1))
+            return make_neighbor_filter(
+                self.pixel[self.rows(material)], self.width, self.surface_points(material), num_passes
+            )
 
-        return self.memory.keep((self.key, "sharing", *self.place(material)), found)
+        return self.cache.get_value((self.key, "sharing", *self.sample_key(material)), build_filter)
 
     def background(self) -> F32:
         """Read the radiance of the samples after the surfaces. (n, 3) float32"""
@@ -263,7 +266,7 @@ class View:
         """Find the unit directions in which a material's samples are seen, from the store. (n, 3)"""
         rows = self.rows(material)
         position = self.store.read(f"views/{self.index}/position", rows.start, rows.stop)
-        return -towards(self.eyes(rows), position).astype(np.float64)
+        return -view_directions(self.ray_origins(rows), position).astype(np.float64)
 
     def surface_at(self, sample: int) -> tuple[F32, F32]:
         """Read position and unit normal of a sample on a surface, world space. (3,) float32 each"""
@@ -278,9 +281,9 @@ class View:
         for index in range(len(self.bounds) - 1):
             material[self.rows(index)] = index
         ids = np.full(self.width * self.height, BACKGROUND, np.uint16)
-        by_weight = np.argsort(self.gains.max(axis=1), kind="stable")  # the heaviest of a pixel is written last
-        pixel_of = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
-        ids[pixel_of[by_weight]] = material[self.order[by_weight]]
+        by_weight = np.argsort(self.throughput.max(axis=1), kind="stable")  # the heaviest of a pixel is written last
+        pixel_index = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+        ids[pixel_index[by_weight]] = material[self.order[by_weight]]
         return ids.reshape(self.height, self.width)
 
     @cached_property
@@ -293,21 +296,21 @@ class View:
         ]
 
     @cached_property
-    def tiles_of_material(self) -> list[list[Tile]]:
+    def material_tiles(self) -> list[list[Tile]]:
         """The tiles with at least one pixel of each material."""
         columns = -(-self.width // TILE_PIXELS)
-        touched = []
+        tiles = []
         for index in range(len(self.bounds) - 1):
             pixel = self.pixel[self.rows(index)]
             codes = pixel // self.width // TILE_PIXELS * columns + pixel % self.width // TILE_PIXELS
-            touched.append([self.all_tiles[code] for code in np.unique(codes)])
-        return touched
+            tiles.append([self.all_tiles[code] for code in np.unique(codes)])
+        return tiles
 
 
 def open_view(
     store: StoreReader,
     index: int,
-    memory: Memory,
+    cache: Cache,
     key: str,
     maps: tuple[Hashable | None, ...] = (),
     rows: NDArray[np.int64] | None = None,
@@ -316,8 +319,8 @@ def open_view(
 
     Args:
         store: of the bake. index: of the view in it.
-        memory: where what neighbouring samples share is kept. key: of the bake in it.
-        maps: see `View`. rows: `View.sorted`.
+        cache: where what neighbouring samples share is kept. key: of the bake in it.
+        maps: see `View`. rows: `View.baked_rows`.
     Raises:
         ChunkDamagedError: arrays of the store do not fit each other.
     """
@@ -326,68 +329,68 @@ def open_view(
     prefix = f"views/{index}"
     pixel = store.read(f"{prefix}/pixel")
     material = store.read(f"{prefix}/material")
-    gains = store.read(f"{prefix}/weight")[:, None]
+    throughput = store.read(f"{prefix}/weight")[:, None]
     has_layers = store.attributes.get("has_layers")
     if has_layers or store.attributes.get("has_glass"):  # so stores said it that knew of no mirrors
-        gains = gains * store.read(f"{prefix}/through")
+        throughput = throughput * store.read(f"{prefix}/through")
     num_materials = len(store.attributes["materials"])
-    surface = int(np.searchsorted(material, BACKGROUND))
+    num_surface = int(np.searchsorted(material, BACKGROUND))
     if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(material[1:] < material[:-1]):
         raise ChunkDamagedError(prefix, "its samples do not fit its size")
-    if surface and int(material[surface - 1]) >= num_materials:
+    if num_surface and int(material[num_surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
-    bounds = np.searchsorted(material[:surface], np.arange(num_materials + 1)).astype(np.int64)
-    level, ratios = read_levels(store, index, surface), read_ratios(store)
-    if any(not _are_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], ratios, strict=True)):
+    bounds = np.searchsorted(material[:num_surface], np.arange(num_materials + 1)).astype(np.int64)
+    level, ratios = read_roughness_levels(store, index, num_surface), read_roughness_ratios(store)
+    if any(not _are_valid_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], ratios, strict=True)):
         raise ChunkDamagedError(prefix, "its levels of roughness do not fit its materials")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
-    eye = read_eyes(store, index, 0, surface)
-    mirrored = read_mirrored(store, index, order, gains, surface)
-    is_mirrored = store.read(f"{prefix}/is_mirrored", 0, surface) if has_layers else np.zeros(surface, np.bool_)
+    origin = read_ray_origins(store, index, 0, num_surface)
+    mirrored = read_mirror_samples(store, index, order, throughput, num_surface)
+    is_mirrored = store.read(f"{prefix}/is_mirrored", 0, num_surface) if has_layers else np.zeros(num_surface, np.bool_)
     if mirrored is not None:
-        gains[mirrored.sample] = 0
+        throughput[mirrored.sample] = 0
     return View(
         camera=camera,
         index=index,
         width=width,
         height=height,
         store=store,
-        memory=memory,
+        cache=cache,
         key=key,
         bounds=bounds,
         pixel=pixel,
         first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int32),
         order=order,
-        gains=np.ascontiguousarray(gains[order], np.float32),
-        eye=eye,
+        throughput=np.ascontiguousarray(throughput[order], np.float32),
+        origin=origin,
         mirrored=mirrored,
         is_mirrored=is_mirrored.astype(np.bool_, copy=False),
         textures=[_textures(store, prefix, *ends) for ends in pairwise(bounds.tolist())],
-        cos_theta_o=_cos_theta_o(store, prefix, eye, surface),
+        cos_theta_o=_cos_theta_o(store, prefix, origin, num_surface),
         level=level,
         ratios=ratios,
         maps=maps,
-        sorted=rows,
+        baked_rows=rows,
     )
 
 
 def _textures(store: StoreReader, prefix: str, start: int, stop: int) -> dict[str, F32]:
     """Read the images of the scene at a material's samples; none where it is 1 all over, as without an image."""
-    read = {name: store.read(f"{prefix}/{name}", start, stop) for name in _IMAGES}
+    read = {name: store.read(f"{prefix}/{name}", start, stop) for name in _TEXTURE_NAMES}
     return {name: values for name, values in read.items() if np.any(values != 1)}
 
 
-def _cos_theta_o(store: StoreReader, prefix: str, eye: F32, num: int) -> NDArray[np.float64]:
+def _cos_theta_o(store: StoreReader, prefix: str, origin: F32, num: int) -> NDArray[np.float64]:
     """Find the cosines at which samples on surfaces are seen, some after others. (num,)"""
-    found = np.empty(num)
-    for start in range(0, num, _ROWS_AT_ONCE):
-        rows = slice(start, min(start + _ROWS_AT_ONCE, num))
+    cosines = np.empty(num)
+    for start in range(0, num, _ROWS_PER_BATCH):
+        rows = slice(start, min(start + _ROWS_PER_BATCH, num))
         position, normal = (store.read(f"{prefix}/{name}", rows.start, rows.stop) for name in ("position", "normal"))
-        wo = towards(eye if len(eye) == 1 else eye[rows], position)
-        found[rows] = np.clip(np.einsum("nc,nc->n", normal, wo.astype(np.float64)), 0, 1)
-    return found
+        wo = view_directions(origin if len(origin) == 1 else origin[rows], position)
+        cosines[rows] = np.clip(np.einsum("nc,nc->n", normal, wo.astype(np.float64)), 0, 1)
+    return cosines
 
 
-def _are_levels(level: NDArray[np.uint8], ratios: tuple[float, ...]) -> bool:
+def _are_valid_levels(level: NDArray[np.uint8], ratios: tuple[float, ...]) -> bool:
     """Whether the levels of a material's samples rise, and are among those that it has."""
     return len(level) == 0 or (int(level[-1]) < max(1, len(ratios)) and bool(np.all(level[1:] >= level[:-1])))

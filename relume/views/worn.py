@@ -14,35 +14,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.channels import NormalMap
-from relume.brdf.levels import Levels
+from relume.brdf.levels import RoughnessLevels
 from relume.errors import StoreError
-from relume.eye.view_samples import thresholds
+from relume.eye.view_samples import dither_thresholds
 from relume.eye.windows import morton
-from relume.images.shelf import mean_roughness, normals_of, roughness_of
-from relume.scene.roughness import ends_of, level_of, levels_over, narrowed, shortest_normal, widened
+from relume.images.shelf import load_normal_map, load_roughness_map, mean_roughness
+from relume.scene.roughness import levels_in_range, min_mean_normal_length, ratio_range, rougher, select_level, smoother
 from relume.trace.texture import sample_image
-from relume.views.leaning import Leant, leant
+from relume.views.leaning import PerturbedNormals, perturbed
 from relume.views.store_io import read_normal_length, read_shortest_normals, read_uv
 from relume.views.view import View, open_view
-from relume.views.worn_store import Tracer, WornStore
+from relume.views.worn_store import MapOverrideStore, RayTracer
 
 F32 = NDArray[np.float32]
 
 
-class Maps(NamedTuple):
+class MapOverrides(NamedTuple):
     """What a look names in the place of a material's maps.
 
     Attributes:
         roughness: "image:<id>", None for its own. normals: None for its own.
-        own: the roughness of its terms, as the scene has it, that bumps widen; None where no term follows a map.
+        base_roughness: the roughness of its terms, as the scene has it, that bumps widen; None where no term follows a
+            map.
     """
 
     roughness: str | None
     normals: NormalMap | None
-    own: float | None
+    base_roughness: float | None
 
 
-def worn(view: View, maps: tuple[Maps | None, ...], tracer: Tracer) -> View:
+def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: RayTracer) -> View:
     """Let materials of a baked view wear images in the place of their maps.
 
     Args:
@@ -54,62 +55,71 @@ def worn(view: View, maps: tuple[Maps | None, ...], tracer: Tracer) -> View:
         StoreError: the store does not say where samples lie in textures. NotFoundError, SceneError: an image cannot be
             had.
     """
-    known = view.worn.get(maps)
-    if known is not None or not any(maps):
-        return known or view
-    rows, level, ratios = view.as_baked(), view.level.copy(), list(view.ratios)
-    under, materials = dict[int, Leant](), dict[int, int]()
-    for material, wears in enumerate(maps):
-        of_material = view.rows(material)
-        if wears is None or of_material.start == of_material.stop:
+    cached = view.overridden.get(maps)
+    if cached is not None or not any(maps):
+        return cached or view
+    rows, level, ratios = view.unmodified(), view.level.copy(), list(view.ratios)
+    perturbed_by_row, materials = dict[int, PerturbedNormals](), dict[int, int]()
+    for material, override in enumerate(maps):
+        material_rows = view.rows(material)
+        if override is None or material_rows.start == material_rows.stop:
             continue
-        if wears.normals is not None:
+        if override.normals is not None:
             tracer.check()
-        bumps = None if wears.normals is None else leant(view, material, wears.normals)
-        ratios[material], of_samples = _levels(view, material, wears, bumps)
-        code = morton(view.pixel[of_material].astype(np.int64), view.width)
-        order = np.lexsort((code, of_samples))
-        level[of_material], rows[of_material] = of_samples[order], rows[of_material][order]
-        if bumps is not None:
-            under[of_material.start], materials[of_material.start] = bumps.rows(order), material
-    rays = tracer, view.memory, (view.key, view.name, maps)
-    store = WornStore(view.store, view.index, rows, level, ratios, under, materials, *rays)
-    view.worn[maps] = found = open_view(store, view.index, view.memory, view.key, maps, rows)
-    return found
+        perturbed_normals = None if override.normals is None else perturbed(view, material, override.normals)
+        ratios[material], sample_levels = _overridden_levels(view, material, override, perturbed_normals)
+        code = morton(view.pixel[material_rows].astype(np.int64), view.width)
+        order = np.lexsort((code, sample_levels))
+        level[material_rows], rows[material_rows] = sample_levels[order], rows[material_rows][order]
+        if perturbed_normals is not None:
+            perturbed_by_row[material_rows.start], materials[material_rows.start] = (
+                perturbed_normals.rows(order),
+                material,
+            )
+    tracer_arguments = tracer, view.cache, (view.key, view.name, maps)
+    store = MapOverrideStore(
+        view.store, view.index, rows, level, ratios, perturbed_by_row, materials, *tracer_arguments
+    )
+    view.overridden[maps] = overridden = open_view(store, view.index, view.cache, view.key, maps, rows)
+    return overridden
 
 
-def _levels(view: View, material: int, wears: Maps, bumps: Leant | None) -> Levels:
+def _overridden_levels(
+    view: View, material: int, override: MapOverrides, perturbed_normals: PerturbedNormals | None
+) -> RoughnessLevels:
     """How rough a material's samples are where images say it: what a bake finds whose scene has the images."""
-    rows, store, own = view.rows(material), view.store, wears.own
+    rows, store, base_roughness = view.rows(material), view.store, override.base_roughness
     shortest = read_shortest_normals(store)[material]
     length = read_normal_length(store, view.index, rows.start, rows.stop)
-    if wears.roughness is None:
-        ratio, low, high = _unwidened(view, material, own, length, shortest)
+    if override.roughness is None:
+        ratio, low, high = _map_roughness(view, material, base_roughness, length, shortest)
     else:
-        uv, texture = read_uv(store, view.index, rows.start, rows.stop), roughness_of(wears.roughness)
+        uv, texture = read_uv(store, view.index, rows.start, rows.stop), load_roughness_map(override.roughness)
         if uv is None:
             raise StoreError("this bake is too old to show images; bake the scene again")
-        own = mean_roughness(wears.roughness) or None
-        ratio, (low, high) = sample_image(texture, uv)[:, 0], ends_of(texture)
-    if bumps is not None and wears.normals is not None:
-        length, shortest = bumps.normal_length, shortest_normal(normals_of(wears.normals))
-    ratios = levels_over(low, high, own, shortest)
+        base_roughness = mean_roughness(override.roughness) or None
+        ratio, (low, high) = sample_image(texture, uv)[:, 0], ratio_range(texture)
+    if perturbed_normals is not None and override.normals is not None:
+        length, shortest = perturbed_normals.normal_length, min_mean_normal_length(load_normal_map(override.normals))
+    ratios = levels_in_range(low, high, base_roughness, shortest)
     if not ratios:
-        return Levels(ratios, np.zeros(rows.stop - rows.start, np.uint8))
-    if own and shortest < 1:
-        ratio = widened(ratio, length, own)
+        return RoughnessLevels(ratios, np.zeros(rows.stop - rows.start, np.uint8))
+    if base_roughness and shortest < 1:
+        ratio = rougher(ratio, length, base_roughness)
     pixel = view.pixel[rows].astype(np.int64)
-    return Levels(ratios, level_of(ratios, ratio, thresholds(pixel, view.width)))
+    return RoughnessLevels(ratios, select_level(ratios, ratio, dither_thresholds(pixel, view.width)))
 
 
-def _unwidened(view: View, material: int, own: float | None, length: F32, shortest: float) -> tuple[F32, float, float]:
+def _map_roughness(
+    view: View, material: int, base_roughness: float | None, length: F32, shortest: float
+) -> tuple[F32, float, float]:
     """The roughness of a material's samples over its own as the scene's map has it, without what bumps add; and the
     ends of that map."""
     ratios, level = view.ratios[material], view.level[view.rows(material)]
     if not ratios or ratios[0] == 1:  # there is no map, or bumps alone widen it
         return np.ones(len(level), np.float32), 1.0, 1.0
     ratio, low, high = np.array(ratios, np.float32)[level], ratios[0], ratios[-1]
-    if own is None or shortest == 1:
+    if base_roughness is None or shortest == 1:
         return ratio, low, high
-    highest = narrowed(np.array([high], np.float32), np.array([shortest], np.float32), own)
-    return narrowed(ratio, length, own), low, max(low, float(highest[0]))
+    highest = smoother(np.array([high], np.float32), np.array([shortest], np.float32), base_roughness)
+    return smoother(ratio, length, base_roughness), low, max(low, float(highest[0]))

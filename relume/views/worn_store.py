@@ -14,33 +14,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.bake import StoreReader
-from relume.light.gather_rays import Pattern
-from relume.memory import Memory
-from relume.points import Points
-from relume.steps import Steps
-from relume.views.leaning import Leant
-from relume.views.store_io import pattern_of_material, read_chance, read_eyes, read_seeds, towards
+from relume.light.gather_rays import RayPattern
+from relume.memory import Cache
+from relume.points import SurfacePoints
+from relume.steps import ResumableLoop
+from relume.views.leaning import PerturbedNormals
+from relume.views.store_io import (
+    make_material_pattern,
+    read_alpha_samples,
+    read_ray_origins,
+    read_seeds,
+    view_directions,
+)
 
 F32 = NDArray[np.float32]
-Rows = NDArray[np.int64]
+RowIndices = NDArray[np.int64]
 
-_LEANT = ("normal", "tangent", "uv", "normal_length")
-_TRACED = ("visibility", "links", "thrown")
-_STEP = 1024  # samples; a tenth of a second's rays
+_PERTURBED_COLUMNS = ("normal", "tangent", "uv", "normal_length")
+_TRACED_COLUMNS = ("visibility", "links", "thrown")
+_SAMPLES_PER_STEP = 1024  # samples; a tenth of a second's rays
 
 
-class Tracer(Protocol):
+class RayTracer(Protocol):
     """Rays of a bake, for normals that it did not know."""
 
     def check(self) -> None:
         """Raises StoreError where they cannot be traced."""
         ...
 
-    def seen(self, points: Points, before: F32, known: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def visibility(self, points: SurfacePoints, baked_normals: F32, baked_bits: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Find which lights points see. before: normals that they had. known: seen above those. Returns (n, bytes)"""
         ...
 
-    def linked(self, points: Points, wo: F32, pattern: Pattern) -> NDArray[np.uint16]:
+    def gather_hits(self, points: SurfacePoints, wo: F32, pattern: RayPattern) -> NDArray[np.uint16]:
         """Find the cells that gather rays of points hit.
 
         Args:
@@ -50,69 +56,69 @@ class Tracer(Protocol):
         """
         ...
 
-    def thrown(self, points: Points) -> NDArray[np.uint8]:
+    def mirror_lights(self, points: SurfacePoints) -> NDArray[np.uint8]:
         """Find which lights points see in flat mirrors. points: as they lean. Returns (n, bytes)"""
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class BegunLinks:
+class PartialHits:
     """Cells that gather rays of samples hit, of which some are traced.
 
     Attributes:
-        cell: that each ray hits. (n, rays) uint16
+        patch: that each ray hits. (n, rays) uint16
         steps: which samples' are traced.
     """
 
-    cell: NDArray[np.uint16]
-    steps: Steps
+    patch: NDArray[np.uint16]
+    steps: ResumableLoop
 
     @classmethod
-    def of(cls, num_samples: int, num_rays: int) -> BegunLinks:
+    def empty(cls, num_samples: int, num_rays: int) -> PartialHits:
         """Nothing of them."""
-        return cls(np.zeros((num_samples, num_rays), np.uint16), Steps.of(num_samples, _STEP))
+        return cls(np.zeros((num_samples, num_rays), np.uint16), ResumableLoop.start(num_samples, _SAMPLES_PER_STEP))
 
-    def trace(self, linked: Callable[[Rows], NDArray[np.uint16]], cancelled: Callable[[], bool]) -> None:
+    def trace(self, trace_rows: Callable[[RowIndices], NDArray[np.uint16]], is_canceled: Callable[[], bool]) -> None:
         """Trace what is left.
 
         Args:
-            linked: finds the cells of some samples. cancelled: asked now and then.
+            trace_rows: finds the cells of some samples. is_canceled: asked now and then.
         Raises:
-            CancelledError: `cancelled` said so; what was traced stays.
+            CancelledError: `is_canceled` said so; what was traced stays.
         """
 
-        def some(start: int, stop: int) -> None:
-            self.cell[start:stop] = linked(np.arange(start, stop))
+        def trace_range(start: int, stop: int) -> None:
+            self.patch[start:stop] = trace_rows(np.arange(start, stop))
 
-        self.steps.work(some, lambda share: None, cancelled, "tracing gather rays")
+        self.steps.run(trace_range, lambda share: None, is_canceled, "tracing gather rays")
 
 
-class WornStore:
+class MapOverrideStore:
     """Another store's samples of one view under other maps; a `StoreReader`.
 
     Args:
         store: the other. view: number of the view. rows: of it, the row of each sample here. (surface samples,)
         level: of each sample here. (surface samples,) uint8 ratios: of each material's levels.
-        leant: samples of materials whose normals are others, by the first row of each; in the order here.
-        materials: number of each of those. tracer: of the rays that they lack. memory, key: where these are kept.
+        perturbed: samples of materials whose normals are others, by the first row of each; in the order here.
+        materials: number of each of those. tracer: of the rays that they lack. cache, key: where these are kept.
     """
 
     def __init__(
         self,
         store: StoreReader,
         view: int,
-        rows: Rows,
+        rows: RowIndices,
         level: NDArray[np.uint8],
         ratios: Sequence[tuple[float, ...]],
-        leant: Mapping[int, Leant],
+        perturbed: Mapping[int, PerturbedNormals],
         materials: Mapping[int, int],
-        tracer: Tracer,
-        memory: Memory,
+        tracer: RayTracer,
+        cache: Cache,
         key: Any,
     ) -> None:
         self._store, self._view, self._rows, self._level = store, view, rows, level
-        self._prefix, self._leant, self._materials = f"views/{view}/", leant, materials
-        self._tracer, self._memory, self._key = tracer, memory, key
+        self._prefix, self._perturbed, self._materials = f"views/{view}/", perturbed, materials
+        self._tracer, self._cache, self._key = tracer, cache, key
         self._attributes = {**store.attributes, "roughness_levels": list(map(list, ratios))}
 
     @property
@@ -132,14 +138,14 @@ class WornStore:
         if name == "level":
             return self._level[start:stop]
         end = self._store.shape(path)[0] if stop is None else stop
-        found = self._reordered(path, start, end)
-        for first, leant in self._leant.items():
-            a, b = max(start, first), min(end, first + len(leant.normal))
+        values = self._reordered(path, start, end)
+        for first, perturbed in self._perturbed.items():
+            a, b = max(start, first), min(end, first + len(perturbed.normal))
             if a < b:
-                self._lean(name, first, slice(a - first, b - first), found[a - start : b - start])
-        return found
+                self._apply_override(name, first, slice(a - first, b - first), values[a - start : b - start])
+        return values
 
-    def read_some(self, path: str, rows: Rows) -> NDArray[Any]:
+    def read_rows(self, path: str, rows: RowIndices) -> NDArray[Any]:
         """Some rows of an array of the view, of one material's samples; for those alone rays are traced.
 
         Args:
@@ -148,85 +154,98 @@ class WornStore:
         if len(rows) == 0:
             return self.read(path, 0, 0)
         name, start, end = path.removeprefix(self._prefix), int(rows.min()), int(rows.max()) + 1
-        first = next((a for a, of in self._leant.items() if a <= start < a + len(of.normal)), None)
-        if first is None or name not in _TRACED:
+        first = next(
+            (
+                material_start
+                for material_start, perturbed in self._perturbed.items()
+                if material_start <= start < material_start + len(perturbed.normal)
+            ),
+            None,
+        )
+        if first is None or name not in _TRACED_COLUMNS:
             return np.asarray(self.read(path, start, end)[rows - start])
-        found = self._reordered(path, start, end)[rows - start]
-        self._trace(name, first, rows - first, found)
-        return found
+        values = self._reordered(path, start, end)[rows - start]
+        self._trace(name, first, rows - first, values)
+        return values
 
     def _reordered(self, path: str, start: int, end: int) -> NDArray[Any]:
         rows = self._rows[start:end]
         if len(rows) == 0:
             return self._store.read(path, start, end)
         first = int(rows.min())
-        found = self._store.read(path, first, int(rows.max()) + 1)[rows - first]
+        values = self._store.read(path, first, int(rows.max()) + 1)[rows - first]
         if end <= len(self._rows):
-            return found
-        return np.concatenate([found, self._store.read(path, len(self._rows), end)])  # behind all surfaces
+            return values
+        return np.concatenate([values, self._store.read(path, len(self._rows), end)])  # behind all surfaces
 
-    def _lean(self, name: str, first: int, some: slice, found: NDArray[Any]) -> None:
+    def _apply_override(self, name: str, first: int, rows: slice, values: NDArray[Any]) -> None:
         """Bring what was read of some samples of a material to their normals. first: row of the material's first."""
-        if name in _LEANT:
-            found[:] = getattr(self._leant[first], name)[some]
+        if name in _PERTURBED_COLUMNS:
+            values[:] = getattr(self._perturbed[first], name)[rows]
         elif name == "links":
-            found[:] = self._links(first)[some]
-        elif name in _TRACED:
-            self._trace(name, first, self._every(first)[some], found)
+            values[:] = self._gather_hits(first)[rows]
+        elif name in _TRACED_COLUMNS:
+            self._trace(name, first, self._all_rows(first)[rows], values)
 
-    def trace_links(self, first: int, cancelled: Callable[[], bool]) -> None:
+    def trace_gather_rays(self, first: int, is_canceled: Callable[[], bool]) -> None:
         """Trace the gather rays of a material's samples, where it leans; they are kept for a while.
 
         Args:
-            first: row of the material's first sample. cancelled: asked now and then.
+            first: row of the material's first sample. is_canceled: asked now and then.
         Raises:
-            CancelledError: `cancelled` said so; what was traced is there for who asks next.
+            CancelledError: `is_canceled` said so; what was traced is there for who asks next.
         """
-        if first in self._leant:
-            self._links(first, cancelled)
+        if first in self._perturbed:
+            self._gather_hits(first, is_canceled)
 
-    def _links(self, first: int, cancelled: Callable[[], bool] = lambda: False) -> NDArray[np.uint16]:
+    def _gather_hits(self, first: int, is_canceled: Callable[[], bool] = lambda: False) -> NDArray[np.uint16]:
         """The cells that they hit, for each of the material's terms. (samples, rays)"""
-        pattern, num = self._pattern(first), len(self._leant[first].normal)
+        pattern, num = self._pattern(first), len(self._perturbed[first].normal)
         key = *self._key, "links", first
-        links = self._memory.passing.keep(key, lambda: BegunLinks.of(num, pattern.num_rays))
-        if not links.steps.done.all():
-            every = self._every(first)
-            points, wo = self._points(first, every), self._wo(first, every)
-            links.trace(lambda rows: self._tracer.linked(points.rows(rows), wo[rows], pattern), cancelled)
-        return links.cell
+        partial_hits = self._cache.transient.get_value(key, lambda: PartialHits.empty(num, pattern.num_rays))
+        if not partial_hits.steps.done.all():
+            all_rows = self._all_rows(first)
+            surface_points, wo = self._surface_points(first, all_rows), self._wo(first, all_rows)
+            partial_hits.trace(
+                lambda rows: self._tracer.gather_hits(surface_points.rows(rows), wo[rows], pattern), is_canceled
+            )
+        return partial_hits.patch
 
-    def _every(self, first: int) -> Rows:
-        return np.arange(len(self._leant[first].normal))
+    def _all_rows(self, first: int) -> RowIndices:
+        return np.arange(len(self._perturbed[first].normal))
 
-    def _trace(self, name: str, first: int, chosen: Rows, found: NDArray[Any]) -> None:
+    def _trace(self, name: str, first: int, rows: RowIndices, values: NDArray[Any]) -> None:
         """Trace rays of some samples of a material. found: what was baked; written."""
         if name == "links":
-            found[:] = self._tracer.linked(self._points(first, chosen), self._wo(first, chosen), self._pattern(first))
+            values[:] = self._tracer.gather_hits(
+                self._surface_points(first, rows), self._wo(first, rows), self._pattern(first)
+            )
             return
-        points = self._points(first, chosen)
+        surface_points = self._surface_points(first, rows)
         if name == "visibility":
-            found[:] = self._tracer.seen(points, self._leant[first].before[chosen], found)
+            values[:] = self._tracer.visibility(surface_points, self._perturbed[first].baked_normal[rows], values)
         else:
-            found[:] = self._tracer.thrown(points)
+            values[:] = self._tracer.mirror_lights(surface_points)
 
-    def _wo(self, first: int, chosen: Rows) -> F32:
+    def _wo(self, first: int, rows: RowIndices) -> F32:
         """Towards the viewer, of some samples of a material. (n, 3)"""
-        eyes = read_eyes(self, self._view, first, first + len(self._leant[first].normal))
-        return towards(eyes if len(eyes) == 1 else eyes[chosen], self._points(first, chosen).position)
+        origins = read_ray_origins(self, self._view, first, first + len(self._perturbed[first].normal))
+        return view_directions(
+            origins if len(origins) == 1 else origins[rows], self._surface_points(first, rows).position
+        )
 
-    def _pattern(self, first: int) -> Pattern:
-        return pattern_of_material(self._store, self._view, self._materials[first])
+    def _pattern(self, first: int) -> RayPattern:
+        return make_material_pattern(self._store, self._view, self._materials[first])
 
-    def _points(self, first: int, chosen: Rows) -> Points:
+    def _surface_points(self, first: int, rows: RowIndices) -> SurfacePoints:
         """Some samples of a material, counted from its first."""
-        leant = self._leant[first]
-        start, stop = first, first + len(leant.normal)
-        chance = read_chance(self, self._view, start, stop)
-        return Points(
-            np.asarray(self._reordered(f"{self._prefix}position", start, stop)[chosen], np.float32),
-            np.ascontiguousarray(leant.normal[chosen]),
-            np.ascontiguousarray(leant.tangent[chosen]),
-            read_seeds(self, self._view, start, stop)[chosen],
-            chance if len(chance) == 1 else chance[chosen],
+        perturbed = self._perturbed[first]
+        start, stop = first, first + len(perturbed.normal)
+        alpha_samples = read_alpha_samples(self, self._view, start, stop)
+        return SurfacePoints(
+            np.asarray(self._reordered(f"{self._prefix}position", start, stop)[rows], np.float32),
+            np.ascontiguousarray(perturbed.normal[rows]),
+            np.ascontiguousarray(perturbed.tangent[rows]),
+            read_seeds(self, self._view, start, stop)[rows],
+            alpha_samples if len(alpha_samples) == 1 else alpha_samples[rows],
         )

@@ -12,18 +12,18 @@ from server.access.audit import Audit, Change
 from server.access.identity import Identity
 from server.access.quotas import Quotas
 from server.access.roles import Caller
-from server.access.tokens import REMEMBERED_S, TokenStore
+from server.access.tokens import TOKEN_CACHE_S, TokenStore
 from server.errors import LoginError
-from worker.database.faults import AWAY
+from worker.database.faults import DATABASE_ERRORS
 
 if TYPE_CHECKING:
     from server.settings import Settings
 
-PROXY_AGAIN_S = 900.0
+PROXY_REVALIDATION_S = 900.0
 """Only the proxy knows whether somebody whom it named may still be here: after this time they come by it again."""
 
 
-class Access:
+class AuthServices:
     """Tokens and who they are, quotas, and the audit, of one database."""
 
     def __init__(self, sessions: sessionmaker[Session], settings: Settings) -> None:
@@ -31,7 +31,7 @@ class Access:
         self.quotas = Quotas(sessions, settings)
         self.audit = Audit(sessions, settings.audit_lines)
 
-    async def note(self, change: Change) -> None:
+    async def record(self, change: Change) -> None:
         """Write a line of the audit, beside the event loop."""
         await run_sync(self.audit.add, change)
 
@@ -42,12 +42,12 @@ class Access:
             LoginError: the token has run out or was revoked.
         """
         while await self.may_stay(caller):
-            await asyncio.sleep(REMEMBERED_S)
+            await asyncio.sleep(TOKEN_CACHE_S)
         raise LoginError("your token has run out or was revoked; log in with another one")
 
     async def may_stay(self, caller: Caller) -> bool:
         """Whether what a caller has open may go on; while the database is away it does."""
         try:
             return caller.token is None or await run_sync(self.tokens.is_valid, caller.token)
-        except AWAY:
+        except DATABASE_ERRORS:
             return True

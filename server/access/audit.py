@@ -15,12 +15,12 @@ from sqlalchemy.orm import Session, sessionmaker
 from server.access.roles import Caller
 from server.access.tables import AuditRow
 from server.logs.context import REQUEST
-from worker.database.faults import AWAY, told
+from worker.database.faults import DATABASE_ERRORS, describe_error
 
 log = logging.getLogger(__name__)
 _TRIM_EVERY = 100
 _REFUSED = (401, 403)
-_REFUSED_SHARE = 10
+_REFUSED_DIVISOR = 10
 MAX_LISTED = 1_000
 
 
@@ -43,28 +43,28 @@ class Change:
     request: str
 
     @classmethod
-    def by(cls, caller: Caller, what: str, thing: str, status: int) -> Change:
+    def by(cls, caller: Caller, action: str, target: str, status: int) -> Change:
         """A change that a caller makes in the request at hand."""
-        role, address = caller.role.word, caller.address[:64]
-        return cls(caller.shown[:80], role, address, what[:200], thing[:500], status, REQUEST.get())
+        role, address = caller.role.label, caller.address[:64]
+        return cls(caller.display_name[:80], role, address, action[:200], target[:500], status, REQUEST.get())
 
 
 @dataclass(frozen=True)
 class Entry(Change):
-    """A line; `number` counts up, `at` is in seconds since 1970."""
+    """A line; `seq` counts up, `at` is in seconds since 1970."""
 
     number: int
     at: float
 
 
 class Audit:
-    """Lines of the audit, the newest `most` of them; may be used from any thread.
+    """Lines of the audit, the newest `max_lines` of them; may be used from any thread.
 
     Of refusals a tenth as many, beside them: whoever tries to get in again and again pushes no change out.
     """
 
-    def __init__(self, sessions: sessionmaker[Session], most: int) -> None:
-        self._sessions, self._most = sessions, most
+    def __init__(self, sessions: sessionmaker[Session], max_lines: int) -> None:
+        self._sessions, self._max_lines = sessions, max_lines
         self._until_trim = 0
 
     def add(self, change: Change) -> None:
@@ -76,20 +76,20 @@ class Audit:
             if self._until_trim < 0:
                 self._until_trim = _TRIM_EVERY
                 self._trim()
-        except AWAY as error:
-            log.error("a line of the audit could not be kept (%s): %s", told(error), change)
+        except DATABASE_ERRORS as error:
+            log.error("a line of the audit could not be kept (%s): %s", describe_error(error), change)
 
-    def list(self, most: int = 100, before: int | None = None, who: str | None = None) -> Sequence[Entry]:
+    def list(self, limit: int = 100, before: int | None = None, actor: str | None = None) -> Sequence[Entry]:
         """Lines, newest first.
 
         Args:
-            most: how many. before: only older ones than this number. who: only of this name.
+            limit: how many. before: only older ones than this number. actor: only of this name.
         """
-        query = select(AuditRow).order_by(AuditRow.number.desc()).limit(min(most, MAX_LISTED))
+        query = select(AuditRow).order_by(AuditRow.number.desc()).limit(min(limit, MAX_LISTED))
         if before is not None:
             query = query.where(AuditRow.number < before)
-        if who is not None:
-            query = query.where(AuditRow.who == who)
+        if actor is not None:
+            query = query.where(AuditRow.who == actor)
         with self._sessions() as session:
             return [
                 Entry(**{field.name: getattr(row, field.name) for field in fields(Entry)})
@@ -98,11 +98,11 @@ class Audit:
 
     def _trim(self) -> None:
         with self._sessions.begin() as session:
-            for are, most in (
-                (AuditRow.status.not_in(_REFUSED), self._most),
-                (AuditRow.status.in_(_REFUSED), max(1, self._most // _REFUSED_SHARE)),
+            for condition, limit in (
+                (AuditRow.status.not_in(_REFUSED), self._max_lines),
+                (AuditRow.status.in_(_REFUSED), max(1, self._max_lines // _REFUSED_DIVISOR)),
             ):
-                numbers = select(AuditRow.number).where(are).order_by(AuditRow.number.desc())
-                oldest = session.scalar(numbers.offset(most - 1).limit(1))
+                numbers = select(AuditRow.number).where(condition).order_by(AuditRow.number.desc())
+                oldest = session.scalar(numbers.offset(limit - 1).limit(1))
                 if oldest is not None:
-                    session.execute(delete(AuditRow).where(are, AuditRow.number < oldest))
+                    session.execute(delete(AuditRow).where(condition, AuditRow.number < oldest))

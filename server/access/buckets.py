@@ -16,19 +16,19 @@ IPV6_BITS = 64
 """Of an address of IPv6, those that tell one customer from another: who has a network has all addresses in it."""
 
 
-def bucket_of(address: str) -> str:
+def bucket_name(address: str) -> str:
     """Name of the bucket of an address: IPv6 counts by networks of /64."""
     try:
-        known = ipaddress.ip_address(address.partition("%")[0])
+        parsed = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:  # what a proxy said, a socket file, or a test
         return address
-    if known.version == 4:
-        return str(known)
-    mapped = known.ipv4_mapped
-    return str(mapped or ipaddress.ip_network((known, IPV6_BITS), strict=False))
+    if parsed.version == 4:
+        return str(parsed)
+    mapped = parsed.ipv4_mapped
+    return str(mapped or ipaddress.ip_network((parsed, IPV6_BITS), strict=False))
 
 
-class Buckets:
+class TokenBuckets:
     """One bucket for each name; used from the event loop only.
 
     Args:
@@ -53,7 +53,7 @@ class Buckets:
                 self._levels.popitem(last=False)
         return wait_s
 
-    def give_back(self, name: str) -> None:
+    def refund(self, name: str) -> None:
         """What was taken last did not count after all."""
         self._levels[name] = min(self._burst, self.level(name) + 1.0), self._clock()
 

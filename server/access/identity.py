@@ -10,7 +10,7 @@ from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
 from starlette.types import Scope
 
-from server.access.buckets import Buckets, bucket_of
+from server.access.buckets import TokenBuckets, bucket_name
 from server.access.proxies import Proxies
 from server.access.roles import PROXY, ROLES, Caller, Role
 from server.access.tokens import TokenStore
@@ -30,11 +30,11 @@ class Identity:
     """Tells who calls, as the settings say; on the event loop."""
 
     def __init__(self, settings: Settings) -> None:
-        self._is_asked = settings.login
+        self._requires_login = settings.login
         self._header, self._roles, self._role = settings.user_header, settings.proxy_roles, settings.proxy_role
         self._proxies = Proxies(settings.trusted_proxies, time.monotonic)
         rate = settings.requests_per_second or UNKNOWN_PER_SECOND
-        self._unknown = Buckets(rate, settings.requests_at_once, time.monotonic)
+        self._unknown = TokenBuckets(rate, settings.requests_at_once, time.monotonic)
 
     async def caller(self, scope: Scope, tokens: TokenStore) -> Caller:
         """Who calls. A token in the header goes before what a proxy says, and that before a cookie.
@@ -43,29 +43,31 @@ class Identity:
             LoginError: a token was sent in the header that opens nothing.
             RateError: too many such were sent from there.
         """
-        await self._proxies.look_up(_peer(scope))
+        await self._proxies.resolve(_peer(scope))
         headers, address = Headers(scope=scope), self.address(scope)
-        if not self._is_asked:
+        if not self._requires_login:
             return Caller("", Role.ADMIN, address, "open")
-        scheme, _, sent = headers.get("authorization", "").partition(" ")
+        scheme, _, credentials = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
-            found = await self.by_token(sent.strip(), address, tokens)
-            if found is None:
+            token_caller = await self.by_token(credentials.strip(), address, tokens)
+            if token_caller is None:
                 raise LoginError(OPENS_NOTHING)
-            return found
-        if self._proxies.has(_peer(scope)) and (named := self._by_proxy(headers, address)) is not None:
-            return named
-        if (cookie := cookie_of(headers)) and (found := await self.by_token(cookie, address, tokens)) is not None:
-            return found
+            return token_caller
+        if self._proxies.has(_peer(scope)) and (proxy_caller := self._by_proxy(headers, address)) is not None:
+            return proxy_caller
+        if (cookie := read_token_cookie(headers)) and (
+            token_caller := await self.by_token(cookie, address, tokens)
+        ) is not None:
+            return token_caller
         return Caller("", Role.ANYONE, address, "nobody")
 
     def address(self, scope: Scope) -> str:
         """Of the client: who has connected, or where that is a trusted proxy whom it has added last."""
-        return self._of_proxy(scope, "x-forwarded-for").split(",")[-1].strip()[:64] or _peer(scope)
+        return self._proxy_header(scope, "x-forwarded-for").split(",")[-1].strip()[:64] or _peer(scope)
 
     def is_secure(self, scope: Scope) -> bool:
         """Whether the browser speaks TLS, to the server or to a trusted proxy."""
-        return "https" in (scope["scheme"], self._of_proxy(scope, "x-forwarded-proto").split(",")[-1].strip())
+        return "https" in (scope["scheme"], self._proxy_header(scope, "x-forwarded-proto").split(",")[-1].strip())
 
     async def by_token(self, text: str, address: str, tokens: TokenStore) -> Caller | None:
         """Whose token a text is; asks the database, unless it has just done so.
@@ -76,15 +78,15 @@ class Identity:
         Raises:
             RateError: enough have been looked up for now.
         """
-        is_guess, bucket = not tokens.knows(text), bucket_of(address)
+        is_guess, bucket = not tokens.is_cached(text), bucket_name(address)
         wait_s = self._unknown.take(bucket) if is_guess else 0.0
         if wait_s > 0.0:
             raise RateError(f"too many wrong tokens; wait {max(wait_s, 0.1):.1f} s, then send a right one", wait_s)
-        token = await run_sync(tokens.find, text)
+        token = await run_sync(tokens.authenticate, text)
         if token is None:
             return None
         if is_guess:
-            self._unknown.give_back(bucket)
+            self._unknown.refund(bucket)
         return Caller(token.name, token.role, address, "token", token.id)
 
     def _by_proxy(self, headers: Headers, address: str) -> Caller | None:
@@ -94,7 +96,7 @@ class Identity:
             return None
         return Caller(PROXY + name, ROLES[self._roles.get(name, self._role)], address, "proxy")
 
-    def _of_proxy(self, scope: Scope, name: str) -> str:
+    def _proxy_header(self, scope: Scope, name: str) -> str:
         """What a trusted proxy says in a header; empty where nobody is trusted."""
         return _last(Headers(scope=scope), name) if self._proxies.has(_peer(scope)) else ""
 
@@ -117,7 +119,7 @@ def _as_utf8(value: str) -> str:
         return value
 
 
-def cookie_of(headers: Headers) -> str:
+def read_token_cookie(headers: Headers) -> str:
     """The token in the cookie; empty where there is none.
 
     Read as browsers write them: `http.cookies` reads none beside one of another program on the host that is not as

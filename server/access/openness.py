@@ -28,14 +28,14 @@ def check_openness(settings: Settings) -> None:
         raise OpennessError(
             "RELUME_USER_HEADER is set, but no proxy whose word counts; name its address in RELUME_TRUSTED_PROXIES"
         )
-    if "login" not in settings.model_fields_set and not _is_of_this_machine(settings.host):
+    if "login" not in settings.model_fields_set and not _is_loopback(settings.host):
         raise OpennessError(
             f"on {settings.host} whoever reaches this machine could read, import and delete everything; set "
             "RELUME_LOGIN=true, or RELUME_LOGIN=false if that is what you want"
         )
 
 
-def _is_of_this_machine(host: str) -> bool:
+def _is_loopback(host: str) -> bool:
     """Whether nobody outside reaches an address to listen on."""
     try:
         return ipaddress.ip_address(host).is_loopback

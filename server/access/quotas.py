@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from server.settings import Settings
 
 log = logging.getLogger(__name__)
-Kind = Literal["upload", "scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
+OwnedKind = Literal["upload", "scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
 _ACTIVE = ("queued", "running")
 MAX_STREAMS_EACH = 32
 """Streams of events that one caller may have open."""
@@ -52,36 +52,36 @@ class Quotas:
         return self._open.total()
 
     @contextmanager
-    def session(self, who: str) -> Iterator[None]:
+    def session(self, user: str) -> Iterator[None]:
         """One live session of somebody. Raises BusyError, QuotaError: enough are open."""
-        most, each = self.settings.max_sessions, self.settings.max_sessions_each
+        max_total, max_each = self.settings.max_sessions, self.settings.max_sessions_each
         with self._lock:
-            if self._open.total() >= most:
-                raise BusyError(f"as many sessions are open as may be, {most}; close one and try again")
-            if each is not None and self._open[who] >= each:
-                text = f"you have as many sessions open as may be, {each}; close one (RELUME_MAX_SESSIONS_EACH)"
+            if self._open.total() >= max_total:
+                raise BusyError(f"as many sessions are open as may be, {max_total}; close one and try again")
+            if max_each is not None and self._open[user] >= max_each:
+                text = f"you have as many sessions open as may be, {max_each}; close one (RELUME_MAX_SESSIONS_EACH)"
                 raise QuotaError(text)
-            self._open[who] += 1
+            self._open[user] += 1
         try:
             yield
         finally:
             with self._lock:
-                self._open[who] -= 1
+                self._open[user] -= 1
                 self._open += Counter()  # forgets those who have none
 
     @contextmanager
     def stream(self, caller: Caller) -> Iterator[None]:
         """One stream of events of somebody, of whom is not known by name of an address. Raises QuotaError."""
-        who = f"name {caller.name}" if caller.name else f"address {caller.address}"
+        stream_key = f"name {caller.name}" if caller.name else f"address {caller.address}"
         with self._lock:
-            if self._streams[who] >= MAX_STREAMS_EACH:
+            if self._streams[stream_key] >= MAX_STREAMS_EACH:
                 raise QuotaError(f"you follow as many bakes as may be, {MAX_STREAMS_EACH}; close a stream, or poll")
-            self._streams[who] += 1
+            self._streams[stream_key] += 1
         try:
             yield
         finally:
             with self._lock:
-                self._streams[who] -= 1
+                self._streams[stream_key] -= 1
                 self._streams += Counter()
 
     @property
@@ -102,107 +102,108 @@ class Quotas:
         if is_full:
             raise NearlyFullError(f"the disk of the data directory has {bytes_text(free)} left; free some space")
 
-    def check_bytes(self, who: str, more: int) -> None:
+    def check_bytes(self, owner: str, added_bytes: int) -> None:
         """Raises QuotaError where somebody would have too much with so many bytes more; and as `check_room` does."""
         self.check_room()
-        most = self.settings.max_bytes_each
-        if most is None:
+        limit_bytes = self.settings.max_bytes_each
+        if limit_bytes is None:
             return
-        used = self.used_bytes(who)
-        if used + more > most:
-            raise _too_much(used, most, more)
+        used_bytes = self.used_bytes(owner)
+        if used_bytes + added_bytes > limit_bytes:
+            raise _quota_exceeded(used_bytes, limit_bytes, added_bytes)
 
-    def left_bytes(self, who: str) -> int | None:
+    def remaining_bytes(self, owner: str) -> int | None:
         """What somebody may still have, below zero where it is too much already; None where there is no limit."""
-        most = self.settings.max_bytes_each
-        return None if most is None else most - self.used_bytes(who)
+        limit_bytes = self.settings.max_bytes_each
+        return None if limit_bytes is None else limit_bytes - self.used_bytes(owner)
 
-    def put_reserved(self, who: str, row: str, num_bytes: int) -> None:
+    def put_reserved(self, owner: str, row_id: str, num_bytes: int) -> None:
         """What an upload takes while it is taken in, see `Reservation`; what a killed server left ends."""
         now = f"{int(time.time()):012d}"
         with self._sessions.begin() as session:
             session.execute(delete(OwnedRow).where(OwnedRow.kind == "upload", OwnedRow.object < now))
-            session.merge(OwnedRow(kind="upload", object=row, owner=who, bytes=num_bytes))
+            session.merge(OwnedRow(kind="upload", object=row_id, owner=owner, bytes=num_bytes))
 
-    def drop_reserved(self, row: str) -> None:
+    def drop_reserved(self, row_id: str) -> None:
         """It takes nothing any more."""
-        self.disown("upload", row)
+        self.disown("upload", row_id)
 
-    def check_reserved(self, who: str, num_bytes: int) -> None:
+    def check_reserved(self, owner: str, num_bytes: int) -> None:
         """Whether there is room for all that is reserved, of which somebody's newest is so many bytes. An upload is on
         the disk twice, as it came and under its own name. Raises QuotaError, NearlyFullError."""
         self.check_room()
         with self._sessions() as session:
-            all_bytes = session.scalar(select(func.sum(OwnedRow.bytes)).where(OwnedRow.kind == "upload")) or 0
-        free = free_bytes(self.settings.data)
-        if free - 2 * all_bytes < self.settings.least_free_bytes:
+            reserved_bytes = session.scalar(select(func.sum(OwnedRow.bytes)).where(OwnedRow.kind == "upload")) or 0
+        disk_bytes = free_bytes(self.settings.data)
+        if disk_bytes - 2 * reserved_bytes < self.settings.least_free_bytes:
             raise NearlyFullError(
-                f"the disk of the data directory has {bytes_text(free)} left, too little for {bytes_text(num_bytes)} "
-                f"more beside what else is sent now ({bytes_text(all_bytes - num_bytes)}); free some space"
+                f"the disk of the data directory has {bytes_text(disk_bytes)} left, too little for "
+                f"{bytes_text(num_bytes)} "
+                f"more beside what else is sent now ({bytes_text(reserved_bytes - num_bytes)}); free some space"
             )
-        most = self.settings.max_bytes_each
-        if most is not None and (used := self.used_bytes(who)) > most:
-            raise _too_much(used - num_bytes, most, num_bytes)
+        limit_bytes = self.settings.max_bytes_each
+        if limit_bytes is not None and (used_bytes := self.used_bytes(owner)) > limit_bytes:
+            raise _quota_exceeded(used_bytes - num_bytes, limit_bytes, num_bytes)
 
-    def check_bakes(self, who: str) -> None:
+    def check_bakes(self, owner: str) -> None:
         """Raises QuotaError where enough bakes of somebody wait or run."""
-        most = self.settings.max_bakes_each
-        if most is None:
+        max_bakes = self.settings.max_bakes_each
+        if max_bakes is None:
             return
         query = (
             select(func.count())
             .select_from(OwnedRow)
             .join(BakeRow, BakeRow.id == OwnedRow.object)
-            .where(OwnedRow.kind == "bake", OwnedRow.owner == who, BakeRow.state.in_(_ACTIVE))
+            .where(OwnedRow.kind == "bake", OwnedRow.owner == owner, BakeRow.state.in_(_ACTIVE))
         )
         with self._sessions() as session:
-            active = session.scalar(query) or 0
-        if active >= most:
+            num_active = session.scalar(query) or 0
+        if num_active >= max_bakes:
             raise QuotaError(
-                f"as many of your bakes wait or run as may, {most}; wait, or cancel one (RELUME_MAX_BAKES_EACH)"
+                f"as many of your bakes wait or run as may, {max_bakes}; wait, or cancel one (RELUME_MAX_BAKES_EACH)"
             )
 
-    def used_bytes(self, who: str) -> int:
+    def used_bytes(self, owner: str) -> int:
         """What somebody's uploads had, finished bakes and renders have, and others are planned to take; of bakes that
         were stopped the share that is done, which is kept for a resume."""
-        others = select(func.coalesce(func.sum(OwnedRow.bytes), 0)).where(
-            OwnedRow.owner == who, OwnedRow.kind != "bake"
+        other_bytes = select(func.coalesce(func.sum(OwnedRow.bytes), 0)).where(
+            OwnedRow.owner == owner, OwnedRow.kind != "bake"
         )
         bakes = (
             select(OwnedRow.bytes, BakeRow.bytes, BakeRow.state, BakeRow.progress)
             .join(BakeRow, BakeRow.id == OwnedRow.object)
-            .where(OwnedRow.kind == "bake", OwnedRow.owner == who)
+            .where(OwnedRow.kind == "bake", OwnedRow.owner == owner)
         )
         with self._sessions() as session:
-            total = int(session.scalar(others) or 0)
+            total = int(session.scalar(other_bytes) or 0)
             for planned, written, state, progress in session.execute(bakes):
                 total += planned if state in _ACTIVE else written if state == "ready" else int(planned * progress)
         return total
 
-    def own(self, who: str, kind: Kind, thing: str, num_bytes: int) -> None:
+    def assign_owner(self, owner: str, kind: OwnedKind, object_id: str, num_bytes: int) -> None:
         """Something of so many bytes is somebody's, unless somebody has it."""
         with self._sessions.begin() as session:
-            if session.get(OwnedRow, (kind, thing)) is None:
-                session.add(OwnedRow(kind=kind, object=thing, owner=who, bytes=num_bytes))
+            if session.get(OwnedRow, (kind, object_id)) is None:
+                session.add(OwnedRow(kind=kind, object=object_id, owner=owner, bytes=num_bytes))
 
     @contextmanager
-    def owning(self, who: str, kind: Kind, thing: str, num_bytes: int) -> Iterator[None]:
+    def owner_assigned(self, owner: str, kind: OwnedKind, object_id: str, num_bytes: int) -> Iterator[None]:
         """What is queued inside is somebody's before anybody works on it; nobody's where that fails."""
-        self.own(who, kind, thing, num_bytes)
+        self.assign_owner(owner, kind, object_id, num_bytes)
         try:
             yield
         except BaseException:
-            self.disown(kind, thing)
+            self.disown(kind, object_id)
             raise
 
-    def measured(self, kind: Kind, thing: str, num_bytes: int) -> None:
+    def set_bytes(self, kind: OwnedKind, object_id: str, num_bytes: int) -> None:
         """What was planned to take so many bytes is finished and takes these."""
         with self._sessions.begin() as session:
             session.execute(
-                update(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object == thing).values(bytes=num_bytes)
+                update(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object == object_id).values(bytes=num_bytes)
             )
 
-    def become(self, before: tuple[Kind, str], after: tuple[Kind, str], num_bytes: int) -> None:
+    def convert(self, before: tuple[OwnedKind, str], after: tuple[OwnedKind, str], num_bytes: int) -> None:
         """Something has become another thing of so many bytes, whose owner is the same, unless somebody has it."""
         with self._sessions.begin() as session:
             row = session.get(OwnedRow, before)
@@ -210,17 +211,18 @@ class Quotas:
                 return
             session.delete(row)
             if session.get(OwnedRow, after) is None:
-                kind, thing = after
-                session.add(OwnedRow(kind=kind, object=thing, owner=row.owner, bytes=num_bytes))
+                kind, object_id = after
+                session.add(OwnedRow(kind=kind, object=object_id, owner=row.owner, bytes=num_bytes))
 
-    def disown(self, kind: Kind, *things: str) -> None:
+    def disown(self, kind: OwnedKind, *object_ids: str) -> None:
         """They are deleted."""
         with self._sessions.begin() as session:
-            session.execute(delete(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object.in_(things)))
+            session.execute(delete(OwnedRow).where(OwnedRow.kind == kind, OwnedRow.object.in_(object_ids)))
 
 
-def _too_much(used: int, most: int, more: int) -> QuotaError:
+def _quota_exceeded(used_bytes: int, limit_bytes: int, added_bytes: int) -> QuotaError:
     return QuotaError(
-        f"you have {bytes_text(used)} of at most {bytes_text(most)}, and this takes {bytes_text(more)}; "
+        f"you have {bytes_text(used_bytes)} of at most {bytes_text(limit_bytes)}, and this takes "
+        f"{bytes_text(added_bytes)}; "
         "delete a scene, a bake, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
     )

@@ -13,11 +13,11 @@ from server.errors import NearlyFullError, QuotaError
 from server.library.disk import free_bytes
 
 if TYPE_CHECKING:
-    from server.access.quotas import Kind, Quotas
+    from server.access.quotas import OwnedKind, Quotas
 
-RESERVED_S = 3600
+RESERVATION_TTL_S = 3600
 """How long what a killed server has reserved still counts."""
-IMPORTS_AT_ONCE = 2
+MAX_CONCURRENT_IMPORTS = 2
 """Among which the room that is left on the disk is shared."""
 
 
@@ -26,16 +26,16 @@ class Reservation:
     the same time, to another server too, counts it. Used by one thread at a time.
 
     Args:
-        quotas: of all. who: whose it is.
+        quotas: of all. owner: whose it is.
     """
 
-    def __init__(self, quotas: Quotas, who: str) -> None:
-        self.who = who
+    def __init__(self, quotas: Quotas, owner: str) -> None:
+        self.owner = owner
         self._quotas = quotas
-        self._row = f"{int(time.time()) + RESERVED_S:012d}-{uuid.uuid4().hex}"
+        self._row = f"{int(time.time()) + RESERVATION_TTL_S:012d}-{uuid.uuid4().hex}"
         self.bytes = 0
 
-    def hold(self, num_bytes: int) -> None:
+    def reserve(self, num_bytes: int) -> None:
         """Count so many bytes from now on.
 
         Raises:
@@ -43,41 +43,44 @@ class Reservation:
         """
         with self._quotas.deciding:  # of one server none is refused for another that is refused
             before, self.bytes = self.bytes, num_bytes
-            self._quotas.put_reserved(self.who, self._row, num_bytes)
+            self._quotas.put_reserved(self.owner, self._row, num_bytes)
             try:
-                self._quotas.check_reserved(self.who, num_bytes)
+                self._quotas.check_reserved(self.owner, num_bytes)
             except (QuotaError, NearlyFullError):
                 self.bytes = before
-                self._quotas.put_reserved(self.who, self._row, before)
+                self._quotas.put_reserved(self.owner, self._row, before)
                 raise
 
-    def most_bytes(self) -> int:
+    def max_import_bytes(self) -> int:
         """How large what is made of the upload may be, now."""
-        left, settings = self._quotas.left_bytes(self.who), self._quotas.settings
-        on_disk = (free_bytes(settings.data) - settings.least_free_bytes) // IMPORTS_AT_ONCE
-        return max(0, on_disk if left is None else min(on_disk, left + self.bytes))
+        remaining_bytes, settings = self._quotas.remaining_bytes(self.owner), self._quotas.settings
+        disk_bytes = (free_bytes(settings.data) - settings.least_free_bytes) // MAX_CONCURRENT_IMPORTS
+        return max(0, disk_bytes if remaining_bytes is None else min(disk_bytes, remaining_bytes + self.bytes))
 
-    def outgrown(self, most: int) -> QuotaError | NearlyFullError:
-        """The error of a file that unpacks to more than `most_bytes` said."""
-        if self._quotas.left_bytes(self.who) is None:
-            return NearlyFullError(f"the file unpacks to more than {bytes_text(most)}, and the disk has no more room")
+    def too_large_error(self, limit_bytes: int) -> QuotaError | NearlyFullError:
+        """The error of a file that unpacks to more than `max_import_bytes` said."""
+        if self._quotas.remaining_bytes(self.owner) is None:
+            return NearlyFullError(
+                f"the file unpacks to more than {bytes_text(limit_bytes)}, and the disk has no more room"
+            )
         return QuotaError(
-            f"the file unpacks to more than the {bytes_text(most)} that you may still have; delete a scene, a bake, a "
+            f"the file unpacks to more than the {bytes_text(limit_bytes)} that you may still have; delete a scene, a "
+            f"bake, a "
             "material or a render of yours first (RELUME_MAX_BYTES_EACH)"
         )
 
-    def become(self, kind: Kind, thing: str, num_bytes: int) -> None:
+    def convert(self, kind: OwnedKind, object_id: str, num_bytes: int) -> None:
         """What was reserved is a thing of so many bytes from now on, unless it is somebody's already."""
-        self._quotas.become(("upload", self._row), (kind, thing), num_bytes)
+        self._quotas.convert(("upload", self._row), (kind, object_id), num_bytes)
 
     @contextmanager
-    def owning(self, kind: Kind, thing: str, num_bytes: int) -> Iterator[None]:
+    def owner_assigned(self, kind: OwnedKind, object_id: str, num_bytes: int) -> Iterator[None]:
         """What is queued inside is somebody's before anybody works on it; nobody's where that fails."""
-        self.become(kind, thing, num_bytes)
+        self.convert(kind, object_id, num_bytes)
         try:
             yield
         except BaseException:
-            self._quotas.disown(kind, thing)
+            self._quotas.disown(kind, object_id)
             raise
 
     def release(self) -> None:

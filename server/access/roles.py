@@ -19,7 +19,7 @@ class Role(IntEnum):
     ADMIN = 3
 
     @property
-    def word(self) -> str:
+    def label(self) -> str:
         """As settings, commands and messages write it."""
         return self.name.lower()
 
@@ -64,7 +64,7 @@ class Caller:
         return self.name.removeprefix(PROXY) if self.by == "proxy" else self.name
 
     @property
-    def shown(self) -> str:
+    def display_name(self) -> str:
         """As logs and the audit call them."""
         return self.name or self.address
 
@@ -73,10 +73,10 @@ KEY = "relume.caller"
 """Under which the gate leaves the caller in the scope of a request."""
 
 
-def caller_of(connection: HTTPConnection) -> Caller:
+def get_caller(connection: HTTPConnection) -> Caller:
     """Who calls, for routes."""
-    found: Caller = connection.scope[KEY]
-    return found
+    caller: Caller = connection.scope[KEY]
+    return caller
 
 
-Who = Annotated[Caller, Depends(caller_of)]
+CallerDep = Annotated[Caller, Depends(get_caller)]

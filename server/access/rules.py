@@ -124,7 +124,7 @@ _COMPILED: tuple[tuple[re.Pattern[str], Mapping[str, Role]], ...] = tuple(
 _COMMENTS = compile_path("/api/scenes/{scene}/comments")[0]
 
 
-def needed(method: str, path: str) -> Role:
+def required_role(method: str, path: str) -> Role:
     """What a call needs: the most that any line asks that fits it; of what is no call, nothing, the editor's files."""
     fitting = [roles[method] for pattern, roles in _COMPILED if method in roles and pattern.match(path)]
     if fitting:
@@ -145,7 +145,7 @@ def is_comment(method: str, path: str) -> bool:
 
 def is_change(method: str, path: str) -> bool:
     """Whether a call changes something that others see: it is not safe, and needs more than to look."""
-    return method not in ("GET", "HEAD", "OPTIONS", SOCKET) and needed(method, path) >= EDIT
+    return method not in ("GET", "HEAD", "OPTIONS", SOCKET) and required_role(method, path) >= EDIT
 
 
 def check_message(caller: Caller, kind: str) -> None:
@@ -154,5 +154,6 @@ def check_message(caller: Caller, kind: str) -> None:
         raise ForbiddenError("this link is for watching; ask who sent it for the one to work together")
     if caller.role < MESSAGES[kind]:
         raise ForbiddenError(
-            f"{caller.shown} may look at this picture but not edit it; ask an admin for a token with the role edit"
+            f"{caller.display_name} may look at this picture but not edit it; ask an admin for a token with the role "
+            f"edit"
         )

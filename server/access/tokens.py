@@ -20,9 +20,9 @@ from server.access.roles import PROXY, ROLES, Role
 from server.access.tables import TokenRow
 
 MAX_TOKENS = 10_000
-MAX_MISSED = 10_000
+MAX_UNKNOWN_IDS = 10_000
 """Ids of which it is remembered that there is no such token."""
-REMEMBERED_S = 2.0
+TOKEN_CACHE_S = 2.0
 """How long a token that was revoked elsewhere may still be taken."""
 _ID_DIGITS, _MAX_LENGTH = 12, 120
 
@@ -48,8 +48,8 @@ class TokenStore:
 
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions = sessions
-        self._remembered: dict[str, tuple[float, Token, str]] = {}
-        self._missed: OrderedDict[str, float] = OrderedDict()
+        self._cached: dict[str, tuple[float, Token, str]] = {}
+        self._unknown_ids: OrderedDict[str, float] = OrderedDict()
 
     def add(self, name: str, role: str, days: float | None = None) -> str:
         """Hand out a token; the text is told this once.
@@ -65,10 +65,10 @@ class TokenStore:
             raise ParameterError("name", name, f"one that does not begin with {PROXY}, as names from proxies do")
         if days is not None and not 0 < days <= 36_500:
             raise ParameterError("days", days, "more than 0, at most 36500")
-        now, known = time.time(), self.all()
-        if any(token.name == name and token.is_valid(now) for token in known):
+        now, tokens = time.time(), self.all()
+        if any(token.name == name and token.is_valid(now) for token in tokens):
             raise ParameterError("name", name, "one that no valid token has; revoke that first")
-        if len(known) >= MAX_TOKENS:
+        if len(tokens) >= MAX_TOKENS:
             raise ParameterError("name", name, f"no more: {MAX_TOKENS:,} tokens were handed out")
         identity, secret = secrets.token_hex(_ID_DIGITS // 2), secrets.token_urlsafe(32)
         expires = None if days is None else now + days * 86_400
@@ -86,57 +86,57 @@ class TokenStore:
     def revoke(self, name: str) -> None:
         """The valid token of that name, or of that id, opens nothing any more. Raises NotFoundError."""
         now = time.time()
-        found = [token for token in self.all() if name in (token.name, token.id) and token.is_valid(now)]
-        if not found:
+        matches = [token for token in self.all() if name in (token.name, token.id) and token.is_valid(now)]
+        if not matches:
             raise NotFoundError(f"there is no valid token {name[:80]!r}; relume token list shows them")
         with self._sessions.begin() as session:
-            for token in found:
+            for token in matches:
                 row = session.get(TokenRow, token.id)
                 if row is not None:
                     row.revoked = now
-                self._remembered.pop(token.id, None)
+                self._cached.pop(token.id, None)
 
-    def find(self, text: str) -> Token | None:
+    def authenticate(self, text: str) -> Token | None:
         """The valid token that a text is; asks the database, unless it has just done so."""
-        identity, secret = _parts(text)
-        known = self._known(identity) if identity else None
-        is_right = known is not None and _is_secret(secret, known[1])
-        return known[0] if known is not None and is_right and known[0].is_valid(time.time()) else None
+        identity, secret = _split_token(text)
+        cached = self._fetch(identity) if identity else None
+        is_right = cached is not None and _is_secret(secret, cached[1])
+        return cached[0] if cached is not None and is_right and cached[0].is_valid(time.time()) else None
 
-    def knows(self, text: str) -> bool:
+    def is_cached(self, text: str) -> bool:
         """Whether a text was a right token when it was looked up last, however long ago; asks no database."""
-        identity, secret = _parts(text)
-        remembered = self._remembered.get(identity)
-        return remembered is not None and _is_secret(secret, remembered[2])
+        identity, secret = _split_token(text)
+        cached = self._cached.get(identity)
+        return cached is not None and _is_secret(secret, cached[2])
 
     def is_valid(self, identity: str) -> bool:
         """Whether the token of that id still opens what it opened."""
-        known = self._known(identity)
-        return known is not None and known[0].is_valid(time.time())
+        cached = self._fetch(identity)
+        return cached is not None and cached[0].is_valid(time.time())
 
-    def _known(self, identity: str) -> tuple[Token, str] | None:
-        now_s, remembered = time.monotonic(), self._remembered.get(identity)
-        if remembered is not None and now_s < remembered[0]:
-            return remembered[1:]
-        if now_s < self._missed.get(identity, 0.0):
+    def _fetch(self, identity: str) -> tuple[Token, str] | None:
+        now_s, cached = time.monotonic(), self._cached.get(identity)
+        if cached is not None and now_s < cached[0]:
+            return cached[1:]
+        if now_s < self._unknown_ids.get(identity, 0.0):
             return None
         with self._sessions() as session:
             row = session.get(TokenRow, identity)
         if row is None:
-            self._missed[identity] = now_s + REMEMBERED_S
-            if len(self._missed) > MAX_MISSED:
-                self._missed.popitem(last=False)
+            self._unknown_ids[identity] = now_s + TOKEN_CACHE_S
+            if len(self._unknown_ids) > MAX_UNKNOWN_IDS:
+                self._unknown_ids.popitem(last=False)
             return None
-        self._remembered[identity] = now_s + REMEMBERED_S, _token(row), row.digest
+        self._cached[identity] = now_s + TOKEN_CACHE_S, _token(row), row.digest
         return _token(row), row.digest
 
 
-def _parts(text: str) -> tuple[str, str]:
+def _split_token(text: str) -> tuple[str, str]:
     """Id and secret of a token; both empty where it is none."""
-    parts = text.split("_", 2)
-    if len(text) > _MAX_LENGTH or len(parts) != 3 or parts[0] != "relume" or len(parts[1]) != _ID_DIGITS:
+    fields = text.split("_", 2)
+    if len(text) > _MAX_LENGTH or len(fields) != 3 or fields[0] != "relume" or len(fields[1]) != _ID_DIGITS:
         return "", ""
-    return parts[1], parts[2]
+    return fields[1], fields[2]
 
 
 def _is_secret(secret: str, digest: str) -> bool:

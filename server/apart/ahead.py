@@ -17,20 +17,20 @@ from relume.code_version import image_code
 from relume.errors import CancelledError, NotFoundError, RelumeError
 from server.apart.step import RunStep, Step
 from server.apart.thumbnails import Thumbnails
-from worker.database.faults import Complaint
+from worker.database.faults import DatabaseError
 from worker.ledger import Ledger
 from worker.paths import bake_path
-from worker.status import MOVING
-from worker.storage.locks import open_locked
+from worker.status import FREE_CAMERA_METHODS
+from worker.storage.locks import open_lock_file
 
 log = logging.getLogger(__name__)
 
-ROUND_S = 5.0
-MOST_AT_START = 20  # an update makes all pictures old
+POLL_INTERVAL_S = 5.0
+MAX_BAKES_AT_START = 20  # an update makes all pictures old
 _LOCK = Path("bakes", "locks", "ahead")
 
 
-class Ahead:
+class Prewarmer:
     """Looks for bakes that have become ready, in a thread of its own."""
 
     def __init__(
@@ -44,7 +44,7 @@ class Ahead:
         self._data, self._ledger, self._run_step = data, ledger, run
         self._thumbnails, self._is_used = thumbnails, is_used
         self._closing = threading.Event()
-        self._complaint = Complaint(log, "first pictures of new bakes cannot be made")
+        self._outage = DatabaseError(log, "first pictures of new bakes cannot be made")
         self._thread = threading.Thread(target=self._run, name="relume-ahead", daemon=True)
 
     def start(self) -> None:
@@ -58,48 +58,48 @@ class Ahead:
             self._thread.join()
 
     def _run(self) -> None:
-        known: set[str] = set()
-        while not self._closing.wait(ROUND_S):  # who waits for a bake opens it meanwhile
+        processed: set[str] = set()
+        while not self._closing.wait(POLL_INTERVAL_S):  # who waits for a bake opens it meanwhile
             try:
-                with self._turn() as is_ours:
-                    if is_ours:
-                        self._go_round(known)
-                        self._complaint.well()  # where another server has the turn nothing was asked
+                with self._try_lock() as has_lock:
+                    if has_lock:
+                        self._run_once(processed)
+                        self._outage.report_recovered()  # where another server has the turn nothing was asked
             except Exception as error:  # the database may be away for a while; the thread must outlive that
-                self._complaint.meet(error)
+                self._outage.report_failure(error)
 
-    def _go_round(self, known: set[str]) -> None:
+    def _run_once(self, processed: set[str]) -> None:
         """Make the pictures of bakes that were not known yet, the newest first; at first, of a few that have none."""
-        ready = self._ledger.ready()
-        known.intersection_update(ready)  # one that was deleted may be baked again
-        new = [bake for bake in ready if bake not in known]
-        if not known:
-            known.update(new[MOST_AT_START:])
-            new = new[:MOST_AT_START]
+        ready_bakes = self._ledger.ready_bakes()
+        processed.intersection_update(ready_bakes)  # one that was deleted may be baked again
+        new = [bake for bake in ready_bakes if bake not in processed]
+        if not processed:
+            processed.update(new[MAX_BAKES_AT_START:])
+            new = new[:MAX_BAKES_AT_START]
         for bake in new:
             if self._closing.is_set():
                 return
-            known.add(bake)
-            if self._lacks_pictures(bake):
-                self._make(bake)
+            processed.add(bake)
+            if self._needs_pictures(bake):
+                self._prewarm(bake)
 
-    def _lacks_pictures(self, bake: str) -> bool:
+    def _needs_pictures(self, bake: str) -> bool:
         """Whether a bake is here, and no picture of its own look by this code."""
         store = bake_path(self._data, bake)
         with suppress(NotFoundError):
-            is_fixed = self._ledger.bake(bake).recipe.method not in MOVING
+            is_fixed = self._ledger.bake(bake).recipe.method not in FREE_CAMERA_METHODS
             return is_fixed and store.exists() and not (store / "derived" / image_code()).exists()
         return False
 
-    def _make(self, bake: str) -> None:
-        def is_wanted() -> bool:
+    def _prewarm(self, bake: str) -> None:
+        def is_needed() -> bool:
             return not self._closing.is_set() and not self._is_used(bake)
 
-        if not is_wanted():
+        if not is_needed():
             return
         try:
             step = Step("first picture of a bake", values={"bake": bake})
-            self._run_step(step, lambda share: None, is_wanted)
+            self._run_step(step, lambda share: None, is_needed)
             self._thumbnails.paint(bake, is_first=False)
         except CancelledError:  # somebody opened it, or the server closes
             pass
@@ -107,10 +107,10 @@ class Ahead:
             log.info("the first picture of bake %s was not made ahead (%s)", bake, error)
 
     @contextmanager
-    def _turn(self) -> Iterator[bool]:
+    def _try_lock(self) -> Iterator[bool]:
         """Whether it is for this process to look, for as long as the block runs."""
         try:
-            lock = open_locked(self._data / _LOCK, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock = open_lock_file(self._data / _LOCK, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             yield False
             return

@@ -8,28 +8,32 @@ from typing import Any
 
 from relume import look as looks
 from relume.imageio.files import write_image
-from relume.imageio.shrink import shrink
-from relume.picture.jobs import Cancelled, Progress
-from server.apart.workshop import Workshop
+from relume.imageio.shrink import downsample
+from relume.picture.jobs import CancelCheck, ProgressCallback
+from server.apart.workshop import BatchContext
 
 MAX_WIDTH = 320
 
 
-def shade(shop: Workshop, tell: Progress, cancelled: Cancelled, *, bake: str) -> Mapping[str, Any]:
+def render_first(
+    context: BatchContext, report: ProgressCallback, is_canceled: CancelCheck, *, bake: str
+) -> Mapping[str, Any]:
     """Shade the scene's own look in every view of a bake of fixed views; its images stay beside the store, where an
     opened picture looks for them."""
-    transfer = shop.transfer(bake)
+    transfer = context.transfer(bake)
     look, num_views = looks.validate(transfer.default_look, transfer.default_look), len(transfer.views)
     for done, view in enumerate(transfer.views):
 
-        def tell_view(share: float, done: int = done) -> None:
-            tell((done + share) / num_views)
+        def report_view(fraction: float, done: int = done) -> None:
+            report((done + fraction) / num_views)
 
-        shop.library.render(transfer, view, look, progress=tell_view, cancelled=cancelled)
+        context.library.render(transfer, view, look, progress=report_view, is_canceled=is_canceled)
     return {}
 
 
-def paint_thumbnail(shop: Workshop, tell: Progress, cancelled: Cancelled, *, bake: str, path: str) -> Mapping[str, Any]:
+def paint_thumbnail(
+    context: BatchContext, report: ProgressCallback, is_canceled: CancelCheck, *, bake: str, path: str
+) -> Mapping[str, Any]:
     """Paint the first view of a bake small.
 
     Args:
@@ -38,12 +42,12 @@ def paint_thumbnail(shop: Workshop, tell: Progress, cancelled: Cancelled, *, bak
     file = Path(path)
     if file.exists():  # somebody else asked at the same time
         return {}
-    transfer = shop.transfer(bake)
+    transfer = context.transfer(bake)
     view = next(iter(transfer.views.values()))
     width = min(MAX_WIDTH, view.width)
     size = (width, max(1, round(view.height * width / view.width)))
     look = looks.validate(transfer.default_look, transfer.default_look)
-    image = shrink(shop.library.render_small(transfer, view.name, look, width), size)
+    image = downsample(context.library.render_small(transfer, view.name, look, width), size)
     file.parent.mkdir(parents=True, exist_ok=True)
     write_image(file, image, look.display.exposure, look.display.tone_map)
     return {}

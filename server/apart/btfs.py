@@ -12,23 +12,28 @@ from typing import Any
 from relume.btf.importing import import_btf
 from relume.btf.shelf import BtfRecord
 from relume.errors import CancelledError
-from relume.picture.jobs import Cancelled, Progress
-from relume.replacing import replacing
-from relume.synthetic.make import MESH, Made, make_btf
-from server.apart.btf_images import ImagesApart
-from server.apart.workshop import Workshop
+from relume.picture.jobs import CancelCheck, ProgressCallback
+from relume.replacing import atomic_write
+from relume.synthetic.make import MESH, SyntheticBtf, synthesize_btf
+from server.apart.btf_images import SandboxedViewArrays
+from server.apart.workshop import BatchContext
 from server.settings import Settings
 from server.wire.btfs import BtfRequest
 from worker.paths import btfs_path
 
-SENT, FOUND = "images.zip", "found.json"  # a container or a mesh has the same name: the first bytes tell
-_MAKING, _REACHED = "making", "reached.txt"
+UPLOAD_FILE, RESULT_FILE = "images.zip", "found.json"  # a container or a mesh has the same name: the first bytes tell
+_WORK_FOLDER, _PROGRESS_FILE = "making", "reached.txt"
 _GRID = 3  # places along each side of a texel
-TURN_S = 30.0
+SLICE_S = 30.0
 
 
-def make(
-    shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: Mapping[str, Any], folder: str
+def run_btf_slice(
+    context: BatchContext,
+    report: ProgressCallback,
+    is_canceled: CancelCheck,
+    *,
+    request: Mapping[str, Any],
+    folder: str,
 ) -> Mapping[str, Any]:
     """Render or read it, compress it, keep it; what was found when it was stopped is still there.
 
@@ -37,54 +42,66 @@ def make(
     Returns:
         `is_done`: whether it is kept; else it is to be gone on with.
     """
-    asked, where = BtfRequest.model_validate(request), Path(folder)
-    turn = _Turn(tell, cancelled, where / _REACHED)
+    btf_request, job_folder = BtfRequest.model_validate(request), Path(folder)
+    time_slice = _TimeSlice(report, is_canceled, job_folder / _PROGRESS_FILE)
     try:
-        record = _made(asked, where, btfs_path(shop.data), turn)
+        record = _make_record(btf_request, job_folder, btfs_path(context.data), time_slice)
     except CancelledError:
-        if cancelled():
+        if is_canceled():
             raise
-        turn.leave()
+        time_slice.report_result()
         return {"is_done": False}
-    with replacing(where / FOUND) as unfinished:
+    with atomic_write(job_folder / RESULT_FILE) as unfinished:
         unfinished.write_text(json.dumps({"material": record.id}))
     return {"is_done": True}
 
 
-def _made(asked: BtfRequest, where: Path, shelf: Path, turn: _Turn) -> BtfRecord:
-    if asked.geometry is None:
+def _make_record(request: BtfRequest, job_folder: Path, btfs_folder: Path, time_slice: _TimeSlice) -> BtfRecord:
+    if request.geometry is None:
         limits = Settings()  # of the environment, which is the server's
-        with closing(ImagesApart(where / SENT, limits.import_bytes, limits.import_seconds)) as images:
-            how = asked.name, asked.error, turn.tell, turn.is_over, where / _MAKING, images
-            return import_btf(shelf, where / SENT, *how)
-    mesh = where / SENT if asked.geometry == MESH else None
-    wanted = Made(asked.geometry, asked.size, _GRID, asked.error, mesh, asked.period)
-    return make_btf(shelf, wanted, asked.name, turn.tell, turn.is_over, where / _MAKING)
+        with closing(
+            SandboxedViewArrays(job_folder / UPLOAD_FILE, limits.import_bytes, limits.import_seconds)
+        ) as images:
+            options = (
+                request.name,
+                request.error,
+                time_slice.report,
+                time_slice.is_over,
+                job_folder / _WORK_FOLDER,
+                images,
+            )
+            return import_btf(btfs_folder, job_folder / UPLOAD_FILE, *options)
+    mesh = job_folder / UPLOAD_FILE if request.geometry == MESH else None
+    synthetic_btf = SyntheticBtf(request.geometry, request.size, _GRID, request.error, mesh, request.period)
+    return synthesize_btf(
+        btfs_folder, synthetic_btf, request.name, time_slice.report, time_slice.is_over, job_folder / _WORK_FOLDER
+    )
 
 
-class _Turn:
+class _TimeSlice:
     """Ends after a while, though not before something was found that no turn before it had.
 
     Args:
-        tell: called with the share done. cancelled: asked now and then. path: file that says what turns have reached.
+        report: called with the share done. is_canceled: asked now and then. path: file that says what turns have
+            reached.
     """
 
-    def __init__(self, tell: Progress, cancelled: Cancelled, path: Path) -> None:
-        self._tell, self._cancelled, self._path = tell, cancelled, path
-        self._until_s = time.monotonic() + TURN_S
-        self._before = float(path.read_text()) if path.exists() else 0.0
-        self._share = 0.0
+    def __init__(self, report: ProgressCallback, is_canceled: CancelCheck, path: Path) -> None:
+        self._report, self._cancelled, self._path = report, is_canceled, path
+        self._until_s = time.monotonic() + SLICE_S
+        self._previous_fraction = float(path.read_text()) if path.exists() else 0.0
+        self._fraction = 0.0
 
-    def tell(self, share: float) -> None:
+    def report(self, fraction: float) -> None:
         """So much is done, of all turns."""
-        self._share = share
-        self._tell(share)
+        self._fraction = fraction
+        self._report(fraction)
 
     def is_over(self) -> bool:
         """Whether to stop: for now, or because it is not wanted any more."""
-        return self._cancelled() or (self._share > self._before and time.monotonic() > self._until_s)
+        return self._cancelled() or (self._fraction > self._previous_fraction and time.monotonic() > self._until_s)
 
-    def leave(self) -> None:
+    def report_result(self) -> None:
         """Say what was reached."""
-        with replacing(self._path) as unfinished:
-            unfinished.write_text(str(max(self._share, self._before)))
+        with atomic_write(self._path) as unfinished:
+            unfinished.write_text(str(max(self._fraction, self._previous_fraction)))

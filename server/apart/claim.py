@@ -10,16 +10,16 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 _NAME = "claim.txt"
-_ASK_AGAIN_S = 0.1
+_CHECK_INTERVAL_S = 0.1
 
 
 def claim(folder: Path, owner: str) -> None:
     """Say that a work's files are changed by an owner of a lease alone from now on."""
     if not is_claimed_by(folder, owner):
-        with replacing(folder / _NAME) as unfinished:
+        with atomic_write(folder / _NAME) as unfinished:
             unfinished.write_text(owner)
 
 
@@ -31,15 +31,15 @@ def is_claimed_by(folder: Path, owner: str) -> bool:
         return False
 
 
-def until_taken_over(folder: Path, owner: str, cancelled: Callable[[], bool]) -> Callable[[], bool]:
+def cancelled_or_taken_over(folder: Path, owner: str, is_canceled: Callable[[], bool]) -> Callable[[], bool]:
     """Whether a step is to end: it is cancelled, or its files are somebody else's. Steps ask thousands of times a
     second, the file is read ten times."""
     next_s, is_over = 0.0, False
 
-    def ask() -> bool:
+    def is_cancelled() -> bool:
         nonlocal next_s, is_over
         if (now_s := time.monotonic()) >= next_s:
-            next_s, is_over = now_s + _ASK_AGAIN_S, not is_claimed_by(folder, owner)
-        return is_over or cancelled()
+            next_s, is_over = now_s + _CHECK_INTERVAL_S, not is_claimed_by(folder, owner)
+        return is_over or is_canceled()
 
-    return ask
+    return is_cancelled

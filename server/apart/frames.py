@@ -8,17 +8,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from relume.exr.attributes import Origin, attributes_of
-from relume.exr.layers import layers_for
+from relume.exr.attributes import Provenance, build_attributes
+from relume.exr.layers import make_layers
 from relume.exr.picture import Progress, export_exr
-from relume.exr.space import space_called
+from relume.exr.space import find_space
 from relume.imageio.files import write_image
-from relume.imageio.shrink import shrink
-from relume.picture.jobs import Cancelled
-from relume.picture.transfer import Axis, Opened
-from relume.replacing import UNFINISHED, replacing
-from server.apart.animation import eyes_of, look_of
-from server.apart.workshop import Workshop
+from relume.imageio.shrink import downsample
+from relume.picture.jobs import CancelCheck
+from relume.picture.transfer import EditAxis, OpenBake
+from relume.replacing import UNFINISHED, atomic_write
+from server.apart.animation import cameras_of, look_at_frame
+from server.apart.workshop import BatchContext
 from server.files.video import write_video
 from server.library.ports import F32
 from server.wire.renders import RenderRequest
@@ -30,9 +30,9 @@ _LAYERS = ".layers-*"  # folders beside a picture that is being written
 
 
 def paint_frame(
-    shop: Workshop,
-    tell: Progress,
-    cancelled: Cancelled,
+    context: BatchContext,
+    report: Progress,
+    is_canceled: CancelCheck,
     *,
     request: Mapping[str, Any],
     index: int,
@@ -45,25 +45,29 @@ def paint_frame(
         request: the batch's body. index: of the picture. path: of its file, which appears whole.
         scene_name: that people read in the file.
     """
-    asked, target = RenderRequest.model_validate(request), Path(path)
+    render_request, target = RenderRequest.model_validate(request), Path(path)
     _tidy(target.parent)
-    transfer = shop.transfer(asked.bake)
-    camera = eyes_of(asked, asked.view, transfer)[index]
-    view = transfer.views[asked.view]
-    eye = None if camera is None else (camera, asked.size or (view.width, view.height))
+    transfer = context.transfer(render_request.bake)
+    camera = cameras_of(render_request, render_request.view, transfer)[index]
+    view = transfer.views[render_request.view]
+    camera_and_size = None if camera is None else (camera, render_request.size or (view.width, view.height))
 
     def render(look: Any, progress: Progress) -> F32:
-        image = shop.library.render(
-            transfer, asked.view, look, progress=progress, for_display=asked.format != "exr",
-            cancelled=cancelled, eye=eye, exact=asked.exact,
+        image = context.library.render(
+            transfer, render_request.view, look, progress=progress, for_display=render_request.format != "exr",
+            is_canceled=is_canceled, camera_and_size=camera_and_size, exact=render_request.exact,
         )  # fmt: skip
-        return image if asked.size is None or eye is not None else shrink(image, asked.size)
+        return (
+            image
+            if render_request.size is None or camera_and_size is not None
+            else downsample(image, render_request.size)
+        )
 
-    look = look_of(asked, asked.view, transfer, index)
-    if asked.format == "exr":
-        _export(target, render, look, transfer, asked, camera or view.camera, scene_name, tell)
+    look = look_at_frame(render_request, render_request.view, transfer, index)
+    if render_request.format == "exr":
+        _export(target, render, look, transfer, render_request, camera or view.camera, scene_name, report)
     else:
-        write_image(target, render(look, tell), look.display.exposure, look.display.tone_map)
+        write_image(target, render(look, report), look.display.exposure, look.display.tone_map)
     return {}
 
 
@@ -79,25 +83,25 @@ def _export(
     path: Path,
     render: Any,
     look: Any,
-    transfer: Opened,
+    transfer: OpenBake,
     request: RenderRequest,
     camera: Camera,
     scene_name: str,
     progress: Progress,
 ) -> None:
     view = transfer.views[request.view]
-    layers = layers_for(request.layers, look, reflects=Axis.BOUNCES in transfer.axes)
-    origin = Origin(transfer.scene_id, scene_name, request.bake)
+    layers = make_layers(request.layers, look, has_indirect=EditAxis.BOUNCES in transfer.axes)
+    origin = Provenance(transfer.scene_id, scene_name, request.bake)
     size = request.size or (view.width, view.height)
-    space = space_called(request.color_space)
-    attributes = attributes_of(origin, camera, size, look, layers, space)
+    space = find_space(request.color_space)
+    attributes = build_attributes(origin, camera, size, look, layers, space)
     export_exr(path, render, look, layers, attributes, request.precision, progress, space)
 
 
 def pack(
-    shop: Workshop,
-    tell: Progress,
-    cancelled: Cancelled,
+    context: BatchContext,
+    report: Progress,
+    is_canceled: CancelCheck,
     *,
     frames: Sequence[Sequence[str]],
     archive: str,
@@ -112,8 +116,8 @@ def pack(
     """
     if video is not None:
         target = Path(video)
-        write_video(target.parent, fps, target, cancelled)
-    with replacing(Path(archive)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as packed:
+        write_video(target.parent, fps, target, is_canceled)
+    with atomic_write(Path(archive)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive_zip:
         for path, name in frames:
-            packed.write(path, name)
+            archive_zip.write(path, name)
     return {}

@@ -1,9 +1,9 @@
 """A process that does steps: `python -m server.apart.main DATA BYTES THREADS NICE [CONFIG [SPACE]]`, started by
-`server.apart.process`; the last two as `relume.imageio.ocio.current` uses them.
+`server.lone_triangle.process`; the last two as `relume.imageio.ocio.current` uses them.
 
 One line of JSON comes in for each step, `"stop"` for one that is not wanted any more; lines with `share`, and at last
-one with `answer`, `problem` or `cancelled` go out. It yields to everything else on the machine, and ends when nobody is
-left who could ask.
+one with `answer`, `problem` or `is_canceled` go out. It yields to everything else on the machine, and ends when nobody
+is left who could ask.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 log = logging.getLogger(__name__)
-_TELL_S = 0.1
+_REPORT_INTERVAL_S = 0.1
 
 
 def main() -> None:
@@ -29,58 +29,58 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # whatever a library prints is no answer
     os.environ["RELUME_THREADS"] = num_threads
-    asked: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    step_queue: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
     stop = threading.Event()
-    threading.Thread(target=_listen, args=(asked, stop), daemon=True).start()
+    threading.Thread(target=_listen, args=(step_queue, stop), daemon=True).start()
 
     # after the above, which is to hold for all threads that they start
-    from relume.imageio.ocio.current import using
-    from relume.resident import give_back
-    from server.apart.workshop import Workshop
+    from relume.imageio.ocio.current import using_config
+    from relume.resident import trim_heap
+    from server.apart.workshop import BatchContext
     from server.library.opening import open_library
-    from server.library.shelves import shelves_at
+    from server.library.shelves import using_asset_stores
 
-    with shelves_at(data), using(*[*sys.argv[5:7], None][:2]):
-        shop = Workshop(data, open_library(num_bytes, 0))
+    with using_asset_stores(data), using_config(*[*sys.argv[5:7], None][:2]):
+        context = BatchContext(data, open_library(num_bytes, 0))
         while True:
-            message = asked.get()
-            out.write(json.dumps(_answer(shop, message, stop, out)) + "\n")
-            give_back()
+            message = step_queue.get()
+            out.write(json.dumps(_answer(context, message, stop, out)) + "\n")
+            trim_heap()
 
 
-def _listen(asked: queue.SimpleQueue[dict[str, Any]], stop: threading.Event) -> None:
+def _listen(step_queue: queue.SimpleQueue[dict[str, Any]], stop: threading.Event) -> None:
     for line in sys.stdin:
         message = json.loads(line)
         if message == "stop":
             stop.set()
         else:
             stop.clear()
-            asked.put(message)
+            step_queue.put(message)
     os._exit(0)
 
 
-def _answer(shop: Any, message: dict[str, Any], stop: threading.Event, out: Any) -> dict[str, Any]:
+def _answer(context: Any, message: dict[str, Any], stop: threading.Event, out: Any) -> dict[str, Any]:
     from relume.errors import CancelledError, RelumeError
     from server.apart.step import Step
     from server.apart.steps import do_step
-    from server.errors import problem_of
+    from server.errors import make_problem
 
-    told_s = 0.0
+    reported_s = 0.0
 
-    def tell(share: float) -> None:
-        nonlocal told_s
-        if (now := time.monotonic()) - told_s >= _TELL_S:
-            told_s = now
-            out.write(json.dumps({"share": share}) + "\n")
+    def report(fraction: float) -> None:
+        nonlocal reported_s
+        if (now_s := time.monotonic()) - reported_s >= _REPORT_INTERVAL_S:
+            reported_s = now_s
+            out.write(json.dumps({"share": fraction}) + "\n")
 
     try:
-        return {"answer": do_step(shop, Step(**message), tell, stop.is_set)}
+        return {"answer": do_step(context, Step(**message), report, stop.is_set)}
     except CancelledError:
         return {"cancelled": True}
     except Exception as error:
         if not isinstance(error, RelumeError | OSError):
             log.exception("a %s failed", message["kind"])
-        problem = problem_of(error)
+        problem = make_problem(error)
         return {"problem": problem.detail, "kind": problem.type.rpartition(":")[2]}
 
 

@@ -19,33 +19,38 @@ import numpy as np
 from PIL import Image
 
 from relume import look as looks
-from relume.code_version import truth_code
+from relume.code_version import comparison_code
 from relume.errors import CancelledError
 from relume.imageio.files import write_image
 from relume.methods.sampled_views import MIN_SIDE
-from relume.picture.jobs import Cancelled, Progress
-from relume.picture.transfer import Axis, Eyes, Opened
+from relume.picture.jobs import CancelCheck, ProgressCallback
+from relume.picture.transfer import CameraMode, EditAxis, OpenBake
 from relume.reference.truth import Comparison, Estimate, compare, error_map
-from relume.replacing import replacing
-from server.apart.animation import compared_from
-from server.apart.step_timer import sampled
-from server.apart.workshop import Workshop
+from relume.replacing import atomic_write
+from server.apart.animation import comparison_camera
+from server.apart.step_timer import estimate_seconds
+from server.apart.workshop import BatchContext
 from server.library.ports import F32
-from server.wire.bodies import TruthRequest
+from server.wire.bodies import ComparisonRequest
 from worker.paths import scene_path
 
 if TYPE_CHECKING:
-    from relume.reference import Truth
+    from relume.reference import ReferenceImage
 
 SPP = 64
 FIGURES = "figures.json"
-_FIRST, _FIRST_SPP = 4, 16  # times as wide as the first pictures is the whole one
-_SAMPLE = 8  # times as wide as its sample is a picture whose pace is not known
+_FIRST_DOWNSCALE, _FIRST_SPP = 4, 16  # times as wide as the first pictures is the whole one
+_TIMING_DOWNSCALE = 8  # times as wide as its sample is a picture whose pace is not known
 _Estimates = dict[str, Estimate]  # by whose paths: "all", "method"
 
 
 def make_frame(
-    shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: Mapping[str, Any], folder: str
+    context: BatchContext,
+    report: ProgressCallback,
+    is_canceled: CancelCheck,
+    *,
+    request: Mapping[str, Any],
+    folder: str,
 ) -> Mapping[str, Any]:
     """The frame that is compared, and a first brute force to look at, where they are not there.
 
@@ -54,31 +59,52 @@ def make_frame(
     Returns:
         `passes`: how many there are of it.
     """
-    asked, where = TruthRequest.model_validate(request), Path(folder)
-    kept = _load(where)
-    if kept is None:
-        transfer = shop.transfer(asked.bake)
-        eye = compared_from(asked, transfer) if transfer.eyes is Eyes.FREE else None
-        frame = shop.library.render(transfer, asked.view, _look(asked, transfer), cancelled=cancelled, eye=eye)
-        kept = frame, {paths: Estimate.nothing(*frame.shape[:2]) for paths in dict.fromkeys((asked.paths, "method"))}
-        _write_first(shop, where, transfer, asked, kept[0], cancelled)
-        _keep(where, *kept)
-    return {"passes": kept[1]["method"].passes}
+    comparison, job_folder = ComparisonRequest.model_validate(request), Path(folder)
+    frame_and_estimates = _load(job_folder)
+    if frame_and_estimates is None:
+        transfer = context.transfer(comparison.bake)
+        camera_and_size = comparison_camera(comparison, transfer) if transfer.camera_mode is CameraMode.FREE else None
+        frame = context.library.render(
+            transfer,
+            comparison.view,
+            _look(comparison, transfer),
+            is_canceled=is_canceled,
+            camera_and_size=camera_and_size,
+        )
+        frame_and_estimates = (
+            frame,
+            {paths: Estimate.empty(*frame.shape[:2]) for paths in dict.fromkeys((comparison.paths, "method"))},
+        )
+        _write_first(context, job_folder, transfer, comparison, frame_and_estimates[0], is_canceled)
+        _save(job_folder, *frame_and_estimates)
+    return {"passes": frame_and_estimates[1]["method"].passes}
 
 
 def _write_first(
-    shop: Workshop, folder: Path, transfer: Opened, asked: TruthRequest, frame: F32, cancelled: Cancelled
+    context: BatchContext,
+    folder: Path,
+    transfer: OpenBake,
+    request: ComparisonRequest,
+    frame: F32,
+    is_canceled: CancelCheck,
 ) -> None:
     """Write small pictures of brute force, of few samples: a pass may take minutes."""
-    look, small = _look(asked, transfer), _smaller(_FIRST, frame.shape[1], frame.shape[0])
-    truth = _pass(shop, transfer, asked, look, small, 0, lambda share: None, cancelled, spp=_FIRST_SPP)
-    for paths in dict.fromkeys((asked.paths, "method")):
-        estimate = Estimate.nothing(*truth.pictures[paths].shape[:2]).add(truth.pictures[paths])
-        _write_reference(folder, estimate, paths != asked.paths, look.display)
+    look, small = _look(request, transfer), _smaller(_FIRST_DOWNSCALE, frame.shape[1], frame.shape[0])
+    reference = _render_pass(
+        context, transfer, request, look, small, 0, lambda share: None, is_canceled, spp=_FIRST_SPP
+    )
+    for paths in dict.fromkeys((request.paths, "method")):
+        estimate = Estimate.empty(*reference.pictures[paths].shape[:2]).add(reference.pictures[paths])
+        _write_reference(folder, estimate, paths != request.paths, look.display)
 
 
 def make_pass(
-    shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: Mapping[str, Any], folder: str
+    context: BatchContext,
+    report: ProgressCallback,
+    is_canceled: CancelCheck,
+    *,
+    request: Mapping[str, Any],
+    folder: str,
 ) -> Mapping[str, Any]:
     """One more pass.
 
@@ -87,23 +113,27 @@ def make_pass(
     Returns:
         `passes`: how many there are now.
     """
-    asked, where = TruthRequest.model_validate(request), Path(folder)
-    kept = _load(where)
-    if kept is None:  # somebody tidied up
-        raise FileNotFoundError(where)
-    frame, before = kept
-    transfer = shop.transfer(asked.bake)
-    look, size = _look(asked, transfer), (frame.shape[1], frame.shape[0])
-    truth = _pass(shop, transfer, asked, look, size, before["method"].passes, tell, cancelled)
-    if cancelled():  # brute force does not ask at its end, and the sums may be another server's now
+    comparison, job_folder = ComparisonRequest.model_validate(request), Path(folder)
+    frame_and_estimates = _load(job_folder)
+    if frame_and_estimates is None:  # somebody tidied up
+        raise FileNotFoundError(job_folder)
+    frame, old_estimates = frame_and_estimates
+    transfer = context.transfer(comparison.bake)
+    look, size = _look(comparison, transfer), (frame.shape[1], frame.shape[0])
+    reference = _render_pass(
+        context, transfer, comparison, look, size, old_estimates["method"].passes, report, is_canceled
+    )
+    if is_canceled():  # brute force does not ask at its end, and the sums may be another server's now
         raise CancelledError("the pass is not wanted any more")
-    after = {paths: estimate.add(truth.pictures[paths]) for paths, estimate in before.items()}
-    _keep(where, frame, after)
-    _judge(where, frame, after, asked.paths, truth, look.display)
-    return {"passes": after["method"].passes}
+    new_estimates = {paths: estimate.add(reference.pictures[paths]) for paths, estimate in old_estimates.items()}
+    _save(job_folder, frame, new_estimates)
+    _write_figures(job_folder, frame, new_estimates, comparison.paths, reference, look.display)
+    return {"passes": new_estimates["method"].passes}
 
 
-def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: Mapping[str, Any]) -> Mapping[str, Any]:
+def time_pass(
+    context: BatchContext, report: ProgressCallback, is_canceled: CancelCheck, *, request: Mapping[str, Any]
+) -> Mapping[str, Any]:
     """How long a pass takes, by one of a small picture.
 
     Args:
@@ -111,12 +141,16 @@ def time_pass(shop: Workshop, tell: Progress, cancelled: Cancelled, *, request: 
     Returns:
         `seconds` of a pass.
     """
-    asked = TruthRequest.model_validate(request)
-    transfer = shop.transfer(asked.bake)
-    look, (_, (width, height)) = _look(asked, transfer), compared_from(asked, transfer)
-    size = _smaller(_SAMPLE, width, height)
+    comparison = ComparisonRequest.model_validate(request)
+    transfer = context.transfer(comparison.bake)
+    look, (_, (width, height)) = _look(comparison, transfer), comparison_camera(comparison, transfer)
+    size = _smaller(_TIMING_DOWNSCALE, width, height)
     scale = width * height / (size[0] * size[1])
-    return {"seconds": sampled(lambda told: _pass(shop, transfer, asked, look, size, 0, told, cancelled), scale)}
+    return {
+        "seconds": estimate_seconds(
+            lambda told: _render_pass(context, transfer, comparison, look, size, 0, told, is_canceled), scale
+        )
+    }
 
 
 def _smaller(factor: int, width: int, height: int) -> tuple[int, int]:
@@ -124,17 +158,19 @@ def _smaller(factor: int, width: int, height: int) -> tuple[int, int]:
     return width // factor, height // factor
 
 
-def _look(request: TruthRequest, transfer: Opened) -> Any:
-    return looks.validate(request.look, transfer.default_look).on_the_map()
+def _look(request: ComparisonRequest, transfer: OpenBake) -> Any:
+    return looks.validate(request.look, transfer.default_look).without_compositing()
 
 
-def _pass(
-    shop: Workshop, transfer: Opened, asked: TruthRequest, look: Any, size: tuple[int, int], index: int, tell: Any,
-    cancelled: Any, spp: int = SPP,
-) -> Truth:  # fmt: skip
-    return shop.library.reference(
-        scene_path(shop.data, transfer.scene_id), compared_from(asked, transfer)[0], look, size, spp, tell, cancelled,
-        index, reflects=Axis.BOUNCES in transfer.axes, is_whole=asked.paths == "all",
+def _render_pass(
+    context: BatchContext, transfer: OpenBake, request: ComparisonRequest, look: Any, size: tuple[int, int],
+    index: int, report: Any,
+    is_canceled: Any, spp: int = SPP,
+) -> ReferenceImage:  # fmt: skip
+    return context.library.reference(
+        scene_path(context.data, transfer.scene_id), comparison_camera(request, transfer)[0], look, size, spp, report,
+        is_canceled,
+        index, reflects=EditAxis.BOUNCES in transfer.axes, is_whole=request.paths == "all",
     )  # fmt: skip
 
 
@@ -143,47 +179,56 @@ def _load(folder: Path) -> tuple[F32, _Estimates] | None:
     path = folder / "passes.npz"
     if not path.exists():
         return None
-    with np.load(path, allow_pickle=False) as kept:
-        if "code" not in kept or str(kept["code"]) != truth_code():  # passes of other code: they are made again
+    with np.load(path, allow_pickle=False) as archive:
+        if (
+            "code" not in archive or str(archive["code"]) != comparison_code()
+        ):  # passes of other code: they are made again
             return None
-        sums = {name.removeprefix("sums_"): kept[name] for name in kept if name.startswith("sums_")}
-        return kept["frame"], {paths: Estimate(of, int(kept["passes"])) for paths, of in sums.items()}
+        sums = {name.removeprefix("sums_"): archive[name] for name in archive if name.startswith("sums_")}
+        return archive["frame"], {
+            paths: Estimate(path_sums, int(archive["passes"])) for paths, path_sums in sums.items()
+        }
 
 
-def _keep(folder: Path, frame: F32, estimates: _Estimates) -> None:
+def _save(folder: Path, frame: F32, estimates: _Estimates) -> None:
     """Before anything is said of them: whatever is lost after that is made again from them."""
-    counted = {"passes": np.array(estimates["method"].passes), "code": np.array(truth_code())}
+    metadata = {"passes": np.array(estimates["method"].passes), "code": np.array(comparison_code())}
     sums = {f"sums_{paths}": estimate.sums for paths, estimate in estimates.items()}
-    with replacing(folder / "passes.npz") as unfinished:
-        np.savez(unfinished, allow_pickle=False, frame=frame, **sums, **counted)
+    with atomic_write(folder / "passes.npz") as unfinished:
+        np.savez(unfinished, allow_pickle=False, frame=frame, **sums, **metadata)
 
 
-def _judge(folder: Path, frame: F32, estimates: _Estimates, asked: str, truth: Truth, display: Any) -> None:
+def _write_figures(
+    folder: Path, frame: F32, estimates: _Estimates, requested_paths: str, reference: ReferenceImage, display: Any
+) -> None:
     """Say what the passes so far say of the frame."""
-    figures: dict[str, Any] = {"left_out": truth.left_out, "untraced": truth.untraced}
+    figures: dict[str, Any] = {"left_out": reference.omitted_paths, "untraced": reference.unsupported_paths}
     if estimates["method"].passes >= 2:
-        found = {paths: _shown(folder, frame, of, paths != asked, display) for paths, of in estimates.items()}
-        figures |= {"found": asdict(found[asked]), "found_of_method": asdict(found["method"])}
+        comparisons = {
+            paths: _write_comparison(folder, frame, path_estimate, paths != requested_paths, display)
+            for paths, path_estimate in estimates.items()
+        }
+        figures |= {"found": asdict(comparisons[requested_paths]), "found_of_method": asdict(comparisons["method"])}
     else:
         for paths, estimate in estimates.items():
-            _write_reference(folder, estimate, paths != asked, display)
-    with replacing(folder / FIGURES) as unfinished:
+            _write_reference(folder, estimate, paths != requested_paths, display)
+    with atomic_write(folder / FIGURES) as unfinished:
         unfinished.write_text(json.dumps(figures))
 
 
-def _shown(folder: Path, frame: F32, estimate: Estimate, is_beside: bool, display: Any) -> Comparison:
+def _write_comparison(folder: Path, frame: F32, estimate: Estimate, is_method_only: bool, display: Any) -> Comparison:
     """Write the pictures of a comparison. is_beside: it is not what was asked for."""
-    found, differs = compare(frame, estimate)
-    _write_reference(folder, estimate, is_beside, display)
-    with replacing(folder / f"{_prefix(is_beside)}error.png") as unfinished:
+    comparison, differs = compare(frame, estimate)
+    _write_reference(folder, estimate, is_method_only, display)
+    with atomic_write(folder / f"{_prefix(is_method_only)}error.png") as unfinished:
         Image.fromarray(error_map(frame, estimate, differs)).save(unfinished)
-    return found
+    return comparison
 
 
-def _write_reference(folder: Path, estimate: Estimate, is_beside: bool, display: Any) -> None:
-    path = folder / f"{_prefix(is_beside)}reference.png"
+def _write_reference(folder: Path, estimate: Estimate, is_method_only: bool, display: Any) -> None:
+    path = folder / f"{_prefix(is_method_only)}reference.png"
     write_image(path, estimate.mean, display.exposure, display.tone_map)
 
 
-def _prefix(is_beside: bool) -> str:
-    return "method-" if is_beside else ""
+def _prefix(is_method_only: bool) -> str:
+    return "method-" if is_method_only else ""

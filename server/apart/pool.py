@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from relume.errors import CancelledError, RelumeError
-from server.apart.process import LostError, Process
-from server.apart.step import IsWanted, Step, Tell
+from server.apart.process import BatchProcess, ProcessExitedError
+from server.apart.step import IsNeeded, ProgressCallback, Step
 
 MAX_STEPS = 500  # after so many a process is exchanged, whatever it holds
 _PROGRAM_BYTES = 1 << 30  # compiled kernels, an opened bake and Embree's trees: beside what is made from it
@@ -19,7 +19,7 @@ _ASK_S = 0.1
 _TRIES = 2
 
 
-class Pool:
+class ProcessPool:
     """Runs steps, so many at once; those that somebody waits for go before all others, else who came first."""
 
     def __init__(
@@ -35,32 +35,32 @@ class Pool:
         self._data, self._num_processes = data, num_processes
         self._limits, self._idle_s = (num_bytes, num_threads, niceness), idle_s
         self._changed = threading.Condition()
-        self._arrivals = itertools.count()
+        self._ticket_numbers = itertools.count()
         self._waiting: list[tuple[bool, int]] = []
-        self._free: list[Process] = []
-        self._busy: set[Process] = set()
-        self._num_places = num_processes
+        self._free: list[BatchProcess] = []
+        self._busy: set[BatchProcess] = set()
+        self._num_free_slots = num_processes
         self._is_closed = False
 
-    def run(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
+    def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
         """See `RunStep`."""
-        self._await_turn(step, is_wanted)
+        self._acquire_slot(step, is_needed)
         try:
             for _ in range(_TRIES):
                 try:
-                    return self._do(step, tell, is_wanted)
-                except LostError:
+                    return self._run_in_process(step, report, is_needed)
+                except ProcessExitedError:
                     continue
         finally:
             with self._changed:
-                self._num_places += 1
+                self._num_free_slots += 1
                 self._changed.notify_all()
         raise RelumeError(
             f"the process that did the {step.kind} was killed twice, perhaps for want of memory; make the picture "
             "smaller, or free memory and try again"
         )
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """End processes that have had nothing to do for a while."""
         long_ago = time.monotonic() - self._idle_s
         with self._changed:
@@ -89,28 +89,28 @@ class Pool:
         for process in processes:
             process.kill()
 
-    def _await_turn(self, step: Step, is_wanted: IsWanted) -> None:
+    def _acquire_slot(self, step: Step, is_needed: IsNeeded) -> None:
         with self._changed:
-            ticket = not step.is_first, next(self._arrivals)
+            ticket = not step.is_first, next(self._ticket_numbers)
             self._waiting.append(ticket)
             try:
-                while self._num_places == 0 or ticket != min(self._waiting):
-                    if self._is_closed or not is_wanted():
+                while self._num_free_slots == 0 or ticket != min(self._waiting):
+                    if self._is_closed or not is_needed():
                         raise CancelledError(f"the {step.kind} was stopped before it began")
                     self._changed.wait(_ASK_S)
-                self._num_places -= 1
+                self._num_free_slots -= 1
             finally:
                 self._waiting.remove(ticket)
                 self._changed.notify_all()
 
-    def _do(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
-        process = self._take()
+    def _run_in_process(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
+        process = self._acquire_process()
         try:
-            return process.do(step, tell, is_wanted)
+            return process.do(step, report, is_needed)
         finally:
-            self._give(process)
+            self._return_process(process)
 
-    def _take(self) -> Process:
+    def _acquire_process(self) -> BatchProcess:
         with self._changed:
             if self._is_closed:
                 raise CancelledError("the server closes")
@@ -120,19 +120,21 @@ class Pool:
                     break
                 process.kill()  # what it leaves
             else:
-                process = Process(self._data, *self._limits)
+                process = BatchProcess(self._data, *self._limits)
             self._busy.add(process)
             return process
 
-    def _give(self, process: Process) -> None:
+    def _return_process(self, process: BatchProcess) -> None:
         """Keep it for the next step, or end it where it has grown."""
-        held = process.resident_bytes()
-        is_kept = process.is_alive and held <= self._limits[0] + _PROGRAM_BYTES and process.num_steps < MAX_STEPS
+        num_bytes = process.resident_bytes()
+        is_reusable = (
+            process.is_alive and num_bytes <= self._limits[0] + _PROGRAM_BYTES and process.num_steps < MAX_STEPS
+        )
         with self._changed:
             self._busy.discard(process)
-            is_kept = is_kept and not self._is_closed
-            if is_kept:
+            is_reusable = is_reusable and not self._is_closed
+            if is_reusable:
                 process.idle_since_s = time.monotonic()
                 self._free.append(process)
-        if not is_kept:
+        if not is_reusable:
             process.kill()

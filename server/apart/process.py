@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from relume.errors import CancelledError, DiskFullError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
-from relume.imageio.ocio.current import source
+from relume.imageio.ocio.current import config_source
 from relume.resident import resident_bytes
-from server.apart.step import IsWanted, Step, Tell
+from server.apart.step import IsNeeded, ProgressCallback, Step
 
 COMMAND = ["-m", "server.apart.main"]
 
@@ -31,7 +31,7 @@ class _NoRoomError(DiskFullError):
         RelumeError.__init__(self, message)
 
 
-_KINDS: Mapping[str, type[RelumeError]] = {
+_ERRORS_BY_KIND: Mapping[str, type[RelumeError]] = {
     "store-not-found": StoreNotFoundError,
     "store": StoreError,
     "not-found": NotFoundError,
@@ -40,14 +40,14 @@ _KINDS: Mapping[str, type[RelumeError]] = {
 """What a step may meet that is no failure of its process, by the last part of the problem's type."""
 _ASK_S = 0.1
 _STOP_S = 1.0  # a kernel may be at work for longer than anybody wants to wait
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-class LostError(RelumeError):
+class ProcessExitedError(RelumeError):
     """The process ended in the middle of a step."""
 
 
-class Process:
+class BatchProcess:
     """Does one step at a time; used by one thread at a time."""
 
     def __init__(self, data: Path, num_bytes: int, num_threads: int, niceness: int) -> None:
@@ -57,16 +57,16 @@ class Process:
             niceness: how much it yields to others, 0…19.
         """
         numbers = map(str, (num_bytes, num_threads, niceness))
-        command = [sys.executable, *COMMAND, str(data.resolve()), *numbers, *source()]
+        command = [sys.executable, *COMMAND, str(data.resolve()), *numbers, *config_source()]
         # a group of its own: Ctrl-C is the server's, and what it starts itself can be killed with it
         self._process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, process_group=0,
-            env=os.environ | dict.fromkeys(_ONE_THREAD, "1"),
+            env=os.environ | dict.fromkeys(_THREAD_VARIABLES, "1"),
         )  # fmt: skip
         assert self._process.stdin is not None
         self._pipe = self._process.stdin
         self.num_steps, self.idle_since_s = 0, time.monotonic()
-        self._told: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
         self._has_ended = threading.Event()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
@@ -85,29 +85,29 @@ class Process:
         """All that it holds."""
         return resident_bytes(self.pid) if self.is_alive else 0
 
-    def do(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
+    def do(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
         """See `RunStep`. Raises LostError where the process ended."""
         self.num_steps += 1
         self._send(asdict(step))
-        while is_wanted():
+        while is_needed():
             with suppress(queue.Empty):
-                message = self._told.get(timeout=_ASK_S)
+                message = self._messages.get(timeout=_ASK_S)
                 if message is None:
-                    raise LostError(f"the process that did the {step.kind} ended")
+                    raise ProcessExitedError(f"the process that did the {step.kind} ended")
                 if "share" not in message:
                     return _answer(message)
-                tell(message["share"])
+                report(message["share"])
         self._stop()
         raise CancelledError(f"the {step.kind} was stopped")
 
     def _stop(self) -> None:
         """End the step in good time, with the process where need be."""
-        with suppress(LostError):
+        with suppress(ProcessExitedError):
             self._send("stop")
         until_s = time.monotonic() + _STOP_S
-        while (left_s := until_s - time.monotonic()) > 0:
+        while (remaining_s := until_s - time.monotonic()) > 0:
             with suppress(queue.Empty):
-                message = self._told.get(timeout=left_s)
+                message = self._messages.get(timeout=remaining_s)
                 if message is None or "share" not in message:
                     return
         self.kill()
@@ -126,21 +126,21 @@ class Process:
             self._pipe.write(json.dumps(message) + "\n")
             self._pipe.flush()
         except OSError:
-            raise LostError("the process ended before it was asked") from None
+            raise ProcessExitedError("the process ended before it was asked") from None
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
         with self._process.stdout as lines, suppress(ValueError):  # it was killed in the middle of a line
             for line in lines:
-                self._told.put(json.loads(line))
+                self._messages.put(json.loads(line))
         self._has_ended.set()
-        self._told.put(None)
+        self._messages.put(None)
 
 
 def _answer(message: Mapping[str, Any]) -> Mapping[str, Any]:
     if "cancelled" in message:
         raise CancelledError("the step was stopped")
     if "problem" in message:
-        raise _KINDS.get(message.get("kind", ""), RelumeError)(message["problem"])
+        raise _ERRORS_BY_KIND.get(message.get("kind", ""), RelumeError)(message["problem"])
     answer: Mapping[str, Any] = message["answer"]
     return answer

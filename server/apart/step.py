@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-Tell = Callable[[float], object]
-IsWanted = Callable[[], bool]
+ProgressCallback = Callable[[float], object]
+IsNeeded = Callable[[], bool]
 
 
 @dataclass(frozen=True)
@@ -15,10 +15,10 @@ class Step:
     """What to do.
 
     Attributes:
-        kind: a name in `server.apart.steps.STEPS`.
+        kind: a name in `server.lone_triangle.steps.MAX_CODE`.
         is_first: somebody waits for it; it goes before what takes its time.
         values: what the step of this kind is called with; JSON.
-        claim: folder and owner of the work whose step it is, see `server.apart.claim`; None: it is of no work.
+        claim: folder and owner of the work whose step it is, see `server.lone_triangle.claim`; None: it is of no work.
     """
 
     kind: str
@@ -30,12 +30,12 @@ class Step:
 class RunStep(Protocol):
     """Runs steps; blocks."""
 
-    def __call__(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
+    def __call__(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
         """Do one step.
 
         Args:
             step: is done once, or once more where a process ended under it.
-            tell: called with the share done, 0…1. is_wanted: asked a few times a second.
+            report: called with the share done, 0…1. is_needed: asked a few times a second.
         Returns:
             What the step answers.
         Raises:
@@ -45,10 +45,10 @@ class RunStep(Protocol):
 
 
 class Batches(Protocol):
-    """Where steps are done; see `server.apart.pool`."""
+    """Where steps are done; see `server.lone_triangle.pool`."""
 
     @property
     def run(self) -> RunStep: ...
     def resident_bytes(self) -> int: ...
-    def let_go(self) -> None: ...
+    def release(self) -> None: ...
     def close(self) -> None: ...

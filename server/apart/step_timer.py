@@ -17,33 +17,33 @@ class StepTimer:
         Args:
             step_s: seconds that a step has taken before; None where that is not known.
         """
-        self._step_s, self._began, self.share = step_s, time.monotonic(), 0.0
+        self._step_s, self._start_s, self.fraction = step_s, time.monotonic(), 0.0
 
-    def begin(self) -> None:
+    def start(self) -> None:
         """The first step begins now: what was done before is done once."""
-        self._began = time.monotonic()
+        self._start_s = time.monotonic()
 
-    def tell(self, share: float) -> None:
+    def report(self, fraction: float) -> None:
         """So much of the step at hand is done, 0…1."""
-        self.share = share
+        self.fraction = fraction
 
     def next_step(self) -> float:
         """The step at hand is done. Returns: how many seconds a step takes, later ones counting more."""
-        took, known = time.monotonic() - self._began, self._step_s
-        self._step_s = took if known is None else 0.5 * (known + took)
-        self._began, self.share = time.monotonic(), 0.0
+        elapsed_s, previous_s = time.monotonic() - self._start_s, self._step_s
+        self._step_s = elapsed_s if previous_s is None else 0.5 * (previous_s + elapsed_s)
+        self._start_s, self.fraction = time.monotonic(), 0.0
         return self._step_s
 
     def seconds_left(self, steps: int) -> float | None:
         """Until so many steps are done, that at hand included; None where nothing was measured yet."""
         step_s = self._step_s
-        if self.share > _ENOUGH:
-            of_this = (time.monotonic() - self._began) / self.share
-            step_s = of_this if step_s is None else (1 - self.share) * step_s + self.share * of_this
-        return None if step_s is None else max(0.0, steps - self.share) * step_s
+        if self.fraction > _ENOUGH:
+            current_s = (time.monotonic() - self._start_s) / self.fraction
+            step_s = current_s if step_s is None else (1 - self.fraction) * step_s + self.fraction * current_s
+        return None if step_s is None else max(0.0, steps - self.fraction) * step_s
 
 
-def sampled(work: Callable[[Callable[[float], object]], object], scale: float) -> float:
+def estimate_seconds(work: Callable[[Callable[[float], object]], object], scale: float) -> float:
     """Seconds that work would take if all but its preparation were `scale` times as much.
 
     Args:
@@ -52,12 +52,12 @@ def sampled(work: Callable[[Callable[[float], object]], object], scale: float) -
     began = time.monotonic()
     early: list[tuple[float, float]] = []
 
-    def tell(share: float) -> None:
-        if not early and share >= _EARLY:
-            early.append((time.monotonic(), share))
+    def report(fraction: float) -> None:
+        if not early and fraction >= _EARLY:
+            early.append((time.monotonic(), fraction))
 
-    work(tell)
+    work(report)
     ended = time.monotonic()
-    at, share = early[0] if early else (began, 0.0)
-    whole = (ended - at) / (1 - share) if share < 1 else ended - began
-    return max(0.0, at - began - share * whole) + scale * whole
+    early_s, early_fraction = early[0] if early else (began, 0.0)
+    whole_s = (ended - early_s) / (1 - early_fraction) if early_fraction < 1 else ended - began
+    return max(0.0, early_s - began - early_fraction * whole_s) + scale * whole_s

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from relume.code_version import image_code
 from server.apart.step import RunStep, Step
-from server.library.once import Once
+from server.library.once import SingleFlight
 
 NUM_WAITING = 2
 """Threads that wait for steps: others have to wait for their turn there anyway."""
@@ -21,13 +21,13 @@ class Thumbnails:
 
     def __init__(self, folder: Path, run: RunStep) -> None:
         self._folder, self._run = folder, run
-        self._once = Once(NUM_WAITING, "relume-thumbnail")
+        self._single_flight = SingleFlight(NUM_WAITING, "relume-thumbnail")
 
     def close(self) -> None:
         """Paint no more; no step may be under way that is not ended."""
-        self._once.close()
+        self._single_flight.close()
 
-    async def find(self, bake: str) -> Path:
+    async def get_or_paint(self, bake: str) -> Path:
         """The file of a ready bake's thumbnail, painted where it is missing; somebody waits for it.
 
         Args:
@@ -35,7 +35,7 @@ class Thumbnails:
         """
         path = self.path(bake)
         if not path.exists():
-            await self._once.make(bake, lambda: self.paint(bake, is_first=True))
+            await self._single_flight.run(bake, lambda: self.paint(bake, is_first=True))
         return path
 
     def path(self, bake: str) -> Path:
@@ -47,6 +47,6 @@ class Thumbnails:
         path = self.path(bake)
         values = {"bake": bake, "path": str(path)}
         self._run(Step("thumbnail of a bake", is_first, values), lambda share: None, lambda: True)
-        for other in self._folder.glob(f"{bake}-*.webp"):  # of other code
-            if other != path:
-                other.unlink(missing_ok=True)
+        for stale in self._folder.glob(f"{bake}-*.webp"):  # of other code
+            if stale != path:
+                stale.unlink(missing_ok=True)

@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from relume.picture.transfer import Opened
+from relume.picture.transfer import OpenBake
 from server.library.ports import Library
 from worker.paths import bake_path
 
 
 @dataclass
-class Workshop:
+class BatchContext:
     """Of one process."""
 
     data: Path
     library: Library
-    _opened: dict[str, Opened] = field(default_factory=dict, init=False)
+    _open_bakes: dict[str, OpenBake] = field(default_factory=dict, init=False)
 
-    def transfer(self, bake: str) -> Opened:
+    def transfer(self, bake: str) -> OpenBake:
         """A bake, opened to be read; the last two stay open, of which each queue may need one. Raises StoreError."""
-        if bake not in self._opened:
-            for oldest in list(self._opened)[: len(self._opened) - 1]:
-                del self._opened[oldest]
-            self._opened[bake] = self.library.open_in_passing(bake_path(self.data, bake))
-        self._opened[bake] = found = self._opened.pop(bake)
-        return found
+        if bake not in self._open_bakes:
+            for oldest in list(self._open_bakes)[: len(self._open_bakes) - 1]:
+                del self._open_bakes[oldest]
+            self._open_bakes[bake] = self.library.open_transient(bake_path(self.data, bake))
+        self._open_bakes[bake] = transfer = self._open_bakes.pop(bake)
+        return transfer

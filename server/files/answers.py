@@ -18,7 +18,7 @@ from anyio.to_thread import run_sync
 from fastapi.responses import StreamingResponse
 from numpy.typing import NDArray
 
-from server.library.once import Once
+from server.library.once import SingleFlight
 
 PIECE_BYTES, NUM_READERS = 1 << 17, 4
 Content = bytes | NDArray[Any]
@@ -37,7 +37,7 @@ class _File:
                 while written < self.num_bytes:
                     written += self._file.write(flat[written:])
 
-    async def pieces(self, threads: CapacityLimiter) -> AsyncIterator[bytes]:
+    async def chunks(self, threads: CapacityLimiter) -> AsyncIterator[bytes]:
         """All of it, as fast as they are taken. threads: that read."""
         offset = 0
         while offset < self.num_bytes:
@@ -54,7 +54,7 @@ class Answers:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._once = folder, Once(2, "relume-answer")
+        self._folder, self._single_flight = folder, SingleFlight(2, "relume-answer")
         self._files: WeakValueDictionary[Hashable, _File] = WeakValueDictionary()
         self._readers = CapacityLimiter(NUM_READERS)
 
@@ -64,11 +64,11 @@ class Answers:
         """An answer that is the same for all who ask by the same key. make: makes it, in a thread; it may raise."""
         file = self._files.get(key)
         if file is None:
-            file = await self._once.make(key, lambda: _File(self._folder, make()))
+            file = await self._single_flight.run(key, lambda: _File(self._folder, make()))
             file = self._files.setdefault(key, file)
         length = {"Content-Length": str(file.num_bytes)}
-        return StreamingResponse(file.pieces(self._readers), media_type=media_type, headers={**headers, **length})
+        return StreamingResponse(file.chunks(self._readers), media_type=media_type, headers={**headers, **length})
 
     def close(self) -> None:
         """Make no more."""
-        self._once.close()
+        self._single_flight.close()

@@ -16,7 +16,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from relume.kernel_cache import cache_folder, keep_no_kernels
+from relume.kernel_cache import cache_folder, disable_kernel_saving
 
 _PACKAGES = ("relume", "worker", "server")
 _SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/localtime", "/dev/null", "/dev/urandom")
@@ -28,28 +28,28 @@ _REFUSED_CALLS = (
 )  # fmt: skip
 
 
-def confine(own: Sequence[Path], into: Path) -> None:
+def confine(readable: Sequence[Path], writable_folder: Path) -> None:
     """Give up what reading files does not need; for good, and for all that this process starts.
 
     Args:
-        own: files and folders that it may read. into: folder that it may write to, temporary files too.
+        readable: files and folders that it may read. writable_folder: folder that it may write to, temporary files too.
     """
-    tempfile.tempdir = str(into)
-    keep_no_kernels()
+    tempfile.tempdir = str(writable_folder)
+    disable_kernel_saving()
     with suppress(OSError):  # if memory is short, this process goes first
         Path("/proc/self/oom_score_adj").write_text("1000")
     has_landlock, has_seccomp = _has_landlock(), _has_seccomp()  # what they look for cannot be found afterwards
     if has_landlock:
-        _keep_from_files(own, into)
+        _restrict_files(readable, writable_folder)
     if has_seccomp:
-        _keep_from_calls()
+        _restrict_syscalls()
 
 
 @cache
-def missing() -> tuple[str, ...]:
+def missing_features() -> tuple[str, ...]:
     """What this machine cannot do of it, by name."""
-    found = (("Landlock", _has_landlock()), ("seccomp", _has_seccomp()))
-    return tuple(name for name, is_there in found if not is_there)
+    features = (("Landlock", _has_landlock()), ("seccomp", _has_seccomp()))
+    return tuple(name for name, is_available in features if not is_available)
 
 
 @cache
@@ -78,7 +78,7 @@ def _has_seccomp() -> bool:
     return True
 
 
-def _keep_from_files(own: Sequence[Path], into: Path) -> None:
+def _restrict_files(readable: Sequence[Path], writable_folder: Path) -> None:
     from landlockpy import AccessFS, Ruleset, Scope
 
     read = AccessFS.READ_FILE | AccessFS.READ_DIR
@@ -87,9 +87,9 @@ def _keep_from_files(own: Sequence[Path], into: Path) -> None:
     with Ruleset(scoped=Scope.ABSTRACT_UNIX_SOCKET | Scope.SIGNAL) as rules:
         for path in _program():
             rules.allow_path(path, (read | AccessFS.EXECUTE) if path.is_dir() else AccessFS.READ_FILE)
-        for path in filter(Path.exists, own):  # what has gone meanwhile its reader misses in words
+        for path in filter(Path.exists, readable):  # what has gone meanwhile its reader misses in words
             rules.allow_path(path, read if path.is_dir() else AccessFS.READ_FILE)
-        rules.allow_path(into, write)
+        rules.allow_path(writable_folder, write)
         rules.restrict()
 
 
@@ -103,7 +103,7 @@ def _program() -> tuple[Path, ...]:
     return tuple(root for root in roots if root.exists())
 
 
-def _keep_from_calls() -> None:
+def _restrict_syscalls() -> None:
     import pyseccomp
 
     rules = pyseccomp.SyscallFilter(pyseccomp.ALLOW)

@@ -14,10 +14,10 @@ from fastapi import Depends, Request
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.reservations import Reservation
 from server.access.roles import KEY
-from server.errors import NearlyFullError, QuotaError, problem_of, problem_response
+from server.errors import NearlyFullError, QuotaError, make_problem, problem_response
 from server.files.slots import Slots
 from server.guard import UPLOADS
 
@@ -25,32 +25,34 @@ MEASURED = "/api/materials/measured"
 UPLOADS_AT_ONCE, UPLOADS_EACH = 64, 8
 STEP_BYTES = 16 << 20
 """Held at a time of a body that does not say how large it is."""
-_HELD = "relume.reservation"
+_RESERVATION_KEY = "relume.reservation"
 _Refusal = QuotaError | NearlyFullError
 
 
-class Door:
+class UploadMiddleware:
     """The middleware behind the gate.
 
     Args:
         access: asked for with each upload, because it is opened after the app is made.
-        each: uploads of one user at once; more of them wait. shares: turns of some users.
+        max_per_user: uploads of one user at once; more of them wait. weights: turns of some users.
     """
 
-    def __init__(self, app: ASGIApp, *, access: Callable[[], Access], each: int, shares: Mapping[str, float]) -> None:
+    def __init__(
+        self, app: ASGIApp, *, access: Callable[[], AuthServices], max_per_user: int, weights: Mapping[str, float]
+    ) -> None:
         self._app, self._access = app, access
-        self._places = Slots(UPLOADS_AT_ONCE, each, shares)
+        self._slots = Slots(UPLOADS_AT_ONCE, max_per_user, weights)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Hand on; an upload with what it may take, which is let go when it is answered."""
         if scope["type"] != "http" or scope["method"] != "POST" or scope["path"] not in (*UPLOADS, MEASURED):
             await self._app(scope, receive, send)
             return
-        who = scope[KEY].name
-        async with self._places.held(who):
-            reservation = scope[_HELD] = Reservation(self._access().quotas, who)
+        user = scope[KEY].name
+        async with self._slots.acquire(user):
+            reservation = scope[_RESERVATION_KEY] = Reservation(self._access().quotas, user)
             try:
-                await _Upload(reservation, scope).take(self._app, receive, send)
+                await _Upload(reservation, scope).forward(self._app, receive, send)
             finally:
                 with CancelScope(shield=True):  # whoever has gone takes nothing any more
                     await run_sync(reservation.release)
@@ -66,14 +68,14 @@ class _Upload:
         self._num_bytes, self._is_started = 0, False
         self._refusal: _Refusal | None = None
 
-    async def take(self, app: ASGIApp, receive: Receive, send: Send) -> None:
+    async def forward(self, app: ASGIApp, receive: Receive, send: Send) -> None:
         """Hand it on, unless there is no room for it; said on the way whatever the app makes of that."""
 
         async def counted() -> Message:
             message = await receive()
             self._num_bytes += len(message.get("body", b""))
             if self._num_bytes > self._reservation.bytes:
-                await self._hold(self._num_bytes + STEP_BYTES)
+                await self._reserve(self._num_bytes + STEP_BYTES)
             return message
 
         async def unless_refused(message: Message) -> None:
@@ -82,27 +84,27 @@ class _Upload:
                 await send(message)
 
         try:
-            await self._hold(STEP_BYTES if self._length is None else self._length)
+            await self._reserve(STEP_BYTES if self._length is None else self._length)
             await app(self._scope, counted, unless_refused)
         except (QuotaError, NearlyFullError):
             if self._refusal is None or self._is_started:
                 raise
         if self._refusal is not None and not self._is_started:
             close = {"Connection": "close"}  # what is left of the body is not read
-            await problem_response(problem_of(self._refusal), close)(self._scope, receive, send)
+            await problem_response(make_problem(self._refusal), close)(self._scope, receive, send)
 
-    async def _hold(self, num_bytes: int) -> None:
+    async def _reserve(self, num_bytes: int) -> None:
         try:
-            await run_sync(self._reservation.hold, num_bytes)
+            await run_sync(self._reservation.reserve, num_bytes)
         except (QuotaError, NearlyFullError) as error:
             self._refusal = error
             raise
 
 
-def _held(request: Request) -> Reservation:
-    reservation: Reservation = request.scope[_HELD]
+def _get_reservation(request: Request) -> Reservation:
+    reservation: Reservation = request.scope[_RESERVATION_KEY]
     return reservation
 
 
-Held = Annotated[Reservation, Depends(_held)]
+ReservationDep = Annotated[Reservation, Depends(_get_reservation)]
 """What an upload's route may let it take."""

@@ -17,11 +17,11 @@ from starlette.types import Message, Receive, Scope, Send
 from server.errors import RangeError
 
 _LONGEST = 120
-_PART_BYTES = 1 << 18
+_CHUNK_BYTES = 1 << 18
 _RANGES = re.compile(
     rb"bytes=\s*(\d{1,99}-\d{0,99}|-\d{1,99})(\s*,\s*(\d{1,99}-\d{0,99}|-\d{1,99}))*\s*", re.IGNORECASE
 )
-_BOTH_ENDS = re.compile(rb"(\d+)-(\d+)")
+_CLOSED_RANGE = re.compile(rb"(\d+)-(\d+)")
 
 
 class Download(FileResponse):
@@ -53,49 +53,49 @@ class ZipStream(StreamingResponse):
             files: each with its name in the archive; one that is deleted meanwhile is left out.
             name: of the archive where it is saved.
         """
-        called = f"attachment; filename*=utf-8''{quote(name)}"
-        super().__init__(_zipped(files), headers={"Content-Disposition": called, "Cache-Control": "no-store"})
+        disposition = f"attachment; filename*=utf-8''{quote(name)}"
+        super().__init__(_zip_chunks(files), headers={"Content-Disposition": disposition, "Cache-Control": "no-store"})
 
 
-class _Sent(io.RawIOBase):
+class _ZipBuffer(io.RawIOBase):
     """What was written and not taken yet."""
 
     def __init__(self) -> None:
-        self._parts: list[bytes] = []
+        self._chunks: list[bytes] = []
 
     def writable(self) -> bool:
         """It is."""
         return True
 
-    def write(self, part: Any) -> int:
+    def write(self, data: Any) -> int:
         """Add some."""
-        self._parts.append(bytes(part))
-        return len(self._parts[-1])
+        self._chunks.append(bytes(data))
+        return len(self._chunks[-1])
 
     def take(self) -> bytes:
         """Take all."""
-        taken, self._parts = b"".join(self._parts), []
+        taken, self._chunks = b"".join(self._chunks), []
         return taken
 
 
-def _zipped(files: Sequence[tuple[Path, str]]) -> Iterator[bytes]:
-    sent = _Sent()
-    with zipfile.ZipFile(sent, "w", zipfile.ZIP_STORED) as packed:
+def _zip_chunks(files: Sequence[tuple[Path, str]]) -> Iterator[bytes]:
+    buffer = _ZipBuffer()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for path, name in files:
             try:
                 file = path.open("rb")
             except FileNotFoundError:
                 continue
-            with file, packed.open(zipfile.ZipInfo(name), "w", force_zip64=True) as entry:
-                while part := file.read(_PART_BYTES):
-                    entry.write(part)
-                    yield sent.take()
-            yield sent.take()
-    yield sent.take()
+            with file, archive.open(zipfile.ZipInfo(name), "w", force_zip64=True) as entry:
+                while chunk := file.read(_CHUNK_BYTES):
+                    entry.write(chunk)
+                    yield buffer.take()
+            yield buffer.take()
+    yield buffer.take()
 
 
 def _are_ranges(value: bytes) -> bool:
-    return _RANGES.fullmatch(value) is not None and all(int(a) <= int(b) for a, b in _BOTH_ENDS.findall(value))
+    return _RANGES.fullmatch(value) is not None and all(int(a) <= int(b) for a, b in _CLOSED_RANGE.findall(value))
 
 
 def safe_stem(text: str) -> str:

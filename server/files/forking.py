@@ -25,27 +25,27 @@ from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from server.files.confining import confine
-from server.files.importing import ImportRequest, answer_of
+from server.files.importing import ImportRequest, run_import
 
-MAX_ANSWER_BYTES, MAX_SAID_BYTES = 64 * 1024, 2_000
-LEAST_FILE_BYTES = 1 << 16  # what it says of its end is a file, too
-MAX_OPEN = 1_024  # files at once; a scene has at most 900 companions
+MAX_ANSWER_BYTES, MAX_OUTPUT_BYTES = 64 * 1024, 2_000
+MIN_FILE_BYTES = 1 << 16  # what it says of its end is a file, too
+MAX_OPEN_FILES = 1_024  # files at once; a scene has at most 900 companions
 
 
 @dataclass(frozen=True)
-class End:
+class ImportExit:
     """How a process that imported has ended.
 
     Attributes:
         code: that it ended with, or minus the signal.
-        told: what `answer_of` said, as JSON; empty where it came to nothing.
-        said: the end of what it wrote to stderr.
+        answer: what `run_import` said, as JSON; empty where it came to nothing.
+        output: the end of what it wrote to stderr.
         is_late: whether it was ended for taking too long.
     """
 
     code: int
-    told: str
-    said: str
+    answer: str
+    output: str
     is_late: bool
 
 
@@ -56,16 +56,16 @@ def main() -> None:
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # keepers are waited for by who asked
     asking = socket.socket(fileno=sys.stdin.fileno())
     while True:
-        message, brought, *_ = socket.recv_fds(asking, 1, 1)
+        message, received_fds, *_ = socket.recv_fds(asking, 1, 1)
         if not message:
             return
         with (
-            socket.socket(fileno=brought[0]) as asker,
+            socket.socket(fileno=received_fds[0]) as asker,
             suppress(OSError),
         ):  # no room for one more: who asks is told none
             if os.fork() == 0:
                 asking.close()
-                _keep(asker)
+                _supervise_import(asker)
 
 
 def _load() -> None:
@@ -76,67 +76,67 @@ def _load() -> None:
     import relume.scene.companions
     import relume.scene.importer  # noqa: F401
     import worker.scenes  # noqa: F401
-    from server.files.confining import missing
+    from server.files.confining import missing_features
 
-    missing()
+    missing_features()
 
 
-def _keep(asker: socket.socket) -> NoReturn:
+def _supervise_import(asker: socket.socket) -> NoReturn:
     """Be the process that has one file imported, and tells who asked how that ended."""
     try:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         with asker.makefile("rb") as lines:
             request = ImportRequest(**json.loads(lines.readline()))
-        asker.sendall(json.dumps(asdict(_end(request, asker))).encode())
+        asker.sendall(json.dumps(asdict(_run_import(request, asker))).encode())
     finally:  # never back into the loop that it was forked from; who asked sees an end
         os._exit(0)
 
 
-def _end(request: ImportRequest, asker: socket.socket) -> End:
+def _run_import(request: ImportRequest, asker: socket.socket) -> ImportExit:
     reading, writing = os.pipe()
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         if (process := os.fork()) == 0:
             asker.close()
             os.close(reading)
-            _import(request, writing, said)
+            _import(request, writing, output)
         os.close(writing)
-        told = _told(reading, asker, request.seconds)
+        answer = _read_answer(reading, asker, request.seconds)
         os.kill(process, signal.SIGKILL)
         code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-        said.seek(max(0, said.seek(0, os.SEEK_END) - MAX_SAID_BYTES))
-        return End(code, (told or b"").decode(), said.read().decode(errors="replace"), told is None)
+        output.seek(max(0, output.seek(0, os.SEEK_END) - MAX_OUTPUT_BYTES))
+        return ImportExit(code, (answer or b"").decode(), output.read().decode(errors="replace"), answer is None)
 
 
-def _told(reading: int, asker: socket.socket, seconds: float) -> bytes | None:
+def _read_answer(reading: int, asker: socket.socket, seconds: float) -> bytes | None:
     """What a process tells until it ends; None where it took too long, or who asked is gone."""
-    told, until_s = b"", time.monotonic() + seconds
-    while (left_s := until_s - time.monotonic()) > 0:
-        ready, *_ = select.select([reading, asker.fileno()], [], [], left_s)
-        if asker.fileno() in ready:  # nothing more is asked: it is closed
+    answer, until_s = b"", time.monotonic() + seconds
+    while (remaining_s := until_s - time.monotonic()) > 0:
+        readable, *_ = select.select([reading, asker.fileno()], [], [], remaining_s)
+        if asker.fileno() in readable:  # nothing more is asked: it is closed
             return None
-        if reading in ready:
-            piece = os.read(reading, MAX_ANSWER_BYTES)
-            if not piece:
-                return told
-            told = (told + piece)[-MAX_ANSWER_BYTES:]
+        if reading in readable:
+            chunk = os.read(reading, MAX_ANSWER_BYTES)
+            if not chunk:
+                return answer
+            answer = (answer + chunk)[-MAX_ANSWER_BYTES:]
     return None
 
 
-def _import(request: ImportRequest, writing: int, said: BinaryIO) -> NoReturn:
+def _import(request: ImportRequest, writing: int, output: BinaryIO) -> NoReturn:
     """Be the process that imports."""
-    os.dup2(said.fileno(), 1)
-    os.dup2(said.fileno(), 2)
+    os.dup2(output.fileno(), 1)
+    os.dup2(output.fileno(), 2)
     try:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_CPU, (request.seconds, request.seconds))
         resource.setrlimit(resource.RLIMIT_AS, (request.max_bytes, request.max_bytes))
-        most_bytes = max(request.max_file_bytes, LEAST_FILE_BYTES)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
-        resource.setrlimit(resource.RLIMIT_NOFILE, (MAX_OPEN, MAX_OPEN))
-        confine(request.own, Path(request.into))
-        told = json.dumps(answer_of(request)).encode()
-        while told:
-            told = told[os.write(writing, told) :]
+        max_bytes = max(request.max_file_bytes, MIN_FILE_BYTES)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (max_bytes, max_bytes))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (MAX_OPEN_FILES, MAX_OPEN_FILES))
+        confine(request.input_files, Path(request.into))
+        answer = json.dumps(run_import(request)).encode()
+        while answer:
+            answer = answer[os.write(writing, answer) :]
     except MemoryError:  # met where even a sentence takes too much
         os.kill(os.getpid(), signal.SIGKILL)
     except BaseException:

@@ -13,24 +13,24 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
-from server.files.confining import environment, missing
-from server.files.forking import End
+from server.files.confining import environment, missing_features
+from server.files.forking import ImportExit
 from server.files.importing import ImportRequest
 
 log = logging.getLogger(__name__)
 START_S = 120.0  # that a busy machine may take to load what imports need
 _DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
-_FAULTS: Mapping[str, Callable[[str], Exception]] = {
+_ERRORS_BY_KEY: Mapping[str, Callable[[str], Exception]] = {
     "problem": SceneError,
     "material": MaterialError,
     "full": lambda _: DiskFullError("what was imported"),
-    "large": lambda _: OutgrownError("what was imported is larger than there is room for"),
+    "large": lambda _: ImportTooLargeError("what was imported is larger than there is room for"),
     "failure": RelumeError,
 }
 _COMMAND = [sys.executable, "-m", "server.files.forking"]
 
 
-class OutgrownError(RelumeError):
+class ImportTooLargeError(RelumeError):
     """A file unpacks to more than it may take."""
 
 
@@ -44,7 +44,7 @@ class Importers:
     def start(self) -> None:
         """Have the process run that others are forked from, unless it does; the first import else waits for it."""
         with self._lock:
-            self._running()
+            self._ensure_running()
 
     def run(self, request: ImportRequest) -> str:
         """Import into the request's folder; returns the id. Blocks.
@@ -53,11 +53,11 @@ class Importers:
             SceneError: the file cannot be used, or reading it took too much. DiskFullError: there is no room for it.
             OutgrownError: it takes more than it may. RelumeError: a defect; it is logged.
         """
-        asker, theirs = socket.socketpair()
+        asker, child_socket = socket.socketpair()
         with asker:
-            with theirs, self._lock:
-                socket.send_fds(self._running(), [b"."], [theirs.fileno()])
-            return _result(request, _ask(asker, request))
+            with child_socket, self._lock:
+                socket.send_fds(self._ensure_running(), [b"."], [child_socket.fileno()])
+            return _result(request, _request_import(asker, request))
 
     def close(self) -> None:
         """End the process that others are forked from; they end with who asked."""
@@ -69,63 +69,63 @@ class Importers:
             process.kill()
             process.wait()
 
-    def _running(self) -> socket.socket:
+    def _ensure_running(self) -> socket.socket:
         """Where it is asked; it is begun where it does not run."""
         if self._parent is None or self._parent[0].poll() is not None:
             if self._parent is not None:
                 self._parent[1].close()
-            self._parent = _begin()
+            self._parent = _start_process()
         return self._parent[1]
 
 
-def _begin() -> tuple[subprocess.Popen[bytes], socket.socket]:
+def _start_process() -> tuple[subprocess.Popen[bytes], socket.socket]:
     # No thread pools: what is forked would lack them, and each reserves address space, which counts against the limit.
     environ = environment() | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    if missing():
+    if missing_features():
         log.warning(
             "this machine has no %s: what reads uploads has limits, and is not kept from other files or the network "
             "(docs/operations.md)",
-            " and no ".join(missing()),
+            " and no ".join(missing_features()),
         )
-    asking, theirs = socket.socketpair()
-    with theirs:
-        process = subprocess.Popen(_COMMAND, stdin=theirs.fileno(), stdout=subprocess.DEVNULL, env=environ)  # noqa: S603
+    asking, child_socket = socket.socketpair()
+    with child_socket:
+        process = subprocess.Popen(_COMMAND, stdin=child_socket.fileno(), stdout=subprocess.DEVNULL, env=environ)  # noqa: S603
     return process, asking
 
 
-def _ask(asker: socket.socket, request: ImportRequest) -> End:
+def _request_import(asker: socket.socket, request: ImportRequest) -> ImportExit:
     """How the process ended that was forked for this."""
     asker.settimeout(START_S + request.seconds)
     try:
         asker.sendall(json.dumps(asdict(request)).encode() + b"\n")
         with asker.makefile("rb") as answer:
-            return End(**json.loads(answer.read()))
+            return ImportExit(**json.loads(answer.read()))
     except TimeoutError:
-        return End(0, "", "", is_late=True)
+        return ImportExit(0, "", "", is_late=True)
     except (OSError, ValueError):
-        return End(0, "", "it has gone before it could tell how it ended", is_late=False)
+        return ImportExit(0, "", "it has gone before it could tell how it ended", is_late=False)
 
 
-def _result(request: ImportRequest, end: End) -> str:
+def _result(request: ImportRequest, import_exit: ImportExit) -> str:
     """The id; or raise what a process's end means."""
-    if -end.code in _DAMAGED:
-        _log(end)
+    if -import_exit.code in _DAMAGED:
+        _log(import_exit)
         raise SceneError("the file made its reader fail, it is damaged; export it again")
-    answer = json.loads(end.told) if end.told else {}
+    answer = json.loads(import_exit.answer) if import_exit.answer else {}
     if "id" in answer:
         return str(answer["id"])
-    for key, fault in _FAULTS.items():
+    for key, make_error in _ERRORS_BY_KEY.items():
         if key in answer:
-            if key not in ("problem", "material") and end.said:  # it has no log of its own
-                _log(end)
-            raise fault(answer[key])
-    if end.is_late or end.code < 0:
+            if key not in ("problem", "material") and import_exit.output:  # it has no log of its own
+                _log(import_exit)
+            raise make_error(answer[key])
+    if import_exit.is_late or import_exit.code < 0:
         limits = f"{request.seconds} s or {request.max_bytes / 1e9:.1f} GB"
         raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file")
-    _log(end)
+    _log(import_exit)
     raise RelumeError("the import failed, and not because of the file; the server's log says why, report it")
 
 
-def _log(end: End) -> None:
-    line = " ".join(end.said.split())
-    log.error("the process of an import ended with %d and said: %s", end.code, line or "nothing")
+def _log(import_exit: ImportExit) -> None:
+    line = " ".join(import_exit.output.split())
+    log.error("the process of an import ended with %d and said: %s", import_exit.code, line or "nothing")

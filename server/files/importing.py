@@ -18,18 +18,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from relume.errors import DiskFullError, MaterialError, RelumeError, is_no_room
+from relume.errors import DiskFullError, MaterialError, RelumeError, is_disk_full
 from relume.replacing import UNFINISHED
 
 if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
     from relume.scene.model import Scene
     from server.settings import Settings
 
-_NO_MEMORY = (os.strerror(errno.ENOMEM), "can't start new thread")
+_OUT_OF_MEMORY_MESSAGES = (os.strerror(errno.ENOMEM), "can't start new thread")
 UPLOAD_PREFIX = "upload-"
 SUMMARY = "summary.json"
 """What lists show of a scene, beside its folder."""
-Kind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "tile"]
+ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "tile"]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class ImportRequest:
     """
 
     into: str
-    kind: Kind
+    kind: ImportKind
     file: str
     environment: str | None
     name: str
@@ -62,10 +62,10 @@ class ImportRequest:
     companions: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(
+    def create(
         cls,
         settings: Settings,
-        kind: Kind,
+        kind: ImportKind,
         file: Path | None,
         name: str,
         environment: Path | None = None,
@@ -87,7 +87,7 @@ class ImportRequest:
         )
 
     @property
-    def own(self) -> list[Path]:
+    def input_files(self) -> list[Path]:
         """The files that it is about."""
         paths = [self.file, self.environment or "", *self.companions.values()]
         return [Path(path) for path in paths if path]
@@ -101,7 +101,7 @@ def remove_strays(data: Path, older_than_s: float) -> None:
                 shutil.rmtree(folder)
 
 
-def answer_of(request: ImportRequest) -> dict[str, str]:
+def run_import(request: ImportRequest) -> dict[str, str]:
     """What the process says: {"id": id}, or what failed.
 
     That is {"problem": sentence} of the file, {"material": sentence} of that of a material, {"full": sentence} of the
@@ -119,7 +119,7 @@ def answer_of(request: ImportRequest) -> dict[str, str]:
             return {"large": str(error)}
         return {"problem" if type(error) is not RelumeError else "failure": str(error)}
     except Exception as error:
-        if isinstance(error, OSError) and is_no_room(error):
+        if isinstance(error, OSError) and is_disk_full(error):
             return {"full": str(error)}
         if _is_too_large(error):
             return {"large": str(error)}
@@ -136,7 +136,7 @@ def _is_too_large(error: BaseException | None) -> bool:
 
 def _is_out_of_memory(error: Exception) -> bool:
     """Whether the limit of address space was met: the system's calls say so in their own words."""
-    return isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY)
+    return isinstance(error, MemoryError) or any(message in str(error) for message in _OUT_OF_MEMORY_MESSAGES)
 
 
 def _import(request: ImportRequest) -> str:
@@ -152,27 +152,27 @@ def _import(request: ImportRequest) -> str:
 
 
 def _import_environment(request: ImportRequest) -> str:
-    from relume.environments.asset_store import keep
+    from relume.environments.asset_store import store_environment
 
-    return keep(Path(request.into), Path(request.file), request.name).id
+    return store_environment(Path(request.into), Path(request.file), request.name).id
 
 
 def _import_image(request: ImportRequest) -> str:
-    from relume.images.shelf import keep
+    from relume.images.shelf import store
 
-    return keep(Path(request.into), Path(request.file), request.name).id
+    return store(Path(request.into), Path(request.file), request.name).id
 
 
 def _import_material(request: ImportRequest) -> str:
-    from relume.measured.asset_store import keep
+    from relume.measured.asset_store import store_material
 
-    return keep(Path(request.into), Path(request.file), request.name, request.scene or None).id
+    return store_material(Path(request.into), Path(request.file), request.name, request.scene or None).id
 
 
 def _look_at_tile(request: ImportRequest) -> str:
-    from relume.synthetic.mesh import tile_of
+    from relume.synthetic.mesh import read_tile
 
-    tile_of(Path(request.file), request.period)
+    read_tile(Path(request.file), request.period)
     return ""
 
 
@@ -182,7 +182,7 @@ def _import_scene(request: ImportRequest) -> str:
         from relume.scene.ground import with_ground
 
         scene = with_ground(scene)
-    return _written(request, scene)
+    return _write_scene(request, scene)
 
 
 def _built_in(name: str) -> Scene:
@@ -195,24 +195,24 @@ def _put_on_ground(request: ImportRequest) -> str:
     from relume.scene.archive import load_scene
     from relume.scene.ground import with_ground
 
-    return _written(request, with_ground(load_scene(request.file), request.name))
+    return _write_scene(request, with_ground(load_scene(request.file), request.name))
 
 
-def _written(request: ImportRequest, scene: Scene) -> str:
+def _write_scene(request: ImportRequest, scene: Scene) -> str:
     from relume.scene.archive import save_scene
-    from worker.scenes import summary_of
+    from worker.scenes import summarize_scene
 
     save_scene(scene, Path(request.into) / scene.id)
-    (Path(request.into) / SUMMARY).write_text(json.dumps(summary_of(scene)))
+    (Path(request.into) / SUMMARY).write_text(json.dumps(summarize_scene(scene)))
     return scene.id
 
 
 def _read_scene(request: ImportRequest) -> Scene:
     from relume.environments.reading import read_environment
-    from relume.scene.companions import Sent
+    from relume.scene.companions import UploadedFiles
     from relume.scene.importer import import_scene, read_file
 
     environment = None if request.environment is None else read_environment(request.environment, "Environment")
-    sent = Sent({name: Path(path) for name, path in request.companions.items()}, request.scene)
+    uploaded_files = UploadedFiles({name: Path(path) for name, path in request.companions.items()}, request.scene)
     # bytes: what lies beside the file on this disk is not its own
-    return import_scene(read_file(request.file), request.name, environment, sent)
+    return import_scene(read_file(request.file), request.name, environment, uploaded_files)

@@ -20,22 +20,22 @@ from relume.brdf.channels import IMAGES
 from relume.environments.asset_store import STORE as ENVIRONMENTS
 from relume.errors import RelumeError
 from relume.measured.asset_store import STORE as MATERIALS
-from server.access.quotas import Kind, Quotas
-from server.access.reservations import IMPORTS_AT_ONCE, Reservation
-from server.files.importers import Importers, OutgrownError
+from server.access.quotas import OwnedKind, Quotas
+from server.access.reservations import MAX_CONCURRENT_IMPORTS, Reservation
+from server.files.importers import Importers, ImportTooLargeError
 from server.files.importing import SUMMARY, UPLOAD_PREFIX, ImportRequest
 from server.files.slots import Slots
 from worker.ledger import Ledger
 from worker.paths import environments_path, images_path, materials_path, scene_path
-from worker.scenes import enter_scene
+from worker.scenes import insert_scene
 
 if TYPE_CHECKING:
     from server.settings import Settings
 
 T = TypeVar("T")
-_MADE = "made"
+_OUTPUT_FOLDER = "made"
 MAX_SUMMARY_BYTES = 64 << 20
-_STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], Kind]] = {
+_STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
     "environment": (ENVIRONMENTS, environments_path, "environment"),
     "image": (IMAGES, images_path, "image"),
     "material": (MATERIALS, materials_path, "material"),
@@ -51,65 +51,66 @@ class Intake:
 
     def __init__(self, settings: Settings, ledger: Ledger, quotas: Quotas, importers: Importers) -> None:
         self._settings, self._ledger, self._quotas, self.importers = settings, ledger, quotas, importers
-        self._slots = Slots(IMPORTS_AT_ONCE, 1 if settings.login else IMPORTS_AT_ONCE, settings.turns)
+        self._slots = Slots(MAX_CONCURRENT_IMPORTS, 1 if settings.login else MAX_CONCURRENT_IMPORTS, settings.turns)
 
     @asynccontextmanager
-    async def reserving(self, who: str, num_bytes: int) -> AsyncIterator[Reservation]:
+    async def reserving(self, owner: str, num_bytes: int) -> AsyncIterator[Reservation]:
         """Room for something that is made and not sent. Raises QuotaError, NearlyFullError."""
-        reservation = Reservation(self._quotas, who)
+        reservation = Reservation(self._quotas, owner)
         try:
-            await run_in_threadpool(reservation.hold, num_bytes)
+            await run_in_threadpool(reservation.reserve, num_bytes)
             yield reservation
         finally:
             await run_in_threadpool(reservation.release)
 
-    async def work(self, who: str, work: Callable[[], T]) -> T:
+    async def run_in_slot(self, client: str, work: Callable[[], T]) -> T:
         """Do something in a thread when it is somebody's turn to import."""
-        async with self._slots.held(who):
+        async with self._slots.acquire(client):
             return await run_in_threadpool(work)
 
-    async def take(self, reservation: Reservation, order: Callable[[Path], ImportRequest]) -> str:
+    async def import_file(self, reservation: Reservation, make_request: Callable[[Path], ImportRequest]) -> str:
         """Import a file, and return the id under which it is kept; whose it is, is counted.
 
         Args:
-            reservation: what it may take. order: lays files into an empty folder, in a thread, and says what they are.
+            reservation: what it may take. make_request: lays files into an empty folder, in a thread, and says what
+                they are.
         Raises:
             QuotaError, NearlyFullError: what it unpacks to is too much; nothing of it is kept.
             And what `Importers.run` raises.
         """
-        return await self.work(reservation.who, lambda: self._take(reservation, order))
+        return await self.run_in_slot(reservation.owner, lambda: self._import_file(reservation, make_request))
 
-    def _take(self, reservation: Reservation, order: Callable[[Path], ImportRequest]) -> str:
+    def _import_file(self, reservation: Reservation, make_request: Callable[[Path], ImportRequest]) -> str:
         with tempfile.TemporaryDirectory(dir=self._settings.data, prefix=UPLOAD_PREFIX) as folder:
-            request = order(Path(folder))
+            request = make_request(Path(folder))
             identity = self.read(reservation, request, Path(folder))
-            self._adopt(reservation, request, Path(folder) / _MADE, identity)
+            self._adopt(reservation, request, Path(folder) / _OUTPUT_FOLDER, identity)
         return identity
 
     def read(self, reservation: Reservation, request: ImportRequest, folder: Path) -> str:
         """Have a file of a folder read, within what it may take; what is made of it is there, too."""
-        most, into = reservation.most_bytes(), folder / _MADE
-        into.mkdir()
+        max_bytes, output_folder = reservation.max_import_bytes(), folder / _OUTPUT_FOLDER
+        output_folder.mkdir()
         try:
-            return self.importers.run(replace(request, into=str(into), max_file_bytes=most))
-        except OutgrownError:
-            raise reservation.outgrown(most) from None
+            return self.importers.run(replace(request, into=str(output_folder), max_file_bytes=max_bytes))
+        except ImportTooLargeError:
+            raise reservation.too_large_error(max_bytes) from None
 
     def _adopt(self, reservation: Reservation, request: ImportRequest, into: Path, identity: str) -> None:
         store = _STORES.get(request.kind)
         target = scene_path(self._settings.data, identity)
         if store is not None:
             target = store[1](self._settings.data) / store[0].path(into, identity).name
-        num_bytes = _measured(into / identity)
+        num_bytes = _checked_bytes(into / identity)
         if not target.exists():  # else it takes nothing more
-            reservation.hold(num_bytes)
+            reservation.reserve(num_bytes)
         if store is None:
-            self._enter(into, identity, target)
+            self._register_scene(into, identity, target)
         else:
             store[0].adopt(target.parent, into / identity)
-        reservation.become(store[2] if store else "scene", identity, num_bytes)
+        reservation.convert(store[2] if store else "scene", identity, num_bytes)
 
-    def _enter(self, into: Path, identity: str, target: Path) -> None:
+    def _register_scene(self, into: Path, identity: str, target: Path) -> None:
         """Put a scene in its place; one that is here and damaged is whole again."""
         with (into / SUMMARY).open("rb") as file:
             summary = json.loads(file.read(MAX_SUMMARY_BYTES))
@@ -118,19 +119,19 @@ class Intake:
         for name in ("arrays.npz", "scene.json"):
             os.replace(into / identity / name, target / name)
         try:
-            enter_scene(self._settings.data, self._ledger, identity, summary)
+            insert_scene(self._settings.data, self._ledger, identity, summary)
         except Exception:
             if is_new:  # nobody would find it
                 shutil.rmtree(target, ignore_errors=True)
             raise
 
 
-def _measured(folder: Path) -> int:
+def _checked_bytes(folder: Path) -> int:
     """What the files in a folder take that another process has written. Raises RelumeError where one is no file."""
-    total = 0
+    num_bytes = 0
     for path in folder.rglob("*"):
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
             raise RelumeError("the import wrote what is no file; report the file that was sent")
-        total += status.st_size
-    return total
+        num_bytes += status.st_size
+    return num_bytes

@@ -12,12 +12,12 @@ from PIL import Image
 from relume.errors import ParameterError
 
 MAX_SIDE = 1024
-KEPT_SIDE = 320
+STORED_SIDE = 320
 _FORMATS = ("PNG", "JPEG", "WEBP")
 
 
 def small_picture(text: str) -> bytes:
-    """A picture as it is kept: WebP, at most `KEPT_SIDE` pixels a side.
+    """A picture as it is kept: WebP, at most `STORED_SIDE` pixels a side.
 
     Args:
         text: PNG, JPEG or WebP in Base64, or as the data URL that a canvas gives.
@@ -36,7 +36,7 @@ def small_picture(text: str) -> bytes:
         if isinstance(error, ParameterError):
             raise
         raise ParameterError("picture", "unreadable", "a PNG, JPEG or WebP in Base64") from None
-    small.thumbnail((KEPT_SIDE, KEPT_SIDE))
+    small.thumbnail((STORED_SIDE, STORED_SIDE))
     written = io.BytesIO()
     small.save(written, "WEBP", quality=82)
     return written.getvalue()

@@ -10,7 +10,7 @@ from fastapi import UploadFile
 COPY_BYTES = 1 << 20
 
 
-def keep_upload(upload: UploadFile, path: Path) -> Path:
+def save_upload(upload: UploadFile, path: Path) -> Path:
     """The upload as a file of our own name; its size was bounded while it streamed in."""
     with path.open("wb") as file:
         shutil.copyfileobj(upload.file, file, COPY_BYTES)

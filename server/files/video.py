@@ -8,21 +8,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from relume.errors import CancelledError, ParameterError, RelumeError
-from relume.replacing import replacing
+from relume.replacing import atomic_write
 
 _ASK_S = 0.2
-_SAID = 300  # characters of what the program says
+_MAX_OUTPUT_CHARS = 300  # characters of what the program says
 
 
 def check_encoder() -> str:
     """Path of the program. Raises ParameterError where there is none."""
-    found = shutil.which("ffmpeg")
-    if found is None:
+    encoder_path = shutil.which("ffmpeg")
+    if encoder_path is None:
         raise ParameterError("format", "mp4", "exr, png or webp; for mp4 ffmpeg must be installed on the server")
-    return found
+    return encoder_path
 
 
-def write_video(frames: Path, fps: int, target: Path, cancelled: Callable[[], bool]) -> None:
+def write_video(frames: Path, fps: int, target: Path, is_canceled: Callable[[], bool]) -> None:
     """Encode 0000.png, 0001.png, … of a folder as H.264; the file appears whole or not at all.
 
     Its colours are those of Rec. 709 by that standard's matrix, with sRGB's curve, and the file says so: of a file that
@@ -30,17 +30,17 @@ def write_video(frames: Path, fps: int, target: Path, cancelled: Callable[[], bo
 
     Args:
         frames: the folder. fps: frames a second. target: file that ends in .mp4.
-        cancelled: asked now and then.
+        is_canceled: asked now and then.
     Raises:
-        ParameterError: there is no encoder. CancelledError: `cancelled` said so. RelumeError: it failed.
+        ParameterError: there is no encoder. CancelledError: `is_canceled` said so. RelumeError: it failed.
     """
-    even = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # its colours are halved both ways
-    matrix = "scale=out_color_matrix=bt709:out_range=tv"
-    with replacing(target) as unfinished:
+    pad_filter = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # its colours are halved both ways
+    matrix_filter = "scale=out_color_matrix=bt709:out_range=tv"
+    with atomic_write(target) as unfinished:
         command = [
             check_encoder(), "-nostdin", "-y", "-loglevel", "error",
             "-framerate", str(fps), "-i", str(frames / "%04d.png"),
-            "-vf", f"{even},{matrix}", "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p",
+            "-vf", f"{pad_filter},{matrix_filter}", "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p",
             "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-color_range", "tv",
             "-movflags", "+faststart", "-f", "mp4", str(unfinished),
         ]  # fmt: skip
@@ -48,18 +48,21 @@ def write_video(frames: Path, fps: int, target: Path, cancelled: Callable[[], bo
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603
             while True:
                 try:
-                    _, said = process.communicate(timeout=_ASK_S)
+                    _, output = process.communicate(timeout=_ASK_S)
                     break
                 except subprocess.TimeoutExpired:
-                    if cancelled():
+                    if is_canceled():
                         process.kill()
                         raise CancelledError("the video was cancelled") from None
         if process.returncode != 0:
-            raise RelumeError(f"ffmpeg could not make the video: {_why(process.returncode, said)}")
+            raise RelumeError(f"ffmpeg could not make the video: {_failure_reason(process.returncode, output)}")
 
 
-def _why(code: int, said: str) -> str:
+def _failure_reason(code: int, output: str) -> str:
     """What a program says of its failure, or what becomes of it where it says nothing."""
     if code < 0:
         return f"it was ended by signal {-code}, perhaps for want of memory; free some, then ask again"
-    return said.strip()[-_SAID:] or f"it ended with {code} and said nothing; look into the disk's room, then ask again"
+    return (
+        output.strip()[-_MAX_OUTPUT_CHARS:]
+        or f"it ended with {code} and said nothing; look into the disk's room, then ask again"
+    )

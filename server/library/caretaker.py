@@ -7,49 +7,49 @@ import logging
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from relume.resident import give_back
+from relume.resident import trim_heap
 from server.library.threads import Threads
 from server.library.transfers import TransferPool
 
 log = logging.getLogger(__name__)
 
-ROUND_S = 10.0
+INTERVAL_S = 10.0
 
 
-class Caretaker:
+class CacheEvictor:
     """Goes round every few seconds, for as long as the server runs.
 
     Args:
-        shrink: drops what the caches hold of all but these stores, down to their floor.
-        used_bytes: what the caches hold. let_go: ends processes that have nothing to do.
+        trim_cache: drops what the caches hold of all but these stores, down to their floor.
+        used_bytes: what the caches hold. release_processes: ends processes that have nothing to do.
     """
 
     def __init__(
         self,
         transfers: TransferPool,
         threads: Threads,
-        shrink: Callable[[Collection[Path]], None],
+        trim_cache: Callable[[Collection[Path]], None],
         used_bytes: Callable[[], int],
-        let_go: Callable[[], None],
+        release_processes: Callable[[], None],
     ) -> None:
-        self._let_go = let_go
-        self._transfers, self._threads, self._shrink = transfers, threads, shrink
+        self._release_processes = release_processes
+        self._transfers, self._threads, self._trim_cache = transfers, threads, trim_cache
         self._used_bytes = used_bytes
 
     async def run(self) -> None:
         """Go round for ever."""
         while True:
-            await asyncio.sleep(ROUND_S)
+            await asyncio.sleep(INTERVAL_S)
             try:
-                await self.go_round()
+                await self.run_once()
             except Exception:  # whatever one round meets, the next must come
                 log.exception("what nobody uses could not be let go")
 
-    async def go_round(self) -> None:
+    async def run_once(self) -> None:
         """Let go of what has not been used for a while."""
         before = self._used_bytes()
-        num_closed, used = self._transfers.let_go()
-        self._shrink(used)
-        await asyncio.to_thread(self._let_go)
+        num_closed, used_stores = self._transfers.release()
+        self._trim_cache(used_stores)
+        await asyncio.to_thread(self._release_processes)
         if num_closed or self._used_bytes() < before:
-            await asyncio.get_running_loop().run_in_executor(self._threads.long, give_back)
+            await asyncio.get_running_loop().run_in_executor(self._threads.long, trim_heap)

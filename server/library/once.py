@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-class Once:
+class SingleFlight:
     """Makes each thing once however many wait for it; it forgets what nobody waits for. Used from the event loop only.
 
     Args:
@@ -19,18 +19,18 @@ class Once:
 
     def __init__(self, num_threads: int, name: str) -> None:
         self._threads = ThreadPoolExecutor(num_threads, name)
-        self._making: dict[Hashable, asyncio.Future[Any]] = {}
+        self._futures: dict[Hashable, asyncio.Future[Any]] = {}
 
-    async def make(self, key: Hashable, work: Callable[[], T]) -> T:
+    async def run(self, key: Hashable, work: Callable[[], T]) -> T:
         """What `work` returns or raises, or the work of somebody else under the same key that is not done."""
-        making: asyncio.Future[T] | None = self._making.get(key)
-        if making is None:
-            making = self._making[key] = asyncio.get_running_loop().run_in_executor(self._threads, work)
-            making.add_done_callback(lambda done: self._forget(key, done))
-        return await asyncio.shield(making)  # who goes away does not end it for others
+        future: asyncio.Future[T] | None = self._futures.get(key)
+        if future is None:
+            future = self._futures[key] = asyncio.get_running_loop().run_in_executor(self._threads, work)
+            future.add_done_callback(lambda done: self._remove(key, done))
+        return await asyncio.shield(future)  # who goes away does not end it for others
 
-    def _forget(self, key: Hashable, done: asyncio.Future[Any]) -> None:
-        del self._making[key]
+    def _remove(self, key: Hashable, done: asyncio.Future[Any]) -> None:
+        del self._futures[key]
         if not done.cancelled():
             done.exception()  # perhaps nobody is left to hear of it
 

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.memory import Holder
-from relume.picture.fidelity import Word
-from relume.picture.transfer import Opened
+from relume.memory import CacheOwner
+from relume.picture.fidelity import FidelityLabel
+from relume.picture.transfer import OpenBake
 
 if TYPE_CHECKING:
-    from relume.moving.shader.tables import Numbers, Part
+    from relume.moving.shader.tables import ArrayBlock, ShaderConstants
     from relume.picture.jobs import Job
-    from relume.reference import Truth
+    from relume.reference import ReferenceImage
     from relume.scene.model import Camera
 
 Tile = tuple[int, int, int, int]
 F32 = NDArray[np.float32]
 
 
-class Advance(Protocol):
+class Progress(Protocol):
     """What one step changed."""
 
     @property
@@ -32,7 +32,7 @@ class Advance(Protocol):
     @property
     def exact(self) -> bool: ...
     @property
-    def fidelity(self) -> Word:
+    def fidelity(self) -> FidelityLabel:
         """How near what is seen of it is to its look."""
         ...
 
@@ -52,18 +52,18 @@ class Advance(Protocol):
 class Picture(Protocol):
     """One live picture; used from one thread at a time."""
 
-    def set_look(self, look: Any, *, hand: str | None, solo: frozenset[str] | None) -> None: ...
+    def set_look(self, look: Any, *, active_pointer: str | None, solo: frozenset[str] | None) -> None: ...
     def check(self, look: Any) -> None: ...
     def next_job(self) -> Job | None: ...
-    def install(self, job: Any, made: Any) -> None: ...
-    def touch(self, pointer: str) -> None: ...
-    def advance(self, max_coefficients: int | None) -> Advance: ...
+    def install(self, job: Any, result: Any) -> None: ...
+    def prepare(self, pointer: str) -> None: ...
+    def advance(self, max_coefficients: int | None) -> Progress: ...
     def all_tiles(self) -> Sequence[Tile]: ...
     def encode(self, tiles: Sequence[Tile], form: Any, /) -> bytes: ...
     def encode_alpha(self, tiles: Sequence[Tile], /) -> bytes | None: ...
     def image(self) -> F32: ...
-    def probe(self, x: int, y: int) -> Mapping[str, Any]: ...
-    def brush(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
+    def inspect(self, x: int, y: int) -> Mapping[str, Any]: ...
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32: ...
 
 
 class FixedPicture(Picture, Protocol):
@@ -74,19 +74,19 @@ class FixedPicture(Picture, Protocol):
         ...
 
 
-class MovingPicture(Picture, Protocol):
+class FreeCameraPicture(Picture, Protocol):
     """One whose eye moves."""
 
-    draws: bool
+    renders_pixels: bool
 
-    def set_eye(self, camera: Camera, size: tuple[int, int], *, rests: bool) -> None: ...
-    def parts(self) -> tuple[Mapping[str, Part], Numbers] | None:
+    def set_camera(self, camera: Camera, size: tuple[int, int], *, is_idle: bool) -> None: ...
+    def array_blocks(self) -> tuple[Mapping[str, ArrayBlock], ShaderConstants] | None:
         """What a shader needs to draw it, None where it is a fixed picture now."""
         ...
 
 
-class Finder(Protocol):
-    """A scene as cameras are placed in it; see `relume.render.finder`."""
+class PlacementViewport(Protocol):
+    """A scene as cameras are placed in it; see `relume.render.open_viewport`."""
 
     @property
     def framing(self) -> Camera: ...
@@ -95,7 +95,7 @@ class Finder(Protocol):
     @property
     def highest(self) -> NDArray[np.float64]: ...
     def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]: ...
-    def place_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> NDArray[np.float64] | None: ...
+    def point_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> NDArray[np.float64] | None: ...
 
 
 @dataclass(frozen=True)
@@ -104,31 +104,31 @@ class Library:
 
     Attributes:
         open_transfer: path of a published store -> transfer; heavy.
-        open_in_passing: the same for work that nobody watches: what it makes is the first to be forgotten.
+        open_transient: the same for work that nobody watches: what it makes is the first to be forgotten.
         make_picture: (transfer, view name) -> picture, its caches shared; heavy.
         render: (transfer, view name, complete look) -> (H, W, 3 or 4) linear radiance in the baked size, with coverage
-            where the look's background is transparent; `progress`, `cancelled`, `for_display` and `eye` as of
+            where the look's background is transparent; `progress`, `is_canceled`, `for_display` and `eye` as of
             `render_image`; `exact`, where the eye moves: not as it looks meanwhile; heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns where the bake has them.
         reference: (folder of a scene, camera, complete look, size, spp, progress, cancelled, pass index,
             reflects=whether surfaces light each other, is_whole=whether all light paths are asked for) -> pictures by
-            brute force, `relume.reference.Truth`; heavy.
-        finder: folder of a scene -> what cameras are placed in it by; heavy where nobody has asked for a while.
+            brute force, `relume.reference.ReferenceImage`; heavy.
+        open_viewport: folder of a scene -> what cameras are placed in it by; heavy where nobody has asked for a while.
         shader_arrays: transfer of a moving view -> what its shaders are written from, and the arrays that they keep.
-        held_bytes: what the memory of all that was made from bakes holds now: kind and bake -> bytes.
+        bytes_by_owner: what the memory of all that was made from bakes holds now: kind and bake -> bytes.
         cache_used_bytes: all of it, and what is being made.
-        shrink_cache: (stores) -> drops what they hold of all others, down to their floor.
+        trim_cache: (stores) -> drops what they hold of all others, down to their floor.
     """
 
-    open_transfer: Callable[[Path], Opened]
-    open_in_passing: Callable[[Path], Opened]
+    open_transfer: Callable[[Path], OpenBake]
+    open_transient: Callable[[Path], OpenBake]
     make_picture: Callable[[Any, str], Picture]
     render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]
-    reference: Callable[..., Truth]
-    finder: Callable[[Path], Finder]
+    reference: Callable[..., ReferenceImage]
+    open_viewport: Callable[[Path], PlacementViewport]
     shader_arrays: Callable[[Any], tuple[Mapping[str, Any], Mapping[str, Callable[[], NDArray[Any]]]]]
-    held_bytes: Callable[[], Mapping[Holder, int]]
+    bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]
     cache_used_bytes: Callable[[], int]
-    shrink_cache: Callable[[Collection[Path]], None]
+    trim_cache: Callable[[Collection[Path]], None]

@@ -14,7 +14,7 @@ from relume.measured.asset_store import STORE as MATERIALS
 from worker.paths import btfs_path, environments_path, images_path, materials_path
 
 
-def shelves(data_dir: Path) -> list[tuple[AssetStore, Path]]:
+def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
     """Every store with its folder."""
     return [
         (MATERIALS, materials_path(data_dir)),
@@ -25,9 +25,9 @@ def shelves(data_dir: Path) -> list[tuple[AssetStore, Path]]:
 
 
 @contextmanager
-def shelves_at(data_dir: Path) -> Iterator[None]:
+def using_asset_stores(data_dir: Path) -> Iterator[None]:
     """Looks find what is in this data directory for as long as the block runs."""
     with ExitStack() as stack:
-        for store, folder in shelves(data_dir):
-            stack.enter_context(store.at(folder))
+        for store, folder in list_asset_stores(data_dir):
+            stack.enter_context(store.with_search_folder(folder))
         yield

@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from relume.picture.transfer import Opened
+from relume.picture.transfer import OpenBake
 
 MAX_IDLE = 2
 
@@ -18,7 +18,7 @@ MAX_IDLE = 2
 @dataclass
 class _Entry:
     path: Path
-    future: asyncio.Future[Opened]
+    future: asyncio.Future[OpenBake]
     num_users: int = 0
 
 
@@ -30,7 +30,7 @@ class TransferPool:
 
     def __init__(
         self,
-        open_transfer: Callable[[Path], Opened],
+        open_transfer: Callable[[Path], OpenBake],
         executor: Executor,
         idle_s: float,
         clock: Callable[[], float],
@@ -42,10 +42,10 @@ class TransferPool:
         self._open_transfer, self._executor = open_transfer, executor
         self._idle_s, self._clock = idle_s, clock
         self._entries: OrderedDict[str, _Entry] = OrderedDict()
-        self._left_s: dict[Path, float] = {}  # when somebody left it last
+        self._last_used_s: dict[Path, float] = {}  # when somebody left it last
 
     @asynccontextmanager
-    async def using(self, bake: str, path: Path) -> AsyncIterator[Opened]:
+    async def acquire(self, bake: str, path: Path) -> AsyncIterator[OpenBake]:
         """The transfer of a bake for as long as the block runs. Raises what opening raises (StoreError)."""
         entry = self._entries.get(bake)
         if entry is None:
@@ -56,15 +56,15 @@ class TransferPool:
             yield await asyncio.shield(entry.future)
         except BaseException:
             if entry.future.done() and (entry.future.cancelled() or entry.future.exception() is not None):
-                self._forget(bake, entry)  # the next one tries again
+                self._discard(bake, entry)  # the next one tries again
             raise
         finally:
             entry.num_users -= 1
-            self._left_s[path] = self._clock()
+            self._last_used_s[path] = self._clock()
             self._trim(bake, entry)
 
     @property
-    def opened(self) -> list[Opened]:
+    def open_bakes(self) -> list[OpenBake]:
         """Those that are open now; may be asked from any thread."""
         futures = [entry.future for entry in list(self._entries.values()) if entry.future.done()]
         return [future.result() for future in futures if not future.cancelled() and future.exception() is None]
@@ -74,22 +74,24 @@ class TransferPool:
         entry = self._entries.get(bake)
         return entry is not None and entry.num_users > 0
 
-    def let_go(self) -> tuple[int, Collection[Path]]:
+    def release(self) -> tuple[int, Collection[Path]]:
         """Close bakes that nobody has used for a while.
 
         Returns:
             How many were closed, and the stores that are in use or were until a while ago.
         """
         long_ago = self._clock() - self._idle_s
-        self._left_s = {path: left_s for path, left_s in self._left_s.items() if left_s > long_ago}
+        self._last_used_s = {path: used_s for path, used_s in self._last_used_s.items() if used_s > long_ago}
         idle = [
-            name for name, entry in self._entries.items() if entry.num_users == 0 and entry.path not in self._left_s
+            name
+            for name, entry in self._entries.items()
+            if entry.num_users == 0 and entry.path not in self._last_used_s
         ]
         for name in idle:
             del self._entries[name]
-        return len(idle), {entry.path for entry in self._entries.values()} | self._left_s.keys()
+        return len(idle), {entry.path for entry in self._entries.values()} | self._last_used_s.keys()
 
-    def _forget(self, bake: str, entry: _Entry) -> None:
+    def _discard(self, bake: str, entry: _Entry) -> None:
         if self._entries.get(bake) is entry:
             del self._entries[bake]
 

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import ProtocolError
-from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, message_problem, problem_of
+from server.errors import CLOSE_POLICY, CLOSE_TOO_BIG, make_problem, message_problem
 from server.wire import protocol
 from server.wire.connection import OpenMessage
 
@@ -50,7 +50,7 @@ def read_message(received: Any) -> protocol.ClientMessage | protocol.Problem:
     if size_bytes > protocol.MAX_MESSAGE_BYTES:
         raise ProtocolError(f"messages have at most {protocol.MAX_MESSAGE_BYTES} bytes; send less", CLOSE_TOO_BIG)
     if text is None:
-        return problem_of(ProtocolError("messages are JSON text; send text frames", 1003))
+        return make_problem(ProtocolError("messages are JSON text; send text frames", 1003))
     try:
         return protocol.CLIENT_MESSAGE.validate_json(text)
     except ValidationError as error:

@@ -10,16 +10,16 @@ from typing import Any
 from starlette.websockets import WebSocket
 
 from relume.errors import ParameterError, ProtocolError, RelumeError
-from relume.picture.transfer import Eyes
-from relume.scene.placed_camera import placed_camera
+from relume.picture.transfer import CameraMode
+from relume.scene.placed_camera import make_custom_camera
 from server.access.rules import check_message
 from server.errors import CLOSE_POLICY
 from server.live.pace import Pace
 from server.live.reading import read_message
-from server.live.rooms.room import is_own_way
+from server.live.rooms.room import is_local_setting
 from server.live.session_state import SessionState
-from server.live.state.pointers import check_held, find_curve
-from server.live.state.target import Eye
+from server.live.state.pointers import check_parameter, find_curve
+from server.live.state.target import CameraState
 from server.wire import protocol
 from server.wire.connection import OpenMessage, PingMessage, PongMessage
 from server.wire.rooms import PresenceMessage
@@ -27,14 +27,19 @@ from server.wire.rooms import PresenceMessage
 MAX_BAD_MESSAGES = 50
 
 
-class Reception:
+class MessageReceiver:
     """Runs until the client goes or breaks the rules too often."""
 
     def __init__(self, websocket: WebSocket, state: SessionState) -> None:
-        self._websocket, self._socket, self._pending, self._shown = websocket, state.socket, state.pending, state.shown
+        self._websocket, self._socket, self._pending, self._visible_views = (
+            websocket,
+            state.socket,
+            state.pending,
+            state.visible_views,
+        )
         self._window, self._look, self._transfer = state.window, state.look, state.transfer
         self._metrics, self._traces = state.metrics, state.traces
-        self._caller, self._guest, self._notes = state.caller, state.guest, state.notes
+        self._caller, self._member, self._audit_writer = state.caller, state.member, state.audit_writer
         self._num_bad = 0
 
     async def run(self) -> None:
@@ -49,7 +54,7 @@ class Reception:
             received = await self._websocket.receive()
             received_s = time.perf_counter()
             num_in_flight = self._window.num_in_flight
-            pace.begin()
+            pace.start_message()
             await self._answer(received, received_s)
             await pace.pause(is_due=self._window.num_in_flight < num_in_flight)
 
@@ -57,72 +62,72 @@ class Reception:
         """Do what a message asks, or say why not."""
         message = read_message(received)
         if isinstance(message, protocol.Problem):
-            await self._bad(message)
+            await self._refuse_malformed(message)
             return
         if isinstance(message, PingMessage):  # from here, so that no frame is waited for
             await self._socket.send(PongMessage())
             return
         try:
-            self._take(message, received_s)
+            self._dispatch(message, received_s)
         except RelumeError as error:
             revision = message.revision if isinstance(message, protocol.EditMessage) else None
             await self._socket.refuse(error, revision)
         else:
-            self._pending.news.set()
+            self._pending.changed.set()
 
-    async def _bad(self, problem: protocol.Problem) -> None:
+    async def _refuse_malformed(self, problem: protocol.Problem) -> None:
         """A message that no client of ours sends: said each time, forgiven a number of times."""
         self._num_bad += 1
         if self._num_bad > MAX_BAD_MESSAGES:
             raise ProtocolError("too many messages that cannot be understood; reload the page", CLOSE_POLICY)
         await self._socket.refuse(problem)
 
-    def _take(self, message: protocol.ClientMessage, received_s: float) -> None:
-        check_message(self._caller, _kind(message))
+    def _dispatch(self, message: protocol.ClientMessage, received_s: float) -> None:
+        check_message(self._caller, _permission_key(message))
         match message:
             case protocol.EditMessage():
                 self._edit(message, received_s)
             case protocol.AckMessage():
-                self._window.acknowledged(message.frame, received_s)
+                self._window.on_acknowledged(message.frame, received_s)
             case protocol.ViewMessage():
-                self._show([message.name], message.size)
+                self._show_views([message.name], message.size)
             case protocol.ViewsMessage():
-                self._show(message.names, None)
+                self._show_views(message.names, None)
             case protocol.FocusMessage():
-                self._shown.work_in(message.view)
+                self._visible_views.set_focus(message.view)
             case protocol.RegionMessage():
                 self._look_at(message)
-            case protocol.StreamMessage():
+            case protocol.EncodingMessage():
                 self._pending.form, self._pending.quality = message.format, message.quality
-            case protocol.ProbeMessage():
-                self._shown.check(message.view or self._shown.focus)
-                self._pending.probe = message
-            case protocol.BrushMessage():
+            case protocol.InspectMessage():
+                self._visible_views.check(message.view or self._visible_views.focus)
+                self._pending.inspect = message
+            case protocol.HighlightMessage():
                 find_curve(message.curve, self._look.document)
-                self._pending.brush = message
-            case protocol.TouchMessage():
-                self._touch(message)
-            case protocol.EyeMessage():
-                self._see_from(message, received_s)
-            case protocol.EvaluateMessage():
+                self._pending.highlight = message
+            case protocol.PrepareMessage():
+                self._prepare(message)
+            case protocol.CameraMessage():
+                self._set_camera(message, received_s)
+            case protocol.RendererMessage():
                 self._pending.evaluator = message.by
             case PresenceMessage():
-                self._present(message)
+                self._update_presence(message)
             case OpenMessage():
                 raise ProtocolError("the session is open; send open once, as the first message", CLOSE_POLICY)
 
-    def _present(self, message: PresenceMessage) -> None:
-        if self._guest is None:
+    def _update_presence(self, message: PresenceMessage) -> None:
+        if self._member is None:
             raise ProtocolError("nobody shares this session; open one with a room to work together", CLOSE_POLICY)
-        self._guest.present(message, self._caller.person)
+        self._member.update_presence(message, self._caller.person)
 
-    def _touch(self, message: protocol.TouchMessage) -> None:
+    def _prepare(self, message: protocol.PrepareMessage) -> None:
         if message.curve is not None:
             find_curve(message.curve, self._look.document)
-            self._pending.touch = message.curve
+            self._pending.prepare_curve = message.curve
         elif message.parameter is not None:
-            check_held(message.parameter, self._look.document)
-            self._pending.hold = message.parameter
+            check_parameter(message.parameter, self._look.document)
+            self._pending.active_parameter = message.parameter
 
     def _edit(self, message: protocol.EditMessage, received_s: float) -> None:
         try:
@@ -130,36 +135,36 @@ class Reception:
         except RelumeError as error:
             self._metrics.edits.labels("refused").inc()
             if self._traces is not None:
-                self._traces.refused(received_s, str(error), {"revision": message.revision})
+                self._traces.record_refusal(received_s, str(error), {"revision": message.revision})
             raise
-        if self._guest is not None:
+        if self._member is not None:
             patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
-            target = self._guest.edited(target, patch)
+            target = self._member.accepted(target, patch)
         self._pending.target = target
-        if self._notes is not None:
-            self._notes.note(operation.path for operation in message.patch)
+        if self._audit_writer is not None:
+            self._audit_writer.add_edit(operation.path for operation in message.patch)
         self._metrics.edits.labels("applied").inc()
 
-    def _see_from(self, message: protocol.EyeMessage, received_s: float) -> None:
+    def _set_camera(self, message: protocol.CameraMessage, received_s: float) -> None:
         """Take note of an eye; a number that is not newer than the last says nothing."""
-        if self._transfer.eyes is not Eyes.FREE:
+        if self._transfer.camera_mode is not CameraMode.FREE:
             raise ParameterError("view", message.view, "a view whose eye is free; bake the scene by method surface")
         self._check_view(message.view)
         width, height = message.size
         if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_EYE_PIXELS):
             allowed = f"at least 1×1 pixels, at most {protocol.MAX_EYE_PIXELS} in all"
             raise ParameterError("size", list(message.size), allowed)
-        camera = placed_camera("eye", message.to_world, math.degrees(message.yfov)).camera
-        known = self._pending.eyes.get(message.view)
-        if known is None or message.eye > known.number:
-            self._pending.eyes[message.view] = Eye(
+        camera = make_custom_camera("eye", message.to_world, math.degrees(message.yfov)).camera
+        previous = self._pending.camera_states.get(message.view)
+        if previous is None or message.eye > previous.seq:
+            self._pending.camera_states[message.view] = CameraState(
                 message.eye, camera, message.size, received_s, message.rest == "exact"
             )
 
     def _look_at(self, message: protocol.RegionMessage) -> None:
         """Take note of what is on the screen of a view."""
         self._check_view(message.view)
-        if self._transfer.eyes is Eyes.FREE:
+        if self._transfer.camera_mode is CameraMode.FREE:
             raise ParameterError("view", message.view, "a view whose eye is baked")
         if message.rect is None:
             self._pending.regions.pop(message.view, None)
@@ -173,20 +178,20 @@ class Reception:
         if name not in self._transfer.views:
             raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
 
-    def _show(self, names: Sequence[str], space: tuple[int, int] | None) -> None:
+    def _show_views(self, names: Sequence[str], space: tuple[int, int] | None) -> None:
         for name in names:
             self._check_view(name)
-        self._shown.show(names)
+        self._visible_views.show(names)
         self._pending.space = space
 
 
-def _kind(message: protocol.ClientMessage) -> str:
+def _permission_key(message: protocol.ClientMessage) -> str:
     """What a message is to the table of roles."""
     match message:
         case protocol.EditMessage(patch=patch, hand=hand) if all(
-            is_own_way(path) for path in (*(operation.path for operation in patch), *((hand,) if hand else ()))
+            is_local_setting(path) for path in (*(operation.path for operation in patch), *((hand,) if hand else ()))
         ):
             return "seen"
-        case protocol.TouchMessage(curve=None):
+        case protocol.PrepareMessage(curve=None):
             return "hold"
     return message.type

@@ -6,20 +6,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from server.access.roles import Caller
-from server.live.rooms.door import Door
+from server.live.rooms.door import JoinRequest
 
 
 @dataclass(frozen=True)
-class Visit:
+class JoinContext:
     """What a client says when it opens a session.
 
     Attributes:
         resume: token of a session that was lost. look: complete document that the session begins with; None: the
             scene's own.
-        door: of the room that they come into; None: they are alone.
+        join_request: of the room that they come into; None: they are alone.
     """
 
     caller: Caller
     resume: str | None
     look: dict[str, Any] | None
-    door: Door | None
+    join_request: JoinRequest | None

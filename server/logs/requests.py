@@ -37,11 +37,11 @@ class RequestIds:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        given = Headers(scope=scope).get(HEADER, "")
-        identity = given if _FORM.fullmatch(given) else secrets.token_hex(8)
-        named, start_s, status = REQUEST.set(identity), time.perf_counter(), 0
+        header_value = Headers(scope=scope).get(HEADER, "")
+        identity = header_value if _FORM.fullmatch(header_value) else secrets.token_hex(8)
+        reset_token, start_s, status = REQUEST.set(identity), time.perf_counter(), 0
 
-        async def told(message: Message) -> None:
+        async def send_with_id(message: Message) -> None:
             nonlocal status
             status = message.get("status", message.get("code", status or 101))
             if message["type"] in ("http.response.start", "websocket.accept", "websocket.http.response.start"):
@@ -49,10 +49,10 @@ class RequestIds:
             await send(message)
 
         try:
-            await self._app(scope, receive, told)
+            await self._app(scope, receive, send_with_id)
         finally:
             seconds = time.perf_counter() - start_s
             method = scope.get("method", "WEBSOCKET")
             fields = {"method": method, "path": quoted(scope["path"]), "status": status, "seconds": round(seconds, 4)}
             log.info("%s %s %d in %.4f s", *fields.values(), extra={"fields": fields})
-            REQUEST.reset(named)
+            REQUEST.reset(reset_token)

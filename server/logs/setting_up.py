@@ -42,31 +42,33 @@ class PlainFormatter(logging.Formatter):
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  (of the base class)
         """See `logging.Formatter`."""
-        about = " ".join(f"{name}={value}" for name, value in getattr(record, "about", {}).items())
-        return _shown(super().formatMessage(record).rstrip()) + (f" [{_shown(about)}]" if about else "")
+        context = " ".join(f"{name}={value}" for name, value in getattr(record, "about", {}).items())
+        return _escape_unprintable(super().formatMessage(record).rstrip()) + (
+            f" [{_escape_unprintable(context)}]" if context else ""
+        )
 
     def formatException(self, exc_info: Any) -> str:  # noqa: N802  (of the base class)
         """See `logging.Formatter`."""
-        return "\n".join(f"    {_shown(line)}" for line in super().formatException(exc_info).split("\n"))
+        return "\n".join(f"    {_escape_unprintable(line)}" for line in super().formatException(exc_info).split("\n"))
 
 
-def _shown(text: str) -> str:
+def _escape_unprintable(text: str) -> str:
     """A text with what cannot be printed as Python writes it."""
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
-def _note(record: logging.LogRecord) -> bool:
+def _attach_context(record: logging.LogRecord) -> bool:
     """Write down what is worked on where a line is logged, which may not be where it is formatted."""
     record.about = current()
     return True
 
 
-_OF_CONNECTIONS = "uvicorn.error", "websockets"
+_CONNECTION_LOGGERS = "uvicorn.error", "websockets"
 """Loggers that below a warning write down addresses with their queries, headers, and messages: all of them may hold
 tokens, and `server.logs.requests` says the rest."""
 
 
-def _is_news(record: logging.LogRecord) -> bool:
+def _is_relevant(record: logging.LogRecord) -> bool:
     """Not what uvicorn says of each WebSocket that is answered by a refusal: it takes that for no answer."""
     return record.name != "uvicorn.error" or "without completing handshake" not in record.getMessage()
 
@@ -76,12 +78,12 @@ def set_up(form: Format, level: str) -> None:
     root = logging.getLogger()
     handler = logging.StreamHandler()
     handler.setFormatter(JsonFormatter() if form == "json" else PlainFormatter())
-    handler.addFilter(_is_news)
-    handler.addFilter(_note)
+    handler.addFilter(_is_relevant)
+    handler.addFilter(_attach_context)
     verbose = [logging.INFO] if any(each.level == logging.INFO for each in root.handlers) else []
     handler.setLevel(min([logging.getLevelNamesMapping()[level.upper()], *verbose]))
     root.handlers = [handler]
     logging.captureWarnings(True)  # they are lines of this log, too
     root.setLevel(handler.level)
-    for name in _OF_CONNECTIONS:
+    for name in _CONNECTION_LOGGERS:
         logging.getLogger(name).setLevel(max(logging.WARNING, handler.level))

@@ -14,38 +14,38 @@ from sqlalchemy.orm import Session, sessionmaker
 from server.apart.passes import FIGURES
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
-from server.queues.work import Quota, Work
-from server.queues.work_queue import WorkQueue
+from server.queues.work import Job, Quota
+from server.queues.work_queue import JobQueue
 from server.records.tables import ComparisonRow
-from server.wire.bodies import TruthFigures, TruthRequest
+from server.wire.bodies import ComparisonFigures, ComparisonRequest
 from server.wire.body import Body
 
 ANSWER_S = 1.5  # who asks how long it takes wants to know at once
-GUESSED_S_A_PIXEL = 5e-4  # of a pass, before any was measured: of the built-in scenes, by one core
-Comparing = Work[TruthRequest]
+DEFAULT_PIXEL_S = 5e-4  # of a pass, before any was measured: of the built-in scenes, by one core
+ComparisonJob = Job[ComparisonRequest]
 _Kind = tuple[str, str, tuple[int, int] | None, str]
 
 
 class Figures(Body):
-    """What a comparison has found; fields as of `TruthBody`."""
+    """What a comparison has found; fields as of `ComparisonBody`."""
 
     left_out: Annotated[list[str], Field(default_factory=list)]
     untraced: Annotated[list[str], Field(default_factory=list)]
-    found: TruthFigures | None = None
-    found_of_method: TruthFigures | None = None
+    found: ComparisonFigures | None = None
+    found_of_method: ComparisonFigures | None = None
 
 
-class Foreseen(NamedTuple):
+class DurationEstimate(NamedTuple):
     """How long something will take. is_measured: judged by passes of the same view, not of others."""
 
     seconds: float
     is_measured: bool
 
 
-class ComparisonQueue(WorkQueue[TruthRequest]):
+class ComparisonQueue(JobQueue[ComparisonRequest]):
     """Comparisons in the database, what they found in `data`/truths/<id>/; a step is a pass."""
 
-    row, noun, request_type = ComparisonRow, "comparison", TruthRequest
+    row, noun, request_type = ComparisonRow, "comparison", ComparisonRequest
 
     def __init__(self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota) -> None:
         """
@@ -55,23 +55,23 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         """
         super().__init__(sessions, data / "truths", run, quota)
         self._pass_s: dict[_Kind, float] = {}
-        self._s_a_pixel = GUESSED_S_A_PIXEL
+        self._pixel_s = DEFAULT_PIXEL_S
         self._sampler, self._sampling = ThreadPoolExecutor(1, "relume-pace"), threading.Lock()
         self._sample: Future[None] | None = None
 
-    def steps(self, request: TruthRequest) -> int:
+    def steps(self, request: ComparisonRequest) -> int:
         """The passes."""
         return request.passes
 
-    def step_s(self, request: TruthRequest) -> float | None:
+    def step_s(self, request: ComparisonRequest) -> float | None:
         """As passes of this view took before."""
         return self._pass_s.get(_kind(request))
 
-    def is_first(self, request: TruthRequest) -> bool:
+    def is_first(self, request: ComparisonRequest) -> bool:
         """All of them take their time."""
         return False
 
-    def seconds(self, request: TruthRequest, num_pixels: int) -> Foreseen:
+    def estimate_duration(self, request: ComparisonRequest, num_pixels: int) -> DurationEstimate:
         """What a comparison will take, told within `ANSWER_S` seconds.
 
         As passes of this view took before, or as a small picture takes now; until that is done, and where another view
@@ -84,11 +84,11 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         if key not in self._pass_s:
             self._await_sample(key, request)
         if key in self._pass_s:
-            self._s_a_pixel = self._pass_s[key] / num_pixels
-        pass_s = self._pass_s.get(key, num_pixels * self._s_a_pixel)
-        return Foreseen(request.passes * pass_s, is_measured=key in self._pass_s)
+            self._pixel_s = self._pass_s[key] / num_pixels
+        pass_s = self._pass_s.get(key, num_pixels * self._pixel_s)
+        return DurationEstimate(request.passes * pass_s, is_measured=key in self._pass_s)
 
-    def _await_sample(self, key: _Kind, request: TruthRequest) -> None:
+    def _await_sample(self, key: _Kind, request: ComparisonRequest) -> None:
         """Have a small picture made where none is being made, and wait for it a little. Raises what making it did."""
 
         def sample() -> None:
@@ -103,7 +103,7 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
             pending.result(ANSWER_S)
 
     def close(self) -> None:
-        """See `WorkQueue`."""
+        """See `JobQueue`."""
         super().close()
         self._sampler.shutdown()
 
@@ -119,21 +119,21 @@ class ComparisonQueue(WorkQueue[TruthRequest]):
         path = self.folder / identity / FIGURES
         return Figures.model_validate_json(path.read_text()) if path.exists() else Figures.model_validate({})
 
-    def step(self, work: Comparing, timer: StepTimer) -> int:
+    def step(self, job: ComparisonJob, timer: StepTimer) -> int:
         """Make the frame where it is missing, and a pass."""
-        request = work.request
-        values: dict[str, Any] = {"request": request.model_dump(mode="json"), "folder": str(self.folder / work.id)}
-        self.note(work.id, work.done)
-        done = int(self.run_apart(work, "frame of a comparison", values, lambda share: None)["passes"])
-        if done >= work.total:
-            return work.total
-        self.note(work.id, done)
-        timer.begin()
-        done = int(self.run_apart(work, "pass of a comparison", values, timer.tell)["passes"])
+        request = job.request
+        values: dict[str, Any] = {"request": request.model_dump(mode="json"), "folder": str(self.folder / job.id)}
+        self.record_progress(job.id, job.done)
+        done = int(self.run_in_process(job, "frame of a comparison", values, lambda share: None)["passes"])
+        if done >= job.total:
+            return job.total
+        self.record_progress(job.id, done)
+        timer.start()
+        done = int(self.run_in_process(job, "pass of a comparison", values, timer.report)["passes"])
         self._pass_s[_kind(request)] = timer.next_step()
         return done
 
 
-def _kind(request: TruthRequest) -> _Kind:
+def _kind(request: ComparisonRequest) -> _Kind:
     """Passes of one kind take about as long as each other, wherever an eye is that moves."""
     return request.bake, request.view, request.size, request.paths

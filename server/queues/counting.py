@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, sessionmaker
 
-from server.records.tables import BtfRow, ComparisonRow, RenderRow, WorkRow
+from server.records.tables import BtfRow, ComparisonRow, JobRow, RenderRow
 from worker.database.models import BakeRow
 
-_ROWS: Mapping[str, type[BakeRow] | type[WorkRow]] = {
+_ROWS: Mapping[str, type[BakeRow] | type[JobRow]] = {
     "bake": BakeRow,
     "render": RenderRow,
     "comparison": ComparisonRow,
@@ -19,11 +19,11 @@ _ROWS: Mapping[str, type[BakeRow] | type[WorkRow]] = {
 _STATES = ("queued", "running")
 
 
-def count_work(sessions: sessionmaker[Session]) -> Mapping[tuple[str, str], int]:
+def count_jobs(sessions: sessionmaker[Session]) -> Mapping[tuple[str, str], int]:
     """Rows by kind and state, "queued" or "running"."""
-    found = {(kind, state): 0 for kind in _ROWS for state in _STATES}
+    counts = {(kind, state): 0 for kind in _ROWS for state in _STATES}
     with sessions() as session:
         for kind, row in _ROWS.items():
             query = select(row.state, func.count()).where(row.state.in_(_STATES)).group_by(row.state)
-            found.update({(kind, state): count for state, count in session.execute(query)})
-    return found
+            counts.update({(kind, state): count for state, count in session.execute(query)})
+    return counts

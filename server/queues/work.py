@@ -20,16 +20,16 @@ class Quota:
     """How much work of one kind may wait or run: of all clients together, and of each; and whose turns are how many.
 
     Attributes:
-        shares: see `worker.turns.Turns`.
+        weights: see `worker.turns.Turns`.
     """
 
-    of_all: int
-    of_each: int
-    shares: Mapping[str, float] = field(default_factory=dict)
+    max_total: int
+    max_per_client: int
+    weights: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Work(Generic[Request]):
+class Job(Generic[Request]):
     """One row at one moment.
 
     Attributes:
@@ -55,7 +55,7 @@ class Work(Generic[Request]):
 
 
 @dataclass(frozen=True)
-class WorkFilter:
+class JobFilter:
     """Which works a list shows; None: any. bake, name: of their requests."""
 
     state: str | None = None

@@ -30,21 +30,20 @@ from relume.errors import CancelledError, NotFoundError, RelumeError
 from server.apart.claim import claim
 from server.apart.step import RunStep, Step
 from server.apart.step_timer import StepTimer
-from server.errors import BusyError, NotReadyError, QuotaError, problem_of
-from server.queues.work import ACTIVE, STATES, Quota, Request, Work, WorkFilter, new_id
-from server.records.tables import WorkRow
+from server.errors import BusyError, NotReadyError, QuotaError, make_problem
+from server.queues.work import ACTIVE, STATES, Job, JobFilter, Quota, Request, new_id
+from server.records.tables import JobRow
 from worker.database.clock import epoch_s
-from worker.database.faults import Complaint
-from worker.lease import LeaseKeeper, is_alive, log_lost, log_taken_over, new_owner
-from worker.turns import Turns, Waiting
+from worker.database.faults import DatabaseError
+from worker.lease import LeaseRenewer, is_alive, log_lost_lease, log_taken_over, new_owner
+from worker.turns import FairShare, WaitingBake
 
 log = logging.getLogger(__name__)
-_LOOK_AGAIN_S = 2.0
-_ASK_AGAIN_S = 0.1
+_POLL_INTERVAL_S = 2.0
+_CHECK_INTERVAL_S = 0.1
 
 
-
-class WorkQueue(ABC, Generic[Request]):
+class JobQueue(ABC, Generic[Request]):
     """Work of one kind; its files lie in `folder`/<id>/.
 
     A kind says which table its rows are in, what people call one of them, what a request is, how many steps it takes,
@@ -54,7 +53,7 @@ class WorkQueue(ABC, Generic[Request]):
     than the lease finds that out by its next statement on the row, and drops what it was doing.
     """
 
-    row: ClassVar[type[WorkRow]]
+    row: ClassVar[type[JobRow]]
     noun: ClassVar[str]
     request_type: type[Request]
     resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
@@ -68,10 +67,10 @@ class WorkQueue(ABC, Generic[Request]):
         """
         self._sessions, self.folder, self.run, self._quota = sessions, folder, run, quota
         self._owner = new_owner()
-        self._turns, self._timers = Turns(quota.shares), dict[str, StepTimer]()
+        self._fair_share, self._timers = FairShare(quota.weights), dict[str, StepTimer]()
         self._wake, self._closing = threading.Event(), threading.Event()
-        self._wanted: tuple[str, float] = "", 0.0
-        self._complaint = Complaint(log, f"the queue of {self.noun}s cannot be read or written")
+        self._needed_until: tuple[str, float] = "", 0.0
+        self._outage = DatabaseError(log, f"the queue of {self.noun}s cannot be read or written")
         self._thread = threading.Thread(target=self._run, name=f"relume-{self.noun}s", daemon=True)
 
     @abstractmethod
@@ -87,7 +86,7 @@ class WorkQueue(ABC, Generic[Request]):
         """Whether it is so small that it goes before all others."""
 
     @abstractmethod
-    def step(self, work: Work[Request], timer: StepTimer) -> int:
+    def step(self, job: Job[Request], timer: StepTimer) -> int:
         """Do what comes next; calls `note` before, and tells `timer`.
 
         Returns:
@@ -96,22 +95,22 @@ class WorkQueue(ABC, Generic[Request]):
             CancelledError: it is not wanted any more.
         """
 
-    def has_failed(self, work: Work[Request]) -> None:
+    def on_failed(self, job: Job[Request]) -> None:
         """Called when the row says so, of whoever held the lease: most kinds keep what they have."""
 
-    def is_ready(self, work: Work[Request]) -> None:
+    def on_ready(self, job: Job[Request]) -> None:
         """Called when the row says so, of whoever held the lease: most kinds keep what they have."""
 
-    def run_apart(
-        self, work: Work[Request], kind: str, values: Mapping[str, Any], tell: Callable[[float], object]
+    def run_in_process(
+        self, job: Job[Request], kind: str, values: Mapping[str, Any], report: Callable[[float], object]
     ) -> Mapping[str, Any]:
         """Have a step of work done in another process, for as long as it is wanted.
 
         Args:
-            work: whose step it is. kind, values: of the step. tell: called with the share done.
+            job: whose step it is. kind, values: of the step. report: called with the share done.
         """
-        step = Step(kind, self.is_first(work.request), values, (str(self.folder / work.id), self._owner))
-        return self.run(step, tell, lambda: self.is_wanted(work.id))
+        step = Step(kind, self.is_first(job.request), values, (str(self.folder / job.id), self._owner))
+        return self.run(step, report, lambda: self.is_needed(job.id))
 
     def start(self) -> None:
         """Go on with what was left."""
@@ -158,54 +157,54 @@ class WorkQueue(ABC, Generic[Request]):
     def _check_quota(self, session: Session, client: str) -> None:
         """Whether one more of a client may wait. Raises BusyError, QuotaError."""
         quota = self._quota
-        waiting = session.scalars(select(self.row.client).where(self.row.state.in_(ACTIVE))).all()
-        if len(waiting) >= quota.of_all:
-            text = f"as many {self.noun}s wait or run as may, {quota.of_all}; try again when some are done"
+        clients = session.scalars(select(self.row.client).where(self.row.state.in_(ACTIVE))).all()
+        if len(clients) >= quota.max_total:
+            text = f"as many {self.noun}s wait or run as may, {quota.max_total}; try again when some are done"
             raise BusyError(f"{text} (RELUME_MAX_QUEUED)")
-        if sum((other or "") == client for other in waiting) >= quota.of_each:
-            text = f"as many {self.noun}s of yours wait or run as may, {quota.of_each}; wait, or stop one"
+        if sum((queued_client or "") == client for queued_client in clients) >= quota.max_per_client:
+            text = f"as many {self.noun}s of yours wait or run as may, {quota.max_per_client}; wait, or stop one"
             raise QuotaError(f"{text} (RELUME_MAX_QUEUED_EACH)")
 
-    def get(self, identity: str) -> Work[Request]:
+    def get(self, identity: str) -> Job[Request]:
         """A row. Raises NotFoundError."""
         with self._sessions() as session:
             row = session.get(self.row, identity)
         if row is None:
             raise NotFoundError(f"there is no {self.noun} {identity[:40]}; start one first")
-        return self._work(row)
+        return self._job(row)
 
-    def _work(self, row: WorkRow) -> Work[Request]:
+    def _job(self, row: JobRow) -> Job[Request]:
         request = self.request_type.model_validate_json(row.request)
         total, timer = self.steps(request), self._timers.get(row.id) if row.state == "running" else None
-        progress = min(1.0, (row.done + (timer.share if timer is not None else 0.0)) / total)
+        progress = min(1.0, (row.done + (timer.fraction if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
         ended = row.problem, row.created, row.started, row.ended
-        return Work(row.id, request, row.client or "", row.state, row.done, total, progress, seconds_left, *ended)
+        return Job(row.id, request, row.client or "", row.state, row.done, total, progress, seconds_left, *ended)
 
     def page(
-        self, which: WorkFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
-    ) -> list[Work[Request]]:
+        self, job_filter: JobFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
+    ) -> list[Job[Request]]:
         """Rows, newest first or last.
 
         Args:
-            which: are listed. limit: at most so many.
+            job_filter: are listed. limit: at most so many.
             after: time of creation and id of the row after which the list begins; None: with the first.
         """
         row = self.row
-        query = _where(select(row), row, which).limit(limit)
+        query = _filtered(select(row), row, job_filter).limit(limit)
         created = row.created.desc() if newest_first else row.created
         if after is not None:
             is_later = row.created < after[0] if newest_first else row.created > after[0]
             query = query.where(or_(is_later, and_(row.created == after[0], row.id > after[1])))
         with self._sessions() as session:
-            return [self._work(each) for each in session.scalars(query.order_by(created, row.id))]
+            return [self._job(each) for each in session.scalars(query.order_by(created, row.id))]
 
-    def naming(self, text: str) -> list[str]:
+    def referencing(self, text: str) -> list[str]:
         """Ids of work that waits or goes on whose request holds a text, oldest first."""
         row = self.row
-        asked = select(row.id).where(row.state.in_(ACTIVE), row.request.contains(text, autoescape=True))
+        query = select(row.id).where(row.state.in_(ACTIVE), row.request.contains(text, autoescape=True))
         with self._sessions() as session:
-            return list(session.scalars(asked.order_by(row.created)))
+            return list(session.scalars(query.order_by(row.created)))
 
     def delete(self, identity: str) -> None:
         """Stop the work and forget its files. Raises NotFoundError."""
@@ -226,36 +225,34 @@ class WorkQueue(ABC, Generic[Request]):
         Raises:
             NotFoundError. NotReadyError: it is ready, or its files are gone. BusyError, QuotaError: as `submit`.
         """
-        work = self.get(identity)
-        if work.state not in ACTIVE:
-            self.requeue(work, self.resumable)
+        job = self.get(identity)
+        if job.state not in ACTIVE:
+            self.requeue(job, self.resumable)
 
-    def requeue(
-        self, work: Work[Request], states: Sequence[str], prepare: Callable[[], object] = lambda: None
-    ) -> None:
+    def requeue(self, job: Job[Request], states: Sequence[str], prepare: Callable[[], object] = lambda: None) -> None:
         """Queue a work that is in one of some states again.
 
         Args:
-            work: as it was found. states: from which it may be queued.
+            job: as it was found. states: from which it may be queued.
             prepare: called before anybody can begin with it.
         Raises:
             NotReadyError: it is in another state. BusyError, QuotaError: as `submit`.
         """
         row = self.row
         values = {"state": "queued", "problem": None, "ended": None}
-        statement = update(row).where(row.id == work.id, row.state.in_(states)).values(values)
+        statement = update(row).where(row.id == job.id, row.state.in_(states)).values(values)
         with self._sessions.begin() as session:
-            self._check_quota(session, work.user)
+            self._check_quota(session, job.user)
             if _num_changed(session, statement) == 0:
-                state = session.scalar(select(row.state).where(row.id == work.id))
-                able = f"only one that is {' or '.join(states)} can be queued again"
-                raise NotReadyError(f"the {self.noun} is {state or 'deleted'}; {able}")
+                state = session.scalar(select(row.state).where(row.id == job.id))
+                allowed = f"only one that is {' or '.join(states)} can be queued again"
+                raise NotReadyError(f"the {self.noun} is {state or 'deleted'}; {allowed}")
             prepare()
         self._wake.set()
 
-    def note(self, identity: str, done: int) -> None:
+    def record_progress(self, identity: str, done: int) -> None:
         """Record progress. Raises CancelledError where the work was stopped, its row deleted, or the server closes."""
-        if not self._update_own(identity, state="running", done=done) or self.is_closing:
+        if not self._update_leased(identity, state="running", done=done) or self.is_closing:
             raise CancelledError(f"the {self.noun} was stopped")
 
     @property
@@ -263,20 +260,20 @@ class WorkQueue(ABC, Generic[Request]):
         """Whether the work at hand should stop."""
         return self._closing.is_set()
 
-    def is_wanted(self, identity: str) -> bool:
+    def is_needed(self, identity: str) -> bool:
         """Whether nobody had stopped the work, deleted its row or taken it over some moments ago, and the server goes
         on."""
         if self.is_closing:
             return False
-        if self._wanted[0] == identity and time.monotonic() < self._wanted[1]:
+        if self._needed_until[0] == identity and time.monotonic() < self._needed_until[1]:
             return True  # work asks thousands of times a second
         with self._sessions() as session:
             row = session.get(self.row, identity)
-            is_wanted = row is not None and row.state in ACTIVE and row.owner == self._owner
-        self._wanted = identity if is_wanted else "", time.monotonic() + _ASK_AGAIN_S
-        return is_wanted
+            is_active = row is not None and row.state in ACTIVE and row.owner == self._owner
+        self._needed_until = identity if is_active else "", time.monotonic() + _CHECK_INTERVAL_S
+        return is_active
 
-    def _update_own(self, identity: str, **values: Any) -> bool:
+    def _update_leased(self, identity: str, **values: Any) -> bool:
         """Change a row that is under way, and whose lease is here. False where it is not any more."""
         return self._update(identity, ACTIVE, self.row.owner == self._owner, **values)
 
@@ -290,14 +287,14 @@ class WorkQueue(ABC, Generic[Request]):
         while not self._closing.is_set():
             try:
                 identity = self._next()
-                self._complaint.well()
+                self._outage.report_recovered()
                 if identity is not None:
                     with suppress(NotFoundError):  # somebody has deleted it since
                         self._do(self.get(identity))
                     continue
             except Exception as error:  # the database may be away for a while; the thread must outlive that
-                self._complaint.meet(error)
-            self._wake.wait(timeout=_LOOK_AGAIN_S)
+                self._outage.report_failure(error)
+            self._wake.wait(timeout=_POLL_INTERVAL_S)
             self._wake.clear()
 
     def _next(self) -> str | None:
@@ -306,63 +303,72 @@ class WorkQueue(ABC, Generic[Request]):
         columns = row.id, row.client, row.is_first, row.created, row.owner, row.heartbeat  # requests may be large
         query = select(*columns, epoch_s().label("now")).where(row.state.in_(ACTIVE))
         with self._sessions() as session:
-            found = [one for one in session.execute(query) if not self._is_others(one.owner, one.heartbeat, one.now)]
-        owners = {one.id: one.owner for one in found}
-        waiting = [Waiting(one.id, one.client or "", bool(one.is_first), one.created) for one in found]
-        self._timers = {one.id: self._timers[one.id] for one in waiting if one.id in self._timers}
-        for work in self._turns.order(waiting):
-            before = owners[work.id]
-            unchanged = or_(row.owner.is_(None), row.owner == before)
+            rows = [
+                candidate
+                for candidate in session.execute(query)
+                if not self._is_leased_elsewhere(candidate.owner, candidate.heartbeat, candidate.now)
+            ]
+        owners = {candidate.id: candidate.owner for candidate in rows}
+        waiting = [
+            WaitingBake(candidate.id, candidate.client or "", bool(candidate.is_first), candidate.created)
+            for candidate in rows
+        ]
+        self._timers = {
+            candidate.id: self._timers[candidate.id] for candidate in waiting if candidate.id in self._timers
+        }
+        for waiting_job in self._fair_share.sort(waiting):
+            previous_owner = owners[waiting_job.id]
+            unchanged = or_(row.owner.is_(None), row.owner == previous_owner)
             started = func.coalesce(row.started, time.time())
-            if self._update(work.id, ACTIVE, unchanged, owner=self._owner, heartbeat=epoch_s(), started=started):
-                if before not in (None, self._owner):
-                    log_taken_over(self.noun, work.id, str(before))
-                self._turns.take(work.client)
-                return work.id
+            if self._update(waiting_job.id, ACTIVE, unchanged, owner=self._owner, heartbeat=epoch_s(), started=started):
+                if previous_owner not in (None, self._owner):
+                    log_taken_over(self.noun, waiting_job.id, str(previous_owner))
+                self._fair_share.pick_next(waiting_job.client)
+                return waiting_job.id
         return None
 
-    def _keep(self, identity: str, owner: str) -> None:
+    def _renew_lease(self, identity: str, owner: str) -> None:
         self._update(identity, STATES, self.row.owner == owner, heartbeat=epoch_s())
 
-    def _do(self, work: Work[Request]) -> None:
+    def _do(self, job: Job[Request]) -> None:
         """A step of one row; every failure ends in it as a sentence."""
-        folder = self.folder / work.id
-        timer = self._timers.setdefault(work.id, StepTimer(self.step_s(work.request)))
-        timer.begin()
+        folder = self.folder / job.id
+        timer = self._timers.setdefault(job.id, StepTimer(self.step_s(job.request)))
+        timer.start()
         try:
             folder.mkdir(parents=True, exist_ok=True)
             claim(folder, self._owner)
-            with LeaseKeeper(self._keep, work.id, self._owner):
-                done = self.step(work, timer)
-            self._has_done(work, done)
+            with LeaseRenewer(self._renew_lease, job.id, self._owner):
+                done = self.step(job, timer)
+            self._record_step(job, done)
         except CancelledError:  # closing, stopped, deleted, or taken over
             pass
         except OperationalError:  # the database is away: the step is done again, and finds what is on the disk
             raise
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
-                log.exception("%s %s failed", self.noun, work.id, extra={"fields": {self.noun.lower(): work.id}})
-            if self._update_own(work.id, state="failed", problem=problem_of(error).detail, ended=time.time()):
-                self.has_failed(work)
+                log.exception("%s %s failed", self.noun, job.id, extra={"fields": {self.noun.lower(): job.id}})
+            if self._update_leased(job.id, state="failed", problem=make_problem(error).detail, ended=time.time()):
+                self.on_failed(job)
         finally:
-            is_held = self._update(work.id, STATES, self.row.owner == self._owner, owner=None)
-        if not self._is_there(work.id):
+            has_lease = self._update(job.id, STATES, self.row.owner == self._owner, owner=None)
+        if not self._exists(job.id):
             shutil.rmtree(folder, ignore_errors=True)
-        elif not is_held:
-            log_lost(self.noun, work.id)
+        elif not has_lease:
+            log_lost_lease(self.noun, job.id)
 
-    def _has_done(self, work: Work[Request], done: int) -> None:
+    def _record_step(self, job: Job[Request], done: int) -> None:
         """A step has ended; so many are done now."""
-        if done < work.total:
-            self._update_own(work.id, done=done)
-        elif self._update_own(work.id, done=done, state="ready", ended=time.time()):
-            self.is_ready(work)
+        if done < job.total:
+            self._update_leased(job.id, done=done)
+        elif self._update_leased(job.id, done=done, state="ready", ended=time.time()):
+            self.on_ready(job)
 
-    def _is_there(self, identity: str) -> bool:
+    def _exists(self, identity: str) -> bool:
         with self._sessions() as session:
             return session.get(self.row, identity) is not None
 
-    def _is_others(self, owner: str | None, heartbeat: float | None, now: float) -> bool:
+    def _is_leased_elsewhere(self, owner: str | None, heartbeat: float | None, now: float) -> bool:
         return owner not in (None, self._owner) and is_alive(str(owner), heartbeat or 0.0, now)
 
 
@@ -371,14 +377,14 @@ def _num_changed(session: Session, statement: Any) -> int:
     return cast("CursorResult[Any]", result).rowcount
 
 
-def _where(query: Select[Any], row: type[WorkRow], which: WorkFilter) -> Select[Any]:
+def _filtered(query: Select[Any], row: type[JobRow], job_filter: JobFilter) -> Select[Any]:
     """A query of the rows that a list shows; requests are JSON without blanks."""
-    if which.state is not None:
-        query = query.where(row.state == which.state)
-    if which.user is not None:
-        query = query.where(func.coalesce(row.client, "") == which.user)
-    for key, value in (("bake", which.bake), ("name", which.name)):
+    if job_filter.state is not None:
+        query = query.where(row.state == job_filter.state)
+    if job_filter.user is not None:
+        query = query.where(func.coalesce(row.client, "") == job_filter.user)
+    for key, value in (("bake", job_filter.bake), ("name", job_filter.name)):
         if value is not None:
-            said = f'"{key}":{json.dumps(value, ensure_ascii=False)}'
-            query = query.where(row.request.contains(said, autoescape=True))
+            json_fragment = f'"{key}":{json.dumps(value, ensure_ascii=False)}'
+            query = query.where(row.request.contains(json_fragment, autoescape=True))
     return query

@@ -17,7 +17,7 @@ from relume.errors import NotFoundError, ParameterError
 from server.errors import BusyError
 from server.records.tables import CommentRow
 
-MAX_COMMENTS, MAX_OF_SCENE, MAX_BYTES = 10_000, 500, 256 * 1024**2
+MAX_COMMENTS, MAX_PER_SCENE, MAX_BYTES = 10_000, 500, 256 * 1024**2
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class CommentStore:
     def list(self, scene: str) -> list[Comment]:
         """Of a scene, oldest first."""
         with self._sessions() as session:
-            of_scene = select(CommentRow).where(CommentRow.scene == scene)
-            return [_comment(row) for row in session.scalars(of_scene.order_by(CommentRow.created, CommentRow.id))]
+            query = select(CommentRow).where(CommentRow.scene == scene)
+            return [_comment(row) for row in session.scalars(query.order_by(CommentRow.created, CommentRow.id))]
 
     def marks(self, scenes: Collection[str]) -> dict[str, tuple[object, ...]]:
         """Of each of these scenes, what is another one whenever its comments are."""
@@ -62,10 +62,10 @@ class CommentStore:
             .where(row.scene.in_(scenes))
             .group_by(row.scene)
         )
-        found: dict[str, tuple[object, ...]] = dict.fromkeys(scenes, ())
+        marks: dict[str, tuple[object, ...]] = dict.fromkeys(scenes, ())
         with self._sessions() as session:
-            found.update({scene: tuple(mark) for scene, *mark in session.execute(query)})
-        return found
+            marks.update({scene: tuple(mark) for scene, *mark in session.execute(query)})
+        return marks
 
     def add(self, scene: str, pin: Mapping[str, Any], text: str, author: str, picture: bytes | None) -> Comment:
         """Keep one.
@@ -75,14 +75,14 @@ class CommentStore:
         Raises:
             BusyError: there are as many as may be.
         """
-        where = json.dumps(dict(pin), allow_nan=False)
-        num_bytes = len(where.encode()) + len(text.encode()) + len(picture or b"")
+        pin_json = json.dumps(dict(pin), allow_nan=False)
+        num_bytes = len(pin_json.encode()) + len(text.encode()) + len(picture or b"")
         with self._sessions.begin() as session:
             _check_room(session, scene, num_bytes)
             row = CommentRow(
                 id=secrets.token_hex(8),
                 scene=scene,
-                pin=where,
+                pin=pin_json,
                 text=text,
                 author=author,
                 created=time.time(),
@@ -94,37 +94,37 @@ class CommentStore:
             session.flush()
             return _comment(row)
 
-    def settle(self, scene: str, comment: str, who: str | None) -> None:
+    def resolve(self, scene: str, comment: str, resolver: str | None) -> None:
         """Settle one, by somebody, or with None open it again. Raises NotFoundError."""
         with self._sessions.begin() as session:
             row = _row(session, scene, comment)
-            row.resolved, row.resolved_by = (None, None) if who is None else (time.time(), who)
+            row.resolved, row.resolved_by = (None, None) if resolver is None else (time.time(), resolver)
 
     def picture(self, scene: str, comment: str) -> bytes:
         """The picture of its moment, WebP. Raises NotFoundError."""
         with self._sessions() as session:
-            found = _row(session, scene, comment).picture
-        if found is None:
+            picture = _row(session, scene, comment).picture
+        if picture is None:
             raise NotFoundError("this comment has no picture")
-        return found
+        return picture
 
     def delete(self, scene: str, comment: str) -> None:
         """Forget one. Raises NotFoundError."""
         with self._sessions.begin() as session:
             session.delete(_row(session, scene, comment))
 
-    def forget(self, scene: str) -> None:
+    def delete_scene(self, scene: str) -> None:
         """Forget all of a scene that is gone."""
         with self._sessions.begin() as session:
             session.execute(delete(CommentRow).where(CommentRow.scene == scene))
 
 
 def _check_room(session: Session, scene: str, num_bytes: int) -> None:
-    held = session.execute(select(func.count(), func.coalesce(func.sum(CommentRow.num_bytes), 0))).one()
-    of_scene = select(func.count()).select_from(CommentRow).where(CommentRow.scene == scene)
-    if (session.scalar(of_scene) or 0) >= MAX_OF_SCENE:
-        raise BusyError(f"a scene has at most {MAX_OF_SCENE} comments; delete some first")
-    if held[0] >= MAX_COMMENTS or held[1] + num_bytes > MAX_BYTES:
+    totals = session.execute(select(func.count(), func.coalesce(func.sum(CommentRow.num_bytes), 0))).one()
+    scene_query = select(func.count()).select_from(CommentRow).where(CommentRow.scene == scene)
+    if (session.scalar(scene_query) or 0) >= MAX_PER_SCENE:
+        raise BusyError(f"a scene has at most {MAX_PER_SCENE} comments; delete some first")
+    if totals[0] >= MAX_COMMENTS or totals[1] + num_bytes > MAX_BYTES:
         raise BusyError("no more comments can be kept; delete some first")
 
 

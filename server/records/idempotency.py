@@ -16,7 +16,7 @@ from server.records.tables import IdempotencyRow
 from worker.database.clock import epoch_s
 from worker.lease import may_run, new_owner
 
-KEPT_S = 86_400.0
+RETENTION_S = 86_400.0
 ABANDONED_S = 3_600.0
 """A call whose server says nothing of it for so long is not answered any more."""
 MAX_EACH, MAX_ALL = 200, 10_000
@@ -34,7 +34,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Before:
+class EarlierCall:
     """What is known of an earlier call of the same key; `answer` is None while it is still made."""
 
     digest: str
@@ -47,7 +47,7 @@ class IdempotencyStore:
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions, self._owner = sessions, new_owner()
 
-    def begin(self, client: str, key: str, digest: str) -> Before | None:
+    def claim(self, client: str, key: str, digest: str) -> EarlierCall | None:
         """Take a key for a call, or say what is known of the call that had it before.
 
         Args:
@@ -56,17 +56,17 @@ class IdempotencyStore:
         self._tidy(client)
         while True:
             with self._sessions() as session:
-                found = session.execute(select(IdempotencyRow, epoch_s()).where(_is(client, key))).one_or_none()
-            if found is None:
+                existing = session.execute(select(IdempotencyRow, epoch_s()).where(_is(client, key))).one_or_none()
+            if existing is None:
                 if self._add(client, key, digest):
                     return None
                 continue  # the same call came at the same time
-            row, now = found
+            row, now = existing
             if row.status is not None:
                 answer = Answer(row.status, row.location, row.media_type, row.body)
-                return Before(row.digest, answer)
+                return EarlierCall(row.digest, answer)
             if may_run(row.owner) and now - row.created <= ABANDONED_S:
-                return Before(row.digest, None)
+                return EarlierCall(row.digest, None)
             self._delete(_is(client, key), IdempotencyRow.owner == row.owner, IdempotencyRow.status.is_(None))
 
     def end(self, client: str, key: str, answer: Answer) -> None:
@@ -74,14 +74,14 @@ class IdempotencyStore:
         is_small = answer.body is not None and len(answer.body) <= MAX_BODY_BYTES
         values = {**vars(answer), "body": answer.body if is_small else None}
         with self._sessions.begin() as session:
-            session.execute(update(IdempotencyRow).where(_is(client, key), self._is_own).values(values))
+            session.execute(update(IdempotencyRow).where(_is(client, key), self._has_own_claim).values(values))
 
     def drop(self, client: str, key: str) -> None:
         """Forget a call that was begun here and has made nothing: it may be tried again."""
-        self._delete(_is(client, key), self._is_own)
+        self._delete(_is(client, key), self._has_own_claim)
 
     @property
-    def _is_own(self) -> ColumnElement[bool]:
+    def _has_own_claim(self) -> ColumnElement[bool]:
         return IdempotencyRow.owner == self._owner
 
     def _add(self, client: str, key: str, digest: str) -> bool:
@@ -99,16 +99,16 @@ class IdempotencyStore:
 
     def _tidy(self, client: str) -> None:
         """Forget what is old, and the oldest of what is too much."""
-        row, is_over = IdempotencyRow, []
+        row, excess = IdempotencyRow, []
         with self._sessions() as session:
-            for of, most in ((row.client == client, MAX_EACH), (row.key != "", MAX_ALL)):
-                oldest = select(row.created).where(of).order_by(row.created.desc()).offset(most - 1).limit(1)
+            for condition, limit in ((row.client == client, MAX_EACH), (row.key != "", MAX_ALL)):
+                oldest = select(row.created).where(condition).order_by(row.created.desc()).offset(limit - 1).limit(1)
                 if (created := session.scalar(oldest)) is not None:
-                    is_over.append(and_(of, row.created <= created))
-            is_old = row.created < epoch_s() - KEPT_S
-            has_any = session.scalar(select(func.count()).select_from(row).where(or_(is_old, *is_over)))
+                    excess.append(and_(condition, row.created <= created))
+            is_old = row.created < epoch_s() - RETENTION_S
+            has_any = session.scalar(select(func.count()).select_from(row).where(or_(is_old, *excess)))
         if has_any:
-            self._delete(or_(is_old, *is_over))
+            self._delete(or_(is_old, *excess))
 
 
 def _is(client: str, key: str) -> ColumnElement[bool]:

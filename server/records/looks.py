@@ -21,7 +21,7 @@ from server.records.tables import LookRow
 
 MAX_LOOK_BYTES = 256 * 1024
 MAX_LOOKS = 10_000
-PARTS = tuple(Look.model_fields)
+SECTIONS = tuple(Look.model_fields)
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,12 @@ def parse_document(body: bytes) -> str:
     except (ValueError, RecursionError):
         raise ParameterError("look", "not JSON", "a look document as JSON, every number finite") from None
     if not isinstance(document, dict):
-        raise ParameterError("look", document, "an object with some of " + ", ".join(PARTS))
-    for part, value in document.items():
-        if part not in PARTS:
-            raise ParameterError(f"/{part[:80]}", value, "nothing of that name: a look has " + ", ".join(PARTS))
+        raise ParameterError("look", document, "an object with some of " + ", ".join(SECTIONS))
+    for section, value in document.items():
+        if section not in SECTIONS:
+            raise ParameterError(f"/{section[:80]}", value, "nothing of that name: a look has " + ", ".join(SECTIONS))
         if not isinstance(value, dict):
-            raise ParameterError(f"/{part}", value, "an object")
+            raise ParameterError(f"/{section}", value, "an object")
     return text
 
 
@@ -118,11 +118,11 @@ class LookStore:
             raise NotFoundError(f"there is no look {name!r}; save it first")
         return _saved(row)
 
-    def naming(self, text: str) -> tuple[str, ...]:
+    def referencing(self, text: str) -> tuple[str, ...]:
         """Names of looks whose documents hold a text, sorted; of wildcards none are known."""
         with self._sessions() as session:
-            found = select(LookRow.name).where(LookRow.document.contains(text, autoescape=True))
-            return tuple(sorted(session.scalars(found)))
+            query = select(LookRow.name).where(LookRow.document.contains(text, autoescape=True))
+            return tuple(sorted(session.scalars(query)))
 
     def put(
         self,

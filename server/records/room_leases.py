@@ -16,7 +16,7 @@ from worker.lease import may_run, new_owner
 ROOM_LEASE_S = 3.0
 """People of a room whose server's machine has died wait so long: three rounds of `server.live.rooms.keeper`."""
 
-_FORGOTTEN_S = 3600.0
+_STALE_S = 3600.0
 """What a server that died has left is deleted after so long, if nobody wants it."""
 
 
@@ -29,15 +29,15 @@ class RoomLeases:
     def take(self, prefix: str) -> bool:
         """Take or renew one. False where another server that is alive has it."""
         row = RoomRow
-        asked = select(row.owner, row.heartbeat, epoch_s().label("now")).where(row.prefix == prefix)
+        query = select(row.owner, row.heartbeat, epoch_s().label("now")).where(row.prefix == prefix)
         with self._sessions() as session:
-            found = session.execute(asked).one_or_none()
-        if found is None:
+            lease = session.execute(query).one_or_none()
+        if lease is None:
             return self._add(prefix)
-        is_fresh = found.now - found.heartbeat <= ROOM_LEASE_S
-        if found.owner != self._owner and is_fresh and may_run(found.owner):
+        is_fresh = lease.now - lease.heartbeat <= ROOM_LEASE_S
+        if lease.owner != self._owner and is_fresh and may_run(lease.owner):
             return False
-        unchanged = row.prefix == prefix, row.owner == found.owner, row.heartbeat == found.heartbeat
+        unchanged = row.prefix == prefix, row.owner == lease.owner, row.heartbeat == lease.heartbeat
         statement = update(row).where(*unchanged).values(owner=self._owner, heartbeat=epoch_s())
         with self._sessions.begin() as session:  # of two servers that come upon a dead one's lease one changes the row
             return cast("CursorResult[Any]", session.execute(statement)).rowcount > 0
@@ -50,12 +50,12 @@ class RoomLeases:
             return False
         return True
 
-    def keep(self, prefixes: Collection[str]) -> set[str]:
+    def renew(self, prefixes: Collection[str]) -> set[str]:
         """Renew these and give up all others. Returns those of them that another server has."""
-        row, own = RoomRow, RoomRow.owner == self._owner
-        given_up, is_old = and_(own, row.prefix.not_in(prefixes)), row.heartbeat < epoch_s() - _FORGOTTEN_S
+        row, is_owned = RoomRow, RoomRow.owner == self._owner
+        is_dropped, is_old = and_(is_owned, row.prefix.not_in(prefixes)), row.heartbeat < epoch_s() - _STALE_S
         with self._sessions.begin() as session:
-            session.execute(delete(row).where(or_(given_up, is_old)))
-            session.execute(update(row).where(own).values(heartbeat=epoch_s()))
-            kept = set(session.scalars(select(row.prefix).where(own)))
-        return {prefix for prefix in prefixes if prefix not in kept and not self.take(prefix)}
+            session.execute(delete(row).where(or_(is_dropped, is_old)))
+            session.execute(update(row).where(is_owned).values(heartbeat=epoch_s()))
+            renewed = set(session.scalars(select(row.prefix).where(is_owned)))
+        return {prefix for prefix in prefixes if prefix not in renewed and not self.take(prefix)}

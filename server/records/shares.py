@@ -79,14 +79,14 @@ class ShareStore:
         """All links, or those whose contents hold a text."""
         query = select(ShareRow.id, ShareRow.created, ShareRow.bytes)
         with self._sessions() as session:
-            found = session.execute(query.where(ShareRow.document.contains(text, autoescape=True)))
-            return [ListedShare(*row) for row in found]
+            rows = session.execute(query.where(ShareRow.document.contains(text, autoescape=True)))
+            return [ListedShare(*row) for row in rows]
 
-    def naming(self, text: str) -> tuple[str, ...]:
+    def referencing(self, text: str) -> tuple[str, ...]:
         """Ids of links whose contents hold a text, sorted; of wildcards none are known."""
         with self._sessions() as session:
-            found = select(ShareRow.id).where(ShareRow.document.contains(text, autoescape=True))
-            return tuple(sorted(session.scalars(found)))
+            query = select(ShareRow.id).where(ShareRow.document.contains(text, autoescape=True))
+            return tuple(sorted(session.scalars(query)))
 
     def delete(self, identity: str) -> None:
         """Make room: the link opens nothing any more. Raises NotFoundError."""
@@ -106,8 +106,8 @@ class ShareStore:
             with self._sessions.begin() as session:
                 if session.get(ShareRow, identity) is not None:
                     return False
-                held = session.execute(select(func.count(), func.coalesce(func.sum(ShareRow.bytes), 0))).one()
-                if held[0] >= MAX_SHARES or held[1] + num_bytes > MAX_BYTES:
+                totals = session.execute(select(func.count(), func.coalesce(func.sum(ShareRow.bytes), 0))).one()
+                if totals[0] >= MAX_SHARES or totals[1] + num_bytes > MAX_BYTES:
                     raise BusyError("no more links can be kept; delete some with DELETE /api/shares/{id}")
                 session.add(ShareRow(id=identity, document=text, bytes=num_bytes, created=time.time()))
         except IntegrityError:  # somebody else was faster

@@ -38,7 +38,7 @@ class ShareRow(Base):
     created: Mapped[float]
 
 
-class WorkRow(Base):
+class JobRow(Base):
     """A long work of the server, see `server.queues.work_queue`. `request` is the body as JSON.
 
     `client` asked for it and `is_first` says that it goes before others; rows of an older relume have neither. Whoever
@@ -62,19 +62,19 @@ class WorkRow(Base):
     ended: Mapped[float | None] = mapped_column(default=None)
 
 
-class RenderRow(WorkRow):
+class RenderRow(JobRow):
     """A batch of renders; `done` frames are finished."""
 
     __tablename__ = "renders"
 
 
-class BtfRow(WorkRow):
+class BtfRow(JobRow):
     """A BTF that is made or imported, in one step."""
 
     __tablename__ = "btfs"
 
 
-class ComparisonRow(WorkRow):
+class ComparisonRow(JobRow):
     """A comparison with brute force; `done` passes are finished."""
 
     __tablename__ = "truths"

@@ -8,11 +8,11 @@ from fastapi import APIRouter, Query, Request, Response
 
 from server.access.audit import MAX_LISTED, Change
 from server.access.identity import COOKIE, OPENS_NOTHING
-from server.access.roles import Caller, Who
+from server.access.roles import Caller, CallerDep
 from server.errors import LoginError
-from server.services import Shared
+from server.services import ServicesDep
 from server.wire.access import AuditEntry, LoginRequest, MeBody
-from server.wire.bodies import moment
+from server.wire.bodies import format_timestamp
 
 router = APIRouter(prefix="/api", tags=["access"])
 
@@ -20,27 +20,27 @@ COOKIE_SECONDS = 30 * 86_400
 
 
 @router.get("/me", name="get_me")
-async def me(caller: Who, services: Shared, response: Response) -> MeBody:
+async def me(caller: CallerDep, services: ServicesDep, response: Response) -> MeBody:
     """Who calls, and what they may do."""
     response.headers["Cache-Control"] = "no-store"
-    settings, role = services.settings, caller.role.word
+    settings, role = services.settings, caller.role.label
     return MeBody(
         login=settings.login, name=caller.person, role=role, by=caller.by, viewers_comment=settings.viewers_comment
     )
 
 
 @router.post("/login", status_code=204)
-async def login(sent: LoginRequest, request: Request, services: Shared, caller: Who) -> Response:
+async def login(credentials: LoginRequest, request: Request, services: ServicesDep, caller: CallerDep) -> Response:
     """Keep a token in a cookie that no script of a page can read, and no other site can send."""
     access = services.access
-    found = await access.identity.by_token(sent.token, caller.address, access.tokens)
-    await access.note(_line(found or caller, 401 if found is None else 204))
-    if found is None:
+    token_caller = await access.identity.by_token(credentials.token, caller.address, access.tokens)
+    await access.record(_line(token_caller or caller, 401 if token_caller is None else 204))
+    if token_caller is None:
         raise LoginError(OPENS_NOTHING)
     response = Response(status_code=204)
     secure = services.settings.https_only or access.identity.is_secure(request.scope)
     response.set_cookie(
-        COOKIE, sent.token, max_age=COOKIE_SECONDS, path="/", secure=secure, httponly=True, samesite="strict"
+        COOKIE, credentials.token, max_age=COOKIE_SECONDS, path="/", secure=secure, httponly=True, samesite="strict"
     )
     return response
 
@@ -59,13 +59,13 @@ async def logout() -> Response:
 
 @router.get("/audit")
 def list_audit(
-    services: Shared,
+    services: ServicesDep,
     limit: Annotated[int, Query(ge=1, le=MAX_LISTED)] = 100,
     before: Annotated[int | None, Query(ge=1, le=2**53)] = None,
     who: Annotated[str | None, Query(max_length=80)] = None,
 ) -> list[AuditEntry]:
-    """Changes, newest first; older ones by the `number` of the last as `before`."""
+    """Changes, newest first; older ones by the `seq` of the last as `baked_normal`."""
     return [
-        AuditEntry(**{**vars(entry), "at": moment(entry.at)})
+        AuditEntry(**{**vars(entry), "at": format_timestamp(entry.at)})
         for entry in services.access.audit.list(limit, before, who)
     ]

@@ -19,21 +19,21 @@ from relume.bake import Plan, Recipe
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError
 from relume.imageio.files import png_bytes
-from relume.picture.transfer import Eyes, Transfer
-from relume.scene.placed_camera import placed_camera
-from server.access.access import PROXY_AGAIN_S
-from server.access.roles import Caller, Who
+from relume.picture.transfer import CameraMode, FixedViewTransfer
+from relume.scene.placed_camera import make_custom_camera
+from server.access.access import PROXY_REVALIDATION_S
+from server.access.roles import Caller, CallerDep
 from server.errors import NotReadyError
 from server.files.png import FOREVER, PngResponse
-from server.routes.paging import Paged, newest
-from server.services import Services, Shared
-from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, RecipeBody, moment
+from server.routes.paging import PageDep, newest
+from server.services import Services, ServicesDep
+from server.wire.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, RecipeBody, format_timestamp
 from server.wire.body import Id
 from server.wire.cameras import CameraBody
-from worker.cameras import chosen_views
-from worker.presets import PRESETS, points_of
+from worker.cameras import resolve_views
+from worker.presets import PRESETS, resolve_num_points
 from worker.scenes import get_scene
-from worker.status import MOVING, BakeState, BakeStatus, bake_id
+from worker.status import FREE_CAMERA_METHODS, BakeState, BakeStatus, bake_id
 
 router = APIRouter(prefix="/api/bakes", tags=["bakes"])
 
@@ -41,7 +41,7 @@ EVENT_POLL_S = 0.5
 
 
 @router.post("", status_code=202, responses={200: {"model": DryRunBody}, 202: {"model": BakeBody}})
-def submit_bake(request: BakeRequest, services: Shared, caller: Who) -> JSONResponse:
+def submit_bake(request: BakeRequest, services: ServicesDep, caller: CallerDep) -> JSONResponse:
     """Queue a bake, or with `dry_run` only say what it would cost; the same recipe twice is the same bake."""
     recipe = _recipe(request, services)
     if request.dry_run:
@@ -52,7 +52,7 @@ def submit_bake(request: BakeRequest, services: Shared, caller: Who) -> JSONResp
         _check_quotas(request.scene, recipe, caller, services)
         identity = services.bakes.submit(request.scene, recipe, caller.name)
         status = services.bakes.get(identity)
-        services.access.quotas.own(caller.name, "bake", identity, status.plan.planned_bytes)
+        services.access.quotas.assign_owner(caller.name, "bake", identity, status.plan.planned_bytes)
     services.metrics.bakes.inc()
     body = bake_body(status, services)
     return JSONResponse(body.model_dump(), 202, {"Location": f"/api/bakes/{identity}"})
@@ -73,33 +73,35 @@ def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services
 
 @router.get("")
 def list_bakes(
-    services: Shared,
-    page: Paged,
+    services: ServicesDep,
+    page: PageDep,
     scene: Annotated[Id | None, Query()] = None,
     state: Annotated[BakeState | None, Query()] = None,
     user: Annotated[str | None, Query(max_length=80)] = None,
 ) -> list[BakeBody]:
     """Bakes, newest first, those of a scene, a state or a user."""
-    found = [
+    statuses = [
         status
         for status in services.bakes.bakes(scene)
         if state in (None, status.state) and user in (None, status.client)
     ]
-    found = page.cut(found, lambda status: newest(status.created, status.id))
-    return [bake_body(status, services) for status in found]
+    statuses = page.cut(statuses, lambda status: newest(status.created, status.id))
+    return [bake_body(status, services) for status in statuses]
 
 
 @router.get("/{bake}")
-def get_bake(bake: Id, services: Shared) -> BakeBody:
+def get_bake(bake: Id, services: ServicesDep) -> BakeBody:
     """State, progress, rate and time left."""
     return bake_body(services.bakes.get(bake), services)
 
 
 @router.get(
-    "/{bake}/events", response_class=EventSourceResponse,
-    name="bake_events", responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
+    "/{bake}/events",
+    response_class=EventSourceResponse,
+    name="bake_events",
+    responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
 )
-async def bake_events(bake: Id, services: Shared, caller: Who) -> EventSourceResponse:
+async def bake_events(bake: Id, services: ServicesDep, caller: CallerDep) -> EventSourceResponse:
     """Every change as a server-sent event `bake` with the same body as GET; ends with the bake, or with the token."""
     await run_in_threadpool(services.bakes.get, bake)
     return _Events(bake, services, caller)
@@ -120,15 +122,19 @@ class _Events(EventSourceResponse):
 
 async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterator[ServerSentEvent]:
     """For as long as the caller may stay; whom a proxy named comes by it again after a while."""
-    told: BakeStatus | None = None
-    until_s = time.monotonic() + (PROXY_AGAIN_S if caller.by == "proxy" else math.inf)
-    while (told is None or not told.final) and time.monotonic() < until_s and await services.access.may_stay(caller):
+    last_status: BakeStatus | None = None
+    until_s = time.monotonic() + (PROXY_REVALIDATION_S if caller.by == "proxy" else math.inf)
+    while (
+        (last_status is None or not last_status.final)
+        and time.monotonic() < until_s
+        and await services.access.may_stay(caller)
+    ):
         try:
             status = await run_in_threadpool(services.bakes.get, bake)
         except NotFoundError:  # deleted with its scene
             return
-        if status != told:
-            told = status
+        if status != last_status:
+            last_status = status
             body = await run_in_threadpool(bake_body, status, services)
             yield ServerSentEvent(body.model_dump_json(), event="bake")
         else:
@@ -136,10 +142,10 @@ async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterato
 
 
 @router.delete("/{bake}", status_code=204)
-def cancel_bake(bake: Id, services: Shared, forget: bool = False) -> Response:
+def cancel_bake(bake: Id, services: ServicesDep, forget: bool = False) -> Response:
     """Cancel; what was finished is kept for a resume. With `forget` the bake is deleted, finished or not."""
     if forget:
-        services.bakes.forget(bake)
+        services.bakes.delete(bake)
         services.access.quotas.disown("bake", bake)
     elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "cancelled":
         raise NotReadyError(f"the bake is {state}, there is nothing to cancel; ?forget=true deletes it")
@@ -147,29 +153,29 @@ def cancel_bake(bake: Id, services: Shared, forget: bool = False) -> Response:
 
 
 @router.get("/{bake}/views/{view}/materials.png", response_class=PngResponse, name="get_material_ids")
-async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: Shared) -> Response:
+async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: ServicesDep) -> Response:
     """16-bit grey PNG: which material each pixel shows, in the scene's order; 65535 is background."""
-    await run_in_threadpool(ready_bake, services, bake)
-    async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
+    await run_in_threadpool(require_ready_bake, services, bake)
+    async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
         if view not in transfer.views:
             raise NotFoundError(f"this bake has no view {view[:80]!r}; it has {', '.join(transfer.views)[:400]}")
-        if transfer.eyes is Eyes.FREE:
+        if transfer.camera_mode is CameraMode.FREE:
             raise NotFoundError(f"the eye of view {view[:80]!r} moves; ask what a pixel shows by a probe")
-        seen = cast("Transfer", transfer).views[view]
+        fixed_view = cast("FixedViewTransfer", transfer).views[view]
         key, media_type = (bake, view, "materials"), PngResponse.media_type
-        return await services.answers.stream(key, lambda: png_bytes(seen.material_ids()), media_type, FOREVER)
+        return await services.answers.stream(key, lambda: png_bytes(fixed_view.material_ids()), media_type, FOREVER)
 
 
 @router.get("/{bake}/environment.png", response_class=PngResponse, name="get_own_environment")
-async def own_environment(bake: Id, services: Shared) -> PngResponse:
+async def scene_environment(bake: Id, services: ServicesDep) -> PngResponse:
     """The light that the scene came with, as small as those of /api/environments."""
-    await run_in_threadpool(ready_bake, services, bake)
-    async with services.transfers.using(bake, services.bakes.store_path(bake)) as transfer:
-        png = await services.pictures.make(("environment", bake), lambda: thumbnail(transfer.radiance_of(None)))
+    await run_in_threadpool(require_ready_bake, services, bake)
+    async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
+        png = await services.pictures.run(("environment", bake), lambda: thumbnail(transfer.environment_radiance(None)))
     return PngResponse(png, headers=FOREVER)
 
 
-def ready_bake(services: Services, bake: str) -> BakeStatus:
+def require_ready_bake(services: Services, bake: str) -> BakeStatus:
     """A bake that can be opened. Raises NotFoundError, NotReadyError."""
     status = services.bakes.get(bake)
     if status.state != "ready":
@@ -180,25 +186,25 @@ def ready_bake(services: Services, bake: str) -> BakeStatus:
 def _recipe(request: BakeRequest, services: Services) -> Recipe:
     """What is baked: the preset, what the request names beside it, every view of the file where none is named."""
     ledger = services.bakes.ledger
-    wanted = [
-        view if isinstance(view, str) else placed_camera(view.name, view.to_world, view.yfov)
+    requested_views = [
+        view if isinstance(view, str) else make_custom_camera(view.name, view.to_world, view.yfov)
         for view in request.views or ()
     ]
-    views, cameras = chosen_views(ledger, get_scene(ledger, request.scene), wanted)
+    views, cameras = resolve_views(ledger, get_scene(ledger, request.scene), requested_views)
     preset = PRESETS[request.preset or "good"]
-    lights = request.lights or preset.num_lights
-    points = points_of(request.method, request.points)
-    size = request.size or (preset.size if request.aspect is None else preset.shaped(request.aspect))
+    num_lights = request.lights or preset.num_lights
+    num_probes = resolve_num_points(request.method, request.points)
+    size = request.size or (preset.size if request.aspect is None else preset.fit_aspect(request.aspect))
     gathering = (request.gather_samples, request.gather_rays)
-    return Recipe(request.method, views, size, lights, request.relightable, cameras, points, *gathering)
+    return Recipe(request.method, views, size, num_lights, request.relightable, cameras, num_probes, *gathering)
 
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
     """A bake as the API shows it."""
     seconds = None if status.phase_since is None else max(0.0, round(time.time() - status.phase_since, 1))
     plan = _plan(status.plan, services)
-    more = {"plan": plan, "phase_seconds": seconds, "created": moment(status.created), "user": status.client}
-    return BakeBody.of(status, recipe=_recipe_body(status.recipe), **more)
+    more = {"plan": plan, "phase_seconds": seconds, "created": format_timestamp(status.created), "user": status.client}
+    return BakeBody.from_object(status, recipe=_recipe_body(status.recipe), **more)
 
 
 def _recipe_body(recipe: Recipe) -> RecipeBody:
@@ -207,7 +213,7 @@ def _recipe_body(recipe: Recipe) -> RecipeBody:
         views=list(recipe.views),
         size=recipe.size,
         lights=recipe.num_lights,
-        points=recipe.num_points if recipe.method in MOVING else None,
+        points=recipe.num_points if recipe.method in FREE_CAMERA_METHODS else None,
         gather_samples=recipe.gather_samples,
         gather_rays=recipe.gather_rays,
         relightable=recipe.relightable,
@@ -221,5 +227,5 @@ def _plan(plan: Plan, services: Services) -> PlanBody:
         rays=plan.num_rays,
         store_bytes=plan.planned_bytes,
         peak_bytes=plan.peak_bytes,
-        seconds=services.bakes.seconds_for(plan),
+        seconds=services.bakes.estimate_seconds(plan),
     )

@@ -9,33 +9,33 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import NotFoundError
 from relume.scene.built_in import BUILT_IN
-from server.access.roles import Who
+from server.access.roles import CallerDep
 from server.files.importing import ImportRequest
-from server.routes.paging import Paged
-from server.routes.scenes import get_one
-from server.services import Shared
-from server.wire.bodies import BuiltInBody, SceneBody
+from server.routes.paging import PageDep
+from server.routes.scenes import get_scene_body
+from server.services import ServicesDep
+from server.wire.bodies import ExampleSceneBody, SceneBody
 
 router = APIRouter(prefix="/api/built-ins", tags=["scenes"])
-BuiltInName = Annotated[str, Path(max_length=256)]
+ExampleName = Annotated[str, Path(max_length=256)]
 
 
 @router.get("", name="list_built_ins")
-def get_all(page: Paged) -> list[BuiltInBody]:
+def list_examples(page: PageDep) -> list[ExampleSceneBody]:
     """All of them, in the order in which they are shown."""
     return [
-        BuiltInBody(name=name, label=each.label, description=each.description, size=each.size, method=each.method)
+        ExampleSceneBody(name=name, label=each.label, description=each.description, size=each.size, method=each.method)
         for name, each in page.in_order(BUILT_IN.items())
     ]
 
 
 @router.post("/{name}", status_code=201, name="take_built_in")
-async def take_one(name: BuiltInName, services: Shared, caller: Who, response: Response) -> SceneBody:
+async def import_example(name: ExampleName, services: ServicesDep, caller: CallerDep, response: Response) -> SceneBody:
     """Make it and register it like an imported one; a second time it is the same scene."""
     if name not in BUILT_IN:
         raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")
-    order = ImportRequest.of(services.settings, "built_in", None, name)
-    async with services.intake.reserving(caller.name, 0) as held:
-        identity = await services.intake.take(held, lambda folder: order)
+    request = ImportRequest.create(services.settings, "built_in", None, name)
+    async with services.intake.reserving(caller.name, 0) as reservation:
+        identity = await services.intake.import_file(reservation, lambda folder: request)
     response.headers["Location"] = f"/api/scenes/{identity}"
-    return await run_in_threadpool(get_one, identity, services)
+    return await run_in_threadpool(get_scene_body, identity, services)

@@ -10,10 +10,10 @@ from fastapi import APIRouter, Query, Response
 from numpy.typing import NDArray
 
 from relume.errors import NotFoundError
-from relume.imageio.ocio.current import current
+from relume.imageio.ocio.current import get_config
 from relume.imageio.ocio.view import MAX_NAME, OcioView
 from server.files.png import FOREVER
-from server.services import Shared
+from server.services import ServicesDep
 from server.wire.body import Id
 from server.wire.color import ColorBody, DisplayBody, ViewBody
 
@@ -30,7 +30,7 @@ class LutResponse(Response):
 @router.get("")
 def describe_color() -> ColorBody:
     """What looks and renders may name of the config."""
-    config = current()
+    config = get_config()
     if config is None:
         return ColorBody(id=None, name=None, working=None, displays=[], default=None, spaces=[])
     return ColorBody(
@@ -44,13 +44,13 @@ def describe_color() -> ColorBody:
 
 
 @router.get("/{config}/lut", response_class=LutResponse)
-async def get_lut(config: Id, display: ViewName, view: ViewName, services: Shared) -> Response:
+async def get_lut(config: Id, display: ViewName, view: ViewName, services: ServicesDep) -> Response:
     """A view as a table of 65 x 65 x 65 x 3 numbers of 16 bits (docs/api.md)."""
-    known = current()
-    if known is None or known.id != config:
+    ocio_config = get_config()
+    if ocio_config is None or ocio_config.id != config:
         raise NotFoundError("the server has another colour config now; ask /api/color again")
 
-    def make() -> NDArray[np.uint16]:
-        return known.table(OcioView(display, view)).astype("<u2")
+    def read_table() -> NDArray[np.uint16]:
+        return ocio_config.table(OcioView(display, view)).astype("<u2")
 
-    return await services.answers.stream((config, display, view), make, LutResponse.media_type, FOREVER)
+    return await services.answers.stream((config, display, view), read_table, LutResponse.media_type, FOREVER)

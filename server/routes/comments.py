@@ -8,17 +8,17 @@ from fastapi import APIRouter, Path, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume.errors import ParameterError
-from relume.scene.placed_camera import placed_camera
-from server.access.roles import Caller, Who
+from relume.scene.placed_camera import make_custom_camera
+from server.access.roles import Caller, CallerDep
 from server.files.moments import small_picture
 from server.files.png import A_DAY
 from server.live.rooms.door import check_person
 from server.openapi import files
 from server.records.comments import Comment, check_text
-from server.routes.bakes import ready_bake
-from server.routes.paging import Paged
-from server.services import Services, Shared
-from server.wire.bodies import moment
+from server.routes.bakes import require_ready_bake
+from server.routes.paging import PageDep
+from server.services import Services, ServicesDep
+from server.wire.bodies import format_timestamp
 from server.wire.body import Id
 from server.wire.comments import CommentBody, CommentChange, CommentRequest
 from worker.scenes import get_scene
@@ -28,27 +28,27 @@ CommentId = Annotated[Id, Path()]
 
 
 @router.get("")
-def list_comments(scene: Id, services: Shared, page: Paged, resolved: bool | None = None) -> list[CommentBody]:
+def list_comments(scene: Id, services: ServicesDep, page: PageDep, resolved: bool | None = None) -> list[CommentBody]:
     """Of a scene, oldest first; those that are resolved, or that are not."""
     get_scene(services.bakes.ledger, scene)
-    found = [each for each in services.comments.list(scene) if resolved in (None, each.resolved is not None)]
-    return [_body(scene, comment) for comment in page.cut(found, lambda each: (each.created, each.id))]
+    comments = [each for each in services.comments.list(scene) if resolved in (None, each.resolved is not None)]
+    return [_body(scene, comment) for comment in page.cut(comments, lambda each: (each.created, each.id))]
 
 
 @router.post("", status_code=201)
 async def add_comment(
-    scene: Id, request: CommentRequest, services: Shared, caller: Who, response: Response
+    scene: Id, request: CommentRequest, services: ServicesDep, caller: CallerDep, response: Response
 ) -> CommentBody:
     """Pin words to a pixel."""
     comment = await run_in_threadpool(_add, services, scene, request, caller)
-    services.live.rooms.commented(scene)
+    services.live.rooms.notify_comment(scene)
     response.headers["Location"] = f"/api/scenes/{scene}/comments/{comment.id}"
     return _body(scene, comment)
 
 
 def _add(services: Services, scene: str, request: CommentRequest, caller: Caller) -> Comment:
     get_scene(services.bakes.ledger, scene)
-    status = ready_bake(services, request.bake)
+    status = require_ready_bake(services, request.bake)
     if status.scene != scene:
         raise ParameterError("/bake", request.bake, "a bake of this scene")
     if request.view not in status.recipe.views:
@@ -56,7 +56,7 @@ def _add(services: Services, scene: str, request: CommentRequest, caller: Caller
     if request.x >= request.size[0] or request.y >= request.size[1]:
         raise ParameterError("/x", [request.x, request.y], "a pixel of a picture of that size")
     if request.camera is not None:
-        placed_camera("eye", request.camera.to_world, request.camera.yfov)
+        make_custom_camera("eye", request.camera.to_world, request.camera.yfov)
     picture = None if request.picture is None else small_picture(request.picture)
     pin = request.model_dump(include={"bake", "view", "x", "y", "size", "camera"})
     author = caller.person or check_person(request.author or "Guest")
@@ -64,21 +64,21 @@ def _add(services: Services, scene: str, request: CommentRequest, caller: Caller
 
 
 @router.patch("/{comment}", status_code=204)
-async def settle_comment(
-    scene: Id, comment: CommentId, change: CommentChange, services: Shared, caller: Who
+async def resolve_comment(
+    scene: Id, comment: CommentId, change: CommentChange, services: ServicesDep, caller: CallerDep
 ) -> Response:
     """Settle a comment, or open it again."""
-    who = (caller.person or "somebody") if change.resolved else None
-    await run_in_threadpool(services.comments.settle, scene, comment, who)
-    services.live.rooms.commented(scene)
+    resolver = (caller.person or "somebody") if change.resolved else None
+    await run_in_threadpool(services.comments.resolve, scene, comment, resolver)
+    services.live.rooms.notify_comment(scene)
     return Response(status_code=204)
 
 
 @router.delete("/{comment}", status_code=204)
-async def delete_comment(scene: Id, comment: CommentId, services: Shared) -> Response:
+async def delete_comment(scene: Id, comment: CommentId, services: ServicesDep) -> Response:
     """Forget a comment."""
     await run_in_threadpool(services.comments.delete, scene, comment)
-    services.live.rooms.commented(scene)
+    services.live.rooms.notify_comment(scene)
     return Response(status_code=204)
 
 
@@ -88,17 +88,17 @@ async def delete_comment(scene: Id, comment: CommentId, services: Shared) -> Res
     responses=files("image/webp"),
     name="get_comment_picture",
 )
-def get_picture(scene: Id, comment: CommentId, services: Shared) -> Response:
+def get_picture(scene: Id, comment: CommentId, services: ServicesDep) -> Response:
     """The picture of the moment, at most 320 pixels a side."""
     return Response(services.comments.picture(scene, comment), media_type="image/webp", headers=A_DAY)
 
 
 def _body(scene: str, comment: Comment) -> CommentBody:
     picture = f"/api/scenes/{scene}/comments/{comment.id}/picture.webp" if comment.has_picture else None
-    return CommentBody.of(
+    return CommentBody.from_object(
         comment,
         **comment.pin,
-        created=moment(comment.created),
+        created=format_timestamp(comment.created),
         resolved=comment.resolved is not None,
         picture=picture,
     )

@@ -10,11 +10,11 @@ from fastapi.concurrency import run_in_threadpool
 from PIL import Image
 
 from relume.scene.model import Camera
-from relume.scene.placed_camera import placed_camera
-from server.library.ports import Finder
-from server.services import Services, Shared
+from relume.scene.placed_camera import make_custom_camera
+from server.library.ports import PlacementViewport
+from server.services import Services, ServicesDep
 from server.wire.body import Id
-from server.wire.cameras import CameraFrame, FinderBody, FinderPixel, FinderView, PlaceBody
+from server.wire.cameras import CameraFrame, PickBody, ViewportBody, ViewportPixel, ViewportRequest
 from worker.paths import scene_path
 from worker.scenes import get_scene
 
@@ -30,40 +30,40 @@ class JpegResponse(Response):
 
 
 @router.get("")
-async def get_finder(scene: Id, services: Shared) -> FinderBody:
+async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
     """Where the scene is; reads it, which may take seconds."""
-    finder = await _finder(scene, services)
-    framing = finder.framing
+    viewport = await _open_viewport(scene, services)
+    framing = viewport.framing
     frame = CameraFrame(to_world=framing.to_world.ravel().tolist(), yfov=math.degrees(framing.yfov))
-    return FinderBody(lowest=finder.lowest.tolist(), highest=finder.highest.tolist(), framing=frame)
+    return ViewportBody(lowest=viewport.lowest.tolist(), highest=viewport.highest.tolist(), framing=frame)
 
 
 @router.post("", response_class=JpegResponse, name="draw_finder")
-async def picture(scene: Id, view: FinderView, services: Shared) -> JpegResponse:
+async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep) -> JpegResponse:
     """What a camera would see, in plain colours."""
-    camera, finder = _camera(view), await _finder(scene, services)
+    camera, viewport = _camera(view), await _open_viewport(scene, services)
 
-    def drawn() -> bytes:
+    def encode_jpeg() -> bytes:
         file = io.BytesIO()
-        Image.fromarray(finder.image(camera, view.size)).save(file, "JPEG", quality=JPEG_QUALITY)
+        Image.fromarray(viewport.image(camera, view.size)).save(file, "JPEG", quality=JPEG_QUALITY)
         return file.getvalue()
 
-    return JpegResponse(await run_in_threadpool(drawn), headers={"Cache-Control": "no-store"})
+    return JpegResponse(await run_in_threadpool(encode_jpeg), headers={"Cache-Control": "no-store"})
 
 
 @router.post("/place", name="place_in_finder")
-async def place(scene: Id, pixel: FinderPixel, services: Shared) -> PlaceBody:
+async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBody:
     """What a position of that picture shows."""
-    camera, finder = _camera(pixel), await _finder(scene, services)
-    found = await run_in_threadpool(finder.place_at, camera, pixel.size, pixel.x, pixel.y)
-    return PlaceBody(position=None if found is None else found.tolist())
+    camera, viewport = _camera(pixel), await _open_viewport(scene, services)
+    position = await run_in_threadpool(viewport.point_at, camera, pixel.size, pixel.x, pixel.y)
+    return PickBody(position=None if position is None else position.tolist())
 
 
-async def _finder(scene: str, services: Services) -> Finder:
+async def _open_viewport(scene: str, services: Services) -> PlacementViewport:
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     folder = scene_path(services.settings.data, record.id)
-    return await services.pictures.make(("finder", folder), lambda: services.live.library.finder(folder))
+    return await services.pictures.run(("finder", folder), lambda: services.live.library.open_viewport(folder))
 
 
 def _camera(frame: CameraFrame) -> Camera:
-    return placed_camera("finder", frame.to_world, frame.yfov).camera
+    return make_custom_camera("finder", frame.to_world, frame.yfov).camera

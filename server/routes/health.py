@@ -7,7 +7,7 @@ from fastapi.responses import PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from sqlalchemy import select
 
-from server.services import Shared
+from server.services import ServicesDep
 from worker.database.models import BakeRow
 
 router = APIRouter(tags=["health"])
@@ -20,9 +20,9 @@ async def livez() -> dict[str, str]:
 
 
 @router.get("/readyz")
-def readyz(services: Shared) -> dict[str, str]:
+def readyz(services: ServicesDep) -> dict[str, str]:
     """The database can be read, the data directory has room, and the server is not being stopped."""
-    services.leave.check()
+    services.drain.check()
     with services.bakes.ledger.sessions() as session:
         session.execute(select(BakeRow.id).limit(1))
     services.access.quotas.check_room()
@@ -30,6 +30,6 @@ def readyz(services: Shared) -> dict[str, str]:
 
 
 @router.get("/metrics", response_class=PlainTextResponse)
-def metrics(services: Shared) -> PlainTextResponse:
+def metrics(services: ServicesDep) -> PlainTextResponse:
     """Prometheus text."""
     return PlainTextResponse(generate_latest(services.metrics.registry), headers={"Content-Type": CONTENT_TYPE_LATEST})

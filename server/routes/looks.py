@@ -14,9 +14,9 @@ from relume.errors import ParameterError
 from server.files.moments import small_picture
 from server.openapi import LOOK, files
 from server.records.looks import ListedLook, SavedLook, check_name, parse_document
-from server.routes.paging import Paged, newest
-from server.services import Shared
-from server.wire.bodies import LookEntry, ThumbnailRequest, moment
+from server.routes.paging import PageDep, newest
+from server.services import ServicesDep
+from server.wire.bodies import LookEntry, ThumbnailRequest, format_timestamp
 
 router = APIRouter(prefix="/api/looks", tags=["looks"])
 Etags = Annotated[str | None, Header(max_length=4096)]
@@ -25,13 +25,13 @@ LOOK_BODY = {"requestBody": {"required": True, "content": LOOK_CONTENT}}
 
 
 @router.get("")
-def list_looks(services: Shared, page: Paged) -> list[LookEntry]:
+def list_looks(services: ServicesDep, page: PageDep) -> list[LookEntry]:
     """Names and versions, newest first."""
     return [_entry(look) for look in page.cut(services.looks.list(), lambda look: newest(look.modified, look.name))]
 
 
 @router.get("/{name}", responses={200: {"content": LOOK_CONTENT}})
-def get_look(name: str, services: Shared) -> Response:
+def get_look(name: str, services: ServicesDep) -> Response:
     """One look, with its version as ETag."""
     look = services.looks.get(check_name(name))
     return Response(look.document, headers=_headers(look), media_type="application/json")
@@ -46,7 +46,7 @@ def get_look(name: str, services: Shared) -> Response:
 async def put_look(
     name: str,
     request: Request,
-    services: Shared,
+    services: ServicesDep,
     if_match: Etags = None,
     if_none_match: Etags = None,
     created: AwareDatetime | None = None,
@@ -66,24 +66,28 @@ async def put_look(
 
 
 @router.put("/{name}/thumbnail", status_code=204, name="put_look_thumbnail")
-def put_thumbnail(name: str, request: ThumbnailRequest, services: Shared, if_match: Etags = None) -> Response:
+def put_thumbnail(name: str, request: ThumbnailRequest, services: ServicesDep, if_match: Etags = None) -> Response:
     """Store a picture of the version that If-Match names; another version has none."""
     services.looks.put_thumbnail(check_name(name), small_picture(request.picture), if_match)
     return Response(status_code=204)
 
 
 @router.get(
-    "/{name}/thumbnail.webp", response_class=Response,
-    name="get_look_thumbnail", responses=files("image/webp"),
+    "/{name}/thumbnail.webp",
+    response_class=Response,
+    name="get_look_thumbnail",
+    responses=files("image/webp"),
 )
-def get_thumbnail(name: str, services: Shared, version: Annotated[str | None, Query(max_length=64)] = None) -> Response:
+def get_thumbnail(
+    name: str, services: ServicesDep, version: Annotated[str | None, Query(max_length=64)] = None
+) -> Response:
     """The picture of a look as it is, at most 320 pixels a side; `version` makes the address change when it does."""
     picture = services.looks.thumbnail(check_name(name))
     return Response(picture, media_type="image/webp", headers={"Cache-Control": "no-cache"})
 
 
 @router.delete("/{name}", status_code=204)
-def delete_look(name: str, services: Shared, if_match: Etags = None) -> Response:
+def delete_look(name: str, services: ServicesDep, if_match: Etags = None) -> Response:
     """Delete the version that If-Match names."""
     services.looks.delete(check_name(name), if_match)
     return Response(status_code=204)
@@ -94,8 +98,8 @@ def _entry(look: SavedLook | ListedLook) -> LookEntry:
     return LookEntry(
         name=look.name,
         etag=look.etag,
-        created=moment(look.created),
-        modified=moment(look.modified),
+        created=format_timestamp(look.created),
+        modified=format_timestamp(look.modified),
         bytes=look.num_bytes,
         thumbnail=address if look.has_thumbnail else None,
     )

@@ -12,28 +12,28 @@ from fastapi.concurrency import run_in_threadpool
 from relume.brdf import registry
 from relume.brdf.albedo import directional_albedo, reflectance
 from relume.brdf.document import complete_term
-from relume.brdf.mirror import mirrors_below
-from server.routes.paging import Paged
-from server.wire.models import AlbedoBody, InOutBody, ModelBody, TermsRequest
+from relume.brdf.mirror import specular_threshold
+from server.routes.paging import PageDep
+from server.wire.models import AlbedoBody, ModelBody, TermsRequest, ZernikeFitBody
 
 router = APIRouter(prefix="/api/models", tags=["models"])
 
 
 @router.get("")
-def list_models(page: Paged) -> list[ModelBody]:
+def list_models(page: PageDep) -> list[ModelBody]:
     """Every BRDF term."""
     terms = page.in_order(registry.describe())
-    return [ModelBody(**term, mirrors_below=mirrors_below(term["model"])) for term in terms]
+    return [ModelBody(**term, mirrors_below=specular_threshold(term["model"])) for term in terms]
 
 
 @router.post("/in-out")
-async def show_in_out(request: TermsRequest) -> list[InOutBody]:
+async def get_zernike_fit(request: TermsRequest) -> list[ZernikeFitBody]:
     """How terms are sent in views whose eye moves: the in-out factorisation of each (Mahajan 2008)."""
-    return await run_in_threadpool(_in_out, _complete(request))
+    return await run_in_threadpool(_zernike_fit, _complete(request))
 
 
 @router.post("/albedo")
-async def show_albedo(request: TermsRequest) -> AlbedoBody:
+async def get_albedo(request: TermsRequest) -> AlbedoBody:
     """What share of the light that meets a material of these terms it sends back: no more than all, in the world."""
     return await run_in_threadpool(_albedo, _complete(request))
 
@@ -49,7 +49,7 @@ def _albedo(terms: list[dict[str, Any]]) -> AlbedoBody:
     return AlbedoBody(mean=mean.tolist(), most=float(albedo[row].max()), at_deg=math.degrees(theta[row]))
 
 
-def _in_out(terms: list[dict[str, Any]]) -> list[InOutBody]:
-    from relume.moving.basis.in_out import in_out  # loads compiled kernels
+def _zernike_fit(terms: list[dict[str, Any]]) -> list[ZernikeFitBody]:
+    from relume.moving.basis.in_out import factorization_error  # loads compiled kernels
 
-    return [InOutBody(**in_out(term)._asdict()) for term in terms]
+    return [ZernikeFitBody(**factorization_error(term)._asdict()) for term in terms]

@@ -55,9 +55,9 @@ class Page:
         ] = None,
     ) -> None:
         self._request, self._response, self.limit = request, response, limit
-        self.after = None if after is None else _key_of(after)
+        self.after = None if after is None else _decode_cursor(after)
 
-    def at_most(self, limit: int) -> int:
+    def default_limit(self, limit: int) -> int:
         """How many are asked for; so many where nobody says. With one more it shows whether there is a next part."""
         self.limit = self.limit or limit
         return self.limit
@@ -72,14 +72,14 @@ class Page:
             ParameterError: `after` is of another list.
         """
         ordered = sorted(entries, key=key)
-        begin = 0
+        start = 0
         if self.after is not None and ordered:
             self.check(key(ordered[0]))
-            begin = bisect_right(ordered, self.after, key=key)
-        end = len(ordered) if self.limit is None else begin + self.limit
+            start = bisect_right(ordered, self.after, key=key)
+        end = len(ordered) if self.limit is None else start + self.limit
         if end < len(ordered):
-            self._link(key(ordered[end - 1]))
-        return ordered[begin:end]
+            self._set_next_link(key(ordered[end - 1]))
+        return ordered[start:end]
 
     def in_order(self, entries: Iterable[Entry]) -> list[Entry]:
         """The entries that are asked for of a list whose order never changes."""
@@ -87,31 +87,31 @@ class Page:
 
     def check(self, key: Key) -> None:
         """Whether `after` is of a list with such keys. Raises ParameterError."""
-        if self.after is not None and [isinstance(part, str) for part in self.after] != [
-            isinstance(part, str) for part in key
+        if self.after is not None and [isinstance(value, str) for value in self.after] != [
+            isinstance(value, str) for value in key
         ]:
             raise _no_cursor(str(self._request.query_params.get("after")))
 
-    def _link(self, last: Key) -> None:
-        url = self._request.url.include_query_params(limit=self.limit, after=_cursor_of(last))
+    def _set_next_link(self, last: Key) -> None:
+        url = self._request.url.include_query_params(limit=self.limit, after=_encode_cursor(last))
         self._response.headers["Link"] = f'<{url.path}?{url.query}>; rel="next"'
 
 
-Paged = Annotated[Page, Depends()]
+PageDep = Annotated[Page, Depends()]
 
 
-def _cursor_of(key: Key) -> str:
+def _encode_cursor(key: Key) -> str:
     return base64.urlsafe_b64encode(json.dumps(key, separators=(",", ":")).encode()).decode().rstrip("=")
 
 
-def _key_of(cursor: str) -> Key:
+def _decode_cursor(cursor: str) -> Key:
     try:
-        found: Any = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)), parse_constant=_refuse)
+        values: Any = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)), parse_constant=_refuse)
     except (ValueError, binascii.Error, RecursionError):
         raise _no_cursor(cursor) from None
-    if not isinstance(found, list) or not all(isinstance(part, float | int | str) for part in found):
+    if not isinstance(values, list) or not all(isinstance(value, float | int | str) for value in values):
         raise _no_cursor(cursor)
-    return tuple(part if isinstance(part, str) else float(part) for part in found)
+    return tuple(value if isinstance(value, str) else float(value) for value in values)
 
 
 def _refuse(name: str) -> float:
@@ -138,23 +138,23 @@ def check_query(request: Request) -> None:
 
     What is passed over in silence is an error that nobody sees: a filter that was misspelled lists everything.
     """
-    known = _known(request.scope["route"])
+    allowed_names = _query_names(request.scope["route"])
     for name in request.query_params:
-        if name not in known:
-            able = f"only {', '.join(known)}" if known else "none: this call takes no query"
-            raise ParameterError(f"query parameter {name[:80]}", request.query_params[name], able)
+        if name not in allowed_names:
+            allowed = f"only {', '.join(allowed_names)}" if allowed_names else "none: this call takes no query"
+            raise ParameterError(f"query parameter {name[:80]}", request.query_params[name], allowed)
 
 
-_KNOWN: dict[Callable[..., Any], Sequence[str]] = {}
+_QUERY_NAMES: dict[Callable[..., Any], Sequence[str]] = {}
 
 
-def _known(route: APIRoute) -> Sequence[str]:
+def _query_names(route: APIRoute) -> Sequence[str]:
     """Names of the parameters that a route's query may have."""
-    if route.endpoint not in _KNOWN:
-        _KNOWN[route.endpoint] = _names(route.dependant)
-    return _KNOWN[route.endpoint]
+    if route.endpoint not in _QUERY_NAMES:
+        _QUERY_NAMES[route.endpoint] = _names(route.dependant)
+    return _QUERY_NAMES[route.endpoint]
 
 
 def _names(dependant: Dependant) -> list[str]:
-    own = [param.alias for param in dependant.query_params]
-    return own + [name for each in dependant.dependencies for name in _names(each)]
+    names = [param.alias for param in dependant.query_params]
+    return names + [name for dependency in dependant.dependencies for name in _names(dependency)]

@@ -14,24 +14,24 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.errors import NotFoundError, RelumeError, VersionMismatchError
 from relume.look import complete
-from relume.picture.transfer import Opened
-from server.access.roles import caller_of
+from relume.picture.transfer import OpenBake
+from server.access.roles import get_caller
 from server.errors import (
     CLOSE_PROTOCOL,
-    ElsewhereError,
-    LeavingError,
-    close_code_of,
-    problem_of,
+    DrainingError,
+    OtherServerError,
+    find_close_code,
+    find_mapping,
+    make_problem,
     problem_response,
-    row_of,
 )
 from server.live.reading import read_opening
-from server.live.rooms.door import door_of
+from server.live.rooms.door import parse_join_request
 from server.live.session import serve
 from server.live.state.client_socket import ClientSocket
-from server.live.visit import Visit
+from server.live.visit import JoinContext
 from server.records.looks import check_name
-from server.routes.bakes import ready_bake
+from server.routes.bakes import require_ready_bake
 from server.services import Services
 from server.wire.protocol import SUBPROTOCOL
 from server.wire.rooms import ROOM_PREFIX
@@ -49,21 +49,21 @@ async def session(websocket: WebSocket, bake: str) -> None:
     """
     services: Services = websocket.app.state.services
     try:
-        services.leave.check()
-        async with _having_room(services, _room_prefix(websocket)):
+        services.drain.check()
+        async with _holding_room(services, _room_prefix(websocket)):
             await _accept(services, websocket, bake)
-    except (LeavingError, ElsewhereError) as error:
-        services.metrics.refused_sessions.labels(row_of(error).slug).inc()
-        await websocket.send_denial_response(problem_response(problem_of(error)))
+    except (DrainingError, OtherServerError) as error:
+        services.metrics.refused_sessions.labels(find_mapping(error).slug).inc()
+        await websocket.send_denial_response(problem_response(make_problem(error)))
 
 
 @asynccontextmanager
-async def _having_room(services: Services, prefix: str) -> AsyncIterator[None]:
+async def _holding_room(services: Services, prefix: str) -> AsyncIterator[None]:
     """With the rooms of that prefix, if any, on this server."""
     if not _PREFIX.fullmatch(prefix):  # that is said once it is accepted
         yield
         return
-    async with services.live.keeper.having(prefix):
+    async with services.live.room_lease.hold(prefix):
         yield
 
 
@@ -73,42 +73,42 @@ def _room_prefix(websocket: WebSocket) -> str:
 
 
 async def _accept(services: Services, websocket: WebSocket, bake: str) -> None:
-    is_ours = SUBPROTOCOL in websocket.scope["subprotocols"]
+    speaks_protocol = SUBPROTOCOL in websocket.scope["subprotocols"]
     try:
-        await websocket.accept(subprotocol=SUBPROTOCOL if is_ours else None)
+        await websocket.accept(subprotocol=SUBPROTOCOL if speaks_protocol else None)
     except OSError:  # the client has left while it waited
         return
     socket = ClientSocket(websocket, services.settings.ack_seconds)
     try:
-        if not is_ours:
+        if not speaks_protocol:
             raise VersionMismatchError(f"this server speaks {SUBPROTOCOL}; reload the page", CLOSE_PROTOCOL)
         await _serve(services, websocket, bake)
     except WebSocketDisconnect:
         return
     except (RelumeError, OSError) as error:
-        services.metrics.refused_sessions.labels(row_of(error).slug).inc()
-        await socket.close(close_code_of(error), problem_of(error).detail)
+        services.metrics.refused_sessions.labels(find_mapping(error).slug).inc()
+        await socket.close(find_close_code(error), make_problem(error).detail)
 
 
 async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
-    caller = caller_of(websocket)
+    caller = get_caller(websocket)
     with services.access.quotas.session(caller.name):
         opening = await read_opening(websocket)
-        door = door_of(opening, _room_prefix(websocket))
-        status = await run_in_threadpool(ready_bake, services, bake)
-        async with services.transfers.using(status.id, services.bakes.store_path(status.id)) as transfer:
+        join_request = parse_join_request(opening, _room_prefix(websocket))
+        status = await run_in_threadpool(require_ready_bake, services, bake)
+        async with services.transfers.acquire(status.id, services.bakes.store_path(status.id)) as transfer:
             if not transfer.views:
                 raise NotFoundError("this bake has no views; bake again")
             look = await run_in_threadpool(_look, services, transfer, opening.look, opening.share)
-            caller = caller.watching() if door is not None and door.room is None else caller
-            visit = Visit(caller, opening.resume, look, door)
-            await serve(services.live, websocket, status.id, transfer, visit)
+            caller = caller.watching() if join_request is not None and join_request.room is None else caller
+            context = JoinContext(caller, opening.resume, look, join_request)
+            await serve(services.live, websocket, status.id, transfer, context)
 
 
-def _look(services: Services, transfer: Opened, name: str | None, share: str | None) -> dict[str, Any] | None:
+def _look(services: Services, transfer: OpenBake, name: str | None, share_id: str | None) -> dict[str, Any] | None:
     """The saved or shared look that a session is to begin with; who may only look sees those, too."""
     if name is not None:
         return complete(json.loads(services.looks.get(check_name(name)).document), transfer.default_look)
-    if share is not None:
-        return complete(services.shares.get(share).document["look"], transfer.default_look)
+    if share_id is not None:
+        return complete(services.shares.get(share_id).document["look"], transfer.default_look)
     return None

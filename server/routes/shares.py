@@ -11,14 +11,14 @@ from relume import environments
 from relume import look as looks
 from relume.errors import NotFoundError
 from relume.measured.asset_store import STORE as MEASURED
-from relume.picture.transfer import Opened
-from relume.scene.placed_camera import placed_camera
+from relume.picture.transfer import OpenBake
+from relume.scene.placed_camera import make_custom_camera
 from server.records.shares import MAX_ID_LENGTH
-from server.routes.bakes import ready_bake
-from server.routes.paging import Paged, newest
-from server.routes.renders import baked_view, check_eye_size, check_look
-from server.services import Services, Shared
-from server.wire.bodies import ShareBody, ShareEntry, ShareListEntry, ShareRequest, moment
+from server.routes.bakes import require_ready_bake
+from server.routes.paging import PageDep, newest
+from server.routes.renders import baked_view, check_look, check_picture_size
+from server.services import Services, ServicesDep
+from server.wire.bodies import ShareBody, ShareEntry, ShareListEntry, ShareRequest, format_timestamp
 from server.wire.body import Id
 from worker.scenes import get_scene
 
@@ -27,10 +27,10 @@ ShareId = Annotated[str, Path(max_length=MAX_ID_LENGTH, pattern=r"^[a-z2-7]+$")]
 
 
 @router.post("", status_code=201, responses={200: {"model": ShareEntry, "description": "It was shared before"}})
-async def make_share(request: ShareRequest, services: Shared, response: Response) -> ShareEntry:
+async def create_share(request: ShareRequest, services: ServicesDep, response: Response) -> ShareEntry:
     """Save what a link shows: 201, or 200 where the same was shared before."""
-    status = await run_in_threadpool(ready_bake, services, request.bake)
-    async with services.transfers.using(request.bake, services.bakes.store_path(request.bake)) as transfer:
+    status = await run_in_threadpool(require_ready_bake, services, request.bake)
+    async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         look = await run_in_threadpool(_complete, request, transfer)
     document = {**request.model_dump(), "scene": status.scene, "look": look}
     identity, is_new = await run_in_threadpool(services.shares.put, document)
@@ -39,44 +39,52 @@ async def make_share(request: ShareRequest, services: Shared, response: Response
     return ShareEntry(id=identity, url=f"/?share={identity}")
 
 
-def _complete(request: ShareRequest, transfer: Opened) -> dict[str, Any]:
+def _complete(request: ShareRequest, transfer: OpenBake) -> dict[str, Any]:
     """The whole look, so that it stays what it is whatever defaults become."""
     for name in {request.view, *request.views, *request.eyes, *request.sizes}:
         baked_view(name, transfer)
-    for name, eye in request.eyes.items():
-        placed_camera(name, eye.to_world, eye.yfov)
+    for name, frame in request.eyes.items():
+        make_custom_camera(name, frame.to_world, frame.yfov)
     for size in request.sizes.values():
-        check_eye_size(size)
+        check_picture_size(size)
     check_look(request.look, transfer, "/look")
     return looks.complete(request.look, transfer.default_look)
 
 
 @router.get("")
-def list_shares(services: Shared, page: Paged, bake: Annotated[Id | None, Query()] = None) -> list[ShareListEntry]:
+def list_shares(
+    services: ServicesDep, page: PageDep, bake: Annotated[Id | None, Query()] = None
+) -> list[ShareListEntry]:
     """Links, newest first, or those of a bake."""
     links = services.shares.list("" if bake is None else f'"bake":"{bake}"')
     links = page.cut(links, lambda link: newest(link.created, link.id))
-    return [ShareListEntry.of(link, url=f"/?share={link.id}", created=moment(link.created)) for link in links]
+    return [
+        ShareListEntry.from_object(link, url=f"/?share={link.id}", created=format_timestamp(link.created))
+        for link in links
+    ]
 
 
 @router.get("/{share}")
-def get_share(share: ShareId, services: Shared, response: Response) -> ShareBody:
+def get_share(share: ShareId, services: ServicesDep, response: Response) -> ShareBody:
     """What a link shows, and what of it is not here any more."""
-    found = services.shares.get(share)
+    record = services.shares.get(share)
     response.headers["Cache-Control"] = "no-cache"
     return ShareBody(
-        id=found.id, created=moment(found.created), lacking=_lacking(found.document, services), **found.document
+        id=record.id,
+        created=format_timestamp(record.created),
+        lacking=_missing_assets(record.document, services),
+        **record.document,
     )
 
 
 @router.delete("/{share}", status_code=204)
-def delete_share(share: ShareId, services: Shared) -> Response:
+def delete_share(share: ShareId, services: ServicesDep) -> Response:
     """Make room for others; the link opens nothing any more."""
     services.shares.delete(share)
     return Response(status_code=204)
 
 
-def _lacking(document: dict[str, Any], services: Services) -> list[str]:
+def _missing_assets(document: dict[str, Any], services: Services) -> list[str]:
     """What a link names and the server has no more, one sentence each."""
     try:
         get_scene(services.bakes.ledger, document["scene"])
@@ -85,11 +93,11 @@ def _lacking(document: dict[str, Any], services: Services) -> list[str]:
     terms = [term for material in document["look"]["materials"].values() for term in material["terms"]]
     measured = sorted({term["data"] for term in terms if "data" in term})
     map_name = document["look"]["environment"]["map"]
-    lacking = [
+    missing = [
         f"The measured material {name} of this link was deleted; import it again."
         for name in measured
-        if not MEASURED.is_known(name)
+        if not MEASURED.exists(name)
     ]
-    if map_name is not None and not environments.is_known(map_name):
-        lacking.append(f"The environment {map_name} of this link was deleted; import it again.")
-    return lacking
+    if map_name is not None and not environments.environment_exists(map_name):
+        missing.append(f"The environment {map_name} of this link was deleted; import it again.")
+    return missing

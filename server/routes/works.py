@@ -6,33 +6,38 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, Field
 
-from server.queues.work import Work, WorkFilter
-from server.queues.work_queue import WorkQueue
+from server.queues.work import Job, JobFilter
+from server.queues.work_queue import JobQueue
 from server.routes.paging import MAX_LONG, Key, Page, newest
-from server.wire.bodies import moment
+from server.wire.bodies import format_timestamp
 
 Request = TypeVar("Request", bound=BaseModel)
 UserName = Annotated[str, Field(max_length=80)]
 
 
-def work_page(
-    queue: WorkQueue[Request], which: WorkFilter, page: Page, most: int = MAX_LONG, *, newest_first: bool = True
-) -> list[Work[Request]]:
+def list_jobs(
+    queue: JobQueue[Request],
+    job_filter: JobFilter,
+    page: Page,
+    default_limit: int = MAX_LONG,
+    *,
+    newest_first: bool = True,
+) -> list[Job[Request]]:
     """A part of a queue's list. most: how long it is at most where nobody says that."""
 
-    def key(work: Work[Request]) -> Key:
-        return newest(work.created, work.id) if newest_first else (work.created, work.id)
+    def key(job: Job[Request]) -> Key:
+        return newest(job.created, job.id) if newest_first else (job.created, job.id)
 
     page.check((0.0, ""))
     after = None
     if page.after is not None:
         created, identity = float(page.after[0]), str(page.after[1])
         after = -created if newest_first else created, identity
-    works = queue.page(which, page.at_most(most) + 1, after, newest_first=newest_first)
-    return page.cut(works, key)
+    jobs = queue.page(job_filter, page.default_limit(default_limit) + 1, after, newest_first=newest_first)
+    return page.cut(jobs, key)
 
 
-def moments(work: Work[Request]) -> dict[str, str | None]:
+def format_timestamps(job: Job[Request]) -> dict[str, str | None]:
     """When it was asked for, begun and ended, as bodies say it."""
-    times = {"created": work.created, "started": work.started, "ended": work.ended}
-    return {name: None if at is None else moment(at) for name, at in times.items()}
+    times = {"created": job.created, "started": job.started, "ended": job.ended}
+    return {name: None if at is None else format_timestamp(at) for name, at in times.items()}

@@ -125,7 +125,7 @@ class Connection(HttpToolsProtocol):
 
     def _end(self, answer: bytes) -> None:
         """Close, with an answer where none has begun."""
-        is_begun = self.cycle is not None and self.cycle.response_started
-        if self._is_in_head or not is_begun:
+        has_started = self.cycle is not None and self.cycle.response_started
+        if self._is_in_head or not has_started:
             self.transport.write(answer)
         self.transport.close()

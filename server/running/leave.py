@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import asyncio
 
-from server.errors import LeavingError
+from server.errors import DrainingError
 
-LEAVING = "the server is being stopped or exchanged; it is back in a while, and nothing is lost"
+DRAIN_MESSAGE = "the server is being stopped or exchanged; it is back in a while, and nothing is lost"
 
 
-class Leave:
+class DrainState:
     """Begun once, on the event loop."""
 
     def __init__(self) -> None:
-        self._begun = asyncio.Event()
+        self._started = asyncio.Event()
 
     @property
-    def is_taken(self) -> bool:
+    def is_draining(self) -> bool:
         """Whether it has begun."""
-        return self._begun.is_set()
+        return self._started.is_set()
 
-    def take(self) -> None:
+    def start(self) -> None:
         """Begin."""
-        self._begun.set()
+        self._started.set()
 
-    async def taken(self) -> None:
+    async def wait(self) -> None:
         """Wait until it has begun."""
-        await self._begun.wait()
+        await self._started.wait()
 
     def check(self) -> None:
         """Raises LeavingError where it has begun: nothing that lasts is to be begun any more."""
-        if self.is_taken:
-            raise LeavingError(LEAVING)
+        if self.is_draining:
+            raise DrainingError(DRAIN_MESSAGE)

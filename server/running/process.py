@@ -13,34 +13,34 @@ from types import FrameType
 
 import uvicorn
 
-from server.running.leave import Leave
+from server.running.leave import DrainState
 
 log = logging.getLogger(__name__)
 
 
-class Process(uvicorn.Server):
+class ServerProcess(uvicorn.Server):
     """Runs the app until it is stopped: by SIGTERM after its sessions have left, by SIGINT or a second SIGTERM at once.
 
     Args:
-        leave: what sessions and /readyz hear of. num_sessions: that are open.
+        drain: what sessions and /readyz hear of. num_sessions: that are open.
         drain_seconds: how long they may take to leave. stop_seconds: how long all else may take after that.
-        tell_started: called once requests are answered. end: ends this process, whatever it does.
+        on_started: called once requests are answered. end: ends this process, whatever it does.
     """
 
     def __init__(
         self,
         config: uvicorn.Config,
         *,
-        leave: Leave,
+        drain: DrainState,
         num_sessions: Callable[[], int],
         drain_seconds: float,
         stop_seconds: float,
-        tell_started: Callable[[], object] = lambda: None,
+        on_started: Callable[[], object] = lambda: None,
         end: Callable[[int], object] = os._exit,
     ) -> None:
         super().__init__(config)
-        self._leave, self._num_sessions = leave, num_sessions
-        self._tell_started, self._end = tell_started, end
+        self._drain, self._num_sessions = drain, num_sessions
+        self._on_started, self._end = on_started, end
         self._drain_seconds, self._stop_seconds = drain_seconds, stop_seconds
         self._until_s: float | None = None
         self._signal: int | None = None
@@ -58,7 +58,7 @@ class Process(uvicorn.Server):
         """Open what the app needs, then listen."""
         await super().startup(sockets)
         if self.started:
-            self._tell_started()
+            self._on_started()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A signal has come: the first SIGTERM is seen to by `on_tick`, on the event loop."""
@@ -76,7 +76,7 @@ class Process(uvicorn.Server):
             if self._until_s is None:
                 self._until_s = time.monotonic() + self._drain_seconds
                 log.warning("stopping: %d sessions are told to leave", self._num_sessions())
-                self._leave.take()
+                self._drain.start()
             if self._num_sessions() == 0 or time.monotonic() > self._until_s:
                 super().handle_exit(self._signal, None)
         should_exit = await super().on_tick(counter)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from server.wire.body import Body
 
-RoleWord = Literal["anyone", "view", "edit", "admin"]
+AnyRoleName = Literal["anyone", "view", "edit", "admin"]
 
 
 class LoginRequest(Body):
@@ -23,7 +23,7 @@ class MeBody(Body):
 
     login: bool
     name: str
-    role: RoleWord
+    role: AnyRoleName
     by: Literal["open", "nobody", "token", "proxy"]
     viewers_comment: bool
 
@@ -34,7 +34,7 @@ class AuditEntry(Body):
     number: int
     at: str
     who: str
-    role: RoleWord
+    role: AnyRoleName
     address: str
     what: str
     object: str

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from relume.look.document import MAX_BOUNCES
-from relume.look.model import Show
+from relume.look.model import PathFilter
 from relume.remarks import Effect
-from server.wire.body import Body, Id, Name, WorkState
+from server.wire.body import Body, Id, JobState, Name
 from server.wire.cameras import CameraBody, CameraFrame
 from server.wire.comments import MAX_PICTURE_TEXT
 from server.wire.protocol import MAX_VIEWS_SHOWN
@@ -20,7 +20,7 @@ from worker.status import Phase
 Preset = Literal["preview", "good", "final"]
 
 
-def moment(posix_s: float) -> str:
+def format_timestamp(posix_s: float) -> str:
     """A time as all bodies write it: ISO 8601, UTC."""
     return datetime.fromtimestamp(posix_s, UTC).isoformat()
 
@@ -34,9 +34,12 @@ class SceneView(Body):
 
 
 class SceneMaterial(Body):
-    """A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its
-    shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection. `is_glass`:
-    light passes it, as the scene's file says and no look changes."""
+    """A material and its default terms, in look-document form.
+
+    `shadow_catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles
+    have no texture coordinates, and take a projection. `is_glass`: light passes it, as the scene's file says and no
+    look changes.
+    """
 
     name: str
     terms: list[dict[str, Any]]
@@ -52,8 +55,8 @@ class SceneVariant(Body):
     look: dict[str, Any]
 
 
-class SceneRemark(Body):
-    """What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it."""
+class SceneWarning(Body):
+    """What the import has to say: `wrong` in the picture, `approximated`, or `ignored` without harm to it."""
 
     text: str
     effect: Effect
@@ -73,13 +76,13 @@ class SceneBody(Body):
     lights: list[str]
     variants: list[SceneVariant]
     warnings: list[str]
-    remarks: list[SceneRemark]
+    remarks: list[SceneWarning]
     triangles: int
     thumbnail: str | None
     bakes: list[str]
 
 
-class BuiltInBody(Body):
+class ExampleSceneBody(Body):
     """A scene made by code; `size` and `method` of a bake show it well."""
 
     name: str
@@ -176,10 +179,10 @@ class BakeRequest(Body):
     preset's picture, of as many pixels; beside a `size` it says nothing.
 
     `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
-    where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none,
-    and a number of them is refused.
-    `gather_samples`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point,
-    that look for them; as many as fit the picture where they are not named (methods `gather` and `surface`).
+    where none are named. `points`: that light is kept at where the eye moves (method `stored_scene`); fixed views have
+    none, and a number of them is refused.
+    `sample_points`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point,
+    that look for them; as many as fit the picture where they are not named (methods `gather` and `stored_scene`).
     `relightable`: divide the light so that turning or exchanging the environment errs little.
     """
 
@@ -210,7 +213,7 @@ class PlanBody(Body):
 
 class RecipeBody(Body):
     """What was asked for, complete; `cameras` are those of the `views` that somebody placed. `points`: null where the
-    eye does not move. `gather_samples`, `gather_rays`: null where the method chooses."""
+    eye does not move. `sample_points`, `gather_rays`: null where the method chooses."""
 
     method: str
     views: list[str]
@@ -277,9 +280,9 @@ class ThumbnailRequest(Body):
 
 
 class SharedPaths(Body):
-    """Light paths that are looked at; as a look's `transport`."""
+    """Light paths that are looked at; as a look's `edit_transport`."""
 
-    show: Show
+    show: PathFilter
     bounces: Annotated[int, Field(ge=0, le=MAX_BOUNCES)]
 
 
@@ -325,7 +328,7 @@ class ShareBody(ShareRequest):
     lacking: list[str]
 
 
-class TruthRequest(Body):
+class ComparisonRequest(Body):
     """Compare a look with brute force, in so many passes; figures come from the second on.
 
     `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone,
@@ -343,7 +346,7 @@ class TruthRequest(Body):
     dry_run: bool = False
 
 
-class TruthPlanBody(Body):
+class ComparisonPlanBody(Body):
     """The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn.
 
     `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment.
@@ -354,7 +357,7 @@ class TruthPlanBody(Body):
     is_measured: bool
 
 
-class TruthFigures(Body):
+class ComparisonFigures(Body):
     """Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md.
 
     `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its
@@ -370,20 +373,20 @@ class TruthFigures(Body):
     significant: float
 
 
-class TruthBody(Body):
+class ComparisonBody(Body):
     """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `user`
     asked for it; `created`, `started` and `ended` are times; null: not yet.
 
     `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method
-    follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves
-    out, too. In sentences; both are empty before the first pass.
+    follows. `left_out`: which paths the method leaves out of what the look shows; `unsupported_paths`: which brute
+    force leaves out, too. In sentences; both are empty before the first pass.
     """
 
     id: str
     user: str
     bake: str
     view: str
-    state: WorkState
+    state: JobState
     created: str
     started: str | None
     ended: str | None
@@ -394,6 +397,6 @@ class TruthBody(Body):
     paths: Literal["all", "method"]
     left_out: list[str]
     untraced: list[str]
-    found: TruthFigures | None
-    found_of_method: TruthFigures | None
+    found: ComparisonFigures | None
+    found_of_method: ComparisonFigures | None
     problem: str | None

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 Id = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 MAX_NAME = 256
 Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
-WorkState = Literal["queued", "running", "ready", "failed", "stopped"]
+JobState = Literal["queued", "running", "ready", "failed", "stopped"]
 
 
 class Body(BaseModel):
@@ -18,7 +18,7 @@ class Body(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     @classmethod
-    def of(cls, status: object, **more: Any) -> Self:
-        """A body whose fields are the attributes of `status` with the same names, and `more`."""
-        own = {name: getattr(status, name) for name in cls.model_fields if name not in more}
-        return cls(**own, **more)
+    def from_object(cls, source: object, **more: Any) -> Self:
+        """A body whose fields are the attributes of `source` with the same names, and `more`."""
+        values = {name: getattr(source, name) for name in cls.model_fields if name not in more}
+        return cls(**values, **more)

@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.wire.body import Body, Id, Name, WorkState
+from server.wire.body import Body, Id, JobState, Name
 
 Geometry = Literal["weave", "pebbles", "corduroy"]
-Made = Literal[Geometry, "mesh"]
+GeometrySource = Literal[Geometry, "mesh"]
 Texels = Annotated[int, Field(ge=8, le=256)]
 Period = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False, description="side of what repeats, metres")]
 TEXELS = 128
@@ -31,20 +31,20 @@ class BtfRequest(Body):
 
     name: Name
     error: Bound
-    geometry: Made | None = None
+    geometry: GeometrySource | None = None
     size: int = 0
     period: Period | None = None
 
 
-class BtfWorkBody(Body):
+class BtfJobBody(Body):
     """A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. `user` asked
     for it; `created`, `started` and `ended` are times; null: not yet."""
 
     id: Id
     name: str
     user: str
-    geometry: Made | None
-    state: WorkState
+    geometry: GeometrySource | None
+    state: JobState
     created: str
     started: str | None
     ended: str | None

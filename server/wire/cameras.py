@@ -8,7 +8,7 @@ from pydantic import Field
 
 from server.wire.body import Body, Name
 
-FinderSide = Annotated[int, Field(ge=16, le=1024)]
+ViewportSide = Annotated[int, Field(ge=16, le=1024)]
 
 
 class CameraFrame(Body):
@@ -33,7 +33,7 @@ class CameraEntry(CameraBody):
     is_placed: bool
 
 
-class FinderBody(Body):
+class ViewportBody(Body):
     """The corners of a scene, metres, and a camera that sees all of it."""
 
     lowest: list[float]
@@ -41,20 +41,20 @@ class FinderBody(Body):
     framing: CameraFrame
 
 
-class FinderView(CameraFrame):
+class ViewportRequest(CameraFrame):
     """A camera, and how many pixels of its picture are wanted."""
 
-    size: tuple[FinderSide, FinderSide]
+    size: tuple[ViewportSide, ViewportSide]
 
 
-class FinderPixel(FinderView):
+class ViewportPixel(ViewportRequest):
     """A position in such a picture, pixels from the left and from the top."""
 
     x: Annotated[float, Field(ge=0, le=1024)]
     y: Annotated[float, Field(ge=0, le=1024)]
 
 
-class PlaceBody(Body):
+class PickBody(Body):
     """World space, metres; null where nothing is there."""
 
     position: list[float] | None

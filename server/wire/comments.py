@@ -13,7 +13,7 @@ from server.wire.rooms import PersonName
 MAX_COMMENT = 2000
 MAX_PICTURE_TEXT = 350_000
 Side = Annotated[int, Field(ge=1, le=16384)]
-PixelPlace = Annotated[int, Field(ge=0, lt=16384)]
+PixelCoordinate = Annotated[int, Field(ge=0, lt=16384)]
 
 
 class CommentRequest(Body):
@@ -26,8 +26,8 @@ class CommentRequest(Body):
 
     bake: Id
     view: Name
-    x: PixelPlace
-    y: PixelPlace
+    x: PixelCoordinate
+    y: PixelCoordinate
     size: tuple[Side, Side]
     camera: CameraFrame | None = None
     text: Annotated[str, Field(min_length=1, max_length=MAX_COMMENT)]

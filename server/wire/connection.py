@@ -42,7 +42,7 @@ class PongMessage(Message):
     type: Literal["pong"] = "pong"
 
 
-class LeavingMessage(Message):
+class DrainMessage(Message):
     """server → client: the server is being stopped. Open the session again, there or on another server, within so many
     seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token."""
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 Pointer = Annotated[str, Field(min_length=1, max_length=512, pattern=r"^/")]
 Name = Annotated[str, Field(min_length=1, max_length=256)]
 Revision = Annotated[int, Field(ge=0, le=2**53)]
-RoleWord = Literal["view", "edit", "admin"]
+RoleName = Literal["view", "edit", "admin"]
 
 
 class Message(BaseModel):

@@ -42,8 +42,8 @@ class CurveBody(Body):
 
 class ModelBody(Body):
     """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the
-    parameter that maps of roughness scale, `width_power` the power of a roughness that it grows with, `mirrors_below`
-    where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`)."""
+    parameter that maps of roughness scale, `width_power` the power of a roughness that it grows with,
+    `specular_threshold` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`)."""
 
     model: str
     label: str
@@ -71,7 +71,7 @@ class BallRequest(TermsRequest):
     material: Name
 
 
-class InOutBody(Body):
+class ZernikeFitBody(Body):
     """How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share
     of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as
     a blurred mirror instead."""

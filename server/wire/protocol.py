@@ -17,11 +17,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
 from relume.look.patch import MAX_OPERATIONS
-from relume.picture.fidelity import Word
+from relume.picture.fidelity import FidelityLabel
 from relume.scene.checks import MAX_LIGHTS
-from server.wire.connection import LeavingMessage, OpenMessage, PingMessage, PongMessage
-from server.wire.message import Message, Name, PatchOperation, Pointer, Revision, RoleWord
-from server.wire.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, SharedMessage
+from server.wire.connection import DrainMessage, OpenMessage, PingMessage, PongMessage
+from server.wire.message import Message, Name, PatchOperation, Pointer, Revision, RoleName
+from server.wire.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, RoomUpdate
 from worker.status import Phase
 
 SUBPROTOCOL = "relume.v1"
@@ -52,13 +52,13 @@ class EditMessage(Message):
     solo: Sources | None = None
 
     @property
-    def says_solo(self) -> bool:
+    def changes_solo(self) -> bool:
         """Whether it changes what is alone."""
         return "solo" in self.model_fields_set
 
     @model_validator(mode="after")
     def _is_edit(self) -> EditMessage:
-        if not self.patch and not self.says_solo:
+        if not self.patch and not self.changes_solo:
             raise ValueError("an edit has a patch of one operation at least, or says what is solo")
         return self
 
@@ -103,7 +103,7 @@ class AckMessage(Message):
     frame: Annotated[int, Field(ge=0, le=2**53)]
 
 
-class StreamMessage(Message):
+class EncodingMessage(Message):
     """client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it."""
 
     type: Literal["stream"]
@@ -111,8 +111,8 @@ class StreamMessage(Message):
     quality: Annotated[int, Field(ge=1, le=95)] = 80
 
 
-class ProbeMessage(Message):
-    """client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `ProbeAnswer`."""
+class InspectMessage(Message):
+    """client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `InspectAnswer`."""
 
     type: Literal["probe"]
     view: Name | None = None
@@ -120,7 +120,7 @@ class ProbeMessage(Message):
     y: Pixel
 
 
-class BrushMessage(Message):
+class HighlightMessage(Message):
     """client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "brush"."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
@@ -131,7 +131,7 @@ class BrushMessage(Message):
     to_degrees: Degrees = Field(alias="to")
 
 
-class TouchMessage(Message):
+class PrepareMessage(Message):
     """client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now
     on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the
     environment: prepare for it, the open curve stays open."""
@@ -141,13 +141,13 @@ class TouchMessage(Message):
     parameter: Pointer | None = None
 
     @model_validator(mode="after")
-    def _is_one(self) -> TouchMessage:
+    def _has_one_target(self) -> PrepareMessage:
         if (self.curve is None) == (self.parameter is None):
             raise ValueError("a touch names a curve or a parameter, one of them")
         return self
 
 
-class EyeMessage(Message):
+class CameraMessage(Message):
     """client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames
     name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as
     in an edit; nothing is prepared for it. `rest`: "exact", an exact picture from there follows when the eye rests, and
@@ -163,7 +163,7 @@ class EyeMessage(Message):
     rest: Literal["exact", "stay"] = "exact"
 
 
-class EvaluateMessage(Message):
+class RendererMessage(Message):
     """client → server: who finds the pixels of views whose eye is "free" while they move. "browser": from now on frames
     of kind "tables" bring what a shader needs, beside what GET /api/bakes/{id}/surface gave once, each part again where
     it has changed; no frame comes for an eye alone. Exact pictures come as ever."""
@@ -180,12 +180,12 @@ ClientMessage = Annotated[
     | FocusMessage
     | RegionMessage
     | AckMessage
-    | StreamMessage
-    | ProbeMessage
-    | BrushMessage
-    | TouchMessage
-    | EyeMessage
-    | EvaluateMessage
+    | EncodingMessage
+    | InspectMessage
+    | HighlightMessage
+    | PrepareMessage
+    | CameraMessage
+    | RendererMessage
     | PresenceMessage
     | PingMessage,
     Field(discriminator="type"),
@@ -223,7 +223,7 @@ class ViewInfo(Message):
     bounds: tuple[list[float], list[float]] | None = None
 
 
-class MovingError(Message):
+class FreeCameraError(Message):
     """How far pictures are from the exact ones while an eye moves, measured in the bake: relative RMS over the surfaces
     that a few eyes see, in the scene's own look."""
 
@@ -236,8 +236,8 @@ class HelloMessage(Message):
 
     `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the
     light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`:
-    where others share the look, null for a session of one. `moving_error`: null where no eye moves, of bakes of before,
-    and where it could not be measured.
+    where others share the look, null for a session of one. `free_camera_error`: null where no eye moves, of bakes of
+    before, and where it could not be measured.
     """
 
     type: Literal["hello"] = "hello"
@@ -255,9 +255,9 @@ class HelloMessage(Message):
     views: list[ViewInfo]
     materials: list[str]
     resume: str
-    role: RoleWord
+    role: RoleName
     room: RoomInfo | None
-    moving_error: MovingError | None = None
+    moving_error: FreeCameraError | None = None
 
 
 class StatusMessage(Message):
@@ -279,7 +279,7 @@ class ProblemMessage(Message):
     problem: Problem
 
 
-class ProbeAnswer(Message):
+class InspectAnswer(Message):
     """server → client: one pixel; `bands` is each band's contribution of the active curve, per channel.
 
     `position` and `normal` are of the surface that covers most of it, world space; null for background.
@@ -324,12 +324,12 @@ ServerMessage = (
     HelloMessage
     | StatusMessage
     | ProblemMessage
-    | ProbeAnswer
+    | InspectAnswer
     | CurveMessage
     | BakeMessage
-    | LeavingMessage
+    | DrainMessage
     | RoomMessage
-    | SharedMessage
+    | RoomUpdate
     | CommentsMessage
     | PongMessage
 )
@@ -351,7 +351,7 @@ class ArrayInfo(Message):
     shape: tuple[int, int]
 
 
-class TablesInfo(Message):
+class SceneUpdate(Message):
     """What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what
     lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height
     and width of each. `lamps`: of the sky, that lobes show apart: direction, light, spread. `is_direct`: light that
@@ -372,7 +372,7 @@ class TablesInfo(Message):
 
 
 class FrameHeader(Message):
-    """Header of a binary frame. `shared`: as in the last `SharedMessage` whose look it shows. `eye`: number of the eye
+    """Header of a binary frame. `shared`: as in the last `RoomUpdate` whose look it shows. `eye`: number of the eye
     that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how
     far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone."""
 
@@ -385,11 +385,11 @@ class FrameHeader(Message):
     tiles: list[tuple[int, int, int, int]]
     format: Literal["rgb9e5", "jpeg", "f32", "r8", "arrays"]
     exact: bool
-    fidelity: Word
+    fidelity: FidelityLabel
     complete: bool
     kind: Literal["picture", "brush", "tables"]
     alpha: bool = False
     eye: int | None = None
     was_off: float | None = None
-    tables: TablesInfo | None = None
+    tables: SceneUpdate | None = None
     ms: FrameTimes

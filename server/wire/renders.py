@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from relume.exr.layers import Layering
-from relume.look.morph import Way
-from server.wire.body import Body, Id, Name, WorkState
+from relume.look.morph import InterpolationMode
+from server.wire.body import Body, Id, JobState, Name
 from server.wire.cameras import CameraFrame
 
 Side = Annotated[int, Field(ge=1, le=16384)]
@@ -16,10 +16,10 @@ ImageFormat = Literal["exr", "png", "webp"]
 RenderFormat = Literal["exr", "png", "webp", "mp4"]
 MAX_LOOKS = 1000
 MAX_FRAMES = 3600
-MAX_TOLD = 600  # frames whose looks are told at once
-MAX_TOLD_BYTES = 16 << 20
+MAX_LISTED_FRAMES = 600  # frames whose looks are told at once
+MAX_LISTED_BYTES = 16 << 20
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
-Turns = Literal["eye", "object", "environment"]
+TurntableSubject = Literal["eye", "object", "environment"]
 Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
@@ -34,24 +34,24 @@ class Turntable(Body):
     turntable: Frames
     start: CameraFrame | None = None
     about: Annotated[list[Metres], Field(min_length=3, max_length=3)] | None = None
-    turns: Turns = "eye"
+    turns: TurntableSubject = "eye"
 
 
-class EyePath(Body):
+class CameraPath(Body):
     """From camera to camera, at even shares of the frames; one frame each where no number of frames is given."""
 
     eyes: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
 
 
-def _way_of(path: Any) -> str:
+def _path_kind(path: Any) -> str:
     """Which way is meant, so that nobody is told what the other lacks."""
     is_round = isinstance(path, Turntable) or (isinstance(path, dict) and "turntable" in path)
     return "turntable" if is_round else "eyes"
 
 
 Path = Annotated[
-    Annotated[Turntable, Tag("turntable")] | Annotated[EyePath, Tag("eyes")],
-    Discriminator(_way_of),
+    Annotated[Turntable, Tag("turntable")] | Annotated[CameraPath, Tag("eyes")],
+    Discriminator(_path_kind),
 ]
 
 
@@ -63,7 +63,7 @@ class Keyframes(Body):
     bake: Id
     looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
     frames: Frames | None = None
-    between: Way = "parameters"
+    between: InterpolationMode = "parameters"
 
     @property
     def num_frames(self) -> int:
@@ -141,7 +141,7 @@ class RenderBody(Body):
     view: str
     format: RenderFormat
     size: tuple[int, int] | None
-    state: WorkState
+    state: JobState
     created: str
     started: str | None
     ended: str | None

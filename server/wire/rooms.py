@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from server.wire.message import Message, Name, Revision, RoleWord
+from server.wire.message import Message, Name, Revision, RoleName
 
 MAX_PERSON_NAME = 40
 PersonName = Annotated[str, Field(min_length=1, max_length=MAX_PERSON_NAME)]
@@ -26,13 +26,13 @@ class PresenceMessage(Message):
 
 
 class Person(Message):
-    """Somebody in a room. `number`: theirs as long as they are in it. `here`: false while their connection is lost."""
+    """Somebody in a room. `seq`: theirs as long as they are in it. `here`: false while their connection is lost."""
 
     number: int
     name: str
     color: str
     material: str | None
-    role: RoleWord
+    role: RoleName
     here: bool
 
 
@@ -73,7 +73,7 @@ class SharedOperation(Message):
     value: Any = None
 
 
-class SharedMessage(Message):
+class RoomUpdate(Message):
     """server → client: what the room's look has become since the last such message, or `hello`, with this session's own
     edits up to `revision` in it. The `patch` is empty where there were no others. `shared` counts its changes, and
     frames say which they show. `by`: numbers of those who edited."""

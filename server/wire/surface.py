@@ -5,8 +5,8 @@ from __future__ import annotations
 from server.wire.body import Body
 
 
-class LadderBody(Body):
-    """How the functions of the in-basis follow from each other; see `relume.basis.zernike.Ladder`."""
+class RecurrenceBody(Body):
+    """How the functions of the in-basis follow from each other; see `relume.basis.zernike.Recurrence`."""
 
     order: list[int]
     norm: list[float]
@@ -28,7 +28,7 @@ class LobeListsBody(Body):
     widths: int
 
 
-class ShapesBody(Body):
+class LobeShapesBody(Body):
     """Sizes of tables of highlights, see `relume.moving.basis.shapes`: rings, half an octave each, from the float that
     has the bits `least_bits`; spokes; widths of lights."""
 
@@ -38,19 +38,19 @@ class ShapesBody(Body):
     least_bits: int
 
 
-class SurfaceBody(Body):
-    """Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K).
+class FreeCameraBody(Body):
+    """Sizes of the tables: K functions, rows over θo, columns over φo. `basis_gradients` of leaning normals, (3, K).
     `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET
-    /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say:
-    pictures of the server show it."""
+    /api/bakes/{id}/surface/{array} gives. `has_alpha_tested_surfaces`: some surfaces are not everywhere, which the
+    arrays do not say: pictures of the server show it."""
 
     functions: int
     rows: int
     columns: int
-    ladder: LadderBody
+    ladder: RecurrenceBody
     expansions: list[list[float]]
     first_points: list[int]
     lobe_lists: LobeListsBody
-    shapes: ShapesBody
+    shapes: LobeShapesBody
     has_holes: bool
     arrays: list[str]

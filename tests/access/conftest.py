@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from server_fixtures import ack_seconds, baked, client, control, empty_ledger
 from server_fixtures import settings as open_settings
 
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.settings import Settings
 
 __all__ = ["ack_seconds", "baked", "client", "control", "empty_ledger", "open_settings"]
@@ -23,12 +23,12 @@ def settings(open_settings: Settings) -> Settings:
 
 
 @pytest.fixture
-def access(client: TestClient) -> Access:
+def access(client: TestClient) -> AuthServices:
     return client.app.state.services.access
 
 
 @pytest.fixture
-def bearer(access: Access) -> Callable[..., dict[str, str]]:
+def bearer(access: AuthServices) -> Callable[..., dict[str, str]]:
     """Headers of somebody with a role."""
 
     def headers(role: str, name: str | None = None, **more: Any) -> dict[str, str]:

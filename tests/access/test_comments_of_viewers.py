@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from server_fakes import SIZE
 from session_client import Baked
 
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.settings import Settings
 
 
@@ -21,7 +21,7 @@ def settings(settings: Settings) -> Settings:
 
 
 def test_viewers_write_under_their_name_and_change_nothing_else(
-    client: TestClient, baked: Baked, bearer: Callable[..., dict[str, str]], access: Access
+    client: TestClient, baked: Baked, bearer: Callable[..., dict[str, str]], access: AuthServices
 ) -> None:
     vera, path = bearer("view", "Vera"), f"/api/scenes/{baked.scene}/comments"
     pin: dict[str, Any] = {"bake": baked.bake, "view": "front", "x": 1, "y": 2, "size": SIZE, "text": "Too bright"}

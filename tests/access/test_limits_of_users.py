@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from btf_zips import zipped
 from fastapi.testclient import TestClient
-from server_fakes import SIZE, FakeMethod, made
+from server_fakes import SIZE, FakeMethod, write_tiny_scene
 from session_client import Baked
 from sqlalchemy import update
 
 from relume.bake import Recipe
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.audit import Audit, Change
-from server.access.buckets import Buckets
+from server.access.buckets import TokenBuckets
 from server.errors import BusyError
 from server.settings import Settings
 from worker.database.models import BakeRow
@@ -33,12 +33,12 @@ SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
 @pytest.fixture
 def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     """Importing makes the tiny scene, without a process of its own."""
-    monkeypatch.setattr(client.app.state.services.intake.importers, "run", made)
+    monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)
 
 
 def test_buckets_fill_again() -> None:
     now_s = 0.0
-    buckets = Buckets(2.0, 3, lambda: now_s)
+    buckets = TokenBuckets(2.0, 3, lambda: now_s)
     assert [buckets.take("Ann") for _ in range(4)] == [0, 0, 0, 0.5]
     assert buckets.take("Bob") == 0
     now_s = 0.5
@@ -49,7 +49,7 @@ def test_buckets_fill_again() -> None:
 
 def test_buckets_are_of_bounded_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.access.buckets.MAX_BUCKETS", 2)
-    buckets = Buckets(1.0, 1, lambda: 0.0)
+    buckets = TokenBuckets(1.0, 1, lambda: 0.0)
     assert [buckets.take(name) for name in "abc"] == [0, 0, 0]
     assert (buckets.take("c"), buckets.take("a")) == (1, 0)
 
@@ -69,7 +69,7 @@ class TestRates:
         assert int(refused.headers["retry-after"]) > 100
         assert "too many calls; wait" in refused.json()["detail"]
         with monkeypatch.context() as patch:
-            patch.setattr(Buckets, "take", lambda *_: 0.001)
+            patch.setattr(TokenBuckets, "take", lambda *_: 0.001)
             assert "wait 0.1 s" in client.get("/api/me", headers=ann).json()["detail"]
         assert client.get("/api/me", headers=bob).status_code == 200
         wrong = {"Authorization": "Bearer relume_000000000000_x"}
@@ -84,7 +84,7 @@ class TestBytes:
         return settings
 
     def test_uploads_and_bakes_count_until_they_are_deleted(
-        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings
+        self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings
     ) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         made = client.post("/api/scenes", files=SCENE, headers=ann)
@@ -107,9 +107,9 @@ class TestBytes:
         assert access.quotas.used_bytes("Ann") == 0
 
     def test_of_stopped_bakes_the_share_that_is_done_counts(
-        self, client: TestClient, access: Access, baked: Baked
+        self, client: TestClient, access: AuthServices, baked: Baked
     ) -> None:
-        access.quotas.own("Ann", "bake", baked.bake, 1_000)
+        access.quotas.assign_owner("Ann", "bake", baked.bake, 1_000)
         for state, used in (("cancelled", 250), ("failed", 250), ("queued", 1_000), ("ready", 77)):
             with client.app.state.services.bakes.ledger.sessions.begin() as session:  # type: ignore[attr-defined]
                 changed = {"state": state, "progress": 0.25, "bytes": 77}
@@ -117,7 +117,7 @@ class TestBytes:
             assert access.quotas.used_bytes("Ann") == used
 
     def test_renders_count_by_what_they_may_take_until_they_are_there(
-        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings, baked: Baked
+        self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, baked: Baked
     ) -> None:
         settings.max_bytes_each = 1_000_000
         ann = bearer("edit", "Ann")
@@ -134,7 +134,7 @@ class TestBytes:
         assert access.quotas.used_bytes("Ann") == 0
 
     def test_a_btf_that_was_made_here_counts_by_what_is_kept(
-        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings, tmp_path: Path
+        self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, tmp_path: Path
     ) -> None:
         settings.max_bytes_each = 1_000_000
         ann, works = bearer("edit", "Ann"), "/api/materials/btf-works"
@@ -162,7 +162,7 @@ class TestBytes:
         self,
         client: TestClient,
         bearer: Bearer,
-        access: Access,
+        access: AuthServices,
         settings: Settings,
         tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch,
@@ -262,9 +262,9 @@ class TestQueues:
 
 
 def test_without_names_all_are_one_client_who_may_fill_a_queue() -> None:
-    assert Settings(max_queued=8).most_queued_each == 8
-    assert Settings(max_queued=8, login=True).most_queued_each == 2
-    assert Settings(max_queued=8, max_queued_each=3).most_queued_each == 3
+    assert Settings(max_queued=8).max_queued_per_client == 8
+    assert Settings(max_queued=8, login=True).max_queued_per_client == 2
+    assert Settings(max_queued=8, max_queued_each=3).max_queued_per_client == 3
 
 
 def test_each_change_is_a_line_and_each_refusal(client: TestClient, bearer: Bearer, baked: Baked) -> None:

@@ -9,15 +9,15 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from fastapi.testclient import TestClient
 
 from relume.errors import DatabaseDamagedError
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.roles import Caller, Role
 from server.access.rules import RULES, SOCKET
 from server.settings import Settings
-from worker.database.faults import Absence, away_elsewhere
+from worker.database.faults import MissingDatabase, make_unavailable_error
 
 Bearer = Callable[..., dict[str, str]]
 
@@ -94,14 +94,16 @@ def test_the_secret_counts_not_the_id(client: TestClient, bearer: Bearer) -> Non
     assert client.get("/api/scenes", headers={"Authorization": other}).status_code == 401
 
 
-def test_secrets_are_not_kept(access: Access, settings: Settings) -> None:
+def test_secrets_are_not_kept(access: AuthServices, settings: Settings) -> None:
     secret = access.tokens.add("Ann", "edit").split("_", 2)[2]
     kept = b"".join(path.read_bytes() for path in settings.data.glob("relume.db*"))
     assert b"Ann" in kept
     assert secret.encode() not in kept
 
 
-def test_tokens_run_out_and_are_revoked(client: TestClient, access: Access, bearer: Bearer, monkeypatch: Any) -> None:
+def test_tokens_run_out_and_are_revoked(
+    client: TestClient, access: AuthServices, bearer: Bearer, monkeypatch: Any
+) -> None:
     short, long = bearer("edit", "short", days=1), bearer("edit", "long")
     assert client.get("/api/scenes", headers=short).status_code == 200
     now = time.time()
@@ -113,16 +115,16 @@ def test_tokens_run_out_and_are_revoked(client: TestClient, access: Access, bear
 
 
 def test_a_token_that_another_process_revokes_is_soon_refused(
-    client: TestClient, access: Access, bearer: Bearer, monkeypatch: Any
+    client: TestClient, access: AuthServices, bearer: Bearer, monkeypatch: Any
 ) -> None:
     headers = bearer("edit", "Ann")
     assert client.get("/api/scenes", headers=headers).status_code == 200
-    Access(client.app.state.services.looks._sessions, Settings()).tokens.revoke("Ann")
+    AuthServices(client.app.state.services.looks._sessions, Settings()).tokens.revoke("Ann")
     monkeypatch.setattr("server.access.tokens.time.monotonic", lambda: time.perf_counter() + 1e9)
     assert client.get("/api/scenes", headers=headers).status_code == 401
 
 
-def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: Access) -> None:
+def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: AuthServices) -> None:
     token = access.tokens.add("Ann", "edit")
     assert client.post("/api/login", json={"token": "relume_000000000000_x"}).status_code == 401
     answer = client.post("/api/login", json={"token": token})
@@ -137,19 +139,21 @@ def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: Access)
 
 
 @pytest.mark.parametrize("beside", ['prefs={"a":1,"b":2}', "a[b]=1", "a@b=1", "novalue", "name=Zo\xeb", "path=/x"])
-def test_cookies_of_other_programs_on_the_host_hide_no_login(client: TestClient, access: Access, beside: str) -> None:
+def test_cookies_of_other_programs_on_the_host_hide_no_login(
+    client: TestClient, access: AuthServices, beside: str
+) -> None:
     cookie = f"{beside}; relume_token={access.tokens.add('Ann', 'edit')}; {beside}".encode("latin-1")
     answer = client.get("/api/me", headers=[(b"cookie", cookie)])
     assert answer.json()["name"] == "Ann"
 
 
-def test_what_is_sent_to_another_address_is_no_change(client: TestClient, access: Access, bearer: Bearer) -> None:
+def test_what_is_sent_to_another_address_is_no_change(client: TestClient, access: AuthServices, bearer: Bearer) -> None:
     headers = bearer("admin")
     assert client.delete("/api/looks/Red/", headers=headers, follow_redirects=False).status_code == 307
     assert not [line for line in access.audit.list() if line.status]
 
 
-def test_another_site_cannot_use_the_cookie(client: TestClient, access: Access) -> None:
+def test_another_site_cannot_use_the_cookie(client: TestClient, access: AuthServices) -> None:
     client.post("/api/login", json={"token": access.tokens.add("Ann", "edit")})
     refused = client.put("/api/looks/Red", json={}, headers={"Origin": "https://evil.example"})
     assert refused.status_code == 403
@@ -189,13 +193,13 @@ class TestProxy:
             told = {"X-Forwarded-User": "Ann", "X-Forwarded-For": "10.1.2.3"}
             assert other.get("/api/scenes", headers=told).status_code == 401
 
-    def test_addresses_are_those_that_it_saw(self, client: TestClient, bearer: Bearer, access: Access) -> None:
+    def test_addresses_are_those_that_it_saw(self, client: TestClient, bearer: Bearer, access: AuthServices) -> None:
         told = {"X-Forwarded-For": "1.2.3.4, 192.0.2.7"}  # of which the client may have made up the first
         for each, name in ((self.at(client, "10.1.2.3"), "Red"), (client, "Blue")):
             each.put(f"/api/looks/{name}", json={}, headers={**told, **bearer("edit", name)})
         assert [line.address for line in access.audit.list()] == ["testclient", "192.0.2.7"]
 
-    def test_tls_that_it_ends_makes_cookies_secure(self, client: TestClient, access: Access) -> None:
+    def test_tls_that_it_ends_makes_cookies_secure(self, client: TestClient, access: AuthServices) -> None:
         token = {"token": access.tokens.add("Ann", "edit")}
         told = {"X-Forwarded-Proto": "https"}
         behind, direct = (
@@ -210,7 +214,7 @@ class TestProxy:
         assert self.at(client, "10.1.2.3").get("/api/me", headers=told).json()["name"] == "Root"
 
 
-def test_names_of_tokens_are_unique_while_they_open(access: Access) -> None:
+def test_names_of_tokens_are_unique_while_they_open(access: AuthServices) -> None:
     access.tokens.add("Ann", "view")
     with pytest.raises(Exception, match="one that no valid token has"):
         access.tokens.add("Ann", "edit")
@@ -230,7 +234,7 @@ def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
     def damaged(*_: object) -> None:
         raise DatabaseDamagedError("database disk image is malformed")
 
-    monkeypatch.setattr("server.access.tokens.TokenStore._known", damaged)
+    monkeypatch.setattr("server.access.tokens.TokenStore._fetch", damaged)
     caplog.clear()
     answer = client.get("/api/scenes", headers=headers)
     assert answer.status_code == 503
@@ -247,11 +251,13 @@ def test_a_database_that_is_away_is_said_once_however_many_call(
     headers = bearer("edit")
 
     def away(*_: object) -> None:
-        raise away_elsewhere("connection refused")
+        raise make_unavailable_error("connection refused")
 
-    monkeypatch.setattr("server.access.tokens.TokenStore._known", away)
-    monkeypatch.setattr("worker.database.faults.Absence.well", lambda _: None)  # loops do reach it
-    monkeypatch.setattr("server.access.gate.database_away", Absence(logging.getLogger("away"), "the database"))
+    monkeypatch.setattr("server.access.tokens.TokenStore._fetch", away)
+    monkeypatch.setattr("worker.database.faults.MissingDatabase.report_recovered", lambda _: None)  # loops do reach it
+    monkeypatch.setattr(
+        "server.access.gate.database_outage", MissingDatabase(logging.getLogger("away"), "the database")
+    )
     for _ in range(3):
         assert client.get("/api/scenes", headers=headers).status_code == 503
     assert [record.getMessage() for record in caplog.records if record.levelno == logging.ERROR] == [
@@ -259,9 +265,9 @@ def test_a_database_that_is_away_is_said_once_however_many_call(
     ]
 
 
-def test_open_sessions_go_on_while_the_database_is_away(access: Access, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_open_sessions_go_on_while_the_database_is_away(access: AuthServices, monkeypatch: pytest.MonkeyPatch) -> None:
     def away(*_: object) -> None:
         raise DatabaseDamagedError("database disk image is malformed")
 
     monkeypatch.setattr(access.tokens, "is_valid", away)
-    assert run_alone(access.may_stay(Caller("Ann", Role.EDIT, "", "token", "0123456789ab")))
+    assert run_in_thread(access.may_stay(Caller("Ann", Role.EDIT, "", "token", "0123456789ab")))

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 from fastapi.testclient import TestClient
 
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.audit import Audit, Change
-from server.access.buckets import bucket_of
+from server.access.buckets import bucket_name
 from server.access.tokens import TokenStore
 from server.settings import Settings
 
@@ -24,7 +24,7 @@ def settings(settings: Settings) -> Settings:
 
 
 @pytest.fixture
-def looked_up(client: TestClient, access: Access, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+def looked_up(client: TestClient, access: AuthServices, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Has an entry for each question to the database about a token."""
     asked: list[int] = []
     sessions = access.tokens._sessions
@@ -56,27 +56,27 @@ def test_who_is_known_is_not_held_up_by_guesses_from_the_same_address(
     assert client.get("/api/scenes", headers=ann).status_code == 200
     for k in range(8):
         client.get("/api/scenes", headers={"Authorization": f"Bearer {GUESS.format(k)}"})
-    monkeypatch.setattr("server.access.tokens.REMEMBERED_S", -1.0)  # each call is looked up
+    monkeypatch.setattr("server.access.tokens.TOKEN_CACHE_S", -1.0)  # each call is looked up
     assert [client.get("/api/scenes", headers=ann).status_code for _ in range(8)] == [200] * 8
 
 
 def test_that_there_is_no_such_token_is_remembered_for_so_many(
-    access: Access, looked_up: list[int], monkeypatch: pytest.MonkeyPatch
+    access: AuthServices, looked_up: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.access.tokens.MAX_MISSED", 2)
+    monkeypatch.setattr("server.access.tokens.MAX_UNKNOWN_IDS", 2)
     for k in (0, 0, 1, 2):
-        assert access.tokens.find(GUESS.format(k)) is None
+        assert access.tokens.authenticate(GUESS.format(k)) is None
     assert len(looked_up) == 3
-    assert len(access.tokens._missed) == 2
+    assert len(access.tokens._unknown_ids) == 2
 
 
-def test_a_right_id_with_a_wrong_secret_is_a_guess(access: Access) -> None:
+def test_a_right_id_with_a_wrong_secret_is_a_guess(access: AuthServices) -> None:
     tokens: TokenStore = access.tokens
     right = tokens.add("Ann", "view")
-    assert not tokens.knows(right)
-    assert tokens.find(right) is not None
-    assert tokens.knows(right)
-    assert not tokens.knows(right[:-1] + ("a" if right[-1] != "a" else "b"))
+    assert not tokens.is_cached(right)
+    assert tokens.authenticate(right) is not None
+    assert tokens.is_cached(right)
+    assert not tokens.is_cached(right[:-1] + ("a" if right[-1] != "a" else "b"))
 
 
 @pytest.mark.parametrize(
@@ -91,12 +91,12 @@ def test_a_right_id_with_a_wrong_secret_is_a_guess(access: Access) -> None:
     ],
 )
 def test_ipv6_counts_by_network(address: str, bucket: str) -> None:
-    assert bucket_of(address) == bucket
+    assert bucket_name(address) == bucket
 
 
 class TestAudit:
     def test_logins_wrong_tokens_and_refusals_are_lines(
-        self, client: TestClient, bearer: Bearer, access: Access
+        self, client: TestClient, bearer: Bearer, access: AuthServices
     ) -> None:
         token = access.tokens.add("Ann", "edit")
         assert client.post("/api/login", json={"token": token}).status_code == 204
@@ -115,7 +115,7 @@ class TestAudit:
         ]
         assert token not in str(access.audit.list())
 
-    def test_refusals_push_no_change_out(self, access: Access) -> None:
+    def test_refusals_push_no_change_out(self, access: AuthServices) -> None:
         audit = Audit(access.tokens._sessions, 20)
         audit.add(Change("Ann", "edit", "::1", "PUT /api/looks/Red", "/api/looks/Red", 201, "r1"))
         for _ in range(210):
@@ -131,7 +131,7 @@ class TestHttpsOnly:
         settings.https_only = True
         return settings
 
-    def test_cookies_are_secure_and_browsers_keep_to_it(self, client: TestClient, access: Access) -> None:
+    def test_cookies_are_secure_and_browsers_keep_to_it(self, client: TestClient, access: AuthServices) -> None:
         answer = client.post("/api/login", json={"token": access.tokens.add("Ann", "edit")})
         assert "; secure" in answer.headers["set-cookie"].lower()
         assert answer.headers["strict-transport-security"] == "max-age=31536000"

@@ -8,14 +8,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from fastapi.testclient import TestClient
 from server_fakes import SIZE
 from session_client import Baked
 
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.openness import check_openness
-from server.access.proxies import LOOK_UP_EVERY_S, Proxies
+from server.access.proxies import RESOLVE_INTERVAL_S, Proxies
 from server.errors import OpennessError
 from server.settings import Settings
 
@@ -38,7 +38,7 @@ def test_of_a_proxy_whose_addresses_count_nobody_is_known_by_name(client: TestCl
 
 
 def test_the_line_that_the_proxy_adds_counts_not_the_clients_own(
-    client: TestClient, bearer: Bearer, access: Access
+    client: TestClient, bearer: Bearer, access: AuthServices
 ) -> None:
     lines = [("X-Forwarded-For", "1.2.3.4"), ("X-Forwarded-For", "5.6.7.8, 192.0.2.7"), *bearer("edit").items()]
     assert proxy(client).put("/api/looks/Red", json={}, headers=lines).status_code == 201
@@ -57,7 +57,7 @@ class TestNames:
         assert proxy(client).get("/api/me", headers=lines).json()["name"] == "Ann"
 
     def test_whom_a_proxy_calls_ann_uses_up_nothing_of_who_has_anns_token(
-        self, client: TestClient, bearer: Bearer, access: Access
+        self, client: TestClient, bearer: Bearer, access: AuthServices
     ) -> None:
         said, token = {"X-Forwarded-User": "Ann"}, bearer("edit", "Ann")
         answers = [proxy(client).get("/api/me", headers=said) for _ in range(4)]
@@ -74,7 +74,7 @@ class TestNames:
         made = proxy(client).post(path, json=pin, headers={"X-Forwarded-User": "Ann"})
         assert (made.status_code, made.json()["author"]) == (201, "Ann")
 
-    def test_no_token_is_called_as_a_proxy_calls_people(self, access: Access) -> None:
+    def test_no_token_is_called_as_a_proxy_calls_people(self, access: AuthServices) -> None:
         with pytest.raises(Exception, match="does not begin with proxy:"):
             access.tokens.add("proxy:Ann", "edit")
 
@@ -99,19 +99,19 @@ def test_a_name_is_looked_up_again_when_its_proxy_calls_from_elsewhere(monkeypat
     monkeypatch.setattr(asyncio.BaseEventLoop, "getaddrinfo", found)
 
     async def trusts(peer: str) -> bool:
-        await proxies.look_up(peer)
+        await proxies.resolve(peer)
         return proxies.has(peer)
 
-    assert run_alone(trusts("192.0.2.1"))
+    assert run_in_thread(trusts("192.0.2.1"))
     assert asked == []  # it is known without
-    assert run_alone(trusts("10.9.9.9"))
+    assert run_in_thread(trusts("10.9.9.9"))
     place = "10.9.9.8"
-    assert not run_alone(trusts("10.9.9.8"))  # asked too lately
-    now_s = LOOK_UP_EVERY_S
-    assert run_alone(trusts("10.9.9.8"))
+    assert not run_in_thread(trusts("10.9.9.8"))  # asked too lately
+    now_s = RESOLVE_INTERVAL_S
+    assert run_in_thread(trusts("10.9.9.8"))
     assert not proxies.has("10.9.9.9")
-    now_s, place = 2 * LOOK_UP_EVERY_S, ""
-    assert not run_alone(trusts("10.9.9.7"))
+    now_s, place = 2 * RESOLVE_INTERVAL_S, ""
+    assert not run_in_thread(trusts("10.9.9.7"))
     assert asked == ["relight-proxy.relume.svc"] * 3
 
 
@@ -155,4 +155,4 @@ class TestStart:
 
 
 def test_without_a_login_all_are_one_client_whatever_proxies_there_are() -> None:
-    assert Settings(trusted_proxies=["10.0.0.5"], max_queued=8).most_queued_each == 8
+    assert Settings(trusted_proxies=["10.0.0.5"], max_queued=8).max_queued_per_client == 8

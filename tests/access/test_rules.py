@@ -7,7 +7,7 @@ from typing import get_args
 from fastapi.routing import APIRoute, APIWebSocketRoute
 
 from server.access.roles import Role
-from server.access.rules import MESSAGES, RULES, SOCKET, is_change, needed
+from server.access.rules import MESSAGES, RULES, SOCKET, is_change, required_role
 from server.app import ROUTE_GROUPS, create_app
 from server.settings import Settings
 from server.wire import protocol
@@ -37,16 +37,16 @@ def test_every_message_has_a_role() -> None:
 
 
 def test_a_call_that_is_not_listed_is_for_admins() -> None:
-    assert needed("GET", "/api/secrets") is Role.ADMIN
-    assert needed("PATCH", "/api/scenes") is Role.ADMIN
-    assert needed("POST", "/elsewhere") is Role.ADMIN
-    assert needed("GET", "/assets/index.js") is Role.ANYONE
+    assert required_role("GET", "/api/secrets") is Role.ADMIN
+    assert required_role("PATCH", "/api/scenes") is Role.ADMIN
+    assert required_role("POST", "/elsewhere") is Role.ADMIN
+    assert required_role("GET", "/assets/index.js") is Role.ANYONE
 
 
 def test_of_lines_that_fit_the_strictest_counts() -> None:
-    assert needed("GET", "/api/materials/measured/0123456789abcdef/thumbnail.png") is Role.VIEW
-    assert needed("DELETE", "/api/scenes/0123456789abcdef") is Role.EDIT
-    assert needed("POST", "/api/scenes/0123456789abcdef/finder") is Role.VIEW
+    assert required_role("GET", "/api/materials/measured/0123456789abcdef/thumbnail.png") is Role.VIEW
+    assert required_role("DELETE", "/api/scenes/0123456789abcdef") is Role.EDIT
+    assert required_role("POST", "/api/scenes/0123456789abcdef/finder") is Role.VIEW
 
 
 def test_an_answer_of_200_says_that_nothing_was_changed() -> None:

@@ -9,13 +9,13 @@ from dataclasses import replace
 import pytest
 from anyio.from_thread import start_blocking_portal
 from fastapi.testclient import TestClient
-from session_client import SIGMA, THETA_H, TOGETHER, Baked, open_session
+from session_client import ROOM_FIELDS, SIGMA, THETA_H, Baked, open_session
 
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.audit import Entry
 from server.access.roles import Caller, Role
-from server.live.edit_notes import EditNotes
-from server.live.rooms.door import Door
+from server.live.edit_notes import AuditWriter
+from server.live.rooms.door import JoinRequest
 from server.live.rooms.room import Room
 from server.settings import Settings
 
@@ -25,8 +25,8 @@ Bearer = Callable[..., dict[str, str]]
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.access.access.REMEMBERED_S", 0.05)
-    monkeypatch.setattr("server.access.tokens.REMEMBERED_S", 0.0)
+    monkeypatch.setattr("server.access.access.TOKEN_CACHE_S", 0.05)
+    monkeypatch.setattr("server.access.tokens.TOKEN_CACHE_S", 0.0)
 
 
 def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
@@ -36,7 +36,9 @@ def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
     assert "log in first" in ended.value.args[1]
 
 
-def test_editors_edit_and_the_audit_says_what(client: TestClient, baked: Baked, bearer: Bearer, access: Access) -> None:
+def test_editors_edit_and_the_audit_says_what(
+    client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices
+) -> None:
     opening = {"room": "abcdefgh" * 4}
     with open_session(client, baked.bake, opening=opening, headers=bearer("edit", "Ann")) as session:
         hello = session.text("hello")
@@ -51,9 +53,9 @@ def test_editors_edit_and_the_audit_says_what(client: TestClient, baked: Baked, 
 
 
 def test_what_is_edited_is_in_the_audit_before_the_session_ends(
-    client: TestClient, baked: Baked, bearer: Bearer, access: Access, monkeypatch: pytest.MonkeyPatch
+    client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.edit_notes.EVERY_S", 0.05)
+    monkeypatch.setattr("server.live.edit_notes.WRITE_INTERVAL_S", 0.05)
     with open_session(client, baked.bake, headers=bearer("edit", "Ann")) as session:
         session.text("hello")
         for k in (1, 2):
@@ -63,17 +65,17 @@ def test_what_is_edited_is_in_the_audit_before_the_session_ends(
     assert len(lines_of(access, 2)) == 2
 
 
-def lines_of(access: Access, least: int) -> Sequence[Entry]:
+def lines_of(access: AuthServices, least: int) -> Sequence[Entry]:
     """The audit's lines, when there are so many."""
     while len(lines := access.audit.list()) < least:
         time.sleep(0.01)
     return lines
 
 
-def test_a_line_of_edits_is_bounded_and_can_be_read(access: Access) -> None:
+def test_a_line_of_edits_is_bounded_and_can_be_read(access: AuthServices) -> None:
     async def edit(places: Sequence[str]) -> str:
-        notes = EditNotes(access.audit, Caller("Ann", Role.EDIT, "", "token"), "here")
-        notes.note(places)
+        notes = AuditWriter(access.audit, Caller("Ann", Role.EDIT, "", "token"), "here")
+        notes.add_edit(places)
         await notes.write()
         await notes.write()
         return access.audit.list()[0].what
@@ -94,46 +96,46 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
     with open_session(client, baked.bake, headers=bearer("view", "Vera")) as session:
         assert session.text("hello")["role"] == "view"
         before = session.exact(0)
-        session.send(type="edit", revision=1, patch=[SEEN, {"op": "replace", "path": SIGMA, "value": 0.3}])
+        session.send_message(type="edit", revision=1, patch=[SEEN, {"op": "replace", "path": SIGMA, "value": 0.3}])
         told = session.text("problem")
         assert (told["revision"], told["problem"]["status"]) == (1, 403)
         assert told["problem"]["detail"].startswith("Vera may look at this picture but not edit it; ask an admin")
-        session.send(type="touch", parameter=SIGMA)
+        session.send_message(type="touch", parameter=SIGMA)
         assert session.text("problem")["problem"]["status"] == 403
-        session.send(type="edit", revision=1, patch=[SEEN], hand=SIGMA)  # which would prepare it
+        session.send_message(type="edit", revision=1, patch=[SEEN], hand=SIGMA)  # which would prepare it
         assert session.text("problem")["problem"]["status"] == 403
-        session.send(type="touch", curve=THETA_H)
+        session.send_message(type="touch", curve=THETA_H)
         shape = session.text("curve")
         assert (shape["curve"], len(shape["bands"])) == (THETA_H, len(shape["generated"]))
-        session.send(type="view", name="front")
+        session.send_message(type="view", name="front")
         again = session.exact(0)
         assert again.payload == before.payload
-        session.send(type="edit", revision=2, patch=[], solo=["environment"])
+        session.send_message(type="edit", revision=2, patch=[], solo=["environment"])
         session.exact(2)
-        session.send(type="edit", revision=3, patch=[SEEN])
+        session.send_message(type="edit", revision=3, patch=[SEEN])
         session.exact(3)
-        session.send(type="probe", x=3, y=4)
+        session.send_message(type="probe", x=3, y=4)
         assert session.text("probe")["material"] == "Paper"
 
 
 def test_how_viewers_look_is_their_own_and_no_edit(
-    client: TestClient, baked: Baked, bearer: Bearer, access: Access
+    client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices
 ) -> None:
     ann, vera = bearer("edit", "Ann"), bearer("view", "Vera")
-    with open_session(client, baked.bake, opening=TOGETHER, headers=ann) as editor:
+    with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=ann) as editor:
         editor.text("hello")
-        with open_session(client, baked.bake, opening=TOGETHER, headers=vera) as viewer:
-            viewer.send(type="edit", revision=1, patch=[SEEN])
+        with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=vera) as viewer:
+            viewer.send_message(type="edit", revision=1, patch=[SEEN])
             viewer.exact(1)
-            with open_session(client, baked.bake, opening=TOGETHER, headers=bearer("edit", "Bob")) as late:
+            with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=bearer("edit", "Bob")) as late:
                 assert late.text("hello")["look"]["display"]["exposure"] == 0.0
     assert access.audit.list() == []
 
 
 def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked, bearer: Bearer) -> None:
-    with open_session(client, baked.bake, opening=TOGETHER, headers=bearer("edit", "Ann")) as ann:
+    with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=bearer("edit", "Ann")) as ann:
         seat = ann.text("hello")["room"]["seat"]
-        opening = {**TOGETHER, "seat": seat}
+        opening = {**ROOM_FIELDS, "seat": seat}
         with open_session(client, baked.bake, opening=opening, headers=bearer("view", "Vera")) as vera:
             found = vera.text("hello")["room"]
             assert [(each["name"], each["role"]) for each in found["people"]] == [("Ann", "edit"), ("Vera", "view")]
@@ -141,11 +143,11 @@ def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked,
 
 def test_whom_a_proxy_names_comes_back_to_the_own_place_and_to_nobody_elses() -> None:
     room = Room({}, 8, 60.0, lambda room: None)
-    door = Door(TOGETHER["room"], "watch", None, None)
-    ann = room.sit(door, Caller("proxy:Ann", Role.EDIT, "10.0.0.5", "proxy"))
-    back = replace(door, seat=ann.token)
-    assert room.sit(back, Caller("proxy:Ann", Role.EDIT, "10.0.0.5", "proxy")) is ann
-    assert room.sit(back, Caller("Ann", Role.VIEW, "10.0.0.9", "token")) is not ann
+    door = JoinRequest(ROOM_FIELDS["room"], "watch", None, None)
+    ann = room.join(door, Caller("proxy:Ann", Role.EDIT, "10.0.0.5", "proxy"))
+    back = replace(door, participant_token=ann.token)
+    assert room.join(back, Caller("proxy:Ann", Role.EDIT, "10.0.0.5", "proxy")) is ann
+    assert room.join(back, Caller("Ann", Role.VIEW, "10.0.0.9", "token")) is not ann
     assert [(person.name, person.role) for person in room.people()] == [("Ann", "edit"), ("Ann", "view")]
 
 
@@ -167,7 +169,7 @@ def test_viewers_see_shared_and_saved_looks(client: TestClient, baked: Baked, be
 
 
 def test_revoking_a_token_ends_its_sessions_and_no_others(
-    client: TestClient, baked: Baked, access: Access, bearer: Bearer
+    client: TestClient, baked: Baked, access: AuthServices, bearer: Bearer
 ) -> None:
     ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
     with (

@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from session_client import Baked, open_session
 
 from server.access import quotas
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.identity import Identity
 from server.access.quotas import Quotas
 from server.access.roles import Caller, Role
@@ -28,8 +28,8 @@ ANN = Caller("Ann", Role.EDIT, "10.0.0.1", "proxy")
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.access.access.REMEMBERED_S", 0.05)
-    monkeypatch.setattr("server.access.tokens.REMEMBERED_S", 0.0)
+    monkeypatch.setattr("server.access.access.TOKEN_CACHE_S", 0.05)
+    monkeypatch.setattr("server.access.tokens.TOKEN_CACHE_S", 0.0)
     monkeypatch.setattr("server.routes.bakes.EVENT_POLL_S", 0.05)
 
 
@@ -54,7 +54,7 @@ def named_by_a_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Identity, "caller", caller)
 
 
-def test_streams_of_a_caller_are_bounded_and_those_of_others_are_not_in_their_way(access: Access) -> None:
+def test_streams_of_a_caller_are_bounded_and_those_of_others_are_not_in_their_way(access: AuthServices) -> None:
     bob, unnamed, elsewhere = (
         Caller("Bob", Role.VIEW, "10.0.0.1", "token"),
         *(Caller("", Role.ADMIN, address, "open") for address in ("10.0.0.1", "10.0.0.2")),
@@ -74,7 +74,7 @@ def check_bound(found: Quotas, caller: Caller) -> None:
         pass
 
 
-def test_a_stream_too_many_is_refused(client: TestClient, baked: Baked, access: Access, bearer: Bearer) -> None:
+def test_a_stream_too_many_is_refused(client: TestClient, baked: Baked, access: AuthServices, bearer: Bearer) -> None:
     ann = bearer("view", "Ann")
     with ExitStack() as held:
         for _ in range(quotas.MAX_STREAMS_EACH):
@@ -87,7 +87,7 @@ def test_a_stream_too_many_is_refused(client: TestClient, baked: Baked, access: 
 
 
 def test_a_stream_ends_with_the_token(
-    client: TestClient, baked: Baked, access: Access, bearer: Bearer, asked: list[str]
+    client: TestClient, baked: Baked, access: AuthServices, bearer: Bearer, asked: list[str]
 ) -> None:
     ann = bearer("view", "Ann")
     with ThreadPoolExecutor() as beside:
@@ -103,7 +103,7 @@ def test_whom_a_proxy_named_comes_by_it_again(
     client: TestClient, baked: Baked, asked: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     named_by_a_proxy(monkeypatch)
-    monkeypatch.setattr("server.routes.bakes.PROXY_AGAIN_S", 0.2)
+    monkeypatch.setattr("server.routes.bakes.PROXY_REVALIDATION_S", 0.2)
     assert "event: bake" in client.get(f"/api/bakes/{baked.bake}/events").text
 
 
@@ -117,7 +117,7 @@ class TestSession:
         self, client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         named_by_a_proxy(monkeypatch)
-        monkeypatch.setattr("server.live.session.PROXY_AGAIN_S", 0.05)
+        monkeypatch.setattr("server.live.session.PROXY_REVALIDATION_S", 0.05)
         with open_session(client, baked.bake) as session:
             hello = session.text("hello")
             assert session.text("leaving")["seconds"] == 0.2

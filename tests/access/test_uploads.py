@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from fastapi.testclient import TestClient
 from server_fakes import tiny_scene
 from starlette.types import Message, Receive, Scope, Send
@@ -18,14 +18,14 @@ from relume.environments.model import Environment
 from relume.folders import folder_bytes
 from relume.scene.archive import make_scene
 from server.access import quotas as quotas_module
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.access.reservations import Reservation
 from server.access.roles import KEY, Caller, Role
 from server.errors import NearlyFullError, QuotaError
 from server.files import door
-from server.files.door import Door
-from server.files.importers import OutgrownError
-from server.files.importing import ImportRequest, _written
+from server.files.door import UploadMiddleware
+from server.files.importers import ImportTooLargeError
+from server.files.importing import ImportRequest, _write_scene
 from server.files.slots import Slots
 from server.settings import Settings
 
@@ -38,7 +38,7 @@ def some_scene(request: ImportRequest) -> str:
     """Each name is another scene."""
     scene = tiny_scene(request.name)
     light = Environment("gray", np.full((4, 8, 3), float(request.name.removeprefix("n")), np.float32))
-    return _written(request, make_scene(request.name, scene.meshes, scene.materials, scene.cameras, light))
+    return _write_scene(request, make_scene(request.name, scene.meshes, scene.materials, scene.cameras, light))
 
 
 @pytest.fixture
@@ -83,8 +83,8 @@ async def taken(scope: Scope, receive: Receive, send: Send) -> None:
     await send({"type": "http.response.body", "body": b""})
 
 
-def a_door(access: Access, app: Callable[..., Any] = taken, each: int = 8) -> Door:
-    return Door(app, access=lambda: access, each=each, shares={})
+def a_door(access: AuthServices, app: Callable[..., Any] = taken, each: int = 8) -> UploadMiddleware:
+    return UploadMiddleware(app, access=lambda: access, max_per_user=each, weights={})
 
 
 class TestBodies:
@@ -93,22 +93,22 @@ class TestBodies:
         settings.max_bytes_each = 100_000
         return settings
 
-    def test_one_that_says_that_it_is_too_large_is_not_read(self, access: Access) -> None:
+    def test_one_that_says_that_it_is_too_large_is_not_read(self, access: AuthServices) -> None:
         body = Body(a_door(access), [b"x"], length=100_001)
-        assert run_alone(body()) == 429
+        assert run_in_thread(body()) == 429
         assert body.num_read == 0
         assert access.quotas.used_bytes("Ann") == 0
 
     def test_one_that_does_not_say_it_is_read_as_far_as_there_is_room(
-        self, access: Access, monkeypatch: pytest.MonkeyPatch
+        self, access: AuthServices, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(door, "STEP_BYTES", 10_000)
         body = Body(a_door(access), [b"x" * 10_000] * 50)
-        assert run_alone(body()) == 429
+        assert run_in_thread(body()) == 429
         assert body.num_read <= 10
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_those_that_come_together_count_each_other(self, access: Access) -> None:
+    def test_those_that_come_together_count_each_other(self, access: AuthServices) -> None:
         reading = asyncio.Event()
         waiting: list[bool] = []
 
@@ -126,10 +126,10 @@ class TestBodies:
             reading.set()
             return sorted(await asyncio.gather(*tasks))
 
-        assert run_alone(all_at_once()) == [201, 201, 201, 429, 429]
+        assert run_in_thread(all_at_once()) == [201, 201, 201, 429, 429]
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_of_one_user_so_many_are_read_at_once(self, access: Access) -> None:
+    def test_of_one_user_so_many_are_read_at_once(self, access: AuthServices) -> None:
         now, most = [0], [0]
 
         async def slow(scope: Scope, receive: Receive, send: Send) -> None:
@@ -143,23 +143,23 @@ class TestBodies:
             whole = a_door(access, slow, each=2)
             return list(await asyncio.gather(*(Body(whole, [b"x"], length=1)() for _ in range(6))))
 
-        assert run_alone(all_at_once()) == [201] * 6
+        assert run_in_thread(all_at_once()) == [201] * 6
         assert most == [2]
 
-    def test_who_goes_away_takes_nothing_any_more(self, access: Access) -> None:
+    def test_who_goes_away_takes_nothing_any_more(self, access: AuthServices) -> None:
         async def gone(scope: Scope, receive: Receive, send: Send) -> None:
             assert access.quotas.used_bytes("Ann") == 5
             raise asyncio.CancelledError
 
         with pytest.raises(asyncio.CancelledError):
-            run_alone(Body(a_door(access, gone), [b"x"], length=5)())
+            run_in_thread(Body(a_door(access, gone), [b"x"], length=5)())
         assert access.quotas.used_bytes("Ann") == 0
 
 
 @pytest.mark.usefixtures("_imports")
 class TestUnpacking:
     def test_ten_at_once_keep_no_more_than_a_quota(
-        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings
+        self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings
     ) -> None:
         ann = bearer("edit", "Ann")
 
@@ -178,16 +178,21 @@ class TestUnpacking:
         assert not list(settings.data.glob("upload-*"))
 
     def test_what_unpacks_to_more_than_there_is_left_is_stopped_there(
-        self, client: TestClient, bearer: Bearer, access: Access, settings: Settings, monkeypatch: pytest.MonkeyPatch
+        self,
+        client: TestClient,
+        bearer: Bearer,
+        access: AuthServices,
+        settings: Settings,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         asked: list[int] = []
 
         def unpack(request: ImportRequest) -> str:
             asked.append(request.max_file_bytes)
-            raise OutgrownError("too large")
+            raise ImportTooLargeError("too large")
 
         settings.max_bytes_each = 5_000
-        access.quotas.own("Ann", "scene", "another", 3_000)
+        access.quotas.assign_owner("Ann", "scene", "another", 3_000)
         monkeypatch.setattr(client.app.state.services.intake.importers, "run", unpack)
         refused = client.post("/api/scenes", files=SCENE, headers=bearer("edit", "Ann"))
         assert (refused.status_code, asked) == (429, [2_000])
@@ -202,34 +207,36 @@ class TestDisk:
         for name in ("quotas", "reservations"):
             monkeypatch.setattr(f"server.access.{name}.free_bytes", lambda _: 10_000)
 
-    def test_what_all_send_leaves_the_ledger_its_room(self, access: Access) -> None:
+    def test_what_all_send_leaves_the_ledger_its_room(self, access: AuthServices) -> None:
         quotas = access.quotas
         ann, bob = Reservation(quotas, "Ann"), Reservation(quotas, "Bob")
-        ann.hold(3_000)
+        ann.reserve(3_000)
         with pytest.raises(NearlyFullError, match="beside what else is sent now"):
-            bob.hold(3_000)
-        bob.hold(1_000)
+            bob.reserve(3_000)
+        bob.reserve(1_000)
         ann.release()
-        bob.hold(4_000)
+        bob.reserve(4_000)
 
-    def test_what_one_makes_leaves_the_ledger_its_room(self, access: Access) -> None:
+    def test_what_one_makes_leaves_the_ledger_its_room(self, access: AuthServices) -> None:
         reservation = Reservation(access.quotas, "Ann")
-        assert reservation.most_bytes() == (10_000 - 1_000) // 2  # another may unpack at the same time
-        assert isinstance(reservation.outgrown(4_500), NearlyFullError)
+        assert reservation.max_import_bytes() == (10_000 - 1_000) // 2  # another may unpack at the same time
+        assert isinstance(reservation.too_large_error(4_500), NearlyFullError)
 
-    def test_what_a_killed_server_has_reserved_ends(self, access: Access, monkeypatch: pytest.MonkeyPatch) -> None:
-        Reservation(access.quotas, "Ann").hold(4_000)
+    def test_what_a_killed_server_has_reserved_ends(
+        self, access: AuthServices, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        Reservation(access.quotas, "Ann").reserve(4_000)
         assert access.quotas.used_bytes("Ann") == 4_000
         monkeypatch.setattr(quotas_module.time, "time", lambda: 1e10)
-        Reservation(access.quotas, "Bob").hold(4_000)
+        Reservation(access.quotas, "Bob").reserve(4_000)
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_what_was_held_is_held_where_more_is_refused(self, access: Access, settings: Settings) -> None:
+    def test_what_was_held_is_held_where_more_is_refused(self, access: AuthServices, settings: Settings) -> None:
         settings.max_bytes_each = 2_000
         reservation = Reservation(access.quotas, "Ann")
-        reservation.hold(1_500)
+        reservation.reserve(1_500)
         with pytest.raises(QuotaError, match=r"you have 0 bytes of at most 2 kB, and this takes 2.5 kB"):
-            reservation.hold(2_500)
+            reservation.reserve(2_500)
         assert (reservation.bytes, access.quotas.used_bytes("Ann")) == (1_500, 1_500)
 
 
@@ -239,14 +246,14 @@ class TestSlots:
         got: list[str] = []
 
         async def take(client: str) -> None:
-            async with slots.held(client):
+            async with slots.acquire(client):
                 got.append(client)
                 await asyncio.sleep(0)
 
         async def all_of_them() -> None:
             await asyncio.gather(*map(take, who))
 
-        run_alone(all_of_them())
+        run_in_thread(all_of_them())
         return "".join(got)
 
     def test_users_take_turns(self) -> None:
@@ -256,14 +263,14 @@ class TestSlots:
         assert self.order_of(Slots(2, 1, {}), "aab") == "aba"
 
     def test_one_who_does_not_wait_any_more_leaves_the_slot(self) -> None:
-        async def cancelled() -> None:
+        async def is_canceled() -> None:
             slots = Slots(1, 1, {})
-            async with slots.held("a"):
-                waiting = asyncio.create_task(slots.held("b").__aenter__())
+            async with slots.acquire("a"):
+                waiting = asyncio.create_task(slots.acquire("b").__aenter__())
                 await asyncio.sleep(0)
                 waiting.cancel()
                 await asyncio.gather(waiting, return_exceptions=True)
-            async with slots.held("c"):
+            async with slots.acquire("c"):
                 pass
 
-        run_alone(cancelled())
+        run_in_thread(is_canceled())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relume.basis.haar import haar, levels, padded_length
+from relume.basis.haar import coefficient_levels, haar, padded_length
 
 
 def matrix(length):
@@ -36,4 +36,4 @@ def test_values_are_padded_with_zeros_to_a_power_of_two(length, padded):
 
 
 def test_levels_double():
-    assert levels(16).tolist() == [0, 0, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3]
+    assert coefficient_levels(16).tolist() == [0, 0, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3]

@@ -11,15 +11,15 @@ import pytest
 from relume.basis.pca import decompose, joint, relative_rms, worst_relative_rms
 from relume.brdf.curves import generated_bands
 from relume.brdf.registry import TERMS
-from relume.brdf.sweep import bands_at, moved_curves, slider_values
+from relume.brdf.sweep import curve_at_value, curves_of_parameter, slider_values
 
 BLINN_PHONG = TERMS["blinn_phong"]
 EXPONENT = replace(BLINN_PHONG.parameter("exponent"), minimum=3.0, maximum=300.0, scale="linear")
 
 
 def lobes(values):
-    (curve,) = moved_curves(BLINN_PHONG, "exponent")
-    return np.array([bands_at(BLINN_PHONG, curve, {"exponent": value}) for value in values])
+    (curve,) = curves_of_parameter(BLINN_PHONG, "exponent")
+    return np.array([curve_at_value(BLINN_PHONG, curve, {"exponent": value}) for value in values])
 
 
 def test_vectors_are_orthonormal_and_all_of_them_give_the_curves_back():
@@ -47,7 +47,7 @@ def test_no_other_vectors_of_that_number_are_better():
 def test_figure_5_of_nguyen_2010():
     """Blinn-Phong on [3, 300], exponents evenly spaced; RMS over bands and exponents relative to the curves' own."""
     components = decompose(lobes(slider_values(EXPONENT, 298)))
-    exact = lobes(slider_values(EXPONENT, 297, between=True))
+    exact = lobes(slider_values(EXPONENT, 297, at_midpoints=True))
     errors = {}
     for k in range(1, 13):
         few = components.first(k)
@@ -62,20 +62,22 @@ def test_slider_runs_through_its_range():
     values = slider_values(exponent, 5)
     assert values[[0, -1]] == pytest.approx([exponent.minimum, exponent.maximum])
     np.testing.assert_allclose(values[1:] / values[:-1], values[1] / values[0])
-    between = slider_values(exponent, 4, between=True)
+    between = slider_values(exponent, 4, at_midpoints=True)
     np.testing.assert_allclose(between, np.sqrt(values[1:] * values[:-1]))
     np.testing.assert_allclose(slider_values(EXPONENT, 3), [3, 151.5, 300])
-    np.testing.assert_allclose(slider_values(EXPONENT, 2, between=True), [77.25, 225.75])
+    np.testing.assert_allclose(slider_values(EXPONENT, 2, at_midpoints=True), [77.25, 225.75])
 
 
 def test_bands_along_a_slider_are_those_of_a_look():
     for term in TERMS.values():
         for parameter in term.parameters:
-            for curve in moved_curves(term, parameter.name):
+            for curve in curves_of_parameter(term, parameter.name):
                 for value in slider_values(parameter, 3):
                     look = {"model": term.model, "params": {parameter.name: float(value)}}
                     np.testing.assert_allclose(
-                        bands_at(term, curve, {parameter.name: value}), generated_bands(look, curve)[0], rtol=1e-12
+                        curve_at_value(term, curve, {parameter.name: value}),
+                        generated_bands(look, curve)[0],
+                        rtol=1e-12,
                     )
 
 
@@ -83,7 +85,7 @@ def test_product_of_curves_has_every_pair():
     one, two = np.array([1.0, 2, 3]), np.array([5.0, 7])
     assert joint([one, two]).tolist() == [5, 7, 10, 14, 15, 21]
     assert joint([one]).tolist() == [1, 2, 3]
-    assert [curve.name for curve in moved_curves(TERMS["ggx"], "roughness")] == ["theta_h", "theta_i"]
+    assert [curve.name for curve in curves_of_parameter(TERMS["ggx"], "roughness")] == ["theta_h", "theta_i"]
 
 
 def test_norms():

@@ -9,7 +9,7 @@ import pytest
 
 from bench import registry, table
 from bench.figure import Figure
-from bench.machine import stolen_share
+from bench.machine import measure_stolen_fraction
 from bench.mitsuba import map_for_mitsuba
 
 FIXED_NAMES = {
@@ -94,9 +94,9 @@ def test_long_benchmark_runs_small(module: str) -> None:
 
 
 def test_stolen_share_is_a_share_of_what_was_wanted() -> None:
-    assert stolen_share((1000, 10), (1200, 60)) == 0.25
-    assert stolen_share((1000, 10), (1000, 10)) is None
-    assert stolen_share(None, (1, 1)) is None
+    assert measure_stolen_fraction((1000, 10), (1200, 60)) == 0.25
+    assert measure_stolen_fraction((1000, 10), (1000, 10)) is None
+    assert measure_stolen_fraction(None, (1, 1)) is None
 
 
 def test_json_is_a_list_of_figures(capsys: pytest.CaptureFixture[str]) -> None:
@@ -145,7 +145,7 @@ def test_table_keeps_rows_that_were_not_measured() -> None:
 def test_documents_have_their_table(name: str) -> None:
     text = (table.DOCS / name).read_text()
     assert table.filled(text, []).count("| figure | value | target |") == 1
-    mine = [figure for figure in registry.names() if table.document_of(figure) == name]
+    mine = [figure for figure in registry.names() if table.find_document(figure) == name]
     for figure in mine:
         assert figure.removesuffix(".p50").removesuffix(".p95") in text
 

@@ -3,17 +3,21 @@
 import numpy as np
 import pytest
 
-from bench.standard_error import over_passes, over_points
+from bench.standard_error import compare_with_passes, estimate_point_error
 
 
 def test_standard_error_over_points_is_the_spread_of_repeated_draws() -> None:
     rng = np.random.default_rng(3)
     truth = rng.uniform(0.5, 1.5, (100_000, 3))
     found = truth + rng.exponential(0.05, truth.shape)
-    drawn = [over_points(found[rows], truth[rows]) for rows in np.split(rng.permutation(len(truth))[:60_000], 200)]
+    drawn = [
+        estimate_point_error(found[rows], truth[rows]) for rows in np.split(rng.permutation(len(truth))[:60_000], 200)
+    ]
     told = np.mean([estimate.standard_error for estimate in drawn])
     assert told == pytest.approx(np.std([estimate.value for estimate in drawn]), rel=0.15)
-    assert np.mean([estimate.value for estimate in drawn]) == pytest.approx(over_points(found, truth).value, rel=0.01)
+    assert np.mean([estimate.value for estimate in drawn]) == pytest.approx(
+        estimate_point_error(found, truth).value, rel=0.01
+    )
 
 
 def _passes(truth: np.ndarray, noise: float, num: int, seed: int) -> np.ndarray:
@@ -25,7 +29,7 @@ def test_standard_error_over_passes_is_the_spread_of_repeated_renders() -> None:
     rng = np.random.default_rng(5)
     truth = rng.uniform(0.5, 1.5, (40, 40, 3))
     ours = truth + rng.normal(0.01, 0.05, truth.shape)
-    found = [over_passes(ours, _passes(truth, 0.3, 8, seed)) for seed in range(60)]
+    found = [compare_with_passes(ours, _passes(truth, 0.3, 8, seed)) for seed in range(60)]
     for of in ("error", "bias"):
         values = [getattr(each, of).value for each in found]
         told = np.mean([getattr(each, of).standard_error for each in found])
@@ -37,6 +41,6 @@ def test_standard_error_over_passes_is_the_spread_of_repeated_renders() -> None:
 
 def test_picture_that_is_right_is_not_told_from_the_noise() -> None:
     truth = np.random.default_rng(7).uniform(0.5, 1.5, (32, 32, 3))
-    told = [over_passes(truth, _passes(truth, 0.3, 8, seed)).is_told for seed in range(50)]
+    told = [compare_with_passes(truth, _passes(truth, 0.3, 8, seed)).is_significant for seed in range(50)]
     assert np.mean(told) < 0.1
-    assert over_passes(1.1 * truth, _passes(truth, 0.3, 8, 99)).is_told
+    assert compare_with_passes(1.1 * truth, _passes(truth, 0.3, 8, 99)).is_significant

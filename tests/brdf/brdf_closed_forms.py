@@ -134,9 +134,9 @@ def oren_nayar(wi, wo, sigma, albedo):
     c1 = 1 - 0.5 * s2 / (s2 + 0.33)
     c2 = 0.45 * s2 / (s2 + 0.09) * (np.sin(alpha) - np.where(cosine >= 0, 0, (2 * beta / np.pi) ** 3))
     c3 = 0.125 * s2 / (s2 + 0.09) * (4 * alpha * beta / np.pi**2) ** 2
-    once = c1 + cosine * c2 * np.tan(beta) + (1 - np.abs(cosine)) * c3 * np.tan((alpha + beta) / 2)
-    twice = 0.17 * albedo * s2 / (s2 + 0.13) * (1 - cosine * (2 * beta / np.pi) ** 2)
-    return np.maximum(once + twice, 0) / np.pi
+    single_bounce = c1 + cosine * c2 * np.tan(beta) + (1 - np.abs(cosine)) * c3 * np.tan((alpha + beta) / 2)
+    double_bounce = 0.17 * albedo * s2 / (s2 + 0.13) * (1 - cosine * (2 * beta / np.pi) ** 2)
+    return np.maximum(single_bounce + double_bounce, 0) / np.pi
 
 
 def sheen(wi, wo, roughness):
@@ -146,14 +146,17 @@ def sheen(wi, wo, roughness):
     fibres = (2 + 1 / alpha) * sine2 ** (0.5 / alpha) / (2 * np.pi)
 
     def exponent(x):
-        one, other = (25.3245, 3.32435, 0.16801, -1.27393, -4.85967), (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
-        a, b, c, d, e = (1 - (1 - alpha) ** 2) * np.array(other) + (1 - alpha) ** 2 * np.array(one)
+        smooth_fit, rough_fit = (
+            (25.3245, 3.32435, 0.16801, -1.27393, -4.85967),
+            (21.5473, 3.82987, 0.19823, -1.97760, -4.32054),
+        )
+        a, b, c, d, e = (1 - (1 - alpha) ** 2) * np.array(rough_fit) + (1 - alpha) ** 2 * np.array(smooth_fit)
         return a / (1 + b * x**c) + d * x + e
 
-    def hidden(cosine):
+    def shadowing_lambda(cosine):
         return np.where(cosine < 0.5, np.exp(exponent(cosine)), np.exp(2 * exponent(0.5) - exponent(1 - cosine)))
 
-    return fibres / ((1 + hidden(wi[..., 2]) + hidden(wo[..., 2])) * 4 * wi[..., 2] * wo[..., 2])
+    return fibres / ((1 + shadowing_lambda(wi[..., 2]) + shadowing_lambda(wo[..., 2])) * 4 * wi[..., 2] * wo[..., 2])
 
 
 CLOSED_FORMS = {

@@ -6,14 +6,14 @@ from analytic_terms import ANALYTIC
 
 from relume.brdf.albedo import (
     directional_albedo,
-    images_in,
-    lobes_in,
-    mirrors_in,
-    normals_in,
+    drop_normal_map,
+    pack_reflectance,
     reflectance,
-    reflectances_of,
-    shares_in,
-    without_normals,
+    unpack_images,
+    unpack_lobes,
+    unpack_mirrors,
+    unpack_normal_map,
+    unpack_reflectance,
 )
 from relume.brdf.channels import NormalMap
 from relume.brdf.document import complete_term
@@ -72,12 +72,12 @@ def test_what_leans_a_material_is_part_of_what_it_sends(roughness):
     terms = [term_of("lambert", (0.5, 0.4, 0.2)), term_of("ggx", roughness=roughness, f0=0.9)]
     terms[0]["texture"] = "image:0123456789abcdef"
     normals = NormalMap("image:fedcba9876543210", 1.5)
-    flat, leant = reflectances_of(terms), reflectances_of(terms, normals)
-    assert (normals_in(flat), normals_in(leant)) == (None, normals)
-    assert leant not in (flat, reflectances_of(terms, normals._replace(scale=1.4)))
-    assert without_normals(leant) == without_normals(flat) == flat
-    assert images_in(leant) == images_in(flat) == (terms[0]["texture"], None)
-    assert lobes_in(leant) == lobes_in(flat)
-    np.testing.assert_array_equal(shares_in(leant), shares_in(flat))
-    assert bool(mirrors_in(flat)) == (roughness < 0.06)
-    assert mirrors_in(leant) == []
+    flat, leant = pack_reflectance(terms), pack_reflectance(terms, normals)
+    assert (unpack_normal_map(flat), unpack_normal_map(leant)) == (None, normals)
+    assert leant not in (flat, pack_reflectance(terms, normals._replace(scale=1.4)))
+    assert drop_normal_map(leant) == drop_normal_map(flat) == flat
+    assert unpack_images(leant) == unpack_images(flat) == (terms[0]["texture"], None)
+    assert unpack_lobes(leant) == unpack_lobes(flat)
+    np.testing.assert_array_equal(unpack_reflectance(leant), unpack_reflectance(flat))
+    assert bool(unpack_mirrors(flat)) == (roughness < 0.06)
+    assert unpack_mirrors(leant) == []

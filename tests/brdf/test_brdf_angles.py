@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from brdf_closed_forms import directions
 
-from relume.brdf.angles import alpha_and_beta_into, angle_at
+from relume.brdf.angles import angle_at, compute_alpha_beta
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.term import Angle
 
@@ -74,7 +74,7 @@ def test_a_pair_by_one_power_equals_its_numpy_twin():
     rng, wo = np.random.default_rng(11), direction(40, 70)
     wi = np.concatenate([directions(rng, 3000, 1e-3), [direction(40, 250), wo]])
     found, scale = np.empty((2, len(wi)), np.float32), np.array([2, 3], np.float32)
-    alpha_and_beta_into(scale, *np.ascontiguousarray(wi.T, np.float32), *wo.astype(np.float32), *found)
+    compute_alpha_beta(scale, *np.ascontiguousarray(wi.T, np.float32), *wo.astype(np.float32), *found)
     twin = np.stack([angles_numpy(angle, wi, wo) for angle in (Angle.ALPHA, Angle.BETA)])
     np.testing.assert_allclose(found / scale[:, None], twin, atol=5e-4)
     np.testing.assert_allclose(np.cos(found / scale[:, None]), np.cos(twin), atol=1e-6)

@@ -69,7 +69,7 @@ def test_band_averages_are_exact_for_polynomials(num_bands):
     np.testing.assert_allclose(band_averages(lambda x: x**5, num_bands), expected, rtol=1e-12, atol=1e-15)
     weighed = np.diff(edges**7 / 7) / np.diff(edges**2 / 2)
     np.testing.assert_allclose(
-        band_averages(lambda x: x**5, num_bands, about_pole=True), weighed, rtol=1e-12, atol=1e-15
+        band_averages(lambda x: x**5, num_bands, solid_angle_weighted=True), weighed, rtol=1e-12, atol=1e-15
     )
 
 

@@ -12,7 +12,7 @@ from brdf_closed_forms import CLOSED_FORMS, complex_fresnel, directions
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.fresnel import fresnel
 from relume.brdf.registry import TERMS, describe
-from relume.brdf.sweep import moved_curves
+from relume.brdf.sweep import curves_of_parameter
 from relume.brdf.term import VIEW, Angle
 
 MODELS = sorted(ANALYTIC)
@@ -292,7 +292,7 @@ def test_fixed_parameters_are_put_in_and_default_to_what_is_declared(model):
     term = TERMS[model]
     rng = np.random.default_rng(7)
     wi, wo = directions(rng, 50), directions(rng, 50)
-    as_declared = term.settled({"model": model})
+    as_declared = term.normalized({"model": model})
     np.testing.assert_array_equal(as_declared.quotient(*wi.T, *wo.T), term.quotient(*wi.T, *wo.T))
     assert [c.axes for c in as_declared.curves] == [c.axes for c in term.curves]
     before = eval_brdf({"model": model}, wi, wo)
@@ -317,8 +317,8 @@ def test_declaration_is_complete_and_consistent(model):
         assert p.help
     generating = {name for curve in term.curves for name in curve.parameters}
     assert generating | set(term.fixed) == set(names)
-    assert not any(moved_curves(term, name) for name in term.fixed)
-    assert bool(term.fixed) == (term.settle is not None)
+    assert not any(curves_of_parameter(term, name) for name in term.fixed)
+    assert bool(term.fixed) == (term.normalize is not None)
     angles = [curve.angle for curve in term.curves]
     assert len(set(angles)) == len(angles)
     for curve in term.curves:
@@ -363,10 +363,10 @@ def test_description_is_json_for_every_term():
 
 
 def test_outgoing_is_the_view_angle_alone():
-    outgoing = {t.model for t in TERMS.values() for c in t.curves if c.outgoing}
+    outgoing = {t.model for t in TERMS.values() for c in t.curves if c.depends_on_view}
     assert outgoing == {t.model for t in TERMS.values() for c in t.curves if c.angle is Angle.THETA_O}
     assert outgoing == set(TERMS) - {"measured_btf"}  # which has no curves
-    declared = {t.model for t in TERMS.values() for c in t.curves if c.outgoing and c is not VIEW}
+    declared = {t.model for t in TERMS.values() for c in t.curves if c.depends_on_view and c is not VIEW}
     assert declared == {"ggx", "ggx_multiple", "measured_lv", "measured_hf"}
 
 
@@ -388,7 +388,7 @@ def test_any_term_may_depend_on_the_view_angle(model):
     factor = np.where(np.arccos(wo[:, 2]) < np.pi / 4, 3.0, 0.5)
     np.testing.assert_allclose(eval_brdf(drawn, wi, wo), before * factor[:, None], rtol=1e-9)
     term = TERMS[model]
-    assert (VIEW in term.curves_in(plain), VIEW in term.curves_in(drawn)) == (
+    assert (VIEW in term.active_curves(plain), VIEW in term.active_curves(drawn)) == (
         False,
         model not in ("ggx", "ggx_multiple"),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relume.brdf.curves import curve_bands, curve_values, generated_bands
-from relume.brdf.edited import relative_edit
+from relume.brdf.edited import curve_edit
 from relume.brdf.registry import TERMS
 
 CASES = [("cook_torrance", {"sigma": 0.01}), ("ggx", {"roughness": 0.05}), ("ggx", {"roughness": 0.245})]
@@ -134,5 +134,5 @@ def test_the_editor_bends_curves_alike():
     eight = {"factors": [1, 1, 2, 0, 1, 1, 1, 1], "offsets": [0, 0, 0, 3, 0, 0, 0, 0]}
     drawn = {**eight, "handles": [[0, 8, 12], [20, 4, 2], [45, 3, 9], [90, 0, 0]]}
     ground = np.broadcast_to([8.0, 6, 4, 3, 2, 1, 0.5, 0], (3, 8))
-    factor, offset = relative_edit(drawn, ground)
+    factor, offset = curve_edit(drawn, ground)
     np.testing.assert_allclose((factor * ground + offset)[0], TWIN, rtol=1e-12)

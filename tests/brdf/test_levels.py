@@ -7,12 +7,19 @@ import pytest
 
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.document import complete_term
-from relume.brdf.levels import PLAIN, Levels, at_ratio, follows_map, level_bands, level_values
+from relume.brdf.levels import (
+    NO_LEVELS,
+    RoughnessLevels,
+    level_bands,
+    level_values,
+    scaled_roughness,
+    uses_roughness_map,
+)
 from relume.brdf.registry import TERMS
 from relume.errors import ParameterError
 
 WIDE = [term for term in TERMS.values() if term.width is not None and term.model != "ggx_multiple"]  # no highlight
-LEVELS = Levels((0.5, 1.0, 1.5), np.array([0, 0, 1, 2, 2, 2], np.uint8))
+LEVELS = RoughnessLevels((0.5, 1.0, 1.5), np.array([0, 0, 1, 2, 2, 2], np.uint8))
 
 
 def document(model, **more):
@@ -23,7 +30,7 @@ def half_width(model, ratio):
     """The angle at which the highlight has half of its peak."""
     curve = TERMS[model].curves[0]
     gamma = np.linspace(0, 1.2, 20_001)
-    values = curve_values(at_ratio(document(model), ratio), curve, gamma)[0]
+    values = curve_values(scaled_roughness(document(model), ratio), curve, gamma)[0]
     return gamma[np.argmax(values < values[0] / 2)]
 
 
@@ -31,24 +38,28 @@ def half_width(model, ratio):
 def test_highlights_are_as_wide_as_the_square_of_the_roughness(model) -> None:
     """α is the square of what artists call roughness, whatever parameter says it."""
     given = TERMS[model].parameter(TERMS[model].width[0])
-    assert given.minimum < at_ratio(document(model), 0.7)["params"][given.name] < given.maximum
+    assert given.minimum < scaled_roughness(document(model), 0.7)["params"][given.name] < given.maximum
     assert half_width(model, 0.7) / half_width(model, 1.0) == pytest.approx(0.49, rel=0.08)
 
 
 def test_parameters_stay_in_their_range() -> None:
-    assert at_ratio(document("ggx", params={"roughness": [0.2, 0.5, 0.9]}), 2.0)["params"]["roughness"] == [0.4, 1, 1]
-    assert at_ratio(document("ggx"), 0.0)["params"]["roughness"] == 0.03
-    assert at_ratio(document("phong"), 0.01)["params"]["exponent"] == 1e5
+    assert scaled_roughness(document("ggx", params={"roughness": [0.2, 0.5, 0.9]}), 2.0)["params"]["roughness"] == [
+        0.4,
+        1,
+        1,
+    ]
+    assert scaled_roughness(document("ggx"), 0.0)["params"]["roughness"] == 0.03
+    assert scaled_roughness(document("phong"), 0.01)["params"]["exponent"] == 1e5
 
 
 def test_curves_of_the_width_differ_and_others_do_not() -> None:
     term, curves = document("ggx"), {curve.name: curve for curve in TERMS["ggx"].curves}
     assert level_bands(term, curves["theta_h"], LEVELS).shape == (3, 3, 256)
     assert level_bands(term, curves["theta_d"], LEVELS).shape == (3, 64)
-    assert level_bands(term, curves["theta_h"], PLAIN).shape == (3, 256)
+    assert level_bands(term, curves["theta_h"], NO_LEVELS).shape == (3, 256)
     assert level_bands({**term, "roughness_map": False}, curves["theta_h"], LEVELS).shape == (3, 256)
     for k, ratio in enumerate(LEVELS.ratios):
-        expected = curve_bands(at_ratio(term, ratio), curves["theta_h"])
+        expected = curve_bands(scaled_roughness(term, ratio), curves["theta_h"])
         np.testing.assert_array_equal(level_bands(term, curves["theta_h"], LEVELS)[k], expected)
 
 
@@ -64,7 +75,7 @@ def test_values_are_those_of_each_sample_s_level() -> None:
     gamma = np.linspace(0.2, 1.5, 6)
     found = level_values(term, curve, gamma, LEVELS)
     for sample, level in enumerate(LEVELS.level):
-        expected = curve_values(at_ratio(term, LEVELS.ratios[level]), curve, gamma[sample : sample + 1])
+        expected = curve_values(scaled_roughness(term, LEVELS.ratios[level]), curve, gamma[sample : sample + 1])
         np.testing.assert_allclose(found[:, sample], expected[:, 0])
 
 
@@ -78,4 +89,4 @@ def test_terms_without_a_width_refuse_a_map(model) -> None:
 def test_only_true_and_false_say_whether_the_map_is_followed(value) -> None:
     with pytest.raises(ParameterError, match="roughness_map"):
         complete_term(("terms", 0), {"model": "ggx", "roughness_map": value}, None)
-    assert not follows_map(complete_term(("terms", 0), {"model": "ggx"}, None))
+    assert not uses_roughness_map(complete_term(("terms", 0), {"model": "ggx"}, None))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from shared_bakes import unmeasured
 
-from relume.btf.rings import ubo_rings
+from relume.btf.rings import ubo_grid
 from relume.btf.shelf import STORE, BtfRecord
-from relume.btf.values import Values
-from relume.synthetic.make import MESH, Made, make_btf
-from relume.synthetic.render import SmallGeometry
+from relume.btf.values import ValueFile
+from relume.synthetic.make import MESH, SyntheticBtf, synthesize_btf
+from relume.synthetic.render import TileGeometry
 
 __all__ = ["unmeasured"]  # a fixture
 
@@ -25,14 +25,14 @@ class Cords(NamedTuple):
 
     folder: Path
     record: BtfRecord
-    values: Values
+    values: ValueFile
 
 
 def cords(folder: Path) -> Path:
     """Two cords of unlike colours a metre, one of them shining, their piles uneven; of few faces, as light between them
     takes longest."""
-    shining = "newmtl b\nKd 0.1 0.3 0.4\nKs 0.1 0.1 0.1\nNs 9\nillum 3\n"  # a mirror's Ks is read as it stands
-    (folder / "m.mtl").write_text(f"newmtl a\nKd 0.6 0.4 0.2\nillum 1\n{shining}")
+    glossy_material = "newmtl b\nKd 0.1 0.3 0.4\nKs 0.1 0.1 0.1\nNs 9\nillum 3\n"  # a mirror's Ks is read as it stands
+    (folder / "m.mtl").write_text(f"newmtl a\nKd 0.6 0.4 0.2\nillum 1\n{glossy_material}")
     v, u = np.meshgrid(*[np.linspace(0, 1, STEPS + 1)] * 2, indexing="ij")
     height = 0.08 * np.sin(2 * np.pi * u) ** 2 + 0.02 * np.cos(2 * np.pi * (u + 2 * v))
     lines = ["mtllib m.mtl", *(f"v {x} {y} {-z}" for x, y, z in zip(u.flat, height.flat, v.flat, strict=True))]
@@ -48,11 +48,15 @@ def cords(folder: Path) -> Path:
 @pytest.fixture(scope="session")
 def small_btf(tmp_path_factory):
     folder, rendered = tmp_path_factory.mktemp("btf"), tmp_path_factory.mktemp("values")
-    wanted = Made(MESH, SIZE, GRID, BOUND, cords(tmp_path_factory.mktemp("geometry")))
-    values = Values(rendered, ubo_rings(), (SIZE, SIZE))
-    small = SmallGeometry(wanted.tile(), ubo_rings(), (SIZE, SIZE), GRID, 1)
-    values.fill(small.seen_from, lambda share: None, lambda: False)
-    begun = folder / "begun"  # goes on where it was, at the end
-    shutil.copytree(rendered, begun)
-    with STORE.at(folder):
-        yield Cords(folder, make_btf(folder, wanted, "Cords", lambda share: None, lambda: False, begun), values)
+    synthetic_btf = SyntheticBtf(MESH, SIZE, GRID, BOUND, cords(tmp_path_factory.mktemp("geometry")))
+    values = ValueFile(rendered, ubo_grid(), (SIZE, SIZE))
+    small = TileGeometry(synthetic_btf.tile(), ubo_grid(), (SIZE, SIZE), GRID, 1)
+    values.fill(small.get_view, lambda share: None, lambda: False)
+    partial_folder = folder / "begun"  # goes on where it was, at the end
+    shutil.copytree(rendered, partial_folder)
+    with STORE.with_search_folder(folder):
+        yield Cords(
+            folder,
+            synthesize_btf(folder, synthetic_btf, "Cords", lambda share: None, lambda: False, partial_folder),
+            values,
+        )

@@ -14,15 +14,15 @@ from PIL import Image
 from cli.main import main
 from relume.brdf.document import complete_term
 from relume.btf import shelf
-from relume.btf.packing import packed
-from relume.btf.rings import ubo_rings
-from relume.btf.shelf import STORE, btf, get_record, keep, records
-from relume.btf.values import Values
+from relume.btf.packing import pack
+from relume.btf.rings import ubo_grid
+from relume.btf.shelf import STORE, get_record, load_btf, records, store_btf
+from relume.btf.values import ValueFile
 from relume.errors import CancelledError, MaterialError, NotFoundError, ParameterError
-from relume.synthetic.make import Made, make_btf
+from relume.synthetic.make import SyntheticBtf, synthesize_btf
 from server.app import create_app
 from server.live.state.look_state import LookState
-from server.live.state.shown_views import ShownViews
+from server.live.state.shown_views import VisibleViews
 from server.records.tables import RenderRow
 from server.settings import Settings
 from server.wire.renders import RenderRequest
@@ -35,8 +35,8 @@ def test_what_is_kept_is_found_by_its_name(small_btf):
     assert record.size == (16, 16)
     assert record.error[-1] < 0.03
     assert records(small_btf.folder) == [record]
-    assert 0.02 < np.ptp(btf(record.data).height) < 0.12  # of cords, seen from above
-    assert btf(record.data).num_components == record.components
+    assert 0.02 < np.ptp(load_btf(record.data).height) < 0.12  # of cords, seen from above
+    assert load_btf(record.data).num_components == record.components
     term = complete_term(("terms", 0), record.terms()[0], None)
     assert term["params"] == {"scale": 1.0, "rotation": 0.0, "components": 16}
     assert not (small_btf.folder / "making").exists() or not list((small_btf.folder / "making").iterdir())
@@ -81,10 +81,10 @@ def changed(path, **changes):
 def test_clusters_and_weights_that_have_a_byte_each_are_read_as_before(small_btf, tmp_path, are_packed):
     at = tmp_path / small_btf.record.id
     shutil.copytree(small_btf.folder / small_btf.record.id, at)
-    expected = btf(small_btf.record.data)
+    expected = load_btf(small_btf.record.data)
     np.save(at / "cluster.npy", expected.cluster)
     if are_packed:  # weights alone
-        np.save(at / "packed.npy", np.stack([packed(weight, expected.bits) for weight in expected.weight]))
+        np.save(at / "packed.npy", np.stack([pack(weight, expected.bits) for weight in expected.weight]))
     else:
         np.save(at / "weight.npy", expected.weight)
         (at / "packed.npy").unlink()
@@ -99,7 +99,7 @@ def test_clusters_and_weights_that_have_a_byte_each_are_read_as_before(small_btf
 
 def test_what_is_told_of_its_bytes_is_what_lies_on_the_disk(small_btf):
     """But for the coarser levels, headers of 128 bytes, and the average, which lists read."""
-    found, folder = btf(small_btf.record.data), small_btf.folder / small_btf.record.id
+    found, folder = load_btf(small_btf.record.data), small_btf.folder / small_btf.record.id
     texels, all_texels = found.size[0] * found.size[1], found.cluster.shape[1]
     on_disk = {path.stem: path.stat().st_size - 128 for path in folder.glob("*.npy")}
     assert on_disk["packed"] == pytest.approx(
@@ -137,15 +137,15 @@ def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
         asked.append(0)
         return len(asked) > 20
 
-    wanted, (at_once, resumed) = Made("corduroy", 8, 1, 0.02), (tmp_path / "at once", tmp_path / "resumed")
-    whole = make_btf(at_once, wanted, "Corduroy", lambda share: None, lambda: False)
+    wanted, (at_once, resumed) = SyntheticBtf("corduroy", 8, 1, 0.02), (tmp_path / "at once", tmp_path / "resumed")
+    whole = synthesize_btf(at_once, wanted, "Corduroy", lambda share: None, lambda: False)
     with pytest.raises(CancelledError):
-        make_btf(resumed, wanted, "Corduroy", lambda share: None, after_some)
+        synthesize_btf(resumed, wanted, "Corduroy", lambda share: None, after_some)
     (begun,) = (resumed / "making").iterdir()
     done = int((begun / "done").read_text())
     assert 5 < done < 81
     shares = []
-    record = make_btf(resumed, wanted, "Corduroy", shares.append, lambda: False)
+    record = synthesize_btf(resumed, wanted, "Corduroy", shares.append, lambda: False)
     assert shares[0] == pytest.approx(0.8 * done / 81)
     assert record.id == whole.id
     for array in [*shelf._ARRAYS, "packed"]:
@@ -154,26 +154,26 @@ def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
 
 
 def test_values_of_another_btf_are_not_taken(tmp_path):
-    Values(tmp_path, ubo_rings(), (8, 8))
+    ValueFile(tmp_path, ubo_grid(), (8, 8))
     with pytest.raises(MaterialError, match="another BTF"):
-        Values(tmp_path, ubo_rings(), (8, 9))
+        ValueFile(tmp_path, ubo_grid(), (8, 9))
     (tmp_path / "done").write_text("x")
-    assert Values(tmp_path, ubo_rings(), (8, 8)).num_done == 0
+    assert ValueFile(tmp_path, ubo_grid(), (8, 8)).num_done == 0
 
 
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
-        (Made("wool", 16, 1, 0.1), "weave"),
-        (Made("weave", 0, 1, 0.1), "texels"),
-        (Made("weave", 1 << 20, 1, 0.1), "texels"),
-        (Made("weave", 16, 0, 0.1), "1 to 8"),
-        (Made("weave", 16, 1, float("nan")), "0.5"),
+        (SyntheticBtf("wool", 16, 1, 0.1), "weave"),
+        (SyntheticBtf("weave", 0, 1, 0.1), "texels"),
+        (SyntheticBtf("weave", 1 << 20, 1, 0.1), "texels"),
+        (SyntheticBtf("weave", 16, 0, 0.1), "1 to 8"),
+        (SyntheticBtf("weave", 16, 1, float("nan")), "0.5"),
     ],
 )
 def test_what_cannot_be_made_is_said(tmp_path, wanted, said):
     with pytest.raises(ParameterError, match=said):
-        make_btf(tmp_path, wanted, "x", lambda share: None, lambda: False)
+        synthesize_btf(tmp_path, wanted, "x", lambda share: None, lambda: False)
 
 
 def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
@@ -197,7 +197,7 @@ def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
         assert (model["needs_data"], model["data_prefix"], model["curves"]) == (True, "btf:", [])
         resumes, bake = client.app.state.services.live.resumes, "0123456789abcdef"
         shows = LookState({"materials": {"Ball": {"terms": []}}}, {"materials": {"Ball": json.loads(terms)}}, 0)
-        token = resumes.open(bake, shows, ShownViews(["front"], "front"))
+        token = resumes.open(bake, shows, VisibleViews(["front"], "front"))
         refused = client.delete(f"/api/materials/btf/{found['id']}")
         assert refused.status_code == 409
         assert f"a session of bake {bake}" in refused.json()["detail"]
@@ -216,14 +216,14 @@ def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
         assert client.get(f"/api/materials/btf/{found['id']}").status_code == 404
         assert client.get("/api/materials/btf").json() == []
     with pytest.raises(NotFoundError):
-        STORE.found(name)
+        STORE.resolve(name)
 
 
 def test_clusters_are_kept_whatever_their_number(small_btf, tmp_path):
     (source := tmp_path / "five").write_text("5")
-    few = btf(small_btf.record.data).with_components(2)
+    few = load_btf(small_btf.record.data).with_components(2)
     five = replace(few, **{name: np.repeat(getattr(few, name)[:, :1], 5, axis=1) for name in ("mean", "eigen", "step")},
                    cluster=np.random.default_rng(0).integers(0, 5, few.cluster.shape).astype(np.uint8))  # fmt: skip
-    kept = shelf._load(tmp_path / keep(tmp_path, source, "Five", None, lambda: five).id)
+    kept = shelf._load(tmp_path / store_btf(tmp_path, source, "Five", None, lambda: five).id)
     np.testing.assert_array_equal(kept.cluster, five.cluster)
     np.testing.assert_array_equal(kept.weight, five.weight)

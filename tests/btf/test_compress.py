@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from relume.btf.begun import Begun
-from relume.btf.compress import MOST_COMPONENTS, compress, most_texels
-from relume.btf.rings import directions, rings_of, ubo_rings
+from relume.btf.begun import PartialCompression
+from relume.btf.compress import MAX_COMPONENTS, compress, max_texels
+from relume.btf.rings import directions, make_direction_grid, ubo_grid
 from relume.errors import CancelledError, MaterialError
 
-RINGS = ubo_rings()
+RINGS = ubo_grid()
 
 
 class Facets:
-    """Texels of few kinds, each a Lambertian facet that leans; `kinds` different ones."""
+    """Texels of few kinds, each a Lambertian facet that leans; `angles` different ones."""
 
-    rings = RINGS
+    grid = RINGS
 
     def __init__(self, kinds, size=(12, 10), seed=2):
         rng = np.random.default_rng(seed)
@@ -24,29 +24,29 @@ class Facets:
         self._kind = rng.integers(0, kinds, size[0] * size[1])
         self._gain = rng.uniform(0.2, 1, (size[0] * size[1], 3))
 
-    def seen_from(self, view):
+    def get_view(self, view):
         lit = np.maximum(self._normals[self._kind] @ directions(RINGS).T, 0)
         seen = np.maximum(self._normals[self._kind] @ directions(RINGS)[view], 0.1)
         return ((lit * seen[:, None]).T[..., None] * self._gain).astype(np.float32)
 
 
-def kept(images, bound=0.01, progress=lambda share: None, cancelled=lambda: False, begun=None):
-    return compress(images, bound, progress, cancelled, begun)
+def kept(images, bound=0.01, progress=lambda share: None, is_canceled=lambda: False, begun=None):
+    return compress(images, bound, progress, is_canceled, begun)
 
 
 def whole(images):
-    return np.stack([images.seen_from(v) for v in range(81)]).transpose(2, 0, 1, 3).astype(np.float64)
+    return np.stack([images.get_view(v) for v in range(81)]).transpose(2, 0, 1, 3).astype(np.float64)
 
 
 def test_the_error_it_says_is_that_of_what_it_kept():
     images = Facets(kinds=9)
     found, truth = kept(images), whole(images)
-    told = np.stack([found.texel(k) for k in range(len(truth))])
+    told = np.stack([found.texel_brdf(k) for k in range(len(truth))])
     error = np.linalg.norm(told - truth) / np.linalg.norm(truth)
     assert found.error[-1] == pytest.approx(error, rel=1e-3)
     assert error <= 0.015  # the bound, and rounding to 256 steps
     fewer = found.with_components(1)
-    one = np.stack([fewer.texel(k) for k in range(len(truth))])
+    one = np.stack([fewer.texel_brdf(k) for k in range(len(truth))])
     assert found.error[1] == pytest.approx(np.linalg.norm(one - truth) / np.linalg.norm(truth), rel=1e-3)
     assert list(found.error) == sorted(found.error, reverse=True)
 
@@ -60,7 +60,7 @@ def test_a_looser_bound_keeps_less():
     for found in (loose, tight):
         assert (np.abs(found.weight).max(axis=(0, 1)) == 2 ** (found.bits.astype(int) - 1) - 1).all()
     assert loose.error[-1] <= 0.21
-    assert tight.num_components <= MOST_COMPONENTS
+    assert tight.num_components <= MAX_COMPONENTS
 
 
 def test_the_average_is_the_mean_of_all_texels_and_coarser_levels_are_means():
@@ -69,7 +69,7 @@ def test_the_average_is_the_mean_of_all_texels_and_coarser_levels_are_means():
     np.testing.assert_allclose(found.average, truth.mean(axis=0), atol=2e-3)
     assert found.levels.tolist() == [[0, 8, 8], [64, 4, 4], [80, 2, 2], [84, 1, 1]]
     of_four = truth.reshape(4, 2, 4, 2, 81, 81, 3).mean(axis=(1, 3)).reshape(16, 81, 81, 3)
-    coarser = np.stack([found.texel(64 + k) for k in range(16)])
+    coarser = np.stack([found.texel_brdf(64 + k) for k in range(16)])
     assert np.linalg.norm(coarser - of_four) < 0.06 * np.linalg.norm(of_four)
 
 
@@ -79,13 +79,13 @@ def test_progress_rises_to_the_end_and_a_cancelled_one_stops():
     assert shares == sorted(shares)
     assert shares[-1] > 0.9
     with pytest.raises(CancelledError):
-        kept(Facets(kinds=3), cancelled=lambda: len(shares) > 0)
+        kept(Facets(kinds=3), is_canceled=lambda: len(shares) > 0)
 
 
 def counted(images):
     """Count how often each view is read, in a list that is returned."""
-    read, seen_from = [], images.seen_from
-    images.seen_from = lambda view: read.append(view) or seen_from(view)
+    read, seen_from = [], images.get_view
+    images.get_view = lambda view: read.append(view) or seen_from(view)
     return read
 
 
@@ -93,22 +93,26 @@ def test_one_that_was_stopped_goes_on_and_finds_the_same(tmp_path):
     images, asked = Facets(kinds=9), []
     expected = kept(images)
     with pytest.raises(CancelledError):
-        kept(images, cancelled=lambda: asked.append(0) or len(asked) > 40, begun=Begun(tmp_path / "a", {"bound": 0.01}))
+        kept(
+            images,
+            is_canceled=lambda: asked.append(0) or len(asked) > 40,
+            begun=PartialCompression(tmp_path / "a", {"bound": 0.01}),
+        )
     (tmp_path / "a" / "view-3.npz").write_bytes(b"PK\x03\x04 half written")
     read = counted(images)
-    found = kept(images, begun=Begun(tmp_path / "a", {"bound": 0.01}))
+    found = kept(images, begun=PartialCompression(tmp_path / "a", {"bound": 0.01}))
     assert read == [3, *range(35, 81)]  # five were read to choose by, then 35
     for name in ("cluster", "weight", "bits", "mean", "eigen", "step", "average", "error"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
     read.clear()
-    kept(images, 0.2, begun=Begun(tmp_path / "a", {"bound": 0.2}))
+    kept(images, 0.2, begun=PartialCompression(tmp_path / "a", {"bound": 0.2}))
     assert len(read) == 5 + 81  # what was found for another bound does not count
 
 
 @pytest.mark.parametrize(("value", "said"), [(np.nan, "no numbers"), (-1.0, "negative"), (np.inf, "no numbers")])
 def test_values_that_are_none_are_refused(value, said):
     images = Facets(kinds=3)
-    good = images.seen_from
+    good = images.get_view
 
     def bad(view):
         values = good(view)
@@ -116,25 +120,25 @@ def test_values_that_are_none_are_refused(value, said):
             values[3, 5, 1] = value
         return values
 
-    images.seen_from = bad
+    images.get_view = bad
     with pytest.raises(MaterialError, match=said):
         kept(images)
 
 
 def test_one_side_may_be_black():
     images = Facets(kinds=3)
-    good = images.seen_from
-    images.seen_from = lambda view: good(view) * (view != 0)
+    good = images.get_view
+    images.get_view = lambda view: good(view) * (view != 0)
     found = kept(images)
     assert found.error[-1] < 0.015
-    assert not found.texel(7)[0].any()
+    assert not found.texel_brdf(7)[0].any()
 
 
 def test_what_is_no_smaller_is_not_kept_however_near():
     """Noise has no components: a bound that cannot be met does not keep all of it."""
     images, rng = Facets(kinds=3, size=(16, 16)), np.random.default_rng(3)
     noise = rng.uniform(size=(81, 256, 3)).astype(np.float32)
-    images.seen_from = lambda view: noise
+    images.get_view = lambda view: noise
     found = kept(images, 0.001)
     assert found.num_bytes * 2.4 < found.measured_bytes
     assert found.error[-1] > 0.1
@@ -142,7 +146,7 @@ def test_what_is_no_smaller_is_not_kept_however_near():
 
 def test_a_black_btf_and_one_that_is_too_large_are_refused():
     images = Facets(kinds=3)
-    images.seen_from = lambda view: np.zeros((81, 120, 3), np.float32)
+    images.get_view = lambda view: np.zeros((81, 120, 3), np.float32)
     with pytest.raises(MaterialError, match="black"):
         kept(images)
     images.size = (1 << 20, 1 << 20)
@@ -152,8 +156,11 @@ def test_a_black_btf_and_one_that_is_too_large_are_refused():
 
 def test_more_texels_than_memory_is_meant_for_are_refused_before_any_is_read():
     class Large:
-        rings, size = rings_of([(0.0, 1), (40.0, 199), (70.0, 200)]), (300, 300)  # 81 directions may have as many
+        grid, size = (
+            make_direction_grid([(0.0, 1), (40.0, 199), (70.0, 200)]),
+            (300, 300),
+        )  # 81 directions may have as many
 
-    assert most_texels(81) > 300 * 300
+    assert max_texels(81) > 300 * 300
     with pytest.raises(MaterialError, match="in 400 directions at most 83,886 can be kept, scale it down"):
         kept(Large())

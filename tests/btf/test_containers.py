@@ -4,10 +4,10 @@ import struct
 
 import numpy as np
 import pytest
-from btf_containers import ANGLES, SIZE, YUV_TO_RGB, container, content, random_factors, values
+from btf_containers import ANGLES, SIZE, YUV_TO_RGB, container, encode_container, random_factors, values
 
 from cli.main import main
-from relume.btf.factored import FactoredBtf
+from relume.btf.factored import MatrixBtf
 from relume.btf.rings import directions
 from relume.errors import MaterialError
 
@@ -15,8 +15,8 @@ LAST = len(ANGLES) - 1  # files have their directions from the last to the first
 
 
 def images(path):
-    found = FactoredBtf(path)
-    return [found.seen_from(view) for view in range(len(ANGLES))]
+    found = MatrixBtf(path)
+    return [found.get_view(view) for view in range(len(ANGLES))]
 
 
 @pytest.mark.parametrize(
@@ -25,13 +25,13 @@ def images(path):
 )
 def test_values_come_in_the_order_of_the_rings_with_the_cosine(tmp_path, changes):
     path, file = container(tmp_path / "a.btf", **changes)
-    found = FactoredBtf(path)
+    found = MatrixBtf(path)
     assert found.size == SIZE
     theta, phi = np.radians(ANGLES).T
     expected = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
-    np.testing.assert_allclose(directions(found.rings), expected, atol=1e-6)
+    np.testing.assert_allclose(directions(found.grid), expected, atol=1e-6)
     for view in (0, 3, 9):
-        seen = found.seen_from(view)
+        seen = found.get_view(view)
         for light in (0, 2, 7):
             truth = values(file, LAST - view, LAST - light) * np.cos(theta[light])
             np.testing.assert_allclose(seen[light], truth, rtol=2e-6)
@@ -39,7 +39,7 @@ def test_values_come_in_the_order_of_the_rings_with_the_cosine(tmp_path, changes
 
 def test_a_cosine_that_is_in_the_values_is_not_put_there_again(tmp_path):
     path, file = container(tmp_path / "a.btf", cosine=1)
-    np.testing.assert_allclose(FactoredBtf(path).seen_from(4)[9], values(file, LAST - 4, LAST - 9), rtol=2e-6)
+    np.testing.assert_allclose(MatrixBtf(path).get_view(4)[9], values(file, LAST - 4, LAST - 9), rtol=2e-6)
 
 
 @pytest.mark.parametrize("model", [0, 1, 9, 11, 12])
@@ -54,13 +54,13 @@ def test_colours_are_told_by_their_model(tmp_path, model):
     one = np.ones((SIZE[0] * SIZE[1], 1))
     channels = [(np.full((len(ANGLES) ** 2, 1), number), one) for number in told]
     path, _ = container(tmp_path / "a.btf", model=model, kind="<f8", channels=channels)
-    np.testing.assert_allclose(FactoredBtf(path).seen_from(0)[0], np.tile(rgb, (len(one), 1)), rtol=1e-5)
+    np.testing.assert_allclose(MatrixBtf(path).get_view(0)[0], np.tile(rgb, (len(one), 1)), rtol=1e-5)
 
 
 def test_what_a_product_has_below_zero_is_zero(tmp_path):
     (u, v), *others = random_factors()
     path, _ = container(tmp_path / "a.btf", channels=[(-u, v), *others])
-    seen = FactoredBtf(path).seen_from(0)
+    seen = MatrixBtf(path).get_view(0)
     assert (seen[..., 0] == 0).all()
     assert (seen[..., 1:] > 0).all()
 
@@ -113,7 +113,7 @@ def test_bad_ones_are_refused_with_what_is_wrong(tmp_path, changes, said):
 
 def test_every_cut_is_refused(tmp_path):
     path, file = container(tmp_path / "a.btf")
-    whole = content(file)
+    whole = encode_container(file)
     for length in [1, 9, 12, 100, 250, 262, 300, 310, 400, 1500, *range(1600, len(whole), 997), len(whole) - 1]:
         path.write_bytes(whole[:length])
         with pytest.raises(MaterialError):
@@ -126,12 +126,12 @@ def test_every_cut_is_refused(tmp_path):
 def test_sizes_that_are_told_are_bounded_before_anything_is_allocated(tmp_path):
     """Every aligned number of the first kilobytes, told as the largest there is."""
     path, file = container(tmp_path / "a.btf")
-    whole = content(file)
+    whole = encode_container(file)
     refused = 0
     for at in range(len(file.signature), 400, 4):
         path.write_bytes(whole[:at] + struct.pack("<I", 2**32 - 1) + whole[at + 4 :])
         try:
-            FactoredBtf(path)
+            MatrixBtf(path)
         except MaterialError:
             refused += 1
     assert refused >= 20

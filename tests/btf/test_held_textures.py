@@ -4,23 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sessions import make_next, relative_rmse, settle
-from tiny_scenes import looking, quad, scene_of, studio
+from sessions import relative_rmse, run_next_job, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
 from relume.bake import Recipe
 from relume.brdf.registry import TERMS
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
 from relume.picture.jobs import Shade
-from relume.picture.light import light_of
+from relume.picture.light import illumination_from_look
 from relume.picture.picture import Picture
-from relume.picture.routes.preview import Preview
-from relume.picture.routes.textures import Arrive
-from relume.project.arrived import arrived_rows, turned_tables
+from relume.picture.routes.preview import SparsePreview
+from relume.picture.routes.textures import SumTexels
+from relume.project.arrived import rotated_tables, texture_light_rows
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
 
@@ -29,12 +29,12 @@ GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
 def bake(tmp_path_factory):
     """A floor under a studio."""
     ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    camera = looking("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
+    camera = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
     materials = [Material("Floor", (GREY,)), Material("Other", (GREY,))]
     wall = quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1)
-    scene = scene_of(ground, wall, camera=camera, environment=studio(32, 20.0), materials=materials)
+    scene = make_tiny_scene(ground, wall, camera=camera, environment=studio(32, 20.0), materials=materials)
     recipe, folder = Recipe("direct", ("front",), (64, 48), 300), tmp_path_factory.mktemp("floor")
-    return open_bake(bake_here(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Cache(1 << 30))
 
 
 def covered(bake, record, sky=0.0, **params):
@@ -46,11 +46,11 @@ def covered(bake, record, sky=0.0, **params):
 @pytest.fixture
 def held(bake, small_btf):
     """A picture whose floor is covered, and a hand on it; its first image may have come from the disk."""
-    picture = Picture(bake, "front", Memory(1 << 28), is_watched=True)
+    picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
-    settle(picture).touch("/materials/Floor/terms/0/params/scale")
+    run_until_exact(picture).prepare("/materials/Floor/terms/0/params/scale")
     while picture.next_job() is not None:
-        make_next(picture)
+        run_next_job(picture)
     return picture
 
 
@@ -74,47 +74,47 @@ def test_a_texture_that_is_turned_follows_and_is_exact_at_rest(bake, small_btf, 
         assert held.advance(None).fidelity == "followed"
         expected = render_image(bake, "front", look)
         assert 1e-4 < relative_rmse(held.image(), expected) < 0.2 * relative_rmse(before, expected)
-        assert held.next_job().refines
-    assert relative_rmse(settle(held).image(), expected) < 1e-6
+        assert held.next_job().is_refinement
+    assert relative_rmse(run_until_exact(held).image(), expected) < 1e-6
 
 
 def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_btf, monkeypatch):
     """As in a look that was opened with images from the disk."""
-    monkeypatch.setattr("relume.picture.arrivals._SHARE", 1 << 20)
-    picture = Picture(bake, "front", Memory(1 << 28), is_watched=True)
+    monkeypatch.setattr("relume.picture.arrivals._BUDGET_DIVISOR", 1 << 20)
+    picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
-    before = settle(picture).image()
+    before = run_until_exact(picture).image()
     look = covered(bake, small_btf.record, scale=3.0)
     picture.set_look(look)
     assert picture.advance(None).fidelity == "approximate"
     np.testing.assert_array_equal(picture.image(), before)
-    assert isinstance(make_next(picture), Preview)
+    assert isinstance(run_next_job(picture), SparsePreview)
     assert picture.advance(None).fidelity == "preview"
     expected = render_image(bake, "front", look)
     assert relative_rmse(picture.image(), expected) < 0.2 * relative_rmse(before, expected)
     assert isinstance(picture.next_job(), Shade)
-    assert relative_rmse(settle(picture).image(), expected) < 1e-6
+    assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
 
 
 def test_no_frame_waits_for_many_texels(bake, small_btf, held, monkeypatch):
     """They are glimpsed, and summed in kept light beside the frames."""
-    monkeypatch.setattr("relume.operators.arrived._QUICK", 0)
+    monkeypatch.setattr("relume.operators.arrived._MAX_TABLE_ROWS", 0)
     look = covered(bake, small_btf.record, scale=2.9)
     held.set_look(look)
     assert held.advance(None).fidelity == "approximate"
-    assert isinstance(make_next(held), Preview)
+    assert isinstance(run_next_job(held), SparsePreview)
     assert held.advance(None).fidelity == "preview"
-    assert relative_rmse(settle(held).image(), render_image(bake, "front", look)) < 1e-6
+    assert relative_rmse(run_until_exact(held).image(), render_image(bake, "front", look)) < 1e-6
 
 
 def test_its_light_is_kept_when_a_hand_takes_hold_of_it(bake, small_btf, held):
     """The memory has dropped it."""
     look = covered(bake, small_btf.record, scale=2.0, sky=30.0)
     held.set_look(look)
-    settle(held)
-    held._images.cache.shrink(0, ())
-    held.touch("/materials/Floor/terms/0/params/scale")
-    assert isinstance(make_next(held), Arrive)
+    run_until_exact(held)
+    held._images.cache.trim(0, ())
+    held.prepare("/materials/Floor/terms/0/params/scale")
+    assert isinstance(run_next_job(held), SumTexels)
     assert held.next_job() is None
     held.set_look(covered(bake, small_btf.record, scale=3.0, sky=30.0))
     assert held.advance(None).exact
@@ -125,28 +125,28 @@ def test_other_fixed_parameters_are_glimpsed_too(bake):
         term = {"model": "oren_nayar", "params": {"sigma": sigma}}
         return validate({"materials": {"Floor": {"terms": [term]}}}, bake.default_look)
 
-    picture = Picture(bake, "front", Memory(1 << 28), is_watched=True)
+    picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(look(0.1))
-    before = settle(picture).image()
+    before = run_until_exact(picture).image()
     picture.set_look(look(1.0))
     assert picture.advance(None).fidelity == "approximate"
-    assert isinstance(make_next(picture), Preview)
+    assert isinstance(run_next_job(picture), SparsePreview)
     picture.advance(None)
     expected = render_image(bake, "front", look(1.0))
     assert relative_rmse(picture.image(), expected) < 0.3 * relative_rmse(before, expected)
-    assert picture.next_job().refines
+    assert picture.next_job().is_refinement
 
 
 def test_light_is_turned_with_the_rings(bake, small_btf):
     """By half a turn every direction of these rings takes another's place."""
-    texels = TERMS["measured_btf"].settled({"model": "measured_btf", "data": small_btf.record.data}).texels
-    light = light_of(covered(bake, small_btf.record), bake.material_names, has_bounces=False)
-    arriving = bake.arriving(bake.views["front"], 0, light, bake.memory)
+    texels = TERMS["measured_btf"].normalized({"model": "measured_btf", "data": small_btf.record.data}).texels
+    light = illumination_from_look(covered(bake, small_btf.record), bake.material_names, has_bounces=False)
+    arriving = bake.incident_light(bake.views["front"], 0, light, bake.cache)
     half = replace(texels, rotation=np.pi)
-    rings = texels.btf.rings
-    before, after = (arrived_rows(one, *arriving, 0, 40) for one in (texels, half))
+    rings = texels.btf.grid
+    before, after = (texture_light_rows(one, *arriving, 0, 40) for one in (texels, half))
     tables = np.random.default_rng(3).random((5, rings.num_directions), np.float32)
-    turned = np.einsum("tl,ncl->nct", turned_tables(rings, tables, np.pi), before)
+    turned = np.einsum("tl,ncl->nct", rotated_tables(rings, tables, np.pi), before)
     np.testing.assert_allclose(turned, np.einsum("tl,ncl->nct", tables, after), rtol=1e-4)
-    between = turned_tables(rings, tables, 0.3)
+    between = rotated_tables(rings, tables, 0.3)
     np.testing.assert_allclose(between @ np.ones(81), tables.sum(axis=1), rtol=1e-4)  # none of the light is lost

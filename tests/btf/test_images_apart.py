@@ -12,10 +12,10 @@ import pytest
 from btf_containers import container
 from btf_zips import zipped
 
-from relume.btf.importing import images_of
+from relume.btf.importing import open_images
 from relume.errors import MaterialError
-from server.apart.btf_images import ImagesApart
-from server.files.confining import missing
+from server.apart.btf_images import SandboxedViewArrays
+from server.files.confining import missing_features
 
 LIMITS = (4 << 30, 60)
 
@@ -23,35 +23,35 @@ LIMITS = (4 << 30, 60)
 @pytest.mark.parametrize("kind", ["zip", "container"])
 def test_they_are_what_is_in_the_file(tmp_path: Path, kind: str) -> None:
     file = zipped(tmp_path / "a.zip") if kind == "zip" else container(tmp_path / "a.btf")[0]
-    here = images_of(file)
-    with closing(ImagesApart(file, *LIMITS)) as apart:
+    here = open_images(file)
+    with closing(SandboxedViewArrays(file, *LIMITS)) as apart:
         assert apart.size == tuple(here.size)
-        for ours, theirs in zip(apart.rings, here.rings, strict=True):
+        for ours, theirs in zip(apart.grid, here.grid, strict=True):
             np.testing.assert_array_equal(ours, theirs)
             assert ours.dtype == theirs.dtype
-        for view in (0, 3, here.rings.num_directions - 1):
-            np.testing.assert_array_equal(apart.seen_from(view), here.seen_from(view))
+        for view in (0, 3, here.grid.num_directions - 1):
+            np.testing.assert_array_equal(apart.get_view(view), here.get_view(view))
     assert list(tmp_path.iterdir()) == [file]
 
 
 def test_what_is_wrong_with_a_file_is_said(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_bytes(b"PK, and no more")
     with pytest.raises(MaterialError, match="cut off or damaged"):
-        ImagesApart(tmp_path / "a.zip", *LIMITS)
+        SandboxedViewArrays(tmp_path / "a.zip", *LIMITS)
 
 
 def test_a_file_that_ends_its_reader_is_at_fault(tmp_path: Path) -> None:
-    with closing(ImagesApart(zipped(tmp_path / "a.zip"), *LIMITS)) as apart:
+    with closing(SandboxedViewArrays(zipped(tmp_path / "a.zip"), *LIMITS)) as apart:
         os.kill(apart._process.pid, signal.SIGKILL)
         apart._process.wait()
         with pytest.raises(MaterialError, match=r"made their reader fail, or need more than 4\.3 GB"):
-            apart.seen_from(0)
+            apart.get_view(0)
 
 
-@pytest.mark.skipif(bool(missing()), reason=f"this machine has no {' and no '.join(missing())}")
+@pytest.mark.skipif(bool(missing_features()), reason=f"this machine has no {' and no '.join(missing_features())}")
 def test_who_reads_them_has_no_password_and_no_way_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELUME_DATABASE", "secret")
-    with closing(ImagesApart(zipped(tmp_path / "a.zip"), *LIMITS)) as apart:
+    with closing(SandboxedViewArrays(zipped(tmp_path / "a.zip"), *LIMITS)) as apart:
         process = Path(f"/proc/{apart._process.pid}")
         assert b"RELUME_DATABASE" not in (process / "environ").read_bytes()
         status = dict(line.split(":\t", 1) for line in (process / "status").read_text().splitlines() if ":\t" in line)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from relume.btf.rings import directions, polar, taps_numpy, ubo_rings
+from relume.btf.rings import directions, interpolation_weights_numpy, polar, ubo_grid
 from relume.errors import ParameterError, SceneError
 from relume.synthetic.corduroy import corduroy
-from relume.synthetic.make import MESH, Made, make_btf
-from relume.synthetic.mesh import tile_of
-from relume.synthetic.render import SmallGeometry
+from relume.synthetic.make import MESH, SyntheticBtf, synthesize_btf
+from relume.synthetic.mesh import read_tile
+from relume.synthetic.render import TileGeometry
 
 LIBRARY = "newmtl red\nKd 0.6 0.1 0.1\nKs 0 0 0\nillum 1\nnewmtl green\nKd 0.1 0.5 0.2\nKs 0 0 0\nillum 1\n"
 
@@ -30,12 +30,12 @@ def striped(tmp_path):
 
 
 def test_every_material_of_a_flat_mesh_sends_what_it_would_alone(striped):
-    tile = tile_of(striped, None)
-    seen = SmallGeometry(tile, ubo_rings(), (8, 8), 1, 1).seen_from(30).reshape(81, 8, 8, 3)
+    tile = read_tile(striped, None)
+    seen = TileGeometry(tile, ubo_grid(), (8, 8), 1, 1).get_view(30).reshape(81, 8, 8, 3)
     sums = [sum(np.array(term["color"]) for term in terms if term["model"] == "lambert") for terms in tile.materials]
     for half, matt in zip((seen[:, :, :4], seen[:, :, 4:]), sums, strict=True):
         assert matt.max() > 0.3
-        expected = matt / np.pi * directions(ubo_rings())[:, None, None, 2:]
+        expected = matt / np.pi * directions(ubo_grid())[:, None, None, 2:]
         # lamps are wide, and a mirror's share of what is not matt comes on top
         np.testing.assert_allclose(half.mean(axis=(1, 2)), expected[:, 0, 0], rtol=0.15, atol=0.02)
     assert seen[:, :, :4, 0].mean() > 2 * seen[:, :, 4:, 0].mean()
@@ -43,12 +43,12 @@ def test_every_material_of_a_flat_mesh_sends_what_it_would_alone(striped):
 
 def test_between_its_directions_light_is_neither_lost_nor_won(striped):
     """A matt surface sends the same share of light from everywhere: means of what it sends at directions are less."""
-    albedo, rings = 0.5, ubo_rings()
-    matt = tile_of(striped, None)._replace(materials=(({"model": "lambert", "color": [albedo] * 3},),) * 2)
-    seen = SmallGeometry(matt, rings, (8, 8), 3, 1).seen_from(30).mean(axis=(1, 2), dtype=np.float64)
+    albedo, rings = 0.5, ubo_grid()
+    matt = read_tile(striped, None)._replace(materials=(({"model": "lambert", "color": [albedo] * 3},),) * 2)
+    seen = TileGeometry(matt, rings, (8, 8), 3, 1).get_view(30).mean(axis=(1, 2), dtype=np.float64)
     k = np.arange(4000)
     lights = polar(np.arccos(1 - (k + 0.5) / len(k)), k * np.pi * (3 - 5**0.5))
-    index, weight, left = taps_numpy(rings, lights)
+    index, weight, left = interpolation_weights_numpy(rings, lights)
     assert (weight * seen[index]).sum(axis=1) @ left == pytest.approx(albedo / np.pi * lights[:, 2].sum(), rel=2e-3)
 
 
@@ -59,7 +59,7 @@ def test_a_file_holds_the_same_period(tmp_path):
     rows += ["f " + " ".join(f"{k}//{k}" for k in face + 1) + "\n" for face in tile.faces]
     path = tmp_path / "cords.obj"
     path.write_text("".join(rows))
-    found = tile_of(path, 3.0)
+    found = read_tile(path, 3.0)
     for name in ("positions", "normals"):
         one, other = (getattr(each, name)[each.faces] for each in (found, tile))
         np.testing.assert_allclose(one, other, atol=2e-6)
@@ -80,12 +80,14 @@ def test_meshes_that_are_no_period_are_refused(tmp_path, text, period, error, sa
     path = tmp_path / "bad.obj"
     path.write_text(text)
     with pytest.raises(error, match=said):
-        make_btf(tmp_path / "kept", Made(MESH, 8, 1, 0.1, path, period), "x", lambda share: None, lambda: False)
+        synthesize_btf(
+            tmp_path / "kept", SyntheticBtf(MESH, 8, 1, 0.1, path, period), "x", lambda share: None, lambda: False
+        )
     assert not (tmp_path / "kept").exists()
 
 
 def test_other_colours_are_another_btf(striped):
-    wanted = Made(MESH, 8, 1, 0.1, striped)
+    wanted = SyntheticBtf(MESH, 8, 1, 0.1, striped)
     first = wanted.recipe(wanted.tile())
     assert first == wanted.recipe(wanted.tile())
     (striped.parent / "m.mtl").write_text(LIBRARY.replace("0.6", "0.7"))

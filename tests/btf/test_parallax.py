@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from relume.btf.parallax import height_seen, height_seen_numpy, slant_of, slants
-from relume.btf.rings import directions, ubo_rings
-from relume.synthetic.render import SmallGeometry
+from relume.btf.parallax import compute_shear, compute_shears, parallax_intersection, parallax_intersection_numpy
+from relume.btf.rings import directions, ubo_grid
+from relume.synthetic.render import TileGeometry
 from relume.synthetic.weave import weave
 
 SLANTS = [(0.0, 0.0), (0.4, -0.2), (-2.5, 1.5)]
@@ -19,14 +19,16 @@ def waves():
 
 def seen(relief, place, slant):
     slant = np.asarray(slant, np.float32)
-    return float(height_seen(relief, relief.min(), relief.max(), np.float32(place[0]), np.float32(place[1]), slant))
+    return float(
+        parallax_intersection(relief, relief.min(), relief.max(), np.float32(place[0]), np.float32(place[1]), slant)
+    )
 
 
 @pytest.mark.parametrize("slant", SLANTS)
 def test_the_kernel_is_the_oracle_and_both_are_where_a_ray_meets_the_relief(slant):
     relief, rng = waves(), np.random.default_rng(3)
     for place in rng.uniform(-2, 2, (40, 2)):
-        found, exact = seen(relief, place, slant), height_seen_numpy(relief, place, np.array(slant))
+        found, exact = seen(relief, place, slant), parallax_intersection_numpy(relief, place, np.array(slant))
         assert abs(found - exact) < 1e-5
         # by brute force: relief between texels, in ten thousand steps
         z = np.linspace(relief.max(), relief.min(), 10_001)
@@ -45,14 +47,14 @@ def test_an_even_height_is_seen_at_that_height():
 
 
 def test_slants_end_with_the_last_ring():
-    rings = ubo_rings()
-    for w, slant in zip(directions(rings)[::9], slants(rings)[::9], strict=True):
-        np.testing.assert_allclose(slant_of(rings, *w), slant, rtol=1e-5, atol=1e-6)
-    assert np.hypot(*slant_of(rings, 0.8, 0.59, 0.08)) == pytest.approx(np.tan(np.radians(75)), rel=1e-3)
+    rings = ubo_grid()
+    for w, slant in zip(directions(rings)[::9], compute_shears(rings)[::9], strict=True):
+        np.testing.assert_allclose(compute_shear(rings, *w), slant, rtol=1e-5, atol=1e-6)
+    assert np.hypot(*compute_shear(rings, 0.8, 0.59, 0.08)) == pytest.approx(np.tan(np.radians(75)), rel=1e-3)
 
 
 def test_the_height_of_a_small_geometry_lies_between_its_lowest_and_its_highest():
-    small = SmallGeometry(weave(), ubo_rings(), (8, 8), 2, 1)
+    small = TileGeometry(weave(), ubo_grid(), (8, 8), 2, 1)
     height, z = small.height(), small._positions[:, 2]
     assert height.shape == (8, 8)
     assert z.min() <= height.min() < height.max() <= z.max()

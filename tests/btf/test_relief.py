@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from test_texels import CAMERA, GREY, SIZE, covered, floor, opened
 
-from relume.basis.zernike import in_basis
-from relume.btf.rings import directions, taps_numpy, ubo_rings
-from relume.btf.shelf import btf
+from relume.basis.zernike import project
+from relume.btf.rings import directions, interpolation_weights_numpy, ubo_grid
+from relume.btf.shelf import load_btf
 from relume.look import validate
 from relume.moving import frame
-from relume.moving.look_up import look
+from relume.moving.look_up import trace_primary
 from relume.moving.relief import tables
-from relume.moving.relief.light import ReliefLight, light_about_numpy
-from relume.moving.relief.numbers import AXIS_OF, FUNCTIONS, LANE_OF
-from relume.moving.relief.show import Arrived, Sight, show_texels
-from relume.moving.relief.tables import Covers, covers_of, hat_factors, in_lanes
+from relume.moving.relief.light import TexelLight, node_light_numpy
+from relume.moving.relief.numbers import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
+from relume.moving.relief.show import IncidentTexelLight, TextureFootprint, shade_texels
+from relume.moving.relief.tables import BtfMaterials, filtered_factors, find_btf_materials, pack_lanes
 from relume.render.image import render_image
 
 SCALE, ROTATION, MEAN = 2.0, 40.0, np.float32(0.02)
@@ -31,14 +31,14 @@ def moving(tmp_path_factory):
 
 def sight(moving, pixel_angle=0.0):
     eye = CAMERA.to_world[:3, 3].astype(np.float32)
-    return Sight(eye, pixel_angle, look(moving.surface, moving.embree, CAMERA, SIZE))
+    return TextureFootprint(eye, pixel_angle, trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE))
 
 
 def vectors_of(surface, to_light):
     """Light vectors of all points in light from one side: of its functions, in the frame of each."""
-    n, t = (getattr(surface.points, name).astype(np.float64) for name in ("normal", "tangent"))
+    n, t = (getattr(surface.probes, name).astype(np.float64) for name in ("normal", "tangent"))
     local = np.stack([t @ to_light, np.cross(n, t) @ to_light, n @ to_light], axis=1)
-    return np.repeat(in_basis(local)[:, None], 3, axis=1).astype(np.float32)
+    return np.repeat(project(local)[:, None], 3, axis=1).astype(np.float32)
 
 
 def terms_of(look_of):
@@ -46,13 +46,13 @@ def terms_of(look_of):
 
 
 def arrived(surface):
-    return Arrived(vectors_of(surface, TO_LIGHT), ReliefLight())
+    return IncidentTexelLight(vectors_of(surface, TO_LIGHT), TexelLight())
 
 
 def factors(numbers, axes):
     """Out-factors, in lanes, that numbers stand for. (…, 24) to (…, 3, F)"""
     out = np.zeros((*numbers.shape[:-1], 3, 16))
-    for number, (axis, lane) in enumerate(zip(AXIS_OF, LANE_OF, strict=True)):
+    for number, (axis, lane) in enumerate(zip(COEFFICIENT_AXIS, COEFFICIENT_LANE, strict=True)):
         out[..., lane] += numbers[..., number, None] * axes[:, axis]
     return out
 
@@ -69,17 +69,17 @@ def oracle(cover, d, place):
         share = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
         number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
         numbers += share * found.step * found.weight[:, number].astype(float)
-    light = in_lanes(in_basis(axes @ TO_LIGHT))
-    view, of_view, _ = taps_numpy(cover.texels.btf.rings, -(axes @ d)[None])
+    light = pack_lanes(project(axes @ TO_LIGHT))
+    view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, -(axes @ d)[None])
 
     return np.einsum("a,ack,k->c", of_view[0], factors(numbers, found.axes)[view[0]], light)
 
 
 def test_the_kernel_is_the_oracle(moving, small_btf):
     look_of = covered(moving, small_btf.record, (0.5, 1.0, 2.0), scale=SCALE, rotation=ROTATION)
-    covers, seen_by, surface = covers_of(terms_of(look_of)).shown, sight(moving), moving.surface
-    seen, out = seen_by.seen, np.full((len(seen_by.seen.directions), 3), MEAN, np.float32)
-    show_texels(covers, surface, moving.positions, seen_by, arrived(surface), out)
+    covers, seen_by, surface = find_btf_materials(terms_of(look_of)).available, sight(moving), moving.stored_scene
+    seen, out = seen_by.gbuffer, np.full((len(seen_by.gbuffer.directions), 3), MEAN, np.float32)
+    shade_texels(covers, surface, moving.positions, seen_by, arrived(surface), out)
     rays = np.flatnonzero(seen.hits.face >= 0)
     num_pixels = len(seen.directions) - len(seen.owner)
     assert len(seen.owner)
@@ -87,7 +87,7 @@ def test_the_kernel_is_the_oracle(moving, small_btf):
         middle = ray if ray < num_pixels else seen.owner[ray - num_pixels]
         texel_of = middle if seen.hits.face[middle] >= 0 else ray  # across an edge as in the middle of the pixel
         d = seen.directions[texel_of].astype(np.float64)
-        place = (seen_by.eye + seen.hits.distance[texel_of] * d + [1, 0, 1]) / 2
+        place = (seen_by.camera_position + seen.hits.distance[texel_of] * d + [1, 0, 1]) / 2
         more = [0.5, 1.0, 2.0] * oracle(covers[0], d, place)
         np.testing.assert_allclose(out[ray], np.maximum(MEAN + more, 0), rtol=5e-3, atol=2e-4)
     assert (out[seen.hits.face < 0] == MEAN).all()
@@ -97,20 +97,20 @@ def test_the_kernel_is_the_oracle(moving, small_btf):
 
 def test_light_about_a_vertex_is_the_oracles(moving):
     """Of points whose tangents go any way about the normal."""
-    rng, surface = np.random.default_rng(2), moving.surface
-    turn = rng.uniform(0, 2 * np.pi, len(surface.points.normal))
-    n, t = surface.points.normal, surface.points.tangent
+    rng, surface = np.random.default_rng(2), moving.stored_scene
+    turn = rng.uniform(0, 2 * np.pi, len(surface.probes.normal))
+    n, t = surface.probes.normal, surface.probes.tangent
     tangent = (np.cos(turn)[:, None] * t + np.sin(turn)[:, None] * np.cross(n, t)).astype(np.float32)
-    surface = replace(surface, points=surface.points._replace(tangent=tangent))
+    surface = replace(surface, probes=surface.probes._replace(tangent=tangent))
     vectors = rng.normal(size=moving.vectors_shape).astype(np.float32)
-    light, num = ReliefLight(), len(surface.vertices.normal)
-    light.about(surface, vectors, np.arange(num, dtype=np.uint8) % 2)
-    found = light.about(surface, vectors, np.ones(num, np.uint8))
+    light, num = TexelLight(), len(surface.lattice_nodes.normal)
+    light.around_nodes(surface, vectors, np.arange(num, dtype=np.uint8) % 2)
+    found = light.around_nodes(surface, vectors, np.ones(num, np.uint8))
     for vertex in range(0, len(found.tangent), 37):
-        expected, along = light_about_numpy(surface.vertices, tangent, vectors, vertex)
+        expected, along = node_light_numpy(surface.lattice_nodes, tangent, vectors, vertex)
         np.testing.assert_allclose(
             found.vectors[vertex].reshape(2, 3, 8).swapaxes(0, 1).reshape(3, 16),
-            in_lanes(expected),
+            pack_lanes(expected),
             rtol=1e-4,
             atol=1e-5,
         )
@@ -119,41 +119,45 @@ def test_light_about_a_vertex_is_the_oracles(moving):
 
 def test_another_light_is_another(moving):
     """What was kept of the light before is not shown."""
-    surface, light, every = moving.surface, ReliefLight(), np.ones(len(moving.surface.vertices.normal), np.uint8)
+    surface, light, every = (
+        moving.stored_scene,
+        TexelLight(),
+        np.ones(len(moving.stored_scene.lattice_nodes.normal), np.uint8),
+    )
     dark, bright = np.zeros(moving.vectors_shape, np.float32), np.ones(moving.vectors_shape, np.float32)
-    assert light.about(surface, bright, every).vectors.any()
-    assert not light.about(surface, dark, every).vectors.any()
+    assert light.around_nodes(surface, bright, every).vectors.any()
+    assert not light.around_nodes(surface, dark, every).vectors.any()
 
 
 def test_few_numbers_tell_out_factors(moving, small_btf):
     """Of each texel, from all sides, as its own values have them, but for rounding and colours of what is narrow."""
-    cover = covers_of(terms_of(covered(moving, small_btf.record))).shown[0]
+    cover = find_btf_materials(terms_of(covered(moving, small_btf.record))).available[0]
     whole, found, squares = cover.texels.btf, cover.tables, np.zeros(2)
-    integrals = hat_factors(whole.rings)
+    integrals = filtered_factors(whole.grid)
     mean = np.einsum("vlc,lk->vck", whole.average, integrals)
     for texel in range(0, found.weight.shape[1], 29):
-        expected = np.einsum("vlc,lk->vck", whole.texel(texel), integrals)
+        expected = np.einsum("vlc,lk->vck", whole.texel_brdf(texel), integrals)
         told = mean + factors(found.step * found.weight[:, texel], found.axes)
         squares += np.sum((told - expected) ** 2), np.sum(expected**2)
     assert squares[0] < 0.05**2 * squares[1]
 
 
 def test_the_finest_texels_of_large_tables_are_left_out(small_btf, monkeypatch):
-    whole = btf(small_btf.record.data)
-    monkeypatch.setattr(tables, "_MOST_BYTES", 81 * 24 * 100)
-    found = tables.tables_of(whole)
+    whole = load_btf(small_btf.record.data)
+    monkeypatch.setattr(tables, "_MAX_TABLE_BYTES", 81 * 24 * 100)
+    found = tables.compute_texel_tables(whole)
     assert found.levels[0].tolist() == [0, 8, 8]
     assert found.weight.shape[1] == 64 + 16 + 4 + 1
     monkeypatch.undo()
-    complete = tables.tables_of(whole)
+    complete = tables.compute_texel_tables(whole)
     one, other = (t.step[:, None] * t.weight for t in (found, complete))
     np.testing.assert_allclose(one, other[:, 256:], atol=float((found.step + complete.step).max()))
 
 
 def test_a_matt_surface_has_a_single_factor():
     """Its values are the cosine, ∫ cos θ h_k dω = √π for the first function and nothing for the others."""
-    rings = ubo_rings()
-    found = directions(rings)[:, 2] @ hat_factors(rings)
+    rings = ubo_grid()
+    found = directions(rings)[:, 2] @ filtered_factors(rings)
     assert found[CONSTANT] == pytest.approx(np.sqrt(np.pi), rel=0.02)
     assert np.abs(np.delete(found, CONSTANT)).max() < 0.02 * found[CONSTANT]
 
@@ -162,7 +166,7 @@ def test_a_moving_view_shows_what_a_fixed_one_does(moving, small_btf, tmp_path, 
     look_of = covered(moving, small_btf.record, scale=SCALE)
     expected = render_image(opened(floor(), tmp_path), "front", look_of)
     found = render_image(moving, "front", look_of)
-    monkeypatch.setattr(frame, "covers_of", lambda *_, **__: Covers([], []))
+    monkeypatch.setattr(frame, "find_btf_materials", lambda *_, **__: BtfMaterials([], []))
     mean = render_image(moving, "front", look_of)
     size = np.linalg.norm(expected)
     assert np.linalg.norm(found - expected) < 0.03 * size < 0.1 * size < np.linalg.norm(mean - expected)
@@ -179,10 +183,12 @@ def test_beside_other_terms_a_btf_counts_for_its_share(moving, small_btf, tmp_pa
 
 def test_two_textures_on_one_material_are_summed(moving, small_btf):
     terms = terms_of(covered(moving, small_btf.record, scale=SCALE))
-    seen_by, surface = sight(moving), moving.surface
+    seen_by, surface = sight(moving), moving.stored_scene
     found = []
     for times in (1, 2):
-        out = np.full((len(seen_by.seen.directions), 3), 10.0, np.float32)
-        show_texels(covers_of([terms[0] * times]).shown, surface, moving.positions, seen_by, arrived(surface), out)
+        out = np.full((len(seen_by.gbuffer.directions), 3), 10.0, np.float32)
+        shade_texels(
+            find_btf_materials([terms[0] * times]).available, surface, moving.positions, seen_by, arrived(surface), out
+        )
         found.append(out - 10)
     np.testing.assert_allclose(found[1], 2 * found[0], atol=1e-5)

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from relume.btf.rings import UBO_81, Rings, directions, rings_of, taps, taps_numpy, ubo_rings
+from relume.btf.rings import (
+    UBO_81,
+    DirectionGrid,
+    directions,
+    interpolation_weights,
+    interpolation_weights_numpy,
+    make_direction_grid,
+    ubo_grid,
+)
 from relume.errors import MaterialError
 
 
@@ -16,7 +24,7 @@ def random_directions(num, seed=3):
 
 def of_kernel(rings, w):
     index, weight = np.zeros((len(w), 4), np.int32), np.zeros((len(w), 4), np.float32)
-    left = [taps(rings, *row.astype(np.float32), index[k], weight[k]) for k, row in enumerate(w)]
+    left = [interpolation_weights(rings, *row.astype(np.float32), index[k], weight[k]) for k, row in enumerate(w)]
     return index, weight, np.array(left)
 
 
@@ -32,39 +40,43 @@ TURNED = ((0.0, 1), (30.0, 4), (80.0, 7)), (0.0, 0.25, 0.9)  # rings that do not
 
 @pytest.mark.parametrize(("described", "shift"), [(UBO_81, ()), TURNED])
 def test_the_kernel_finds_what_plain_numpy_does(described, shift):
-    rings, w = rings_of(described, shift), random_directions(500)
+    rings, w = make_direction_grid(described, shift), random_directions(500)
     index, weight, left = of_kernel(rings, w)
-    expected, of_expected, expected_left = taps_numpy(rings, w)
+    expected, of_expected, expected_left = interpolation_weights_numpy(rings, w)
     found = dense(index, weight, rings.num_directions)
     np.testing.assert_allclose(found, dense(expected, of_expected, rings.num_directions), atol=2e-5)
     np.testing.assert_allclose(left, expected_left, atol=1e-5)
 
 
-@pytest.mark.parametrize("rings", [ubo_rings(), rings_of(*TURNED)])
+@pytest.mark.parametrize("rings", [ubo_grid(), make_direction_grid(*TURNED)])
 def test_a_measured_direction_is_itself_alone(rings):
-    found = dense(*taps_numpy(rings, directions(rings))[:2], rings.num_directions)
+    found = dense(*interpolation_weights_numpy(rings, directions(rings))[:2], rings.num_directions)
     np.testing.assert_allclose(found, np.eye(rings.num_directions), atol=1e-6)
 
 
-@pytest.mark.parametrize("rings", [ubo_rings(), rings_of(*TURNED)])
+@pytest.mark.parametrize("rings", [ubo_grid(), make_direction_grid(*TURNED)])
 def test_weights_sum_to_one_and_have_no_seams(rings):
     theta = np.radians(np.linspace(1, 89, 60))
     for first, second in ((np.pi - 1e-7, -np.pi + 1e-7), (-1e-7, 1e-7)):
         sides = [
             np.stack([np.sin(theta) * np.cos(p), np.sin(theta) * np.sin(p), np.cos(theta)], 1) for p in (first, second)
         ]
-        one, other = (dense(*taps_numpy(rings, side)[:2], rings.num_directions) for side in sides)
+        one, other = (dense(*interpolation_weights_numpy(rings, side)[:2], rings.num_directions) for side in sides)
         np.testing.assert_allclose(one, other, atol=1e-5)
         np.testing.assert_allclose(one.sum(axis=1), 1, atol=1e-9)
     pole = np.array([[1e-7, 0, 1.0], [0, -1e-7, 1.0], [-1e-7, 1e-7, 1.0]])
-    np.testing.assert_allclose(dense(*taps_numpy(rings, pole)[:2], rings.num_directions)[:, 0], 1, atol=1e-5)
+    np.testing.assert_allclose(
+        dense(*interpolation_weights_numpy(rings, pole)[:2], rings.num_directions)[:, 0], 1, atol=1e-5
+    )
 
 
 def test_below_the_last_ring_the_cosine_goes_on():
-    rings = ubo_rings()
+    rings = ubo_grid()
     theta = np.radians([75.0, 85.0, 90.0])
     w = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=1)
-    np.testing.assert_allclose(taps_numpy(rings, w)[2], np.cos(theta) / np.cos(np.radians(75)), atol=1e-6)
+    np.testing.assert_allclose(
+        interpolation_weights_numpy(rings, w)[2], np.cos(theta) / np.cos(np.radians(75)), atol=1e-6
+    )
 
 
 @pytest.mark.parametrize(
@@ -74,15 +86,15 @@ def test_below_the_last_ring_the_cosine_goes_on():
 )  # fmt: skip
 def test_what_is_no_rings_is_refused(described):
     with pytest.raises(MaterialError, match="rings"):
-        rings_of(described)
+        make_direction_grid(described)
 
 
 @pytest.mark.parametrize("shift", [(0.0,), (0.0, 1.0), (0.0, -0.1), (0.0, np.nan)])
 def test_turns_that_are_no_shares_of_a_step_are_refused(shift):
     with pytest.raises(MaterialError, match="turned"):
-        rings_of(((0.0, 1), (30.0, 6)), shift)
+        make_direction_grid(((0.0, 1), (30.0, 6)), shift)
 
 
 def test_rings_know_their_number():
-    assert isinstance(ubo_rings(), Rings)
-    assert ubo_rings().num_directions == 81
+    assert isinstance(ubo_grid(), DirectionGrid)
+    assert ubo_grid().num_directions == 81

@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from relume.btf.sent import seen, seen_numpy, sent, sent_numpy
-from relume.btf.shelf import btf
+from relume.btf.sent import outgoing_radiance, outgoing_radiance_numpy, sample_btf, sample_btf_numpy
+from relume.btf.shelf import load_btf
 
 
 @pytest.mark.parametrize("components", [0, 3, 16])
 def test_kernels_do_as_their_oracles(small_btf, components):
-    found, rng = btf(small_btf.record.data).with_components(components), np.random.default_rng(4)
+    found, rng = load_btf(small_btf.record.data).with_components(components), np.random.default_rng(4)
     wo = rng.normal(size=(40, 3))
     wo[:, 2] = np.abs(wo[:, 2]) * rng.uniform(0.02, 1, 40)  # some near the horizon, beyond the last ring
     wo /= np.linalg.norm(wo, axis=1, keepdims=True)
     wo[0] = 0, 0, 1
     places = rng.uniform(-40, 40, (40, 3, 2))
-    all_seen = seen(found, found.tables(), places, wo)
-    expected = np.stack([seen_numpy(found, some, eye) for some, eye in zip(places, wo, strict=True)])
+    all_seen = sample_btf(found, found.tables(), places, wo)
+    expected = np.stack([sample_btf_numpy(found, some, eye) for some, eye in zip(places, wo, strict=True)])
     np.testing.assert_allclose(all_seen, expected, atol=3e-6 * expected.max())
     axes, of = np.array([[[0.6, 0.8], [-0.8, 0.6]], [[0.0, 1.0], [1.0, 0.0]]]), np.arange(40) % 2
     turned = np.column_stack([np.einsum("nij,nj->ni", axes[of], wo[:, :2]), wo[:, 2]])
-    each = [sent_numpy(found, expected[p], one[None])[0] for p, one in zip(of, turned, strict=True)]
-    np.testing.assert_allclose(sent(found, all_seen[:2], axes, of, wo), each, atol=3e-6 * expected.max())
+    each = [outgoing_radiance_numpy(found, expected[p], one[None])[0] for p, one in zip(of, turned, strict=True)]
+    np.testing.assert_allclose(outgoing_radiance(found, all_seen[:2], axes, of, wo), each, atol=3e-6 * expected.max())

@@ -9,21 +9,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from test_texels import CAMERA, GREY, SIZE
-from tiny_scenes import quad, scene_of, studio
+from tiny_scenes import make_tiny_scene, quad, studio
 
 from relume import memory as memories
 from relume.bake import Recipe
 from relume.brdf.terms import btf as term
-from relume.btf.shelf import btf, keep
+from relume.btf.shelf import load_btf, store_btf
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.picture import MovingPicture
+from relume.moving.picture import FreeCameraPicture
 from relume.moving.relief import tables
 from relume.moving.relief.job import TablesJob
 from relume.picture.picture import Picture
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 NUM = 5
 NAMES = [f"Strip {k}" for k in range(NUM)]
@@ -31,13 +31,13 @@ NAMES = [f"Strip {k}" for k in range(NUM)]
 
 @pytest.fixture(scope="module")
 def records(small_btf, tmp_path_factory):
-    whole, folder = btf(small_btf.record.data), tmp_path_factory.mktemp("sources")
+    whole, folder = load_btf(small_btf.record.data), tmp_path_factory.mktemp("sources")
     found = []
     for number in range(NUM):
         source = folder / f"{number}.txt"
         source.write_text(str(number))
         dimmed = replace(whole, mean=(whole.mean * (1 - 0.1 * number)).astype(np.float16))
-        found.append(keep(small_btf.folder, source, f"Cords {number}", None, lambda made=dimmed: made))
+        found.append(store_btf(small_btf.folder, source, f"Cords {number}", None, lambda made=dimmed: made))
     return found
 
 
@@ -50,16 +50,16 @@ def strips():
         for k, (a, b) in enumerate(pairwise(edges))
     ]
     materials = [Material(name, (GREY,)) for name in (*NAMES, "Other")]
-    return scene_of(*floor, camera=CAMERA, environment=studio(32, 20.0), materials=materials)
+    return make_tiny_scene(*floor, camera=CAMERA, environment=studio(32, 20.0), materials=materials)
 
 
 @pytest.fixture(params=["direct", "surface"])
 def opened(request, strips, tmp_path, monkeypatch):
     """A bake, in a memory that has nothing yet."""
-    memory = Memory(1 << 30)
-    monkeypatch.setattr(memories._Assets, "memory", memory)
+    memory = Cache(1 << 30)
+    monkeypatch.setattr(memories._AssetCache, "cache", memory)
     recipe = Recipe(request.param, ("front",), SIZE, 100, num_points=800)
-    return open_bake(bake_here(METHODS[request.param], strips, recipe, tmp_path / "s.zarr"), memory)
+    return open_bake(bake_in_process(METHODS[request.param], strips, recipe, tmp_path / "s.zarr"), memory)
 
 
 def look_of(bake, records, grey=0.5):
@@ -74,7 +74,7 @@ def settle(picture):
         picture.advance(None)
         if (job := picture.next_job()) is None:
             return picture
-        picture.install(job, job.make(lambda share: None, lambda: False))
+        picture.install(job, job.run(lambda share: None, lambda: False))
     raise AssertionError("it never rests")
 
 
@@ -90,9 +90,13 @@ def count(monkeypatch, module, name):
 
 
 def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypatch):
-    is_moving = opened.eyes.name == "FREE"
-    made = count(monkeypatch, tables, "tables_of") if is_moving else count(monkeypatch, term.EigenBtf, "tables")
-    picture = (MovingPicture if is_moving else lambda *args, **how: Picture(args[0], args[1], opened.memory, **how))(
+    is_moving = opened.camera_mode.name == "FREE"
+    made = (
+        count(monkeypatch, tables, "compute_texel_tables")
+        if is_moving
+        else count(monkeypatch, term.LocalPcaBtf, "tables")
+    )
+    picture = (FreeCameraPicture if is_moving else lambda *args, **how: Picture(args[0], args[1], opened.cache, **how))(
         opened, "front", is_watched=True
     )
     for number in range(4):
@@ -100,23 +104,26 @@ def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypa
         settle(picture)
     assert len(made) == NUM
     assert set(made.values()) == {1}
-    assert sum(bytes_ for holder, bytes_ in opened.memory.held().items() if holder.kind.startswith("BTF tables")) > 0
+    assert (
+        sum(bytes_ for holder, bytes_ in opened.cache.bytes_by_owner().items() if holder.kind.startswith("BTF tables"))
+        > 0
+    )
 
 
 @pytest.mark.parametrize("opened", ["surface"], indirect=True)
 def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkeypatch):
-    picture = MovingPicture(opened, "front", is_watched=True)
+    picture = FreeCameraPicture(opened, "front", is_watched=True)
     picture.set_look(look_of(opened, records))
     with monkeypatch.context() as during:
-        during.setattr(tables, "tables_of", lambda whole: pytest.fail("made by a frame"))
+        during.setattr(tables, "compute_texel_tables", lambda whole: pytest.fail("made by a frame"))
         picture.advance(None)
         mean = picture.image()
         while not isinstance(job := picture.next_job(), TablesJob):
-            picture.install(job, job.make(lambda share: None, lambda: False))
+            picture.install(job, job.run(lambda share: None, lambda: False))
             picture.advance(None)
             mean = picture.image()
     found = settle(picture).image()
-    alone = MovingPicture(opened, "front")
+    alone = FreeCameraPicture(opened, "front")
     alone.set_look(look_of(opened, records))
     alone.advance(None)
     wanted = alone.image()
@@ -126,12 +133,12 @@ def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkey
 
 @pytest.mark.parametrize("opened", ["surface"], indirect=True)
 def test_an_edit_beside_btfs_changes_what_it_changes_and_nothing_else(opened, records):
-    picture = MovingPicture(opened, "front", is_watched=True)
+    picture = FreeCameraPicture(opened, "front", is_watched=True)
     picture.set_look(look_of(opened, records, 0.2))
     settle(picture)
     picture.set_look(look_of(opened, records, 0.7))
     picture.advance(None)
-    anew = MovingPicture(opened, "front", is_watched=True)
+    anew = FreeCameraPicture(opened, "front", is_watched=True)
     anew.set_look(look_of(opened, records, 0.7))
     settle(anew)
     np.testing.assert_allclose(picture.image(), anew.image(), rtol=1e-3, atol=1e-4)

@@ -4,40 +4,40 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sessions import settle
-from tiny_scenes import looking, quad, scene_of, sphere, studio
+from sessions import run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
 from relume.bake import Recipe
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
-from relume.btf.rings import taps_numpy
+from relume.btf.rings import interpolation_weights_numpy
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.picture.light import light_of
+from relume.picture.light import illumination_from_look
 from relume.picture.picture import Picture
 from relume.project.texels import texel_numpy, texel_rows
-from relume.reference import Points, reference_image
-from relume.reference.indirect import _covers, _scattered
-from relume.reference.kinds import Kinds
+from relume.reference import ReferencePoints, reference_image
+from relume.reference.indirect import _sample_btf_surfaces, _sample_directions
+from relume.reference.kinds import RoughnessClasses
 from relume.reference.lobes import cosine_lobe
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
-CAMERA = looking("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
+CAMERA = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
 GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
 SIZE = (48, 36)
 
 
 def floor():
     ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    return scene_of(ground, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
+    return make_tiny_scene(ground, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
 
 
 def opened(scene, folder, method="direct"):
     recipe = Recipe(method, ("front",), SIZE, 300, num_points=800)
-    return open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 def covered(bake, record, color=(1, 1, 1), **params):
@@ -52,13 +52,13 @@ def bake(tmp_path_factory):
 
 def settled(record, **params):
     document = {"model": "measured_btf", "data": record.data, "params": params}
-    return TERMS["measured_btf"].settled(document)
+    return TERMS["measured_btf"].normalized(document)
 
 
 def arriving(bake, look, footprint=0.0):
     """What arrives at the floor, and where it does, in the finest level."""
-    light = light_of(look, bake.material_names, has_bounces=False)
-    lights, receivers = bake.arriving(bake.views["front"], 0, light, bake.memory)
+    light = illumination_from_look(look, bake.material_names, has_bounces=False)
+    lights, receivers = bake.incident_light(bake.views["front"], 0, light, bake.cache)
     uv = np.array(receivers.uv)
     uv[:, 2] = footprint
     return lights, replace(receivers, uv=uv)
@@ -103,10 +103,10 @@ def test_a_picture_is_that_of_the_values_before_compression(bake, small_btf):
     uv[:, 1] = (np.floor(uv[:, 1] * height) + 0.5) / height
     rows = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
     axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1, 0]])
-    light, of_light, left = taps_numpy(small_btf.values.rings, lights.direction @ axes.T)
-    view, of_view, _ = taps_numpy(small_btf.values.rings, receivers.wo.astype(np.float64) @ axes.T)
+    light, of_light, left = interpolation_weights_numpy(small_btf.values.grid, lights.direction @ axes.T)
+    view, of_view, _ = interpolation_weights_numpy(small_btf.values.grid, receivers.wo.astype(np.float64) @ axes.T)
     seen = np.unpackbits(receivers.visible, axis=1, count=lights.num_lights, bitorder="little")
-    values = [small_btf.values.seen_from(v).astype(np.float64) for v in range(81)]
+    values = [small_btf.values.get_view(v).astype(np.float64) for v in range(81)]
     texel = (np.floor(uv[:, 1] * height) % height * width + np.floor(uv[:, 0] * width) % width).astype(int)
     expected = np.zeros_like(rows, dtype=np.float64)
     for point in range(len(rows)):
@@ -124,10 +124,10 @@ def test_the_mean_of_its_texels_is_a_brdf(small_btf):
     wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
     found = eval_brdf(document, wi, wo)
     average = sum(
-        small_btf.values.seen_from(v).mean(axis=1)[None] * (np.arange(81) == v)[:, None, None] for v in range(81)
+        small_btf.values.get_view(v).mean(axis=1)[None] * (np.arange(81) == v)[:, None, None] for v in range(81)
     )
-    light, of_light, left = taps_numpy(small_btf.values.rings, wi)
-    view, of_view, _ = taps_numpy(small_btf.values.rings, wo)
+    light, of_light, left = interpolation_weights_numpy(small_btf.values.grid, wi)
+    view, of_view, _ = interpolation_weights_numpy(small_btf.values.grid, wo)
     expected = np.einsum("na,nb,nabc->nc", of_view, of_light, average[view[:, :, None], light[:, None]])
     expected *= (left / wi[:, 2])[:, None]
     np.testing.assert_allclose(found, expected, rtol=0.03, atol=1e-3)
@@ -168,7 +168,7 @@ def test_surfaces_without_places_in_textures_take_a_projection(small_btf, tmp_pa
     """A ball of no texture coordinates is covered all round, in metres."""
     ball = sphere("ball", [0, 0, 0], 0.6, 0, 16)
     bare = type(ball)(**{**vars(ball), "uvs": np.zeros_like(ball.uvs)})
-    scene = scene_of(bare, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
+    scene = make_tiny_scene(bare, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
     bake = opened(scene, tmp_path)
     _, receivers = arriving(bake, covered(bake, small_btf.record))
     position = receivers.points.position
@@ -187,17 +187,17 @@ def test_other_methods_show_it_too_and_follow_a_hand(small_btf, tmp_path, method
     assert picture[..., :3].mean() > 0.01
     if method == "surface":
         return
-    live = Picture(bake, "front", bake.memory)
+    live = Picture(bake, "front", bake.cache)
     live.set_look(covered(bake, small_btf.record, scale=3.0))
-    settle(live)
+    run_until_exact(live)
     for red in (0.8, 0.4):  # its light follows by rows, of a term without curves
         look = covered(bake, small_btf.record, (red, 1, 1), scale=3.0)
-        live.set_look(look, hand="/materials/Floor/terms/0/color")
+        live.set_look(look, active_pointer="/materials/Floor/terms/0/color")
         while (job := live.next_job()) is not None:
-            live.install(job, job.make(lambda share: None, lambda: False))
+            live.install(job, job.run(lambda share: None, lambda: False))
         live.advance(None)
         live.set_look(look)
-        settle(live)
+        run_until_exact(live)
         np.testing.assert_allclose(
             live.image()[..., :3], render_image(bake, "front", look)[..., :3], rtol=1e-4, atol=1e-5
         )
@@ -218,22 +218,22 @@ def test_brute_force_looks_up_places_within_what_pixels_cover(bake, small_btf):
 def test_paths_of_brute_force_begin_at_those_places(bake, small_btf):
     """Drawn directions, each over its density, are on the average what the hemisphere makes of even light."""
     (term,) = covered(bake, small_btf.record, (1.0, 0.8, 0.6)).materials["Floor"].terms
-    kinds, num = Kinds([[term]], [[np.zeros(3)]], [0], [()]), 400
+    kinds, num = RoughnessClasses([[term]], [[np.zeros(3)]], [0], [()]), 400
     rows = np.ones((num, 1), np.float32)
     wo = np.array([0.48, 0.6, 0.64])
     places = np.array([[0.31, 0.77, 0.0, 0.4, -1.0]])
-    points = Points(
+    points = ReferencePoints(
         0 * rows * [1, 1, 1], rows * [0, 0, 1], rows * [1, 0, 0], rows * wo, {}, rows[:, 0], (rows * places).astype("f")
     )
     of, rng = np.zeros(num, np.int64), np.random.default_rng(5)
-    covers = _covers(kinds, points, of, 1)
-    _, share, _ = _scattered(kinds, [[cosine_lobe()]], points, of, covers, rng)
+    covers = _sample_btf_surfaces(kinds, points, of, 1)
+    _, share, _ = _sample_directions(kinds, [[cosine_lobe()]], points, of, covers, rng)
     z, turn = (np.arange(40) + 0.5) / 40, (np.arange(80) + 0.5) * np.pi / 40
     flat = np.sqrt(1 - z**2)[:, None]
     wi = np.stack([flat * np.cos(turn), flat * np.sin(turn), np.broadcast_to(z[:, None], (40, 80))], axis=-1)
-    expected = 2 * np.pi * covers[0, 0].sent(np.full(3200, 7), wi.reshape(-1, 3)).mean(axis=0) * term["color"]
+    expected = 2 * np.pi * covers[0, 0].evaluate(np.full(3200, 7), wi.reshape(-1, 3)).mean(axis=0) * term["color"]
     error = share.std(axis=0) / np.sqrt(num)
     assert (np.abs(share.mean(axis=0) - expected) < 4 * error).all()
     assert (error < 0.04 * expected).all()
-    mean = _scattered(kinds, [[cosine_lobe()]], points, of, {}, rng)[1].mean(axis=0)
+    mean = _sample_directions(kinds, [[cosine_lobe()]], points, of, {}, rng)[1].mean(axis=0)
     assert np.linalg.norm(mean - expected) > 8 * np.linalg.norm(error)  # what all texels make of it is something else

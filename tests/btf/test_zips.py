@@ -9,26 +9,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from btf_zips import DIRECTIONS, image_of, name_of, zipped
+from btf_zips import DIRECTIONS, make_image, make_image_name, zipped
 from PIL import Image
 
 from cli.main import main
 from relume.btf.importing import import_btf
-from relume.btf.rings import rings_of
+from relume.btf.rings import make_direction_grid
 from relume.btf.zips import ZippedBtf
 from relume.errors import MaterialError
-from relume.imageio.exr import channels_of, write_scanlines
+from relume.imageio.exr import image_channels, write_scanlines
 
 
 def test_images_come_in_the_order_of_the_rings_and_linear(tmp_path):
     found = ZippedBtf(zipped(tmp_path / "a.zip"))
-    expected = rings_of([(0.0, 1), (40.0, 4), (70.0, 5)])
-    np.testing.assert_array_equal(found.rings.first, expected.first)
+    expected = make_direction_grid([(0.0, 1), (40.0, 4), (70.0, 5)])
+    np.testing.assert_array_equal(found.grid.first, expected.first)
     assert found.size == (6, 5)
     for view in (0, 3, 9):
-        values = found.seen_from(view)
+        values = found.get_view(view)
         for light in (0, 2, 7):
-            truth = image_of(DIRECTIONS[view], DIRECTIONS[light])[1].reshape(-1, 3)
+            truth = make_image(DIRECTIONS[view], DIRECTIONS[light])[1].reshape(-1, 3)
             np.testing.assert_allclose(values[light], truth, atol=0.006)
 
 
@@ -36,7 +36,7 @@ def renamed(old, new):
     return lambda files: files.update({new: files.pop(old)})
 
 
-FIRST, SECOND = (name_of(DIRECTIONS[k], DIRECTIONS[2]) for k in (1, 3))
+FIRST, SECOND = (make_image_name(DIRECTIONS[k], DIRECTIONS[2]) for k in (1, 3))
 
 
 def told_as(side, png):
@@ -53,13 +53,13 @@ def of_16_bits():
 
 def of_exr(image):
     with tempfile.NamedTemporaryFile(suffix=".exr") as file:
-        write_scanlines(Path(file.name), channels_of(image.astype(np.float32)), {}, "float")
+        write_scanlines(Path(file.name), image_channels(image.astype(np.float32)), {}, "float")
         return Path(file.name).read_bytes()
 
 
 def whole(path):
     found = ZippedBtf(path)
-    return [found.seen_from(view) for view in range(len(DIRECTIONS))]
+    return [found.get_view(view) for view in range(len(DIRECTIONS))]
 
 
 @pytest.mark.parametrize(
@@ -75,10 +75,13 @@ def whole(path):
         (lambda files: files.update({FIRST.replace("tv040/", "again/"): files[FIRST]}), "two images"),
         (lambda files: files.update({FIRST: files[FIRST][:60]}), "cannot be read"),
         (
-            lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], (7, 5))[0]}),
+            lambda files: files.update({FIRST: make_image(DIRECTIONS[1], DIRECTIONS[2], (7, 5))[0]}),
             "^the image tv040.* has 5×7 pixels, the first",
         ),
-        (lambda files: files.update({FIRST: image_of(DIRECTIONS[1], DIRECTIONS[2], kind="GIF")[0]}), "cannot be read"),
+        (
+            lambda files: files.update({FIRST: make_image(DIRECTIONS[1], DIRECTIONS[2], kind="GIF")[0]}),
+            "cannot be read",
+        ),
         (renamed(FIRST, FIRST.replace("tv040 pv000", "tv095 pv000")), "below the horizon"),
         (lambda files: files.clear(), "named by their directions"),
         (lambda files: files.update({"\x1b[2J\n" + FIRST.rpartition("/")[2]: b""}), r"of \?\[2J\?00000 tl040"),
@@ -107,7 +110,7 @@ def test_images_of_open_exr_are_linear_and_not_negative(tmp_path):
             files[name.replace(".png", ".exr")] = of_exr(np.full((6, 5, 3), [7.5, 0.25, -0.5]))
             del files[name]
 
-    seen = ZippedBtf(zipped(tmp_path / "a.zip", linear)).seen_from(3)
+    seen = ZippedBtf(zipped(tmp_path / "a.zip", linear)).get_view(3)
     np.testing.assert_array_equal(seen, np.broadcast_to(np.float32([7.5, 0.25, 0]), seen.shape))
 
 
@@ -115,13 +118,13 @@ def test_large_images_are_kept_as_means_of_linear_values(tmp_path, monkeypatch):
     def larger(files):
         for view in DIRECTIONS:
             for light in DIRECTIONS:
-                files[name_of(view, light)] = image_of(view, light, (6, 4))[0]
+                files[make_image_name(view, light)] = make_image(view, light, (6, 4))[0]
 
-    monkeypatch.setattr("relume.btf.compress.MOST_TEXELS", 10)
+    monkeypatch.setattr("relume.btf.compress.MAX_TEXELS", 10)
     found = ZippedBtf(zipped(tmp_path / "a.zip", larger))
     assert found.size == (3, 2)
-    means = image_of(DIRECTIONS[4], DIRECTIONS[6], (6, 4))[1].reshape(3, 2, 2, 2, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(found.seen_from(4)[6], means.reshape(-1, 3), atol=0.006)
+    means = make_image(DIRECTIONS[4], DIRECTIONS[6], (6, 4))[1].reshape(3, 2, 2, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(found.get_view(4)[6], means.reshape(-1, 3), atol=0.006)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +149,7 @@ def test_a_list_of_millions_of_files_is_not_read(tmp_path):
 
 def test_packing_that_may_ask_for_gigabytes_is_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_LZMA) as file:
-        file.writestr(name_of(DIRECTIONS[0], DIRECTIONS[0]), b"1")
+        file.writestr(make_image_name(DIRECTIONS[0], DIRECTIONS[0]), b"1")
     with pytest.raises(MaterialError, match="deflate"):
         ZippedBtf(tmp_path / "a.zip")
 
@@ -169,7 +172,7 @@ def test_one_that_is_refused_leaves_nothing(tmp_path):
 def test_a_texel_alone_is_kept(tmp_path):
     def of_one_texel(files):
         for name in [name for name in files if name.endswith(".png")]:
-            files[name] = image_of(DIRECTIONS[1], DIRECTIONS[2], (1, 1))[0]
+            files[name] = make_image(DIRECTIONS[1], DIRECTIONS[2], (1, 1))[0]
 
     path = zipped(tmp_path / "a.zip", of_one_texel)
     record = import_btf(tmp_path / "btfs", path, "Cloth", 0.1, lambda share: None, lambda: False)

@@ -23,7 +23,7 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
 ) -> None:
     code, text, _ = run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--days", "30")
     assert code == 0
-    found = open_access(tmp_path).tokens.find(text.strip())
+    found = open_access(tmp_path).tokens.authenticate(text.strip())
     assert found is not None
     assert (found.name, found.role) == ("Ann", Role.EDIT)
     _, listed, _ = run(capsys, tmp_path, "token", "list")
@@ -31,7 +31,7 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
     assert "until 20" in listed
     assert text.strip().split("_", 2)[2] not in listed
     assert run(capsys, tmp_path, "token", "revoke", "Ann")[0] == 0
-    assert open_access(tmp_path).tokens.find(text.strip()) is None
+    assert open_access(tmp_path).tokens.authenticate(text.strip()) is None
     assert "revoked" in run(capsys, tmp_path, "token", "list")[1]
     _, audit, _ = run(capsys, tmp_path, "audit", "--json")
     lines = [json.loads(line) for line in audit.splitlines()]
@@ -45,7 +45,7 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
 
 def test_tokens_are_told_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = json.loads(run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--json")[1])
-    found = open_access(tmp_path).tokens.find(made["token"])
+    found = open_access(tmp_path).tokens.authenticate(made["token"])
     assert found is not None
     assert json.loads(run(capsys, tmp_path, "token", "list", "--json")[1]) == {
         "id": found.id,

@@ -20,7 +20,7 @@ from PIL import Image
 
 from cli import background
 from cli.bake import _interrupted
-from cli.interrupts import noted_interrupts
+from cli.interrupts import capture_interrupts
 from cli.main import main
 from relume.environments.model import Environment
 from relume.scene.archive import make_scene
@@ -381,7 +381,7 @@ def wait_for_state(data: Path, state: str) -> None:
 
 
 def test_interrupt_is_noted_and_raised_nowhere_else() -> None:
-    with noted_interrupts() as asked:
+    with capture_interrupts() as asked:
         assert not asked.is_set()
         os.kill(os.getpid(), signal.SIGINT)
         assert asked.wait(60)

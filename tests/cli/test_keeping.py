@@ -18,7 +18,7 @@ import pytest
 from cli.main import main
 from cli.tokens import open_access
 from worker.database import open_database
-from worker.database.upgrading import newest_revision
+from worker.database.upgrading import latest_revision
 from worker.ledger import Ledger
 from worker.paths import bake_path
 
@@ -42,7 +42,7 @@ def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "0001: The tables as they were before there were revisions"
     assert main(["ledger", "upgrade"]) == 0
-    assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the ledger is at revision {newest_revision()}"]
+    assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the ledger is at revision {latest_revision()}"]
 
 
 def test_a_backup_says_what_is_not_in_it_and_comes_back(
@@ -72,7 +72,7 @@ def test_tokens_that_a_backup_brings_back_are_said_or_revoked(
     assert main(["token", "revoke", "Ann", "--data", old]) == 0
     assert main(["restore", backups, "--data", new, *more]) == 0
     assert said in capsys.readouterr().err
-    assert (open_access(Path(new)).tokens.find(token) is None) == bool(more)
+    assert (open_access(Path(new)).tokens.authenticate(token) is None) == bool(more)
 
 
 def test_what_is_kept_is_for_its_own_user_alone(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_backups_are_told_as_json(data: Path, tmp_path: Path, capsys: pytest.Cap
         return document
 
     backups = str(tmp_path / "backups")
-    assert told("ledger", "upgrade")["revision"] == newest_revision()
+    assert told("ledger", "upgrade")["revision"] == latest_revision()
     made = told("backup", backups)
     assert (made["files"], len(made["left_out"])) == (0, 2)
     assert told("backup", backups, "--verify") == {"name": made["name"], "files": 1, "damaged": []}

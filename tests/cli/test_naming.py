@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cli.naming import pick, spelled
+from cli.naming import match_name, pick
 from relume.errors import NotFoundError
 
 KNOWN = [("aaaa1111", "Still life"), ("bbbb2222", "still-life 2"), ("cccc3333", "Box"), ("dddd4444", "box")]
@@ -43,7 +43,7 @@ def test_what_cannot_be_told_apart_is_said(given: str, said: str) -> None:
 
 
 def test_a_spelling_becomes_the_name_only_where_there_is_one() -> None:
-    assert spelled("FRONT", ["front", "back"]) == "front"
-    assert spelled("Front", ["front", "Front"]) == "Front"
-    assert spelled("FRONT", ["front", "Front"]) == "FRONT"
-    assert spelled("top", ["front"]) == "top"
+    assert match_name("FRONT", ["front", "back"]) == "front"
+    assert match_name("Front", ["front", "Front"]) == "Front"
+    assert match_name("FRONT", ["front", "Front"]) == "FRONT"
+    assert match_name("top", ["front"]) == "top"

@@ -6,7 +6,7 @@ import pytest
 
 from cli.keeping.transfer_bar import transfer_bar
 from cli.terminal.printing import is_quiet
-from cli.terminal.progress import LINE_EVERY_S, ProgressLines, part_of, progress
+from cli.terminal.progress import MAX_INTERVAL_S, ProgressLines, progress, report_part
 
 
 class Clock:
@@ -35,7 +35,7 @@ def test_there_is_a_line_for_each_tenth() -> None:
 
 
 def test_slow_work_is_heard_of_all_the_same() -> None:
-    said = lines_of([(float(second), second / 100_000) for second in range(int(4 * LINE_EVERY_S) + 1)])
+    said = lines_of([(float(second), second / 100_000) for second in range(int(4 * MAX_INTERVAL_S) + 1)])
     assert said == ["bake: 0%, tracing"] * 4
 
 
@@ -53,14 +53,14 @@ def test_parts_of_work_are_shares_of_all() -> None:
     def tell(share: float, detail: str = "") -> None:
         told.append((share, detail))
 
-    part_of(tell, 1, 4, "sun")(0.5)
+    report_part(tell, 1, 4, "sun")(0.5)
     assert told == [(0.375, "sun")]
 
 
 @pytest.fixture
 def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """No line waits for the one before."""
-    monkeypatch.setattr("cli.terminal.progress.LEAST_S", 0.0)
+    monkeypatch.setattr("cli.terminal.progress.MIN_INTERVAL_S", 0.0)
 
 
 @pytest.mark.usefixtures("hurried")

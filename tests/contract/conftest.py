@@ -10,14 +10,14 @@ from leaves import by_leaves
 from watched_bakes import Bake, Done
 
 from relume.bake import Recipe
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.base import TransferMethod
 from relume.methods.registry import METHODS, open_bake
-from relume.picture.transfer import Eyes, Opened
+from relume.picture.transfer import CameraMode, OpenBake
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
-from relume.store import bake_here
-from worker.status import MOVING
+from relume.store import bake_in_process
+from worker.status import FREE_CAMERA_METHODS
 
 __all__ = ["by_leaves"]  # a fixture
 
@@ -58,9 +58,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Every registered method, and the tests' own; of those with pictures, the ones whose eyes move or do not."""
     if "method" not in metafunc.fixturenames:
         return
-    fixed, names = {*METHODS, FurnaceMethod.name} - MOVING, {*METHODS, FurnaceMethod.name}
+    fixed, names = {*METHODS, FurnaceMethod.name} - FREE_CAMERA_METHODS, {*METHODS, FurnaceMethod.name}
     if "moving" in metafunc.fixturenames:
-        names = MOVING
+        names = FREE_CAMERA_METHODS
     elif "transfer" in metafunc.fixturenames:
         names = fixed
     # what a hand does is the same for the tests' own method: it goes through all of it with the long tests
@@ -87,7 +87,9 @@ def watched(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_facto
     """An undisturbed bake, and what was done for it."""
     done: list[Done] = []
     store = tmp_path_factory.mktemp("contract") / "store.zarr"
-    bake_here(method, scene, recipe, store, lambda task, of: done.append(Done(task, tuple(of.arrays), of.num_rays)))
+    bake_in_process(
+        method, scene, recipe, store, lambda task, of: done.append(Done(task, tuple(of.arrays), of.num_rays))
+    )
     return Bake(store, done)
 
 
@@ -98,27 +100,27 @@ def baked(watched: Bake) -> Path:
 
 
 @pytest.fixture(scope="session")
-def opened(baked: Path) -> Opened:
+def opened(baked: Path) -> OpenBake:
     """The bake, opened."""
-    return open_bake(baked, Memory(1 << 30))
+    return open_bake(baked, Cache(1 << 30))
 
 
 @pytest.fixture(scope="session")
-def transfer(opened: Opened) -> Opened:
+def transfer(opened: OpenBake) -> OpenBake:
     """A bake of fixed views, opened."""
-    assert opened.eyes is Eyes.BAKED
+    assert opened.camera_mode is CameraMode.FIXED
     return opened
 
 
 @pytest.fixture(scope="session")
-def moving(opened: Opened) -> Opened:
+def moving(opened: OpenBake) -> OpenBake:
     """A bake whose eyes move, opened."""
-    assert opened.eyes is Eyes.FREE
+    assert opened.camera_mode is CameraMode.FREE
     return opened
 
 
 @pytest.fixture
-def aside(moving: Opened) -> Camera:
+def aside(moving: OpenBake) -> Camera:
     """An eye that nobody baked."""
     first = moving.views["front"].camera
     to_world = first.to_world.copy()

@@ -1,44 +1,44 @@
 """Pictures whose eyes move, made as tests of them want them."""
 
-from looks_of_pictures import lit
-from sessions import look_of
+from looks_of_pictures import add_lights
+from sessions import make_look
 
-from relume.moving.fine_job import FineJob
-from relume.moving.picture import MovingPicture
+from relume.moving.fine_job import RefineHighlights
+from relume.moving.picture import FreeCameraPicture
 
 
-def seen(moving, *changes, eye=None, size=(48, 36)):
-    picture = MovingPicture(moving, "front")
-    picture.set_look(look_of(moving, lit(*changes)))
-    if eye is not None:
-        picture.set_eye(eye, size)
+def make_picture(views, *changes, camera=None, size=(48, 36)):
+    picture = FreeCameraPicture(views, "front")
+    picture.set_look(make_look(views, add_lights(*changes)))
+    if camera is not None:
+        picture.set_camera(camera, size)
     picture.advance(None)
     return picture
 
 
-def begun(moving, *changes):
+def make_watched_picture(views, *changes):
     """A picture that somebody watches, all its light there, its highlights not found finely yet."""
-    picture = MovingPicture(moving, "front", is_watched=True)
-    picture.set_look(look_of(moving, lit(*changes)))
+    picture = FreeCameraPicture(views, "front", is_watched=True)
+    picture.set_look(make_look(views, add_lights(*changes)))
     picture.advance(None)
-    find_light(picture)
+    finish_lighting(picture)
     return picture
 
 
-def find_light(picture):
+def finish_lighting(picture):
     """What follows when a hand rests, but for fine highlights."""
-    while not isinstance(job := picture.next_job(), FineJob):
-        picture.install(job, made(job))
+    while not isinstance(job := picture.next_job(), RefineHighlights):
+        picture.install(job, run_job(job))
         picture.advance(None)
 
 
-def made(job):
-    return job.make(lambda share: None, lambda: False)
+def run_job(job):
+    return job.run(lambda share: None, lambda: False)
 
 
-def rest(picture):
+def finish_refinement(picture):
     """As when a hand rests."""
     while (job := picture.next_job()) is not None:
-        picture.install(job, made(job))
+        picture.install(job, run_job(job))
         picture.advance(None)
     assert picture.advance(None).fidelity == "approximate"

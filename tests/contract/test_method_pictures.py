@@ -8,29 +8,29 @@ import numpy as np
 import pytest
 from looks_of_pictures import (
     EDITS,
-    EDITS_OFTEN,
     EXPONENT,
     LIGHTS,
     LOBE,
-    drawn,
-    environment,
-    exponent,
-    light,
-    lit,
-    matt,
-    painted,
-    transport,
+    MARKED_EDITS,
+    add_lights,
+    draw_curve,
+    edit_environment,
+    edit_light,
+    edit_transport,
+    remove_glossy_term,
+    set_exponent,
+    set_floor_color,
 )
 from oracle import exact_image
-from sessions import BUDGET, is_waiting, look_of, reflects, relative_rmse, settle
+from sessions import BUDGET, has_bounces, has_pending_job, make_look, relative_rmse, run_until_exact
 
 from relume.brdf.registry import TERMS
 from relume.errors import MemoryBudgetError, NotFoundError, ParameterError
-from relume.memory import Memory
-from relume.operators.frozen import frozen_bytes
+from relume.memory import Cache
+from relume.operators.frozen import operator_bytes
 from relume.operators.shade import shaded_bytes
 from relume.picture.picture import Picture
-from relume.picture.transfer import Axis
+from relume.picture.transfer import EditAxis
 from relume.reference import reference_image
 
 UNIT = 2.0**-24  # the relative error of one operation in float32
@@ -40,29 +40,29 @@ ROUNDED = np.sqrt(ADDED) * UNIT  # error of a sum whose roundings are independen
 
 def live(transfer, *changes, cache=None, **options):
     """A picture at rest."""
-    picture = Picture(transfer, "front", cache or Memory(BUDGET), **options)
-    picture.set_look(look_of(transfer, lit(*changes)))
-    return settle(picture)
+    picture = Picture(transfer, "front", cache or Cache(BUDGET), **options)
+    picture.set_look(make_look(transfer, add_lights(*changes)))
+    return run_until_exact(picture)
 
 
 def edited(picture, transfer, pointer, *changes):
     """What a hand touches is made ready; then it edits, and rests."""
     if pointer is not None:
-        picture.touch(pointer)
-        settle(picture)
-    picture.set_look(look_of(transfer, lit(*changes)))
+        picture.prepare(pointer)
+        run_until_exact(picture)
+    picture.set_look(make_look(transfer, add_lights(*changes)))
     picture.advance(8)
-    return settle(picture)
+    return run_until_exact(picture)
 
 
-@pytest.mark.parametrize("edit", EDITS_OFTEN)
+@pytest.mark.parametrize("edit", MARKED_EDITS)
 def test_any_way_to_rest_is_shading_from_nothing(transfer, edit):
     pointer, change = EDITS[edit]
     picture = edited(live(transfer), transfer, pointer, change)
-    assert relative_rmse(picture.image(), exact_image(transfer, look_of(transfer, lit(change)))) < ROUNDED
+    assert relative_rmse(picture.image(), exact_image(transfer, make_look(transfer, add_lights(change)))) < ROUNDED
 
 
-@pytest.mark.parametrize("edit", EDITS_OFTEN)
+@pytest.mark.parametrize("edit", MARKED_EDITS)
 def test_an_edit_undone_leaves_no_trace(transfer, edit):
     pointer, change = EDITS[edit]
     picture = live(transfer)
@@ -73,35 +73,35 @@ def test_an_edit_undone_leaves_no_trace(transfer, edit):
 
 
 def test_a_watched_picture_comes_to_rest_like_any_other(transfer):
-    look = look_of(transfer, lit(environment(rotation=77.0)))
-    found = live(transfer, environment(rotation=77.0), is_watched=True)
+    look = make_look(transfer, add_lights(edit_environment(rotation=77.0)))
+    found = live(transfer, edit_environment(rotation=77.0), is_watched=True)
     np.testing.assert_array_equal(found.image(), exact_image(transfer, look))
 
 
 def test_no_light_is_black(transfer):
     picture = live(transfer)
     before = picture.image()
-    dark = lit(environment(scale=0.0), light("Lamp", on=False), light("Panel", scale=0.0))
-    picture.set_look(look_of(transfer, dark))
-    assert not settle(picture).image().any()
-    picture.set_look(look_of(transfer, lit()))
-    np.testing.assert_array_equal(settle(picture).image(), before)
+    dark = add_lights(edit_environment(scale=0.0), edit_light("Lamp", on=False), edit_light("Panel", scale=0.0))
+    picture.set_look(make_look(transfer, dark))
+    assert not run_until_exact(picture).image().any()
+    picture.set_look(make_look(transfer, add_lights()))
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
 def test_twice_the_light_is_twice_the_picture(transfer):
     picture = live(transfer)
     before = picture.image()
-    twice = (environment(scale=2.0), light("Lamp", scale=2.0), light("Panel", scale=2.0))
+    twice = (edit_environment(scale=2.0), edit_light("Lamp", scale=2.0), edit_light("Panel", scale=2.0))
     np.testing.assert_array_equal(edited(picture, transfer, None, *twice).image(), 2 * before)
-    np.testing.assert_array_equal(exact_image(transfer, look_of(transfer, lit(*twice))), 2 * before)
+    np.testing.assert_array_equal(exact_image(transfer, make_look(transfer, add_lights(*twice))), 2 * before)
 
 
 def test_solos_of_all_sources_sum_to_the_whole(transfer):
     picture = live(transfer)
     whole, total = picture.image(), np.zeros_like(picture.image())
-    for source in (*LIGHTS, None) if Axis.LIGHT in transfer.axes else (None,):
-        off = [light(name, on=False) for name in LIGHTS if name != source]
-        alone = edited(picture, transfer, None, *off, environment(scale=float(source is None))).image()
+    for source in (*LIGHTS, None) if EditAxis.LIGHT in transfer.axes else (None,):
+        off = [edit_light(name, on=False) for name in LIGHTS if name != source]
+        alone = edited(picture, transfer, None, *off, edit_environment(scale=float(source is None))).image()
         assert alone.any()
         total += alone
     np.testing.assert_allclose(total, whole, rtol=ADDED * UNIT)
@@ -112,16 +112,19 @@ NUM_STEPS, A_STEP = 200, 32  # of the drag, and coefficients of each
 
 def test_a_highlight_dragged_to_both_ends_and_back_leaves_no_trace(transfer):
     picture = live(transfer)
-    picture.touch(LOBE)
-    settle(picture)
+    picture.prepare(LOBE)
+    run_until_exact(picture)
     (declared,) = TERMS["blinn_phong"].parameters
     down = np.geomspace(declared.maximum, declared.minimum, NUM_STEPS // 2)
     for value in (*down, *down[::-1]):
-        picture.set_look(look_of(transfer, lit(exponent(value))))
+        picture.set_look(make_look(transfer, add_lights(set_exponent(value))))
         picture.advance(A_STEP)
-    picture.set_look(look_of(transfer, lit()))
+    picture.set_look(make_look(transfer, add_lights()))
     rounded = np.sqrt(NUM_STEPS * A_STEP) * UNIT
-    assert relative_rmse(settle(picture).image(), exact_image(transfer, look_of(transfer, lit()))) < rounded
+    assert (
+        relative_rmse(run_until_exact(picture).image(), exact_image(transfer, make_look(transfer, add_lights())))
+        < rounded
+    )
 
 
 @pytest.mark.parametrize(
@@ -138,8 +141,8 @@ def test_what_points_to_nothing_is_refused_and_changes_nothing(transfer, pointer
     picture = live(transfer)
     before = picture.image()
     with pytest.raises(ParameterError):
-        picture.touch(pointer)
-    assert not is_waiting(picture)
+        picture.prepare(pointer)
+    assert not has_pending_job(picture)
     assert not picture.advance(None).changed
     np.testing.assert_array_equal(picture.image(), before)
 
@@ -151,11 +154,11 @@ def many_terms(document):
 
 def test_what_fits_no_budget_is_refused_and_changes_nothing(transfer):
     rows = [transfer.views["front"].rows(k) for k in range(len(transfer.material_names))]
-    picture = live(transfer, cache=(cache := Memory(12 * sum(shaded_bytes(r.stop - r.start) for r in rows))))
+    picture = live(transfer, cache=(cache := Cache(12 * sum(shaded_bytes(r.stop - r.start) for r in rows))))
     before, used = picture.image(), cache.used_bytes
     with pytest.raises(MemoryBudgetError):
-        picture.check(look_of(transfer, lit(many_terms)))
-    assert (is_waiting(picture), cache.used_bytes) == (False, used)
+        picture.check(make_look(transfer, add_lights(many_terms)))
+    assert (has_pending_job(picture), cache.used_bytes) == (False, used)
     assert not picture.advance(None).changed
     np.testing.assert_array_equal(picture.image(), before)
 
@@ -164,37 +167,39 @@ def test_what_fits_no_budget_is_refused_and_changes_nothing(transfer):
 def test_where_no_operator_fits_a_picture_is_shaded(transfer, pointer):
     views, index = transfer.views["front"], transfer.material_names.index("Wall")
     rows = views.rows(index)
-    picture = live(transfer, cache=Memory(frozen_bytes(rows.stop - rows.start, 64)))
-    found = edited(picture, transfer, pointer, drawn).image()
-    assert relative_rmse(found, exact_image(transfer, look_of(transfer, lit(drawn)))) < ROUNDED
+    picture = live(transfer, cache=Cache(operator_bytes(rows.stop - rows.start, 64)))
+    found = edited(picture, transfer, pointer, draw_curve).image()
+    assert relative_rmse(found, exact_image(transfer, make_look(transfer, add_lights(draw_curve)))) < ROUNDED
 
 
 def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(transfer):
     picture = live(transfer)
     before = picture.image()
-    look = look_of(transfer, lit(painted))
+    look = make_look(transfer, add_lights(set_floor_color))
     gone = look.environment.model_copy(update={"map": "env:0123456789abcdef"})
     with pytest.raises(NotFoundError):
         picture.set_look(look.model_copy(update={"environment": gone}))
-    assert not is_waiting(picture)
+    assert not has_pending_job(picture)
     np.testing.assert_array_equal(picture.image(), before)
 
 
 def brute_force_knows(transfer):
     """Skip where a method's light is its own, as that of the tests' furnace is."""
-    if Axis.LIGHT not in transfer.axes:
+    if EditAxis.LIGHT not in transfer.axes:
         pytest.skip(f"brute force follows light from its sources; {transfer.method} has none")
 
 
 def test_straight_light_is_that_of_brute_force(scene, transfer, recipe):
     """Every texel at exact angles; a hundred triangles for the environment, and curves in bands, are two per cent."""
     brute_force_knows(transfer)
-    look = look_of(transfer, lit(light("Panel", on=False), transport(show="direct")))
+    look = make_look(transfer, add_lights(edit_light("Panel", on=False), edit_transport(show="direct")))
     truth = reference_image(scene, "front", look, recipe.size, 0)
     assert relative_rmse(exact_image(transfer, look), truth) < 0.03
 
 
-OFF = pytest.mark.parametrize("off", [environment(scale=0.0), light("Lamp", on=False)], ids=["of a lamp", "of the map"])
+OFF = pytest.mark.parametrize(
+    "off", [edit_environment(scale=0.0), edit_light("Lamp", on=False)], ids=["of a lamp", "of the map"]
+)
 
 
 def followed(scene, look, recipe, reflects, num_passes=8):
@@ -211,10 +216,13 @@ def followed(scene, look, recipe, reflects, num_passes=8):
 def test_light_between_matt_surfaces_is_that_of_brute_force(scene, transfer, recipe, off):
     """The mean of the picture by a percent and the noise of paths; none where the method has none."""
     brute_force_knows(transfer)
-    look = look_of(transfer, lit(light("Panel", on=False), off, matt, transport(show="first_bounce")))
+    look = make_look(
+        transfer,
+        add_lights(edit_light("Panel", on=False), off, remove_glossy_term, edit_transport(show="first_bounce")),
+    )
     found = exact_image(transfer, look).mean(axis=(0, 1))
-    assert np.all((found > 0) == reflects(transfer))
-    expected, deviation = followed(scene, look, recipe, reflects(transfer))
+    assert np.all((found > 0) == has_bounces(transfer))
+    expected, deviation = followed(scene, look, recipe, has_bounces(transfer))
     assert np.all(deviation <= 0.05 * expected)
     assert np.all(np.abs(found - expected) <= 4 * deviation + 0.01 * expected)
 
@@ -223,12 +231,13 @@ def test_light_between_matt_surfaces_is_that_of_brute_force(scene, transfer, rec
 def test_light_that_highlights_send_is_about_as_much_as_by_brute_force(scene, transfer, recipe, off):
     """It is spread evenly, so that a seventh may go elsewhere; a third would be missing if they sent none."""
     brute_force_knows(transfer)
-    if not reflects(transfer):
+    if not has_bounces(transfer):
         pytest.skip(f"{transfer.method} has no light between surfaces")
-    lights = light("Panel", on=False), off, transport(show="first_bounce")
-    look = look_of(transfer, lit(*lights))
+    lights = edit_light("Panel", on=False), off, edit_transport(show="first_bounce")
+    look = make_look(transfer, add_lights(*lights))
     (expected, deviation), (sent_by_matt, _) = (
-        followed(scene, each, recipe, True, 4) for each in (look, look_of(transfer, lit(*lights, matt)))
+        followed(scene, each, recipe, True, 4)
+        for each in (look, make_look(transfer, add_lights(*lights, remove_glossy_term)))
     )
     found = exact_image(transfer, look).mean(axis=(0, 1))
     assert np.all(sent_by_matt < 0.67 * expected)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracle import KEPT
+from oracle import DERIVED_FOLDERS
 from watched_bakes import Bake
 
 from relume.bake import Recipe, Task
@@ -29,7 +29,7 @@ def tree_hash(folder: Path) -> str:
     """Of what was baked; images that pictures of other tests have kept beside it, and edited ones, are left out."""
     digest = hashlib.sha256()
     for file in sorted(p for p in folder.rglob("*") if p.is_file()):
-        if file.relative_to(folder).parts[0] in KEPT:
+        if file.relative_to(folder).parts[0] in DERIVED_FOLDERS:
             continue
         digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
@@ -43,7 +43,7 @@ def run_elsewhere(method: TransferMethod, scene: Scene, recipe: Recipe, staging:
 
 def test_plan_bounds_what_the_bake_takes(method: TransferMethod, scene: Scene, recipe: Recipe, watched: Bake) -> None:
     plan, reader = method.plan(scene, recipe), open_store(watched.store)
-    paths = [path for path in array_paths(watched.store) if path.split("/")[0] not in KEPT]
+    paths = [path for path in array_paths(watched.store) if path.split("/")[0] not in DERIVED_FOLDERS]
     stored = sum(reader.read(path).nbytes for path in paths)
     assert 0 < sum(done.num_rays for done in watched.done) <= plan.num_rays
     assert 0 < stored <= plan.store_bytes
@@ -88,9 +88,9 @@ def test_order_changes_no_byte(
     method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path
 ) -> None:
     staging = tmp_path / "staging"
-    fill.begin(method, scene, recipe, staging)
+    fill.create_staging_store(method, scene, recipe, staging)
     for stage in range(len(method.stages)):
-        for task in reversed(fill.begin_stage(method, scene, recipe, staging, stage)):
+        for task in reversed(fill.create_stage(method, scene, recipe, staging, stage)):
             run_elsewhere(method, scene, recipe, staging, task)
     publish(staging, tmp_path / "store.zarr")
     assert tree_hash(tmp_path / "store.zarr") == tree_hash(baked)
@@ -102,9 +102,9 @@ def test_neither_interruption_nor_repetition_changes_a_byte(
     staging, done = tmp_path / "staging", set()
 
     def go_on(stop_after: int | None) -> None:
-        fill.begin(method, scene, recipe, staging)
+        fill.create_staging_store(method, scene, recipe, staging)
         for stage in range(len(method.stages)):
-            for task in fill.begin_stage(method, scene, recipe, staging, stage):
+            for task in fill.create_stage(method, scene, recipe, staging, stage):
                 if stop_after is not None and len(done) >= stop_after:
                     return
                 if (stage, task.index) not in done:

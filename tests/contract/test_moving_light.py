@@ -2,16 +2,26 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import EDITS, LOBE, drawn, environment, exponent, lit, painted, replaced, transport
-from moving_pictures import begun, find_light, made, rest, seen
-from sessions import look_of, relative_rmse
+from looks_of_pictures import (
+    EDITS,
+    LOBE,
+    add_lights,
+    draw_curve,
+    edit_environment,
+    edit_transport,
+    replace_terms,
+    set_exponent,
+    set_floor_color,
+)
+from moving_pictures import finish_lighting, finish_refinement, make_picture, make_watched_picture, run_job
+from sessions import make_look, relative_rmse
 
 from relume.errors import CancelledError, ChunkDamagedError
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.harmonic_light import read_harmonic_light
 from relume.methods.registry import open_bake
-from relume.methods.store_io import read_cells
-from relume.moving.picture import MovingPicture
+from relume.methods.store_io import read_patches
+from relume.moving.picture import FreeCameraPicture
 from relume.store import open_store
 
 ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
@@ -20,40 +30,40 @@ ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
 @pytest.mark.parametrize("edit", ["a lamp moved", "the environment turned", "fewer paths", "all at once"])
 def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched(moving, edit):
     _, change = EDITS[edit]
-    other = environment(rotation=11.0 * (1 + list(EDITS).index(edit)))  # nobody has asked for its light before
-    picture = MovingPicture(moving, "front", is_watched=True)
-    picture.set_look(look_of(moving, lit(change, other)))
+    other = edit_environment(rotation=11.0 * (1 + list(EDITS).index(edit)))  # nobody has asked for its light before
+    picture = FreeCameraPicture(moving, "front", is_watched=True)
+    picture.set_look(make_look(moving, add_lights(change, other)))
     assert picture.advance(None).fidelity == "preview"
     rough = picture.image()
     assert not picture.advance(None).changed
     job = picture.next_job()
-    assert job.refines
+    assert job.is_refinement
     with pytest.raises(CancelledError):
-        job.make(lambda share: None, lambda: True)
+        job.run(lambda share: None, lambda: True)
     shares = []
-    picture.install(job, job.make(shares.append, lambda: False))
+    picture.install(job, job.run(shares.append, lambda: False))
     assert shares == sorted(shares)
     assert shares[-1] == 1
     assert picture.next_job() is None
     assert picture.advance(None).fidelity == "approximate"
-    rest(picture)
-    exact = seen(moving, change, other).image()
+    finish_refinement(picture)
+    exact = make_picture(moving, change, other).image()
     np.testing.assert_array_equal(picture.image(), exact)
     assert relative_rmse(rough, exact) < 0.3
 
 
 def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatch):
-    turned = environment(rotation=203.0)
+    turned = edit_environment(rotation=203.0)
 
     def rough(of):
-        picture = MovingPicture(of, "front", is_watched=True)
-        picture.set_look(look_of(of, lit(turned)))
+        picture = FreeCameraPicture(of, "front", is_watched=True)
+        picture.set_look(make_look(of, add_lights(turned)))
         assert picture.advance(None).fidelity == "preview"
         return picture.image()
 
     harmonic = rough(moving)
     monkeypatch.setattr("relume.methods.opened.bounced_views.read_harmonic_light", lambda store, cells: None)
-    plain = rough(open_bake(baked, Memory(1 << 30)))
+    plain = rough(open_bake(baked, Cache(1 << 30)))
     assert 0 < relative_rmse(harmonic, plain) < 0.04
 
 
@@ -68,16 +78,19 @@ def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
             return found[:-1] if path == "harmonics/weight" else found
 
     with pytest.raises(ChunkDamagedError, match="harmonics"):
-        read_harmonic_light(Damaged(), read_cells(store))
+        read_harmonic_light(Damaged(), read_patches(store))
 
 
 FOLLOWED = {
-    "a highlight's exponent": (LOBE, exponent(60)),
-    "a curve drawn": (LOBE, drawn),
-    "a diffuse colour": ("/materials/Floor/terms/0/color", painted),
-    "a metal in place of a wall": (None, replaced),
-    "fewer paths": (None, transport(bounces=1)),
-    "all of them": (LOBE, lambda document: [change(document) for change in (drawn, painted, transport(bounces=2))]),
+    "a highlight's exponent": (LOBE, set_exponent(60)),
+    "a curve drawn": (LOBE, draw_curve),
+    "a diffuse colour": ("/materials/Floor/terms/0/color", set_floor_color),
+    "a metal in place of a wall": (None, replace_terms),
+    "fewer paths": (None, edit_transport(bounces=1)),
+    "all of them": (
+        LOBE,
+        lambda document: [change(document) for change in (draw_curve, set_floor_color, edit_transport(bounces=2))],
+    ),
 }
 
 
@@ -87,103 +100,103 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
     """Under a light that is known, a frame is what was exact and what surfaces send otherwise, made beside the frames;
     at rest all is exact."""
     pointer, change = FOLLOWED[edit]
-    other = environment(rotation=100.0 + 2 * list(FOLLOWED).index(edit) + (solo is None))  # known to nobody else
+    other = edit_environment(rotation=100.0 + 2 * list(FOLLOWED).index(edit) + (solo is None))  # known to nobody else
 
     def shown(*changes):
-        return look_of(moving, lit(other, *changes))
+        return make_look(moving, add_lights(other, *changes))
 
-    picture = MovingPicture(moving, "front", is_watched=True)
+    picture = FreeCameraPicture(moving, "front", is_watched=True)
     picture.set_look(shown(), solo=solo)
     picture.advance(None)
-    rest(picture)
+    finish_refinement(picture)
     before = picture.image()
     if pointer is not None:
-        picture.touch(pointer)
+        picture.prepare(pointer)
     picture.set_look(shown(change), solo=solo)
     assert picture.advance(None).fidelity == "preview"
     stale = picture.image()  # of surfaces as they are, in what they sent each other before
     job = picture.next_job()
-    assert not job.refines
-    picture.install(job, made(job))
+    assert not job.is_refinement
+    picture.install(job, run_job(job))
     assert picture.advance(None).fidelity == "preview"
     seen = picture.image()
-    find_light(picture)
+    finish_lighting(picture)
     assert np.linalg.norm(seen - picture.image()) < 0.1 * np.linalg.norm(stale - picture.image())
-    rest(picture)
+    finish_refinement(picture)
     exact = picture.image()
-    alone = MovingPicture(moving, "front")
+    alone = FreeCameraPicture(moving, "front")
     alone.set_look(shown(change), solo=solo)
     alone.advance(None)
     np.testing.assert_array_equal(exact, alone.image())
     picture.set_look(shown(), solo=solo)
     assert picture.advance(None).fidelity == "approximate"  # it is known
-    rest(picture)
+    finish_refinement(picture)
     np.testing.assert_array_equal(picture.image(), before)
 
 
 def test_edits_wait_for_no_light_and_light_for_no_edits(moving, monkeypatch):
     """Twice: an edit changes a part of the frame, and what was begun before it comes to all of it afterwards."""
-    other = environment(rotation=301.0)
-    picture = begun(moving, other)
-    picture.set_look(look_of(moving, lit(other, exponent(30))))
+    other = edit_environment(rotation=301.0)
+    picture = make_watched_picture(moving, other)
+    picture.set_look(make_look(moving, add_lights(other, set_exponent(30))))
     picture.advance(None)
     for step in (60, 90):
         job, before = picture.next_job(), picture.image()
         with monkeypatch.context() as nothing_whole:
-            nothing_whole.setattr("relume.moving.picture.frame_of", None)
-            nothing_whole.setattr("relume.moving.vectors.live.changed", None)
-            picture.set_look(look_of(moving, lit(other, exponent(step))))
+            nothing_whole.setattr("relume.moving.picture.render_frame", None)
+            nothing_whole.setattr("relume.moving.vectors.live.update_reflectances", None)
+            picture.set_look(make_look(moving, add_lights(other, set_exponent(step))))
             assert picture.advance(None).changed
         edited = picture.image()
         assert (edited != before).any()
-        picture.install(job, made(job))
+        picture.install(job, run_job(job))
         assert picture.advance(None).changed
         assert (picture.image() != edited).any()
         assert picture.next_job().key != job.key  # of the newer look
-    rest(picture)
-    np.testing.assert_array_equal(picture.image(), seen(moving, exponent(90), other).image())
+    finish_refinement(picture)
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, set_exponent(90), other).image())
 
 
 def test_what_surfaces_send_is_behind_a_light_that_turns_and_catches_up(moving):
-    turns = [look_of(moving, lit(environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]
-    picture = begun(moving, environment(rotation=310.0))
+    turns = [make_look(moving, add_lights(edit_environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]
+    picture = make_watched_picture(moving, edit_environment(rotation=310.0))
     picture.set_look(turns[1])
     picture.advance(None)
     job, behind = picture.next_job(), picture.image()
-    assert not job.refines
+    assert not job.is_refinement
     picture.set_look(turns[2])
     picture.advance(None)
-    picture.install(job, made(job))
+    picture.install(job, run_job(job))
     picture.advance(None)
     job = picture.next_job()
-    picture.install(job, made(job))
+    picture.install(job, run_job(job))
     assert picture.advance(None).fidelity == "preview"
-    assert picture.next_job().refines
+    assert picture.next_job().is_refinement
     caught_up = picture.image()
-    at_once = MovingPicture(moving, "front", is_watched=True)
+    at_once = FreeCameraPicture(moving, "front", is_watched=True)
     at_once.set_look(turns[2])
     at_once.advance(None)
     np.testing.assert_allclose(caught_up, at_once.image(), rtol=ROUNDED, atol=ROUNDED)
     assert relative_rmse(behind, caught_up) > 1e-3
-    rest(picture)
-    np.testing.assert_array_equal(picture.image(), seen(moving, environment(rotation=326.0)).image())
+    finish_refinement(picture)
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, edit_environment(rotation=326.0)).image())
 
 
 def test_an_eye_that_moves_finds_light_from_surfaces_wherever_it_looks(moving, aside):
     """The light turns, and the eye moves before what surfaces send is there: no point is left without."""
-    picture = begun(moving, environment(rotation=331.0))
-    now = look_of(moving, lit(environment(rotation=339.0)))
+    picture = make_watched_picture(moving, edit_environment(rotation=331.0))
+    now = make_look(moving, add_lights(edit_environment(rotation=339.0)))
     picture.set_look(now)
     picture.advance(None)
     job = picture.next_job()
-    picture.set_eye(aside, (64, 40))
+    picture.set_camera(aside, (64, 40))
     picture.advance(None)
     before = picture.image()
-    picture.install(job, made(job))
+    picture.install(job, run_job(job))
     picture.advance(None)
-    at_once = MovingPicture(moving, "front", is_watched=True)
+    at_once = FreeCameraPicture(moving, "front", is_watched=True)
     at_once.set_look(now)
-    at_once.set_eye(aside, (64, 40))
+    at_once.set_camera(aside, (64, 40))
     at_once.advance(None)
     np.testing.assert_allclose(picture.image(), at_once.image(), rtol=ROUNDED, atol=ROUNDED)
     assert 0 < relative_rmse(before, at_once.image()) < 0.1
@@ -191,11 +204,11 @@ def test_an_eye_that_moves_finds_light_from_surfaces_wherever_it_looks(moving, a
 
 def test_a_shader_gets_what_follows(moving):
     def bounces(*changes):
-        return look_of(moving, lit(environment(rotation=171.0), *changes))
+        return make_look(moving, add_lights(edit_environment(rotation=171.0), *changes))
 
     def sent(picture):
         found = {}
-        for name, part in picture.parts()[0].items():
+        for name, part in picture.array_blocks()[0].items():
             if name.startswith("vectors/"):
                 light = part.make()
                 scale, num = light[f"{name}/scale"][0]
@@ -203,18 +216,18 @@ def test_a_shader_gets_what_follows(moving):
                 found[name, int(num)] = scale * numbers[:, : 3 * int(num)]
         return found
 
-    picture = MovingPicture(moving, "front", is_watched=True)
-    picture.draws = False
+    picture = FreeCameraPicture(moving, "front", is_watched=True)
+    picture.renders_pixels = False
     picture.set_look(bounces())
     picture.advance(None)
-    rest(picture)
-    picture.set_look(bounces(painted, exponent(8.0)))
+    finish_refinement(picture)
+    picture.set_look(bounces(set_floor_color, set_exponent(8.0)))
     assert picture.advance(None).fidelity == "preview"
     job = picture.next_job()
-    picture.install(job, made(job))
+    picture.install(job, run_job(job))
     assert picture.advance(None).fidelity == "preview"
     followed = sent(picture)
-    rest(picture)
+    finish_refinement(picture)
     exact = sent(picture)
     assert followed.keys() == exact.keys()
     assert {num for _, num in exact} == {1, 36}  # a diffuse floor, a wall with a highlight

@@ -2,12 +2,24 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import EDITS, LOBE, drawn, environment, exponent, light, lit, matt, painted, replaced, transport
-from moving_pictures import begun, made, rest, seen
-from sessions import look_of, relative_rmse
+from looks_of_pictures import (
+    EDITS,
+    LOBE,
+    add_lights,
+    draw_curve,
+    edit_environment,
+    edit_light,
+    edit_transport,
+    remove_glossy_term,
+    replace_terms,
+    set_exponent,
+    set_floor_color,
+)
+from moving_pictures import finish_refinement, make_picture, make_watched_picture, run_job
+from sessions import make_look, relative_rmse
 
 from relume.errors import NotFoundError, ParameterError
-from relume.moving.picture import MovingPicture
+from relume.moving.picture import FreeCameraPicture
 from relume.reference import reference_image
 
 ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
@@ -16,28 +28,32 @@ ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edited_picture_is_that_of_the_look_from_nothing_and_leaves_no_trace(moving, edit):
     _, change = EDITS[edit]
-    picture = seen(moving)
+    picture = make_picture(moving)
     before = picture.image()
-    picture.set_look(look_of(moving, lit(change)))
+    picture.set_look(make_look(moving, add_lights(change)))
     assert picture.advance(None).changed
-    np.testing.assert_array_equal(picture.image(), seen(moving, change).image())
-    picture.set_look(look_of(moving, lit()))
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, change).image())
+    picture.set_look(make_look(moving, add_lights()))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
 
 
-@pytest.mark.parametrize("change", [drawn, exponent(60.0), painted, matt, replaced], ids=lambda one: one.__name__)
+@pytest.mark.parametrize(
+    "change",
+    [draw_curve, set_exponent(60.0), set_floor_color, remove_glossy_term, replace_terms],
+    ids=lambda one: one.__name__,
+)
 def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch):
     """While eye and light stay: the picture, and what is sent of it, are those of the look from nothing."""
-    direct = transport(show="direct")
-    picture = begun(moving, direct)
+    direct = edit_transport(show="direct")
+    picture = make_watched_picture(moving, direct)
     picture.encode(picture.all_tiles(), "rgb9e5")
     before = picture.image()
     with monkeypatch.context() as nothing_whole:
-        nothing_whole.setattr("relume.moving.picture.frame_of", None)
-        picture.set_look(look_of(moving, lit(direct, change)))
+        nothing_whole.setattr("relume.moving.picture.render_frame", None)
+        picture.set_look(make_look(moving, add_lights(direct, change)))
         assert picture.advance(None).changed
-    anew = begun(moving, direct, change)
+    anew = make_watched_picture(moving, direct, change)
     np.testing.assert_array_equal(picture.image(), anew.image())
     assert picture.encode(picture.all_tiles(), "rgb9e5") == anew.encode(anew.all_tiles(), "rgb9e5")
     differs = (picture.image() != before).any(axis=2)
@@ -47,44 +63,44 @@ def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch)
 
 def test_highlights_are_found_finely_once_eye_and_light_rest(moving, aside, monkeypatch):
     """Twice, the second time after an edit, which costs no whole frame; no eye that moves waits for them."""
-    direct = transport(show="direct")
-    picture = begun(moving, direct)
+    direct = edit_transport(show="direct")
+    picture = make_watched_picture(moving, direct)
     at_first, job = picture.image(), picture.next_job()
     for value in (40, 90):
         with monkeypatch.context() as nothing_whole:
-            nothing_whole.setattr("relume.moving.picture.frame_of", None)
-            picture.set_look(look_of(moving, lit(direct, exponent(value))))
+            nothing_whole.setattr("relume.moving.picture.render_frame", None)
+            picture.set_look(make_look(moving, add_lights(direct, set_exponent(value))))
             assert picture.advance(None).changed
-        rest(picture)
+        finish_refinement(picture)
         assert picture.next_job() is None
-        np.testing.assert_array_equal(picture.image(), seen(moving, direct, exponent(value)).image())
-    picture.set_look(look_of(moving, lit(direct)))
+        np.testing.assert_array_equal(picture.image(), make_picture(moving, direct, set_exponent(value)).image())
+    picture.set_look(make_look(moving, add_lights(direct)))
     for eye in (aside, moving.views["front"].camera):
-        picture.set_eye(eye, (48, 36))
+        picture.set_camera(eye, (48, 36))
         picture.advance(None)
     np.testing.assert_array_equal(picture.image(), at_first)
-    picture.install(job, made(job))  # of a frame that is gone
+    picture.install(job, run_job(job))  # of a frame that is gone
     assert not picture.advance(None).changed
     assert picture.next_job().key != job.key
-    coarse, fine = (show(moving, direct, replaced).image() for show in (begun, seen))
+    coarse, fine = (show(moving, direct, replace_terms).image() for show in (make_watched_picture, make_picture))
     assert relative_rmse(coarse, fine) > 1e-3
 
 
 def test_a_picture_does_not_depend_on_where_its_eye_was(moving, aside):
-    picture = seen(moving)
+    picture = make_picture(moving)
     before = picture.image()
-    picture.set_eye(aside, (64, 40))
+    picture.set_camera(aside, (64, 40))
     picture.advance(None)
-    np.testing.assert_array_equal(picture.image(), seen(moving, eye=aside, size=(64, 40)).image())
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, camera=aside, size=(64, 40)).image())
     assert picture.image().shape == (40, 64, 3)
-    picture.set_eye(moving.views["front"].camera, (48, 36))
+    picture.set_camera(moving.views["front"].camera, (48, 36))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
 
 
 def test_it_never_says_that_it_is_exact_and_rests(moving):
-    picture = MovingPicture(moving, "front")
-    picture.set_look(look_of(moving))
+    picture = FreeCameraPicture(moving, "front")
+    picture.set_look(make_look(moving))
     first, second = picture.advance(None), picture.advance(None)
     assert (first.changed, first.exact, first.fidelity, first.complete) == (True, False, "approximate", True)
     assert not second.changed
@@ -92,10 +108,12 @@ def test_it_never_says_that_it_is_exact_and_rests(moving):
 
 
 def test_no_light_is_black_and_twice_the_light_twice_the_picture(moving):
-    dark = (environment(scale=0.0), light("Lamp", on=False), light("Panel", scale=0.0))
-    assert not seen(moving, *dark).image().any()
-    twice = (environment(scale=2.0), light("Lamp", scale=2.0), light("Panel", scale=2.0))
-    np.testing.assert_allclose(seen(moving, *twice).image(), 2 * seen(moving).image(), rtol=ROUNDED, atol=ROUNDED)
+    dark = (edit_environment(scale=0.0), edit_light("Lamp", on=False), edit_light("Panel", scale=0.0))
+    assert not make_picture(moving, *dark).image().any()
+    twice = (edit_environment(scale=2.0), edit_light("Lamp", scale=2.0), edit_light("Panel", scale=2.0))
+    np.testing.assert_allclose(
+        make_picture(moving, *twice).image(), 2 * make_picture(moving).image(), rtol=ROUNDED, atol=ROUNDED
+    )
 
 
 def test_solos_of_all_sources_sum_to_the_whole(moving):
@@ -105,10 +123,10 @@ def test_solos_of_all_sources_sum_to_the_whole(moving):
         for name in diffuse:
             document["materials"][name]["terms"] = [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}}]
 
-    whole, total = seen(moving, plain).image(), 0
+    whole, total = make_picture(moving, plain).image(), 0
     for source in ("Lamp", "Panel", None):
-        off = [light(name, on=False) for name in ("Lamp", "Panel") if name != source]
-        alone = seen(moving, plain, *off, environment(scale=float(source is None))).image()
+        off = [edit_light(name, on=False) for name in ("Lamp", "Panel") if name != source]
+        alone = make_picture(moving, plain, *off, edit_environment(scale=float(source is None))).image()
         assert alone.any()
         total = total + alone
     np.testing.assert_allclose(total, whole, rtol=ROUNDED, atol=ROUNDED)
@@ -116,16 +134,16 @@ def test_solos_of_all_sources_sum_to_the_whole(moving):
 
 @pytest.mark.parametrize("pointer", ["/materials/Nowhere/terms/0/curves/theta_h", LOBE.replace("1", "7"), "nonsense"])
 def test_what_points_to_nothing_is_refused_and_changes_nothing(moving, pointer):
-    picture = seen(moving)
+    picture = make_picture(moving)
     with pytest.raises(ParameterError):
-        picture.touch(pointer)
+        picture.prepare(pointer)
     assert not picture.advance(None).changed
 
 
 def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(moving):
-    picture = seen(moving)
+    picture = make_picture(moving)
     before = picture.image()
-    look = look_of(moving, lit(painted))
+    look = make_look(moving, add_lights(set_floor_color))
     gone = look.environment.model_copy(update={"map": "env:0123456789abcdef"})
     with pytest.raises(NotFoundError):
         picture.set_look(look.model_copy(update={"environment": gone}))
@@ -134,14 +152,14 @@ def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(moving):
 
 
 def test_a_pixel_says_what_it_shows(moving):
-    picture = seen(moving)
-    found = picture.probe(24, 33)
+    picture = make_picture(moving)
+    found = picture.inspect(24, 33)
     assert found["material"] == "Floor"
     assert abs(found["position"][1]) < 1e-3
     np.testing.assert_allclose(found["normal"], [0, 1, 0], atol=1e-5)
     np.testing.assert_array_equal(found["radiance"], picture.image()[33, 24])
     with pytest.raises(ParameterError):
-        picture.probe(48, 0)
+        picture.inspect(48, 0)
 
 
 @pytest.mark.parametrize("show", ["direct", "all"])
@@ -153,14 +171,14 @@ def test_diffuse_light_from_elsewhere_is_that_of_brute_force(scene, moving, asid
         wall = {"model": "lambert", "color": [0.2, 0.3, 0.5], "params": {}, "curves": curves}
         document["materials"]["Wall"]["terms"] = [wall]
 
-    changes = (plain, light("Panel", on=False), light("Lamp", on=False), transport(show=show))
-    look = look_of(moving, lit(*changes))
+    changes = (plain, edit_light("Panel", on=False), edit_light("Lamp", on=False), edit_transport(show=show))
+    look = make_look(moving, add_lights(*changes))
     passes = [
         reference_image(_with(scene, aside), "front", look, (48, 36), 64, pass_index=k, reflects=True) for k in range(4)
     ]
     truth, noise = np.mean(passes, axis=0), np.std(passes, axis=0).mean() / 2
-    found = seen(moving, *changes, eye=aside).image()
-    inner = ~_edges(seen(moving, *changes, eye=aside))
+    found = make_picture(moving, *changes, camera=aside).image()
+    inner = ~_edges(make_picture(moving, *changes, camera=aside))
     assert relative_rmse(found[inner], truth[inner]) < 0.05
     assert abs(found[inner].mean() / truth[inner].mean() - 1) < 0.01 + 4 * noise / truth.mean()
 
@@ -174,7 +192,7 @@ def _with(scene, camera):
 def _edges(picture):
     """Pixels beside one that shows something else: brute force sees parts of both. (height, width)"""
     height, width, _ = picture.image().shape
-    names = np.array([[str(picture.probe(x, y)["material"]) for x in range(width)] for y in range(height)])
+    names = np.array([[str(picture.inspect(x, y)["material"]) for x in range(width)] for y in range(height)])
     edge = np.zeros((height, width), bool)
     edge[1:] |= names[1:] != names[:-1]
     edge[:, 1:] |= names[:, 1:] != names[:, :-1]

@@ -11,13 +11,13 @@ import pytest
 from foliage import tuft
 from tiny_scenes import quad
 
-from bench.plan import taken
+from bench.plan import measure_use
 from relume.bake import Recipe
 from relume.methods.base import TransferMethod
 from relume.methods.registry import METHODS
 from relume.scene.archive import make_scene
 from relume.scene.model import Environment, Material, Scene, Texture
-from worker.status import MOVING
+from worker.status import FREE_CAMERA_METHODS
 
 linux = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux tells the most memory held")
 BLUE = {"model": "lambert", "color": [0.2, 0.3, 0.5], "texture": "diffuse"}
@@ -47,7 +47,7 @@ def _lit_by(radiance: np.ndarray, material: Material) -> Scene:
 
 
 def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int]:
-    plan, took = method.plan(scene, recipe), taken(scene, recipe)
+    plan, took = method.plan(scene, recipe), measure_use(scene, recipe)
     assert took["view_samples"] <= plan.num_view_samples
     assert took["rays"] <= plan.num_rays
     assert took["store_bytes"] <= plan.store_bytes
@@ -61,7 +61,7 @@ def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int
 )
 def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
     took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40, num_points=1000))
-    if name not in MOVING:  # nearly every pixel is an edge, and all flights are short beside one
+    if name not in FREE_CAMERA_METHODS:  # nearly every pixel is an edge, and all flights are short beside one
         assert took["view_samples"] > 3 * 16 * 16
 
 
@@ -80,7 +80,7 @@ def test_what_a_scene_brings_is_planned(make: object) -> None:
     check(METHODS["direct"], make(), Recipe("direct", ("front",), (32, 32), 40))  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("name", sorted(set(METHODS) - MOVING))
+@pytest.mark.parametrize("name", sorted(set(METHODS) - FREE_CAMERA_METHODS))
 def test_a_picture_of_3840_pixels_fits_where_one_process_samples_it(name: str, blades: Scene) -> None:
     views = [replace(blades.cameras[0], name=view) for view in ("front", "again")]
     plans = [

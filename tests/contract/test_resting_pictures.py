@@ -2,21 +2,21 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import EDITS, LOBE, drawn, light, lit, painted, transport
-from sessions import look_of, make_next, relative_rmse
+from looks_of_pictures import EDITS, LOBE, add_lights, draw_curve, edit_light, edit_transport, set_floor_color
+from sessions import make_look, relative_rmse, run_next_job
 
 from relume.bake import Recipe
-from relume.errors import CancelledError, NotMadeError
-from relume.memory import Memory
+from relume.errors import CancelledError, ResultUnavailableError
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.stills import Stills, Tracing
-from relume.moving.frame import frame_of
-from relume.moving.picture import MovingPicture
-from relume.moving.rest.resting import RestingPicture
-from relume.moving.rest.still_jobs import SparseJob, StillJob
+from relume.methods.stills import StaticTracing, StaticViewBuilder
+from relume.moving.frame import render_frame
+from relume.moving.picture import FreeCameraPicture
+from relume.moving.rest.resting import ProgressivePicture
+from relume.moving.rest.still_jobs import SparseExactJob, StaticViewJob
 from relume.render.image import render_image
 from relume.scene.placed_camera import with_cameras
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 SIZE = (64, 40)
 
@@ -29,17 +29,23 @@ def fixed(method, moving, scene, tmp_path_factory):
     to_world[:3, 3] += [0.4, 0.3, -0.2]
     placed = with_cameras(scene, [type(first)("front", to_world, first.yfov)])
     path = tmp_path_factory.mktemp("rest") / "fixed.zarr"
-    bake_here(METHODS["gather"], placed, Recipe("gather", ("front",), SIZE, moving.lit.num_lights), path)
-    return open_transfer(path, Memory(1 << 30))
+    bake_in_process(
+        METHODS["gather"], placed, Recipe("gather", ("front",), SIZE, moving.light_transport.num_lights), path
+    )
+    return open_transfer(path, Cache(1 << 30))
 
 
 @pytest.fixture
 def picture(baked, scene, aside):
     """From `aside`, under the look of these tests; nothing of it has been made."""
-    moving = open_bake(baked, Memory(1 << 30))
-    found = RestingPicture(MovingPicture(moving, "front"), Stills(moving.lit, scene).make, moving.memory)
-    found.set_look(look_of(moving, lit()))
-    found.set_eye(aside, SIZE)
+    moving = open_bake(baked, Cache(1 << 30))
+    found = ProgressivePicture(
+        FreeCameraPicture(moving, "front"),
+        StaticViewBuilder(moving.light_transport, scene).make_static_view,
+        moving.cache,
+    )
+    found.set_look(make_look(moving, add_lights()))
+    found.set_camera(aside, SIZE)
     return found
 
 
@@ -47,7 +53,7 @@ def rested(picture):
     """Make all that waits; returns what the last step changed."""
     step = picture.advance(None)
     while picture.next_job() is not None:
-        make_next(picture)
+        run_next_job(picture)
         step = picture.advance(None)
     return step
 
@@ -58,7 +64,7 @@ OFTEN, LONG = (None, "all at once"), ("a curve drawn", "a lamp moved", "the envi
 @pytest.mark.parametrize("edit", [*OFTEN, *(pytest.param(edit, marks=pytest.mark.slow) for edit in LONG)])
 def test_straight_light_is_that_of_a_fixed_bake_to_the_bit(moving, fixed, picture, edit):
     changes = [EDITS[edit][1]] if edit else []
-    look = look_of(moving, lit(*changes, transport(show="direct")))
+    look = make_look(moving, add_lights(*changes, edit_transport(show="direct")))
     picture.set_look(look)
     step = rested(picture)
     assert (step.exact, step.fidelity) == (True, "exact")
@@ -66,7 +72,7 @@ def test_straight_light_is_that_of_a_fixed_bake_to_the_bit(moving, fixed, pictur
 
 
 def test_reflected_light_is_that_of_other_cells(moving, fixed, picture):
-    look = look_of(moving, lit(transport(show="first_bounce")))
+    look = make_look(moving, add_lights(edit_transport(show="first_bounce")))
     picture.set_look(look)
     rested(picture)
     expected = render_image(fixed, "front", look)
@@ -79,57 +85,57 @@ def test_the_moving_picture_stands_until_the_still_is_exact_and_comes_back_with_
     first = picture.image().copy()
     for _ in range(2):
         while not (step := picture.advance(None)).exact:
-            make_next(picture)
+            run_next_job(picture)
         assert step.changed
         assert step.was_off == pytest.approx(relative_rmse(first, picture.image()), rel=1e-3)
         assert 0 < step.was_off < 0.5
         assert picture.advance(None).was_off is None
         assert not picture.advance(None).changed
-        picture.set_eye(moving.views["front"].camera, (48, 36))
+        picture.set_camera(moving.views["front"].camera, (48, 36))
         step = picture.advance(None)
         assert (step.fidelity, picture.image().shape) == ("approximate", (36, 48, 3))
-        picture.set_eye(aside, SIZE)
+        picture.set_camera(aside, SIZE)
         assert picture.advance(None).fidelity == "approximate"
         np.testing.assert_array_equal(picture.image(), first)
 
 
 def test_edits_go_on_in_the_still_and_those_made_meanwhile_are_kept(picture, moving, fixed):
     job = picture.next_job()
-    assert job.refines
-    made = job.make(lambda share: None, lambda: False)
-    direct = transport(show="direct")
-    picture.set_look(look_of(moving, lit(painted, direct)))
-    picture.touch(LOBE)
+    assert job.is_refinement
+    made = job.run(lambda share: None, lambda: False)
+    direct = edit_transport(show="direct")
+    picture.set_look(make_look(moving, add_lights(set_floor_color, direct)))
+    picture.prepare(LOBE)
     picture.install(job, made)
     assert rested(picture).exact
-    expected = render_image(fixed, "front", look_of(moving, lit(painted, direct)))
+    expected = render_image(fixed, "front", make_look(moving, add_lights(set_floor_color, direct)))
     assert relative_rmse(picture.image(), expected) < 1e-5
-    look = look_of(moving, lit(painted, drawn, direct))
+    look = make_look(moving, add_lights(set_floor_color, draw_curve, direct))
     picture.set_look(look, hand=LOBE)
     assert picture.advance(None).changed  # at once: the curve in hand was frozen
     rested(picture)
     assert relative_rmse(picture.image(), render_image(fixed, "front", look)) < 1e-5
-    assert picture.brush(LOBE, 0, 90).any()
-    assert picture.probe(30, 36)["material"] == "Floor"
+    assert picture.highlight_pixels(LOBE, 0, 90).any()
+    assert picture.inspect(30, 36)["material"] == "Floor"
 
 
 def test_a_still_of_another_eye_is_of_no_use(picture, moving):
     job = picture.next_job()
-    made = job.make(lambda share: None, lambda: False)
-    picture.set_eye(moving.views["front"].camera, SIZE)
+    made = job.run(lambda share: None, lambda: False)
+    picture.set_camera(moving.views["front"].camera, SIZE)
     assert picture.next_job().key != job.key
     picture.install(job, made)
     assert picture.advance(None).fidelity == "approximate"
 
 
 def test_it_tells_how_far_it_is_and_goes_on_from_where_it_was_given_up(picture, monkeypatch):
-    monkeypatch.setattr("relume.methods.stills._ROWS_A_TASK", 512)
+    monkeypatch.setattr("relume.methods.stills._ROWS_PER_TASK", 512)
     job, shares = picture.next_job(), []
     with pytest.raises(CancelledError):
-        job.make(shares.append, lambda: len(shares) > 3)
+        job.run(shares.append, lambda: len(shares) > 3)
     assert shares[0] == 0
     again = []
-    job.make(again.append, lambda: False)
+    job.run(again.append, lambda: False)
     assert again[0] > shares[-1]
     assert again == sorted(again)
     assert again[-1] == 1
@@ -138,7 +144,7 @@ def test_it_tells_how_far_it_is_and_goes_on_from_where_it_was_given_up(picture, 
 def test_the_same_eye_again_is_sent_again_and_traced_no_more(picture, aside):
     rested(picture)
     before = picture.image().copy()
-    picture.set_eye(aside, SIZE)
+    picture.set_camera(aside, SIZE)
     step = picture.advance(None)
     assert step.changed
     assert step.exact
@@ -147,20 +153,24 @@ def test_the_same_eye_again_is_sent_again_and_traced_no_more(picture, aside):
 
 
 def test_who_does_not_want_it_has_the_moving_picture(picture, aside):
-    picture.set_eye(aside, SIZE, rests=False)
+    picture.set_camera(aside, SIZE, is_idle=False)
     assert picture.advance(None).fidelity == "approximate"
     assert picture.next_job() is None
-    picture.set_eye(aside, SIZE, rests=True)
-    assert isinstance(picture.next_job(), StillJob)
+    picture.set_camera(aside, SIZE, is_idle=True)
+    assert isinstance(picture.next_job(), StaticViewJob)
 
 
 def test_with_too_little_memory_the_moving_picture_stays(baked, scene, aside):
-    moving = open_bake(baked, Memory(100_000))
-    picture = RestingPicture(MovingPicture(moving, "front"), Stills(moving.lit, scene).make, moving.memory)
-    picture.set_look(look_of(moving, lit(light("Panel", on=False))))
-    picture.set_eye(aside, SIZE)
+    moving = open_bake(baked, Cache(100_000))
+    picture = ProgressivePicture(
+        FreeCameraPicture(moving, "front"),
+        StaticViewBuilder(moving.light_transport, scene).make_static_view,
+        moving.cache,
+    )
+    picture.set_look(make_look(moving, add_lights(edit_light("Panel", on=False))))
+    picture.set_camera(aside, SIZE)
     picture.advance(None)
-    make_next(picture)
+    run_next_job(picture)
     assert picture.next_job() is None
     assert picture.advance(None).fidelity == "approximate"
 
@@ -170,18 +180,18 @@ def few_at_once(picture, aside, monkeypatch):
     """The same, darker than it should be, with exact samples at every fourth pixel: found, shaded, and shown."""
 
     def darkened(transfer, wanted, seen, camera, size, shares):
-        frame = frame_of(transfer, wanted, seen, camera, size, shares)
+        frame = render_frame(transfer, wanted, seen, camera, size, shares)
         is_hit = seen.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
         return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
 
     for user in ("picture", "fine_job"):
         monkeypatch.setattr(f"relume.moving.{user}.frame_of", darkened)
-    monkeypatch.setattr("relume.moving.rest.still_jobs.STEP", 4)
-    picture.set_eye(aside, (160, 100))
+    monkeypatch.setattr("relume.moving.rest.still_jobs.SAMPLE_SPACING", 4)
+    picture.set_camera(aside, (160, 100))
     picture.advance(None)
     before, job = picture.image().copy(), picture.next_job()
-    assert isinstance(job, SparseJob)
-    picture.install(job, job.make(lambda share: None, lambda: False))
+    assert isinstance(job, SparseExactJob)
+    picture.install(job, job.run(lambda share: None, lambda: False))
     return picture, before
 
 
@@ -191,7 +201,7 @@ def test_a_few_exact_samples_correct_the_moving_picture_until_the_still_is_there
     assert (step.exact, step.fidelity, step.was_off, step.changed) == (False, "approximate", None, True)
     assert picture.parts() is None  # no shader elsewhere knows of it
     first = picture.image().copy()
-    assert isinstance(picture.next_job(), StillJob)
+    assert isinstance(picture.next_job(), StaticViewJob)
     step = rested(picture)
     assert step.exact
     assert step.was_off == pytest.approx(relative_rmse(before, picture.image()), rel=1e-3)
@@ -200,11 +210,11 @@ def test_a_few_exact_samples_correct_the_moving_picture_until_the_still_is_there
 
 
 def test_where_the_moving_picture_is_right_few_samples_leave_it_alone(picture, aside, monkeypatch):
-    monkeypatch.setattr("relume.moving.rest.still_jobs.STEP", 4)
-    picture.set_eye(aside, (160, 100))
+    monkeypatch.setattr("relume.moving.rest.still_jobs.SAMPLE_SPACING", 4)
+    picture.set_camera(aside, (160, 100))
     picture.advance(None)
     before = picture.image().copy()
-    make_next(picture)
+    run_next_job(picture)
     first = picture.image().copy()
     rested(picture)
     assert relative_rmse(first, picture.image()) < 1.01 * relative_rmse(before, picture.image())
@@ -214,37 +224,37 @@ def test_where_the_moving_picture_is_right_few_samples_leave_it_alone(picture, a
 def test_what_a_few_samples_said_is_of_one_look_and_one_eye(few_at_once, moving, is_edit):
     picture, _ = few_at_once
     assert picture.advance(None).changed
-    alone = MovingPicture(moving, "front")
-    look, eye = look_of(moving, lit(drawn)), (moving.views["front"].camera, (160, 100))
+    alone = FreeCameraPicture(moving, "front")
+    look, eye = make_look(moving, add_lights(draw_curve)), (moving.views["front"].camera, (160, 100))
     if is_edit:
         picture.set_look(look, hand=LOBE)
         alone.set_look(look)
-        alone.set_eye(*picture._moving.eye)
+        alone.set_camera(*picture._free_camera_picture.eye)
     else:
-        picture.set_eye(*eye)
-        alone.set_look(look_of(moving, lit()))
-        alone.set_eye(*eye)
+        picture.set_camera(*eye)
+        alone.set_look(make_look(moving, add_lights()))
+        alone.set_camera(*eye)
     assert picture.advance(None).changed
     alone.advance(None)
     np.testing.assert_array_equal(picture.image(), alone.image())
-    assert isinstance(picture.next_job(), SparseJob)
+    assert isinstance(picture.next_job(), SparseExactJob)
 
 
 @pytest.fixture
 def traced(monkeypatch):
     """Stages of what is traced: shadows, and gather rays."""
-    stages, trace = [], Tracing._trace
+    stages, trace = [], StaticTracing._trace
 
     def noted(tracing, task):
         stages.append(task.stage)
         trace(tracing, task)
 
-    monkeypatch.setattr(Tracing, "_trace", noted)
+    monkeypatch.setattr(StaticTracing, "_trace", noted)
     return stages
 
 
 def test_gather_rays_are_traced_when_a_look_shows_their_light_and_then_no_more(moving, picture, traced):
-    straight, whole = look_of(moving, lit(transport(show="direct"))), look_of(moving, lit())
+    straight, whole = make_look(moving, add_lights(edit_transport(show="direct"))), make_look(moving, add_lights())
     picture.set_look(straight)
     assert rested(picture).exact
     assert set(traced) == {1}
@@ -261,10 +271,10 @@ def test_gather_rays_are_traced_when_a_look_shows_their_light_and_then_no_more(m
 
 
 def test_reflected_light_asked_for_while_a_still_without_it_is_made(moving, picture, traced):
-    whole = look_of(moving, lit())
-    picture.set_look(look_of(moving, lit(transport(show="direct"))))
+    whole = make_look(moving, add_lights())
+    picture.set_look(make_look(moving, add_lights(edit_transport(show="direct"))))
     job = picture.next_job()
-    made = job.make(lambda share: None, lambda: False)
+    made = job.run(lambda share: None, lambda: False)
     picture.set_look(whole)
     picture.install(job, made)
     assert picture.advance(None).fidelity == "approximate"
@@ -274,5 +284,5 @@ def test_reflected_light_asked_for_while_a_still_without_it_is_made(moving, pict
 
 def test_while_the_eye_moves_no_curve_tells_what_it_lights(picture):
     picture.advance(None)
-    with pytest.raises(NotMadeError, match="where the eye rests"):
-        picture.brush("/materials/Floor/terms/0/curves/theta_i", 0.0, 9.0)
+    with pytest.raises(ResultUnavailableError, match="where the eye rests"):
+        picture.highlight_pixels("/materials/Floor/terms/0/curves/theta_i", 0.0, 9.0)

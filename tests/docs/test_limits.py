@@ -7,9 +7,9 @@ from relume.brdf import document as terms
 from relume.brdf.channels import IMAGES
 from relume.environments import asset_store as environments
 from relume.environments import reading as environment
-from relume.eye.merged import POSITIONS_A_PIXEL
-from relume.eye.view_samples import most_samples
-from relume.eye.windows import SIDE
+from relume.eye.merged import POSITIONS_PER_PIXEL
+from relume.eye.view_samples import view_sample_limit
+from relume.eye.windows import TILE_SIZE
 from relume.imageio import decoding as images
 from relume.images import reading
 from relume.light import tiles
@@ -32,7 +32,7 @@ OPERATIONS = Path(__file__).resolve().parents[2] / "docs" / "operations.md"
 
 def most(field: str) -> int:
     """The upper bound of a number in a comparison's request."""
-    return int(bodies.TruthRequest.model_json_schema()["properties"][field]["maximum"])
+    return int(bodies.ComparisonRequest.model_json_schema()["properties"][field]["maximum"])
 
 
 ROWS = {
@@ -47,7 +47,7 @@ ROWS = {
     ),
     "environment; its file; kept with a scene at most": (
         f"{environment.MAX_WIDTH:,} × {environment.MAX_HEIGHT:,}; {environment.MAX_FILE_BYTES // MILLION} MB; "
-        f"{environment.OF_SCENES:,} wide"
+        f"{environment.SCENE_MAX_WIDTH:,} wide"
     ),
     "imported environments; kept at most": f"{environments.STORE.max_entries}; {environments.MAX_WIDTH:,} wide",
     "images that looks may name; each; its file": (
@@ -60,10 +60,10 @@ ROWS = {
         f"{patch.MAX_OPERATIONS}; {protocol.MAX_MESSAGE_BYTES // KIB} KiB"
     ),
     "comments on a scene; in all; their pictures and words together": (
-        f"{comments.MAX_OF_SCENE}; {comments.MAX_COMMENTS:,}; {comments.MAX_BYTES // MIB} MiB"
+        f"{comments.MAX_PER_SCENE}; {comments.MAX_COMMENTS:,}; {comments.MAX_BYTES // MIB} MiB"
     ),
     "words of a comment; side of its picture as it is sent; as it is kept": (
-        f"{wire_comments.MAX_COMMENT:,} characters; {moments.MAX_SIDE:,}; {moments.KEPT_SIDE} pixels"
+        f"{wire_comments.MAX_COMMENT:,} characters; {moments.MAX_SIDE:,}; {moments.STORED_SIDE} pixels"
     ),
     "name of somebody in a room; name of a room": (
         f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"
@@ -77,7 +77,8 @@ ROWS = {
         f"{shares.MAX_SHARE_BYTES // KIB} KiB; {shares.MAX_SHARES:,}; {shares.MAX_BYTES // MIB} MiB"
     ),
     "looks and cameras of one batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
-    "frames whose looks are told at once; all together": f"{renders.MAX_TOLD}; {renders.MAX_TOLD_BYTES // MIB} MiB",
+    "frames whose looks are told at once; all together": f"{renders.MAX_LISTED_FRAMES}; "
+    f"{renders.MAX_LISTED_BYTES // MIB} MiB",
     "passes of a comparison; of each kind of long work waiting": f"{most('passes'):,}; {Settings().max_queued}",
     "pixels of a view whose eye moves": f"{protocol.MAX_EYE_PIXELS:,}",
 }
@@ -92,11 +93,11 @@ def test_the_table_of_limits_says_what_the_code_checks() -> None:
 
 def test_what_is_said_of_plans_is_what_plans_count() -> None:
     text = " ".join(OPERATIONS.read_text(encoding="utf-8").split())
-    assert [most_samples([], side * side) / side**2 for side in (256, 512, 1024, 4096)] == [8, 4, 2, 2]
+    assert [view_sample_limit([], side * side) / side**2 for side in (256, 512, 1024, 4096)] == [8, 4, 2, 2]
     assert "eight view samples a pixel in pictures up to 256 × 256" in text
     assert "two from 1024 × 1024 on" in text
     assert f"the process ({bounds.PROGRAM_BYTES // MILLION} MB)" in text
-    assert f"({bounds.LIGHT_BYTES_A_TEXEL} bytes a texel)" in text
-    assert f"({bounds.BYTES_A_RAY} bytes each, nine a pixel" in text
-    assert POSITIONS_A_PIXEL == 8
-    assert f"a window of {SIDE} × {SIDE} of them" in text
+    assert f"({bounds.LIGHT_BYTES_PER_TEXEL} bytes a texel)" in text
+    assert f"({bounds.BYTES_PER_RAY} bytes each, nine a pixel" in text
+    assert POSITIONS_PER_PIXEL == 8
+    assert f"a window of {TILE_SIZE} × {TILE_SIZE} of them" in text

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from editor_page import WAIT_MS, Editor, forget, opened_page
+from editor_page import WAIT_MS, Editor, clear_storage, opened_page
 from editor_server import SIZE, Server
 from playwright.sync_api import Browser, Error, Page, expect, sync_playwright
 from tiny_scenes import still_life
@@ -51,7 +51,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.fixture(scope="module")
 def moving_scene(server: Server) -> Iterator[str]:
     """A scene of its own with one bake, whose view moves; it is gone afterwards."""
-    identity = server.moving_scene()
+    identity = server.create_free_camera_scene()
     yield identity
     server.delete(f"/api/scenes/{identity}")
 
@@ -59,7 +59,7 @@ def moving_scene(server: Server) -> Iterator[str]:
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     names = ("chromium", "chromium-browser", "google-chrome")
-    path = next((found for name in names if (found := shutil.which(name))), None)
+    path = next((executable for name in names if (executable := shutil.which(name))), None)
     if path is None:
         pytest.skip("there is no chromium on this machine")
     with sync_playwright() as playwright:
@@ -90,6 +90,6 @@ def editor(server: Server, kept_page: Page) -> Iterator[Editor]:
     page.goto(f"{server.url}/?scene={scene['id']}")
     editor.wait_until_exact()
     yield editor
-    forget(page, server.url)
+    clear_storage(page, server.url)
     page.remove_listener("pageerror", take_note)
     assert errors == []

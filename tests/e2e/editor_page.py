@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Locator, Page, ViewportSize
 WAIT_MS = 120_000
 VIEWPORT: ViewportSize = {"width": 1280, "height": 800}
 # A patch is sent within one animation frame, the status bar follows within another.
-SETTLE = """() => new Promise((done) => {
+WAIT_FOR_FRAMES = """() => new Promise((done) => {
   let left = 4;
   const tick = () => (left-- > 0 ? requestAnimationFrame(tick) : done());
   tick();
@@ -41,18 +41,18 @@ class Editor:
     def wait_until_exact(self) -> None:
         """Until the status bar says that the picture equals the look."""
         self.page.locator(".exactness").wait_for(timeout=WAIT_MS)
-        self.page.evaluate(SETTLE)
+        self.page.evaluate(WAIT_FOR_FRAMES)
         self.page.locator(".exactness.is-exact", has_text="exact").wait_for(timeout=WAIT_MS)
 
     def pixels(self) -> NDArray[np.int16]:
         """The canvas as it is on the screen, once it is exact. (height, width, 3)"""
         self.wait_until_exact()
-        return self.pixels_now()
+        return self.read_pixels()
 
-    def pixels_now(self) -> NDArray[np.int16]:
+    def read_pixels(self) -> NDArray[np.int16]:
         """The canvas as it is on the screen, exact or not. (height, width, 3)"""
         self.page.mouse.move(2, 2)  # a pointer over the picture outlines what it is over
-        self.page.evaluate(SETTLE)
+        self.page.evaluate(WAIT_FOR_FRAMES)
         with Image.open(io.BytesIO(self.canvas.screenshot(style=WITHOUT_MESSAGES))) as image:
             return np.asarray(image.convert("RGB")).astype(np.int16)
 
@@ -97,7 +97,7 @@ def opened_page(browser: Browser) -> Iterator[Page]:
     assert errors == []
 
 
-def forget(page: Page, url: str) -> None:
+def clear_storage(page: Page, url: str) -> None:
     """Leave the editor, and make the profile of its page as fresh as it was."""
     page.goto(f"{url}/readyz")  # of the same origin, and without scripts that would keep something
     page.evaluate("localStorage.clear(), sessionStorage.clear()")

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_scenes import looking, quad, scene_of, sphere, studio
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
 from relume.scene.model import Material
 from worker.database import open_database
@@ -60,7 +60,7 @@ class Server:
         """DELETE."""
         urllib.request.urlopen(urllib.request.Request(self.url + path, method="DELETE"), timeout=30).close()
 
-    def moving_scene(self) -> str:
+    def create_free_camera_scene(self) -> str:
         """A scene of its own with one bake, whose view moves; it is to be deleted."""
         identity = str(self.call("/api/built-ins/cornell_box", {})["id"])
         self.bake({"scene": identity, "method": "surface", "size": (120, 120), "lights": 100, "points": 4000})
@@ -71,10 +71,10 @@ class Server:
         metal = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.4, "f0": 0.9}}
         clay = {"model": "lambert", "color": [0.8, 0.5, 0.3]}
         floor = quad("floor", [[-3, -2, 3], [3, -2, 3], [3, -2, -3], [-3, -2, -3]], 1)
-        scene = scene_of(
+        scene = make_tiny_scene(
             sphere("ball", [0, 0, 0], 1, 0, 24),
             floor,
-            camera=looking("front", [0, 0.8, 3.2], [0, -0.2, 0], 0.75),
+            camera=make_camera("front", [0, 0.8, 3.2], [0, -0.2, 0], 0.75),
             environment=studio(),
             materials=[Material("Ball", (metal,)), Material("Floor", (clay,))],
         )

@@ -3,7 +3,7 @@
 import pytest
 from environment_files import dusk, write_map
 
-from relume.environments.asset_store import STORE, keep
+from relume.environments.asset_store import STORE, store_environment
 
 
 @pytest.fixture(scope="session")
@@ -14,6 +14,6 @@ def dusk_file(tmp_path_factory):
 @pytest.fixture(scope="session")
 def shelf(dusk_file, tmp_path_factory):
     """A folder with one imported environment, in use."""
-    with STORE.at(tmp_path_factory.mktemp("shelf") / "environments") as folder:
-        keep(folder, dusk_file, "Dusk")
+    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf") / "environments") as folder:
+        store_environment(folder, dusk_file, "Dusk")
         yield folder

@@ -12,8 +12,8 @@ from PIL import Image
 from relume import environments
 from relume.color import luminance
 from relume.environments import asset_store
-from relume.environments.asset_store import STORE, get_record, keep, records, thumbnail_path
-from relume.environments.built_in import BUILT_IN, built_in
+from relume.environments.asset_store import STORE, get_record, records, store_environment, thumbnail_path
+from relume.environments.built_in import BUILT_IN, load_built_in
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.environments.thumbnail import thumbnail
 from relume.errors import NotFoundError, SceneError
@@ -23,19 +23,19 @@ from server.files.importing import remove_strays
 def test_an_import_is_listed_and_found_by_its_name(shelf):
     (record,) = records(shelf)
     assert (record.name, record.map, record.warnings) == ("Dusk", f"env:{record.id}", ())
-    found = environments.find(record.map)
+    found = environments.load_environment(record.map)
     assert found.name == "Dusk"
     np.testing.assert_array_equal(found.radiance, dusk())
     assert not found.radiance.flags.writeable
-    assert environments.is_known(record.map)
-    assert environments.known_names() == [*BUILT_IN, record.map]
+    assert environments.environment_exists(record.map)
+    assert environments.environment_names() == [*BUILT_IN, record.map]
     with Image.open(thumbnail_path(shelf, record.id)) as picture:
         assert (picture.size, picture.mode) == ((192, 96), "RGB")
 
 
 def test_the_same_file_again_takes_the_new_name(dusk_file, tmp_path):
-    first = keep(tmp_path / "shelf", dusk_file, "One")
-    again = keep(tmp_path / "shelf", dusk_file, "Two")
+    first = store_environment(tmp_path / "shelf", dusk_file, "One")
+    again = store_environment(tmp_path / "shelf", dusk_file, "Two")
     assert (again.id, again.name, again.created) == (first.id, "Two", first.created)
     assert len(records(tmp_path / "shelf")) == 1
 
@@ -43,7 +43,7 @@ def test_the_same_file_again_takes_the_new_name(dusk_file, tmp_path):
 def test_a_bad_file_leaves_nothing_behind(tmp_path):
     (tmp_path / "bad.hdr").write_bytes(b"#?RADIANCE\n\n-Y 4 +X 8\n")
     with pytest.raises(SceneError, match="bad"):
-        keep(tmp_path / "shelf", tmp_path / "bad.hdr", "bad")
+        store_environment(tmp_path / "shelf", tmp_path / "bad.hdr", "bad")
     assert not (tmp_path / "shelf").exists()
 
 
@@ -55,7 +55,7 @@ def test_what_a_killed_import_left_is_found_by_its_name(tmp_path):
 
     (tmp_path / "some.hdr").write_bytes(b"some")
     with pytest.raises(SceneError, match="killed"):
-        STORE.keep(tmp_path / "shelf", tmp_path / "some.hdr", "Some", killed)
+        STORE.store(tmp_path / "shelf", tmp_path / "some.hdr", "Some", killed)
     remove_strays(tmp_path, older_than_s=-1)
     assert not list((tmp_path / "left").iterdir())
 
@@ -64,18 +64,18 @@ def test_large_maps_are_kept_smaller_and_as_bright(tmp_path, monkeypatch):
     monkeypatch.setattr(asset_store, "MAX_WIDTH", 32)
     pixels = np.random.default_rng(1).uniform(0, 4, (48, 96, 3)).astype(np.float32)
     path = write_map(tmp_path / "large.exr", pixels)
-    with STORE.at(tmp_path / "shelf") as folder:
-        record = keep(folder, path, "Large")
+    with STORE.with_search_folder(tmp_path / "shelf") as folder:
+        record = store_environment(folder, path, "Large")
         assert record.warnings == ("environment 'Large' is 96×48; it is kept as 32×16",)
-        found = environments.find(record.map).radiance
+        found = environments.load_environment(record.map).radiance
     np.testing.assert_allclose(found, pixels.reshape(16, 3, 32, 3, 3).mean(axis=(1, 3)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", ["", "env:", "env:../../etc", "env:0123456789abcdef", "Studio", "0123456789abcdef"])
 def test_other_names_are_unknown(shelf, name):
-    assert not environments.is_known(name)
+    assert not environments.environment_exists(name)
     with pytest.raises(NotFoundError, match="import its file again"):
-        environments.find(name)
+        environments.load_environment(name)
 
 
 @pytest.mark.parametrize(
@@ -90,16 +90,16 @@ def test_other_names_are_unknown(shelf, name):
 def test_damaged_files_are_named(shelf, tmp_path, file, content):
     shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
     (tmp_path / "fedcba9876543210" / file).write_bytes(content)
-    with STORE.at(tmp_path), pytest.raises(SceneError, match="import it again"):
-        environments.find("env:fedcba9876543210")
+    with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="import it again"):
+        environments.load_environment("env:fedcba9876543210")
 
 
 def test_arrays_of_other_shapes_are_damage(shelf, tmp_path):
     shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
     for shape in ((4, 4, 3), (4, 8), (4, 8, 4), (0, 0, 3)):
         np.save(tmp_path / "fedcba9876543210" / "radiance.npy", np.ones(shape, np.float32))
-        with STORE.at(tmp_path), pytest.raises(SceneError, match="damaged"):
-            environments.find("env:fedcba9876543210")
+        with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="damaged"):
+            environments.load_environment("env:fedcba9876543210")
 
 
 def test_a_record_without_warnings_is_damage(shelf, tmp_path):
@@ -116,23 +116,23 @@ def mean_luminance(radiance):
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_ones_are_sound_and_as_bright_as_the_studio(name):
-    radiance = built_in(name).radiance
+    radiance = load_built_in(name).radiance
     assert radiance.dtype == np.float32
     assert radiance.shape == (256, 512, 3)
     assert np.isfinite(radiance).all()
     assert radiance.min() > 0
-    assert mean_luminance(radiance) == pytest.approx(mean_luminance(built_in("studio").radiance), rel=0.01)
-    assert built_in(name) is built_in(name)
+    assert mean_luminance(radiance) == pytest.approx(mean_luminance(load_built_in("studio").radiance), rel=0.01)
+    assert load_built_in(name) is load_built_in(name)
 
 
 def test_overcast_zenith_is_three_times_the_horizon():
-    light = luminance(built_in("overcast").radiance)
+    light = luminance(load_built_in("overcast").radiance)
     assert light[0].mean() / light[127].mean() == pytest.approx(3.0, rel=0.02)
 
 
 @pytest.mark.parametrize(("name", "elevation"), [("clear_sky", 48.0), ("sunset", 5.0)])
 def test_the_sun_stands_where_it_is_said_to(name, elevation):
-    light = luminance(built_in(name).radiance)
+    light = luminance(load_built_in(name).radiance)
     y = texel_directions(256, 512)[..., 1]
     assert np.degrees(np.arcsin(y.ravel()[light.argmax()])) == pytest.approx(elevation, abs=0.7)
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, mesh, scene_of, studio, torus
+from tiny_scenes import make_camera, make_tiny_scene, mesh, studio, torus
 
 from relume.environments.equirect import lookup
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.trace.geometry import merge
-from relume.trace.primary import Hits, camera_directions, trace_from
+from relume.trace.geometry import build_scene_buffers
+from relume.trace.primary import Hits, camera_directions, trace_rays
 from relume.trace.surface import surface_at
 
 SIZE = (96, 72)
@@ -21,8 +21,8 @@ FINE = 12
 
 @pytest.fixture(scope="module", params=[0.02, 0.05])
 def ring(request):
-    camera = looking("c", [0, 0.6, 1.6], [0, 0, 0], 0.6)
-    return scene_of(torus("ring", 0.5, request.param, 0), camera=camera, environment=studio(64))
+    camera = make_camera("c", [0, 0.6, 1.6], [0, 0, 0], 0.6)
+    return make_tiny_scene(torus("ring", 0.5, request.param, 0), camera=camera, environment=studio(64))
 
 
 def mirrored(scene, normal, towards):
@@ -33,12 +33,12 @@ def mirrored(scene, normal, towards):
 def brute_force(scene):
     """FINE² rays a pixel. Returns radiance (pixels, 3) and the ring's share of each pixel."""
     width, height = SIZE[0] * FINE, SIZE[1] * FINE
-    camera, geometry = scene.cameras[0], merge(scene)
+    camera, geometry = scene.cameras[0], build_scene_buffers(scene)
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(
         camera, SIZE, ((x + 0.5) / FINE).astype(np.float32), ((y + 0.5) / FINE).astype(np.float32)
     )
-    hits = trace_from(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+    hits = trace_rays(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
     hit = hits.face >= 0
     radiance = lookup(scene.environment.radiance, directions)
     on = Hits(hits.face[hit], hits.uv[hit], hits.distance[hit])
@@ -61,7 +61,7 @@ def shown(scene, samples):
 
 def test_a_thin_ring_of_chrome_shows_what_brute_force_shows(ring):
     exact, share = brute_force(ring)
-    found = shown(ring, sample_view(ring, merge(ring), "c", SIZE))
+    found = shown(ring, sample_view(ring, build_scene_buffers(ring), "c", SIZE))
     seen = share > 0.1
     # a screen shows no more than white
     error = np.abs(np.minimum(found, 1) - np.minimum(exact, 1))[seen]
@@ -70,7 +70,7 @@ def test_a_thin_ring_of_chrome_shows_what_brute_force_shows(ring):
 
 
 def test_samples_of_a_pixel_are_turned_apart_and_few(ring):
-    samples = sample_view(ring, merge(ring), "c", SIZE)
+    samples = sample_view(ring, build_scene_buffers(ring), "c", SIZE)
     count = np.bincount(samples.pixel)
     assert 3 <= count.max() <= 8
     assert len(samples.pixel) < 2 * SIZE[0] * SIZE[1]
@@ -79,8 +79,8 @@ def test_samples_of_a_pixel_are_turned_apart_and_few(ring):
 
 def test_where_much_turns_the_number_of_samples_stays_bounded():
     """A fat ring of 25 pixels across turns by more than four degrees a pixel nearly everywhere."""
-    fat = scene_of(torus("ring", 0.4, 0.39, 0, 64, 64), camera=looking("c", [0, 0, 16], [0, 0, 0], 0.1))
-    samples = sample_view(fat, merge(fat), "c", (32, 24))
+    fat = make_tiny_scene(torus("ring", 0.4, 0.39, 0, 64, 64), camera=make_camera("c", [0, 0, 16], [0, 0, 0], 0.1))
+    samples = sample_view(fat, build_scene_buffers(fat), "c", (32, 24))
     count = np.bincount(samples.pixel, minlength=32 * 24)
     assert (count > 1).mean() > 0.1
     assert len(samples.pixel) < 2.5 * 32 * 24
@@ -92,11 +92,13 @@ def two_floors(step):
     corners = [[-2, -2, 2 - near], [0, -2, 2 - near], [0, 2, 2 - near], [-2, 2, 2 - near]]
     corners += [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]
     faces = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]
-    return scene_of(mesh("floors", corners, faces, 0), camera=looking("c", [0.301, 0, 2], [0.301, 0, 0], 0.8))
+    return make_tiny_scene(
+        mesh("floors", corners, faces, 0), camera=make_camera("c", [0.301, 0, 2], [0.301, 0, 0], 0.8)
+    )
 
 
 def test_a_step_between_parallel_faces_of_one_mesh_is_an_edge():
-    samples = sample_view(two_floors(0.1), merge(two_floors(0.1)), "c", SIZE)
+    samples = sample_view(two_floors(0.1), build_scene_buffers(two_floors(0.1)), "c", SIZE)
     several = np.bincount(samples.pixel) == 2
     assert several.sum() == SIZE[1]
     depth = samples.surface.points.position[:, 2]
@@ -108,10 +110,10 @@ def test_a_step_between_parallel_faces_of_one_mesh_is_an_edge():
 
 def test_a_floor_seen_along_itself_has_no_steps():
     corners = [[-50, 0, 50], [50, 0, 50], [50, 0, -50], [-50, 0, -50]]
-    floor = scene_of(
-        mesh("floor", corners, [[0, 1, 2], [0, 2, 3]], 0), camera=looking("c", [0, 0.3, 20], [0, 0.3, 0], 0.4)
+    floor = make_tiny_scene(
+        mesh("floor", corners, [[0, 1, 2], [0, 2, 3]], 0), camera=make_camera("c", [0, 0.3, 20], [0, 0.3, 0], 0.4)
     )
-    samples = sample_view(floor, merge(floor), "c", SIZE)
+    samples = sample_view(floor, build_scene_buffers(floor), "c", SIZE)
     several = np.nonzero(np.bincount(samples.pixel) > 1)[0]
     rows = np.unique(several // SIZE[0])
     assert len(rows) <= 4  # where the floor ends

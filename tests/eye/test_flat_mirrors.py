@@ -6,21 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sessions import look_of, make_next, relative_rmse, settle
-from tiny_scenes import looking, points_at, quad, scene_of, sphere
+from sessions import make_look, relative_rmse, run_next_job, run_until_exact
+from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad, sphere
 
 from relume.bake import Recipe
 from relume.brdf.fresnel import schlick
 from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.eye.flat_mirrors import flat_mirrors, lights_in_mirrors
-from relume.memory import Memory
+from relume.eye.flat_mirrors import find_flat_mirrors, lights_visible_in_mirrors
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.stills import Stills
+from relume.methods.stills import StaticViewBuilder
 from relume.picture.picture import Picture
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
 
 F0, COLOR, ALBEDO, ROWS = 0.7, 0.8, 0.6, 64
 MIRROR = Material("Mirror", ({"model": "ggx", "color": [COLOR] * 3, "params": {"roughness": 0.03, "f0": F0}},))
@@ -34,8 +34,8 @@ def hall(*others):
     floor = quad("floor", [[-1, 0, 2], [3, 0, 2], [3, 0, -2], [-1, 0, -2]], 1)
     light = np.full((ROWS, 2 * ROWS, 3), 1e-4, np.float32)
     light[SUN] = 500
-    return scene_of(
-        floor, wall, *others, camera=looking("front", (1.0, 6.0, 0.01), (1.0, 0, 0), 0.6), environment=light,
+    return make_tiny_scene(
+        floor, wall, *others, camera=make_camera("front", (1.0, 6.0, 0.01), (1.0, 0, 0), 0.6), environment=light,
         materials=[MIRROR, FLOOR],
     )  # fmt: skip
 
@@ -46,11 +46,11 @@ def sun():
 
 def test_lights_are_seen_in_mirrors_where_they_are_and_nothing_hides_them():
     lid = quad("lid", [[-0.5, 0.2, 1], [0.5, 0.2, 1], [0.5, 0.2, 0], [-0.5, 0.2, 0]], 1)
-    geometry = merge(hall(lid))
+    geometry = build_scene_buffers(hall(lid))
     x, z = (grid.ravel() for grid in np.meshgrid(np.linspace(-0.9, 2.5, 35), np.linspace(-1.5, 1.5, 31)))
-    floor = points_at(np.stack([x, 0 * x + 1e-4, z], axis=1), np.tile([0, 1, 0], (len(x), 1)))
+    floor = make_surface_points(np.stack([x, 0 * x + 1e-4, z], axis=1), np.tile([0, 1, 0], (len(x), 1)))
     lights = np.array([[0.8, 0.6, 0], [-0.8, 0.6, 0], [0.6, 0.5, 0.62449980]], np.float32)
-    seen = lights_in_mirrors(geometry, flat_mirrors(hall(lid), geometry), floor, lights)
+    seen = lights_visible_in_mirrors(geometry, find_flat_mirrors(hall(lid), geometry), floor, lights)
     found = np.unpackbits(seen.visible, axis=1, bitorder="little")[:, :3].astype(bool)
     for light, of_light in zip(lights.astype(float), found.T, strict=True):
         going, back = (0.2 / light[1] * light[axis] for axis in (0, 2))  # to the lid's height, and as far on along z
@@ -71,7 +71,7 @@ def test_lights_are_seen_in_mirrors_where_they_are_and_nothing_hides_them():
 
 def test_bent_bumpy_and_rough_mirrors_are_not_flat():
     def planes(scene):
-        return flat_mirrors(scene, merge(scene)).num_planes
+        return find_flat_mirrors(scene, build_scene_buffers(scene)).num_planes
 
     scene, behind = hall(), quad("back", [[-1, 0, -2], [-1, 0, 2], [-1, 1, 2], [-1, 1, -2]], 0, tangent=(0, 0, 1))
     rough = {**MIRROR.terms[0], "params": {"roughness": 0.3, "f0": F0}}
@@ -85,7 +85,7 @@ def test_bent_bumpy_and_rough_mirrors_are_not_flat():
 def lit(tmp_path_factory):
     recipe = Recipe("gather", ("front",), (64, 32), 400, gather_samples=1024, gather_rays=64)
     target = tmp_path_factory.mktemp("thrown") / "gather.zarr"
-    return open_transfer(bake_here(METHODS["gather"], hall(), recipe, target), Memory(1 << 30))
+    return open_transfer(bake_in_process(METHODS["gather"], hall(), recipe, target), Cache(1 << 30))
 
 
 def thrown(transfer, change=lambda document: None):
@@ -98,7 +98,7 @@ def thrown(transfer, change=lambda document: None):
             document["transport"] |= {"show": kind, "bounces": 1}
 
         (view,) = transfer.views
-        pictures.append(render_image(transfer, view, look_of(transfer, shows)).astype(float)[16, :, 0])
+        pictures.append(render_image(transfer, view, make_look(transfer, shows)).astype(float)[16, :, 0])
     half = np.tan(0.3) * 6
     x = 1 + (np.arange(64) + 0.5 - 32) / 16 * half
     return x, pictures[0] - pictures[1]
@@ -115,9 +115,9 @@ def resting(tmp_path_factory):
     """The same where a moving eye rests."""
     recipe = Recipe("surface", ("front",), (64, 32), 400, num_points=300, gather_samples=1024, gather_rays=64)
     target = tmp_path_factory.mktemp("resting") / "surface.zarr"
-    moving = open_bake(bake_here(METHODS["surface"], hall(), recipe, target), Memory(1 << 30))
-    stills, camera = Stills(moving.lit, hall()), moving.views["front"].camera
-    return stills.make(camera, (64, 32), True, lambda share: None, lambda: False)
+    moving = open_bake(bake_in_process(METHODS["surface"], hall(), recipe, target), Cache(1 << 30))
+    stills, camera = StaticViewBuilder(moving.light_transport, hall()), moving.views["front"].camera
+    return stills.make_static_view(camera, (64, 32), True, lambda share: None, lambda: False)
 
 
 @pytest.mark.parametrize("bake", ["lit", pytest.param("resting", marks=pytest.mark.slow)])
@@ -157,15 +157,15 @@ def test_a_hand_on_the_mirrors_colour_sees_what_it_throws(lit):
             document["materials"]["Mirror"]["terms"][0]["color"] = [color] * 3
             document["transport"]["bounces"] = 1
 
-        return look_of(lit, change)
+        return make_look(lit, change)
 
-    picture = Picture(lit, "front", lit.memory)
+    picture = Picture(lit, "front", lit.cache)
     picture.set_look(colored(COLOR))
-    settle(picture)
+    run_until_exact(picture)
     for color in (0.5, 0.1):
-        picture.set_look(colored(color), hand="/materials/Mirror/terms/0/color")
+        picture.set_look(colored(color), active_pointer="/materials/Mirror/terms/0/color")
         while picture.advance(None).fidelity != "followed":
-            make_next(picture)
+            run_next_job(picture)
         exact = render_image(lit, "front", colored(color))
         assert 1e-6 < relative_rmse(picture.image(), exact) < 0.01
-    assert relative_rmse(settle(picture).image(), exact) < 1e-6
+    assert relative_rmse(run_until_exact(picture).image(), exact) < 1e-6

@@ -7,24 +7,24 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from sessions import look_of, relative_rmse
-from tiny_scenes import looking, quad, scene_of, sphere, studio
+from sessions import make_look, relative_rmse
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 from twins import unit
 
 from relume.bake import Recipe
 from relume.brdf.fresnel import fresnel
-from relume.eye.glass import MAX_GLASS, dielectric
-from relume.eye.layers import layers_of
+from relume.eye.glass import MAX_GLASS_HITS, dielectric
+from relume.eye.layers import trace_layers
 from relume.eye.view_samples import sample_view
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.picture import MovingPicture
+from relume.moving.picture import FreeCameraPicture
 from relume.picture.background.coverage import Coverage
 from relume.reference.image import reference_image
 from relume.render.image import render_image
 from relume.scene.model import Glass, Material
-from relume.store import bake_here
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
 from relume.trace.visibility import trace_visibility
 
 SIZE = (64, 48)
@@ -52,13 +52,13 @@ def slab(depth):
 
 
 def scene_with(*meshes, material):
-    camera = looking("front", (0, 0, 3), (0, 0, 0), 0.6)
-    return scene_of(wall(), *meshes, camera=camera, environment=studio(), materials=[WHITE, material])
+    camera = make_camera("front", (0, 0, 3), (0, 0, 0), 0.6)
+    return make_tiny_scene(wall(), *meshes, camera=camera, environment=studio(), materials=[WHITE, material])
 
 
 def followed(scene, directions):
     eye = np.array([0, 0, 3], np.float32)
-    return layers_of(merge(scene), scene.materials, eye, directions.astype(np.float32), EVEN)
+    return trace_layers(build_scene_buffers(scene), scene.materials, eye, directions.astype(np.float32), EVEN)
 
 
 def slanted(num=50):
@@ -90,17 +90,17 @@ def test_a_pane_dims_by_its_tint_and_what_it_reflects_and_bends_nothing():
     pane = quad("pane", [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], 1)
     directions = slanted()
     first, behind = followed(scene_with(pane, material=glass(tint=tint)), directions)
-    assert first.is_shown.all()
+    assert first.is_visible.all()
     np.testing.assert_array_equal(behind.directions, directions.astype(np.float32))
     wanted = (1 - fresnel(-directions[:, 2], 1.5, 0.0))[:, None] * tint
-    np.testing.assert_allclose(behind.through, wanted, rtol=1e-4)
+    np.testing.assert_allclose(behind.transmittance, wanted, rtol=1e-4)
     np.testing.assert_allclose(behind.hits.distance, 4 / -directions[:, 2], rtol=1e-4)
 
 
 def test_only_the_rim_of_a_small_pane_is_an_edge_of_what_lies_behind_it():
     corners = np.array([[-0.3, -0.3, 0], [0.3, -0.3, 0], [0.3, 0.3, 0], [-0.3, 0.3, 0]])
     scene = scene_with(quad("pane", corners, 1), material=glass())
-    samples = sample_view(scene, merge(scene), "front", SIZE)
+    samples = sample_view(scene, build_scene_buffers(scene), "front", SIZE)
     assert np.bincount(samples.pixel).max() > 2
     assert samples.num_rays < 3.5 * SIZE[0] * SIZE[1]
 
@@ -111,8 +111,8 @@ def test_a_slab_shifts_what_is_behind_it_as_snell_says(ior):
     absorbed = (0.0, 0.4, 2.0)
     scene = scene_with(*slab(depth), material=glass(thickness=depth, ior=ior, absorbed=absorbed))
     front, back, behind = followed(scene, directions)
-    assert front.is_shown.all()
-    assert not back.is_shown.any()
+    assert front.is_visible.all()
+    assert not back.is_visible.any()
     np.testing.assert_allclose(behind.directions, directions, atol=2e-5)  # out as it came in
     sin_i = np.linalg.norm(directions[:, :2], axis=1)
     inside = depth / np.sqrt(1 - (sin_i / ior) ** 2)
@@ -123,26 +123,26 @@ def test_a_slab_shifts_what_is_behind_it_as_snell_says(ior):
     b = np.column_stack([1 - behind.hits.uv.sum(axis=1), behind.hits.uv])[:, :, None]
     np.testing.assert_allclose(np.linalg.norm((corners * b).sum(axis=1)[:, :2], axis=1), off_axis, atol=1e-3)
     passed = (1 - fresnel(-directions[:, 2], ior, 0.0))[:, None] ** 2 * np.exp(-inside[:, None] * absorbed)
-    np.testing.assert_allclose(behind.through, passed, rtol=1e-3)
+    np.testing.assert_allclose(behind.transmittance, passed, rtol=1e-3)
 
 
 def test_rays_that_are_kept_inside_end_somewhere():
-    scene = scene_with(sphere("ball", [0, 0, 0], 0.8, 1, rings=24), material=glass(thickness=1.6, ior=2.4))
+    scene = scene_with(sphere("ball", [0, 0, 0], 0.8, 1, num_rings=24), material=glass(thickness=1.6, ior=2.4))
     layers = followed(scene, slanted(2000))
-    assert 3 <= len(layers) <= MAX_GLASS
+    assert 3 <= len(layers) <= MAX_GLASS_HITS
     for before, after in pairwise(layers):
         assert set(after.ray) <= set(before.ray)
-        assert (after.through <= 1).all()
+        assert (after.transmittance <= 1).all()
     np.testing.assert_allclose(np.linalg.norm(layers[-1].directions, axis=1), 1, atol=1e-5)
 
 
 def test_glass_that_neither_bends_nor_reflects_is_not_there():
-    ball = sphere("ball", [0, 0, 0], 0.8, 1, rings=16)
+    ball = sphere("ball", [0, 0, 0], 0.8, 1, num_rings=16)
     scene = scene_with(ball, material=glass(thickness=1.6, ior=1.0))
-    samples = sample_view(scene, merge(scene), "front", SIZE)
+    samples = sample_view(scene, build_scene_buffers(scene), "front", SIZE)
     assert samples.through is not None
     on_wall = samples.material == 0
-    seen = np.bincount(samples.pixel[on_wall], samples.gains[on_wall].mean(axis=1), minlength=SIZE[0] * SIZE[1])
+    seen = np.bincount(samples.pixel[on_wall], samples.throughput[on_wall].mean(axis=1), minlength=SIZE[0] * SIZE[1])
     assert np.median(np.abs(seen - 1)) < 1e-4
     assert np.abs(seen - 1).max() < 0.26  # two layers' rays are merged apart
 
@@ -155,17 +155,19 @@ def test_mirrors_behind_glass_show_what_they_would_without_it(before):
     beyond = quad("beyond", [[9, -9, 5], [-9, -9, 5], [-9, 9, 5], [9, 9, 5]], 2)
     eye, directions, found = np.array([0, 0, 3], np.float32), slanted(), []
     for meshes in ([], before):
-        camera = looking("front", eye, (0, 0, 0), 0.6)
-        scene = scene_of(wall(), *meshes, beyond, camera=camera, environment=studio(), materials=[chrome, clear, WHITE])
-        geometry = merge(scene)
-        layers = layers_of(geometry, scene.materials, eye, directions, EVEN)
+        camera = make_camera("front", eye, (0, 0, 0), 0.6)
+        scene = make_tiny_scene(
+            wall(), *meshes, beyond, camera=camera, environment=studio(), materials=[chrome, clear, WHITE]
+        )
+        geometry = build_scene_buffers(scene)
+        layers = trace_layers(geometry, scene.materials, eye, directions, EVEN)
         (last,) = (of for of in layers if of.chain is not None and (geometry.face_material[of.hits.face] == 2).all())
-        assert last.is_shown.all()
+        assert last.is_visible.all()
         found.append(last)
     np.testing.assert_array_equal(found[0].ray, found[1].ray)
     np.testing.assert_allclose(found[0].hits.distance, found[1].hits.distance, atol=3e-3)  # rays begin off surfaces
     np.testing.assert_allclose(found[0].hits.uv, found[1].hits.uv, atol=3e-4)
-    np.testing.assert_allclose(found[1].through, 1, atol=1e-5)
+    np.testing.assert_allclose(found[1].transmittance, 1, atol=1e-5)
 
 
 def test_light_passes_in_its_share():
@@ -176,10 +178,10 @@ def test_light_passes_in_its_share():
     turn = np.arange(16000) * 2.4
     directions = np.stack([np.sqrt(1 - z**2) * np.cos(turn), z, np.sqrt(1 - z**2) * np.sin(turn)], axis=1)
     points, up = np.array([[0.1, 0, 0.2], [0.5, 0.1, 0.3]], np.float32), np.tile([0, 1, 0], (2, 1)).astype(np.float32)
-    bits = trace_visibility(merge(scene).embree, points, up, directions.astype(np.float32)).visible
+    bits = trace_visibility(build_scene_buffers(scene).embree, points, up, directions.astype(np.float32)).visible
     seen = np.unpackbits(bits, axis=1, bitorder="little")[:, :16000]
     past_wall = replace(scene, meshes=scene.meshes[:1])
-    bits = trace_visibility(merge(past_wall).embree, points, up, directions.astype(np.float32)).visible
+    bits = trace_visibility(build_scene_buffers(past_wall).embree, points, up, directions.astype(np.float32)).visible
     free = np.unpackbits(bits, axis=1, bitorder="little")[:, :16000].all(axis=0)
     np.testing.assert_array_equal(seen[0, free], seen[1, free])  # one light passes everywhere or nowhere
     for part in np.array_split(np.flatnonzero(free), 4):
@@ -190,32 +192,32 @@ def test_light_passes_in_its_share():
 @pytest.fixture(scope="module")
 def tinted():
     """A ball of absorbing glass and a red pane before a wall."""
-    ball = sphere("ball", [-0.5, 0, 0], 0.4, 1, rings=16)
+    ball = sphere("ball", [-0.5, 0, 0], 0.4, 1, num_rings=16)
     pane = quad("pane", [[0.1, -0.5, 0], [0.9, -0.5, 0], [0.9, 0.5, 0], [0.1, 0.5, 0]], 2)
     materials = [WHITE, glass(thickness=0.8, absorbed=(2.0, 0.2, 0.2)), replace(glass(tint=(1, 0.1, 0.1)), name="Pane")]
-    camera = looking("front", (0, 0, 3), (0, 0, 0), 0.6)
+    camera = make_camera("front", (0, 0, 3), (0, 0, 0), 0.6)
     back = quad("wall", [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1]], 0)
-    return scene_of(back, ball, pane, camera=camera, environment=studio(), materials=materials)
+    return make_tiny_scene(back, ball, pane, camera=camera, environment=studio(), materials=materials)
 
 
 def opened(scene, method, folder, size=SIZE, num_lights=600):
     recipe = Recipe(method, ("front",), size, num_lights, num_points=2000)
-    return open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 def test_pictures_agree_with_brute_force_and_the_background_shines_through(tinted, tmp_path):
     found = opened(tinted, "direct", tmp_path)
-    look = look_of(found)
+    look = make_look(found)
     picture = render_image(found, "front", look)
     assert relative_rmse(picture, reference_image(tinted, "front", look, SIZE, 0)) < 0.03
     red, green, _ = picture[18:30, 40:52].mean(axis=(0, 1))
     assert red > 3 * green
     view = found.views["front"]
-    assert view.gains.shape == (view.num_view_samples, 3)
+    assert view.throughput.shape == (view.num_view_samples, 3)
     alpha = Coverage(view, lambda material: np.ones(0, np.float32)).pixels([])
     assert alpha[24, 32] == 1
     (camera,), materials = tinted.cameras, list(tinted.materials)
-    outside = scene_of(*tinted.meshes[1:], camera=camera, environment=studio(), materials=materials)
+    outside = make_tiny_scene(*tinted.meshes[1:], camera=camera, environment=studio(), materials=materials)
     alone = opened(outside, "direct", tmp_path / "alone").views["front"]
     alpha = Coverage(alone, lambda material: np.ones(0, np.float32)).pixels([])
     assert alpha[24, 46] == pytest.approx(1 - 0.96 * 0.4, abs=0.01)
@@ -227,12 +229,12 @@ def test_shadows_of_panes_have_their_colour(tmp_path):
     tint, size = np.array([0.95, 0.8, 0.5]), (16, 16)
     panes = [quad(f"at {y}", [[-60, y, 60], [60, y, 60], [60, y, -60], [-60, y, -60]], 1) for y in (4, 5)]
     floor = quad("floor", [[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]], 0)
-    camera, sky = looking("front", (0, 2, 2), (0, 0, 0), 0.6), np.ones((32, 64, 3), np.float32)
-    scene = scene_of(floor, *panes, camera=camera, environment=sky, materials=[WHITE, glass(tint=tuple(tint))])
+    camera, sky = make_camera("front", (0, 2, 2), (0, 0, 0), 0.6), np.ones((32, 64, 3), np.float32)
+    scene = make_tiny_scene(floor, *panes, camera=camera, environment=sky, materials=[WHITE, glass(tint=tuple(tint))])
     found = opened(scene, "direct", tmp_path, size, 2000)
     for picture in (
-        render_image(found, "front", look_of(found)),
-        reference_image(scene, "front", look_of(found), size, 0),
+        render_image(found, "front", make_look(found)),
+        reference_image(scene, "front", make_look(found), size, 0),
     ):
         seen = picture.mean(axis=(0, 1))
         np.testing.assert_allclose(seen / seen[0], (tint / tint[0]) ** 2, atol=0.04)
@@ -241,17 +243,17 @@ def test_shadows_of_panes_have_their_colour(tmp_path):
 def test_a_moving_eye_sees_panes_as_one_at_rest(tinted, tmp_path):
     back, _, pane = tinted.meshes
     (camera,), materials = tinted.cameras, list(tinted.materials)
-    pane_alone = scene_of(back, pane, camera=camera, environment=studio(), materials=materials)
+    pane_alone = make_tiny_scene(back, pane, camera=camera, environment=studio(), materials=materials)
     found = opened(pane_alone, "surface", tmp_path)
-    look = look_of(found)
+    look = make_look(found)
     moving = render_image(found, "front", look)
     still = reference_image(pane_alone, "front", look, SIZE, 0)
-    session = MovingPicture(found, "front")
+    session = FreeCameraPicture(found, "front")
     session.set_look(look)
     session.advance(None)
     session.image()
-    assert session.probe(46, 24)["material"] == "Pane"
-    assert session.probe(46, 24)["position"][2] == pytest.approx(0, abs=1e-3)
-    assert session.probe(20, 24)["material"] == "White"
+    assert session.inspect(46, 24)["material"] == "Pane"
+    assert session.inspect(46, 24)["position"][2] == pytest.approx(0, abs=1e-3)
+    assert session.inspect(20, 24)["material"] == "White"
     inside = (slice(17, 31), slice(38, 54))
     np.testing.assert_allclose(moving[inside].mean(axis=(0, 1)), still[inside].mean(axis=(0, 1)), rtol=0.08)

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sessions import look_of, relative_rmse
-from tiny_scenes import looking, quad, scene_of
+from sessions import make_look, relative_rmse
+from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.bake import Recipe
 from relume.brdf.fresnel import schlick
 from relume.environments.equirect import texel_directions
-from relume.eye.tinted import Split
+from relume.eye.tinted import TintSplit
 from relume.eye.view_samples import sample_view
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
 from relume.reference.image import reference_image
 from relume.render.image import render_image
 from relume.scene.model import Glass, Material
-from relume.store import bake_here
-from relume.trace.cutout_filter import UP_TO_GROUP
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.cutout_filter import PASS_TINT_GROUPS
+from relume.trace.geometry import build_scene_buffers
 
 SIZE = (24, 16)
 CLEAR = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.3, "f0": [0.04] * 3}}
@@ -39,15 +39,15 @@ def floor_under(*panes, of, tints, sky=None):
     floor = quad("floor", [[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]], 0)
     glasses = [Material(f"Glass {k}", (CLEAR,), glass=Glass(tint=tint)) for k, tint in enumerate(tints)]
     sky = np.ones((32, 64, 3), np.float32) if sky is None else sky
-    camera = looking("front", (0, 3, 4), (0, 0, 0), 0.5)
-    return scene_of(floor, *panes, camera=camera, environment=sky, materials=[of, *glasses])
+    camera = make_camera("front", (0, 3, 4), (0, 0, 0), 0.5)
+    return make_tiny_scene(floor, *panes, camera=camera, environment=sky, materials=[of, *glasses])
 
 
 def rendered(scene, folder, change=lambda document: None, method="direct"):
     recipe = Recipe(method, ("front",), SIZE, 600, relightable=True)
-    store = bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr")
-    found = open_bake(store, Memory(1 << 28))
-    look = look_of(found, change)
+    store = bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr")
+    found = open_bake(store, Cache(1 << 28))
+    look = make_look(found, change)
     return render_image(found, "front", look), look
 
 
@@ -96,7 +96,7 @@ def test_a_matt_floor_below_two_tints_is_as_the_sky_says_however_it_is_turned(de
     sky[:, 8:20] *= 12
     scene = floor_under(pane("red", 1, (-60, 0)), pane("blue", 2, (0, 60)), of=WHITE, tints=[RED, BLUE], sky=sky)
     picture, _ = rendered(scene, tmp_path, lambda d: d["environment"].update(rotation=degrees))
-    samples = sample_view(scene, merge(scene), "front", SIZE)
+    samples = sample_view(scene, build_scene_buffers(scene), "front", SIZE)
     axes = samples.surface.points.position.T
     middle = np.stack([np.bincount(samples.pixel, samples.weight * axis) for axis in axes], axis=1)
     wanted = below_two_panes(middle, sky, degrees)
@@ -114,25 +114,25 @@ def test_light_that_comes_past_the_glass_has_no_tint(tmp_path):
 
 def test_shares_of_split_samples_are_those_of_one_and_no_other_sample_changes():
     scene = floor_under(pane("red", 1, (-60, 0)), pane("blue", 2, (0, 60)), of=WHITE, tints=[RED, BLUE])
-    samples = sample_view(scene, merge(scene), "front", SIZE)
+    samples = sample_view(scene, build_scene_buffers(scene), "front", SIZE)
     whole = np.bincount(samples.pixel, samples.weight, SIZE[0] * SIZE[1])
     np.testing.assert_allclose(whole, 1, atol=1e-6)
-    of_pixel = [np.bincount(samples.pixel, samples.gains[:, c], SIZE[0] * SIZE[1]) for c in range(3)]
+    of_pixel = [np.bincount(samples.pixel, samples.throughput[:, c], SIZE[0] * SIZE[1]) for c in range(3)]
     np.testing.assert_allclose(of_pixel, 1, atol=1e-5)  # light that no glass is before is whole
-    assert set(np.unique(samples.chance)) == set(UP_TO_GROUP[:3])
+    assert set(np.unique(samples.chance)) == set(PASS_TINT_GROUPS[:3])
 
 
 def test_a_sample_is_split_by_the_tints_that_reach_it():
     none = [np.nan] * 3
     tints = np.array([[none, none], [GREEN, none], [none, BLUE], [RED, BLUE]], np.float32)
-    split = Split(tints, np.array([0, 4]), by_channel=False)
-    form = split.form(slice(0, len(split.row)))
+    split = TintSplit(tints, np.array([0, 4]), by_channel=False)
+    form = split.weights(slice(0, len(split.row)))
     np.testing.assert_array_equal(split.row, [0, 1, 2, 3, 1, 3, 2, 3])
-    np.testing.assert_array_equal(form.chance, [0, *UP_TO_GROUP[[0, 0, 0, 1, 1, 2, 2]]])
-    np.testing.assert_array_equal(form.num, [1, 2, 2, 3, 2, 3, 2, 3])
+    np.testing.assert_array_equal(form.alpha_sample, [0, *PASS_TINT_GROUPS[[0, 0, 0, 1, 1, 2, 2]]])
+    np.testing.assert_array_equal(form.num_parts, [1, 2, 2, 3, 2, 3, 2, 3])
     red, green, blue = (np.array(tint, np.float32) for tint in (RED, GREEN, BLUE))
     wanted = [np.ones(3), 1 - green, 1 - blue, 1 - red, green, red - blue, blue, blue]
-    np.testing.assert_allclose(form.shown / form.num[:, None], wanted, atol=1e-6)
+    np.testing.assert_allclose(form.channel_weights / form.num_parts[:, None], wanted, atol=1e-6)
 
 
 @pytest.mark.parametrize("of", [POLISHED, WHITE], ids=["polished", "matt"])

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from foliage import tuft
-from tiny_scenes import checker, looking, mesh, quad, scene_of, sphere, still_life, studio
+from tiny_scenes import checker, make_camera, make_tiny_scene, mesh, quad, sphere, still_life, studio
 
 from relume.environments.equirect import direction_to_uv
 from relume.eye import view_samples, windows
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.scene.model import Coding, Material, Texture
-from relume.trace.geometry import merge
+from relume.scene.model import Material, Texture, TextureEncoding
+from relume.trace.geometry import build_scene_buffers
 from relume.trace.primary import camera_directions
 from relume.trace.texture import MipMap
 
@@ -22,7 +22,7 @@ WHITE = ({"model": "lambert", "color": [1, 1, 1]},)
 
 
 def sampled(scene, size=SIZE, view=None):
-    return sample_view(scene, merge(scene), view or scene.cameras[0].name, size)
+    return sample_view(scene, build_scene_buffers(scene), view or scene.cameras[0].name, size)
 
 
 @pytest.fixture(scope="module")
@@ -84,13 +84,13 @@ def test_samples_found_window_by_window_are_those_found_at_once(still, is_rough,
     scene, at_once = still
     if is_rough:  # in levels, which come before the order in the picture
         texels = np.random.default_rng(1).integers(80, 255, (32, 32, 1), np.uint8)
-        rough = Texture(texels, coding=Coding("share", (1.0, 1.0, 1.0)))
+        rough = Texture(texels, encoding=TextureEncoding("share", (1.0, 1.0, 1.0)))
         scene = replace(scene, materials=[replace(m, textures={"roughness": rough}) for m in scene.materials])
         at_once = sampled(scene)
         assert len(np.unique(at_once.level)) > 4
-    monkeypatch.setattr(windows, "SIDE", 16)
+    monkeypatch.setattr(windows, "TILE_SIZE", 16)
     by_window = flat(sampled(scene))
-    assert len(windows.windows_of(SIZE)) == 12
+    assert len(windows.image_tiles(SIZE)) == 12
     for name, values in flat(at_once).items():
         np.testing.assert_array_equal(by_window[name], values, err_msg=name)
 
@@ -98,12 +98,12 @@ def test_samples_found_window_by_window_are_those_found_at_once(still, is_rough,
 @pytest.mark.parametrize(("room", "most"), [(4, 8), (3, 4), (2, 2)])
 def test_where_all_is_edges_a_pixel_has_as_many_as_there_is_room_for(room, most, monkeypatch):
     size, scene = (24, 24), tuft(4000)
-    monkeypatch.setattr(view_samples, "_SAMPLES_A_SIDE", room * size[0])
+    monkeypatch.setattr(view_samples, "_SAMPLES_PER_SIDE", room * size[0])
     samples = sampled(scene, size)
     count = np.bincount(samples.pixel, minlength=size[0] * size[1])
     assert 1.5 < count.mean() <= room
     assert count.max() == most
-    assert len(samples.pixel) <= view_samples.most_samples(scene.materials, size[0] * size[1])
+    assert len(samples.pixel) <= view_samples.view_sample_limit(scene.materials, size[0] * size[1])
     np.testing.assert_allclose(weight_by_pixel(samples, slice(None), size), 1, atol=1e-6)
 
 
@@ -122,7 +122,9 @@ def disc_samples(radius):
     turns = np.linspace(0, 2 * np.pi, 256, endpoint=False)
     rim = np.column_stack([radius * np.cos(turns), radius * np.sin(turns), 0 * turns])
     faces = [[0, k + 1, (k + 1) % 256 + 1] for k in range(256)]
-    return sampled(scene_of(mesh("disc", [[0, 0, 0], *rim], faces, 0), camera=looking("c", [0, 0, 2], [0, 0, 0], 0.8)))
+    return sampled(
+        make_tiny_scene(mesh("disc", [[0, 0, 0], *rim], faces, 0), camera=make_camera("c", [0, 0, 2], [0, 0, 0], 0.8))
+    )
 
 
 @pytest.mark.parametrize("radius", [0.31, 0.5, 0.731])
@@ -157,7 +159,9 @@ def test_what_stands_for_a_part_of_a_pixel_lies_in_its_middle():
 
 
 def test_position_lies_just_off_the_surface_on_the_viewers_side():
-    scene = scene_of(sphere("ball", [0, 0, 0], 1, 0, rings=40), camera=looking("c", [0, 0.5, 4], [0, 0, 0], 0.7))
+    scene = make_tiny_scene(
+        sphere("ball", [0, 0, 0], 1, 0, num_rings=40), camera=make_camera("c", [0, 0.5, 4], [0, 0, 0], 0.7)
+    )
     samples, eye = sampled(scene), scene.cameras[0].to_world[:3, 3]
     solid = samples.material == 0
     surface = samples.surface.points
@@ -204,8 +208,8 @@ def flat_scene(material, repeat=1.0, size=1.0):
     """A square that fills the picture of a camera which looks straight at it."""
     square = quad("square", np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * size, 0)
     square.uvs[:] = square.uvs * repeat
-    camera = looking("c", [0, 0, 2], [0, 0, 0], 2 * np.arctan(0.5))
-    return scene_of(square, camera=camera, materials=[material])
+    camera = make_camera("c", [0, 0, 2], [0, 0, 0], 2 * np.arctan(0.5))
+    return make_tiny_scene(square, camera=camera, materials=[material])
 
 
 def test_texture_lies_where_its_coordinates_say():
@@ -267,10 +271,10 @@ def test_mapped_normals_are_unit_outward_and_lean_as_the_map_says(strength):
 
 def test_rough_normal_map_keeps_frames_unit_and_on_the_outer_side():
     rough = np.random.default_rng(5).normal(size=(16, 16, 3)).astype(np.float32)
-    ball = sphere("ball", [0, 0, 0], 1, 0, rings=12)
-    scene = scene_of(
+    ball = sphere("ball", [0, 0, 0], 1, 0, num_rings=12)
+    scene = make_tiny_scene(
         ball,
-        camera=looking("c", [0, 0, 4], [0, 0, 0], 0.6),
+        camera=make_camera("c", [0, 0, 4], [0, 0, 0], 0.6),
         materials=[Material("M", WHITE, normal_map=Texture(rough))],
     )
     samples = sampled(scene)
@@ -283,11 +287,11 @@ def test_rough_normal_map_keeps_frames_unit_and_on_the_outer_side():
 
 
 def test_mesh_without_tangents_or_coordinates_has_frames_all_the_same():
-    bare = sphere("ball", [0, 0, 0], 1, 0, rings=8)
+    bare = sphere("ball", [0, 0, 0], 1, 0, num_rings=8)
     bare.tangents[:], bare.uvs[:] = 0, 0
-    scene = scene_of(
+    scene = make_tiny_scene(
         bare,
-        camera=looking("c", [0, 0, 4], [0, 0, 0], 0.6),
+        camera=make_camera("c", [0, 0, 4], [0, 0, 0], 0.6),
         materials=[Material("M", WHITE, {"diffuse": checker()}, Texture(np.tile(np.float32([0, 0, 1]), (4, 4, 1))))],
     )
     samples = sampled(scene)
@@ -298,7 +302,7 @@ def test_mesh_without_tangents_or_coordinates_has_frames_all_the_same():
 
 def test_back_faces_are_shaded_as_if_turned_round():
     front = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
-    scene = scene_of(quad("back", front[::-1], 0), camera=looking("c", [0, 0, 3], [0, 0, 0], 0.5))
+    scene = make_tiny_scene(quad("back", front[::-1], 0), camera=make_camera("c", [0, 0, 3], [0, 0, 0], 0.5))
     samples = sampled(scene)
     solid = samples.material == 0
     assert solid.sum() > 100
@@ -307,7 +311,9 @@ def test_back_faces_are_shaded_as_if_turned_round():
 
 
 def test_empty_view_is_all_background():
-    scene = scene_of(sphere("ball", [0, 0, 0], 1, 0, rings=6), camera=looking("c", [0, 0, 4], [0, 0, 9], 0.6))
+    scene = make_tiny_scene(
+        sphere("ball", [0, 0, 0], 1, 0, num_rings=6), camera=make_camera("c", [0, 0, 4], [0, 0, 9], 0.6)
+    )
     samples = sampled(scene)
     assert len(samples.pixel) == SIZE[0] * SIZE[1]
     assert (samples.material == BACKGROUND).all()

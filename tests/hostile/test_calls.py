@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from session_client import Baked
 
 IDS = "0123456789abcdef"
@@ -13,7 +13,7 @@ IDS = "0123456789abcdef"
 
 def test_file_that_is_no_scene_is_refused(client: TestClient) -> None:
     response = client.post("/api/scenes", files={"scene": ("../../x.glb", b"glTF\x02\x00\x00\x00\xff\xff\xff\x7f")})
-    assert problem_of(response)["type"] == "urn:relume:problem:scene"
+    assert parse_problem(response)["type"] == "urn:relume:problem:scene"
     assert client.get("/api/scenes").json() == []
 
 
@@ -21,7 +21,7 @@ def test_files_beside_a_scene_are_bounded_and_their_names_are_no_paths(client: T
     obj = b"mtllib ../../relume.db\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     beside = [("companions", (f"{number}.png", b"")) for number in range(901)]
     refused = client.post("/api/scenes", files=[("scene", ("a.obj", obj)), *beside])
-    assert problem_of(refused)["type"] == "urn:relume:problem:parameter"
+    assert parse_problem(refused)["type"] == "urn:relume:problem:parameter"
     climbing = [("scene", ("a/b/c.obj", obj)), ("companions", ("../../../../tmp/x", b"newmtl Red\n"))]
     taken = client.post("/api/scenes", files=climbing).json()
     assert ["relume.db' is not beside" in warning for warning in taken["warnings"]] == [True]
@@ -32,13 +32,13 @@ def test_files_beside_a_scene_are_bounded_and_their_names_are_no_paths(client: T
 def test_import_that_takes_too_much_is_stopped(client: TestClient, settings: Any) -> None:
     settings.import_bytes = 64 * 1024**2  # less than an interpreter with NumPy needs
     response = client.post("/api/scenes", files={"scene": ("x.glb", b"glTF")})
-    assert problem_of(response)["status"] == 422
+    assert parse_problem(response)["status"] == 422
     assert list(settings.data.glob("upload-*")) == []
 
 
 def test_upload_beyond_the_limit_is_413(client: TestClient) -> None:
     response = client.post("/api/scenes", files={"scene": ("x.glb", b"\x00" * (4 * 1024**2 + 1))})
-    assert problem_of(response)["status"] == 413
+    assert parse_problem(response)["status"] == 413
 
 
 @pytest.mark.parametrize(("path", "field"), [("/api/environments", "environment"), ("/api/images", "image")])
@@ -46,7 +46,7 @@ def test_environments_and_images_may_be_as_large_as_scenes(client: TestClient, p
     """Those of 4K have more bytes than any document."""
     for num_mib, is_too_large in ((3, False), (4, True)):  # of a document 2 MiB are taken here
         response = client.post(path, files={field: ("x.exr", b"\x00" * (num_mib * 1024**2))})
-        assert (problem_of(response)["status"] == 413) == is_too_large
+        assert (parse_problem(response)["status"] == 413) == is_too_large
 
 
 def test_upload_of_unknown_length_is_cut_at_the_limit(client: TestClient) -> None:
@@ -60,13 +60,13 @@ def test_upload_of_unknown_length_is_cut_at_the_limit(client: TestClient) -> Non
 
     headers = {"Content-Type": "multipart/form-data; boundary=b"}
     response = client.post("/api/scenes", content=chunks(), headers=headers)
-    assert problem_of(response)["status"] == 413
+    assert parse_problem(response)["status"] == 413
 
 
 def test_body_of_another_call_beyond_the_limit_is_413(client: TestClient) -> None:
-    assert problem_of(client.post("/api/bakes", content=b" " * (2 * 1024**2 + 1)))["status"] == 413
+    assert parse_problem(client.post("/api/bakes", content=b" " * (2 * 1024**2 + 1)))["status"] == 413
     headers = {"Content-Length": "9" * 5000}
-    assert problem_of(client.post("/api/bakes", content=b"{}", headers=headers))["status"] == 413
+    assert parse_problem(client.post("/api/bakes", content=b"{}", headers=headers))["status"] == 413
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_body_of_another_call_beyond_the_limit_is_413(client: TestClient) -> Non
 )
 def test_look_name_that_is_none_is_refused(client: TestClient, name: str) -> None:
     response = client.put(f"/api/looks/{name}", json={})
-    assert problem_of(response)["status"] in (404, 405, 422)
+    assert parse_problem(response)["status"] in (404, 405, 422)
     assert client.get("/api/looks").json() == []
 
 
@@ -93,12 +93,12 @@ def test_look_name_that_is_none_is_refused(client: TestClient, name: str) -> Non
     ],
 )
 def test_look_that_is_none_is_refused(client: TestClient, body: bytes) -> None:
-    assert problem_of(client.put("/api/looks/a", content=body))["status"] == 422
+    assert parse_problem(client.put("/api/looks/a", content=body))["status"] == 422
 
 
 def test_look_beyond_its_size_is_413(client: TestClient) -> None:
     body = json.dumps({"materials": {"a": {"x": "y" * 262_144}}})
-    assert problem_of(client.put("/api/looks/a", content=body))["status"] == 413
+    assert parse_problem(client.put("/api/looks/a", content=body))["status"] == 413
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_look_beyond_its_size_is_413(client: TestClient) -> None:
 )
 def test_render_that_cannot_be_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
     request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "png"} | change
-    assert problem_of(client.post("/api/renders", json=request))["status"] in (404, 422)
+    assert parse_problem(client.post("/api/renders", json=request))["status"] in (404, 422)
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_render_that_cannot_be_is_refused(client: TestClient, baked: Baked, chan
 )
 def test_bake_that_cannot_be_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
     response = client.post("/api/bakes", json={"scene": baked.scene, "size": [8, 8], "lights": 9} | change)
-    assert problem_of(response)["status"] in (404, 422)
+    assert parse_problem(response)["status"] in (404, 422)
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_no_path_leaves_the_editors_folder(client: TestClient, settings: Any, pa
     ],
 )
 def test_every_refusal_is_a_problem(client: TestClient, method: str, path: str, status: int) -> None:
-    assert problem_of(client.request(method, path))["status"] == status
+    assert parse_problem(client.request(method, path))["status"] == status
 
 
 @pytest.mark.parametrize(
@@ -188,14 +188,14 @@ def test_every_refusal_is_a_problem(client: TestClient, method: str, path: str, 
     [("DELETE", f"/api/scenes/{IDS}/cameras/a%00b"), ("GET", "/api/audit?who=%00"), ("GET", f"/api/shares/{IDS}%00")],
 )
 def test_null_characters_come_to_no_database(client: TestClient, method: str, path: str) -> None:
-    refused = problem_of(client.request(method, path))
+    refused = parse_problem(client.request(method, path))
     assert (refused["status"], refused["parameter"]) == (422, "the address")
 
 
 @pytest.mark.parametrize("path", ["/api/models/albedo", "/api/models/in-out"])
 def test_names_that_are_no_unicode_are_refused_in_unicode(client: TestClient, path: str) -> None:
     body = b'{"terms": [{"model": "lambert", "\\ud800": 1}]}'
-    refused = problem_of(client.post(path, content=body, headers={"Content-Type": "application/json"}))
+    refused = parse_problem(client.post(path, content=body, headers={"Content-Type": "application/json"}))
     assert refused["status"] == 422
     assert "is 'unknown'" in refused["detail"]
 
@@ -210,19 +210,19 @@ def test_names_that_are_no_unicode_are_refused_in_unicode(client: TestClient, pa
 def test_bodies_that_cannot_be_read_are_a_kind_of_problem(
     client: TestClient, content: bytes, kind: str, words: str
 ) -> None:
-    refused = problem_of(client.post("/api/environments", content=content, headers={"Content-Type": kind}))
+    refused = parse_problem(client.post("/api/environments", content=content, headers={"Content-Type": kind}))
     assert refused["type"] == "urn:relume:problem:form"
     if refused["status"] == 400:
         assert words in refused["detail"]
 
 
 def test_text_in_the_place_of_a_file_is_told_in_words(client: TestClient) -> None:
-    refused = problem_of(client.post("/api/scenes", files={"scene": (None, b"text")}))
+    refused = parse_problem(client.post("/api/scenes", files={"scene": (None, b"text")}))
     assert refused["detail"] == "/scene is a text; give a file, with a file name in its part of the form"
 
 
 def test_missing_data_directory_is_a_problem_not_a_trace(client: TestClient, settings: Any) -> None:
     settings.data = settings.data / "gone"
-    problem = problem_of(client.get("/readyz"))
+    problem = parse_problem(client.get("/readyz"))
     assert problem["status"] == 507
     assert str(settings.data) not in json.dumps(problem)

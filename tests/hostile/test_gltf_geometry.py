@@ -123,7 +123,7 @@ def test_nodes_that_are_no_tree_appear_once_with_one_warning(nodes: list[dict[st
 
 
 def test_import_refuses_instances_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importer, "MAX_PLACED", 2_000)
+    monkeypatch.setattr(importer, "MAX_INSTANCES", 2_000)
     glb = Glb().quad()
     glb.document["meshes"][0]["primitives"] *= 1_000
     glb.document["nodes"] = [{"mesh": 0}] * 3

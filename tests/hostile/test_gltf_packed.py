@@ -75,9 +75,9 @@ def test_attributes_that_draco_has_besides_end_in_words_within_a_limit_of_memory
     besides = {number: np.zeros((len(points), 127), np.uint8) for number in range(7, 57)}
     packed = DracoPy.encode(points, face, generic_attributes=besides, **options)
     limited = (
-        "import resource, sys; from relume.scene.gltf.packed import unpacked_draco; import DracoPy; "
+        "import resource, sys; from relume.scene.gltf.packed import decompress_draco; import DracoPy; "
         "resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30)); "
-        "unpacked_draco(sys.stdin.buffer.read(), 3, 60_000, 'the mesh')"
+        "decompress_draco(sys.stdin.buffer.read(), 3, 60_000, 'the mesh')"
     )
     ended = subprocess.run([sys.executable, "-c", limited], input=packed, capture_output=True, check=False)
     assert ended.stderr.splitlines()[-1].startswith(b"relume.errors.SceneError: the mesh cannot be unpacked")

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from server_fakes import Control
 from server_fixtures import impatient
 from session_client import SIGMA, THETA_H, Baked, Session, open_session, session_path
@@ -161,7 +161,7 @@ def test_curve_of_a_hundred_thousand_points_is_too_big_a_message(client: TestCli
 def test_impossible_wish_is_a_problem(client: TestClient, baked: Baked, message: dict[str, Any]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(**message)
+        session.send_message(**message)
         assert session.text("problem")["problem"]["status"] in (400, 422)
         assert is_alive(session, 1)
 
@@ -172,7 +172,7 @@ def test_flood_of_edits_and_brushes_keeps_one_of_each(client: TestClient, baked:
         session.frame()
         for revision in range(1, 500):
             session.edit(revision, SIGMA, 0.2 + revision / 1000)
-            session.send(type="brush", curve=THETA_H, **{"from": 0.0, "to": 9.0})
+            session.send_message(type="brush", curve=THETA_H, **{"from": 0.0, "to": 9.0})
         with pytest.raises(ConnectionError) as closed:
             session.text("never")
     assert closed.value.args[0] == 4408
@@ -206,7 +206,7 @@ def test_page_of_another_site_gets_no_session_and_changes_nothing(
         open_session(client, baked.bake, headers=headers),
     ):
         pass
-    assert problem_of(client.delete(f"/api/scenes/{baked.scene}", headers=headers))["status"] == 403
+    assert parse_problem(client.delete(f"/api/scenes/{baked.scene}", headers=headers))["status"] == 403
     assert client.get(f"/api/scenes/{baked.scene}").status_code == 200
 
 
@@ -266,7 +266,7 @@ def test_a_client_that_says_nothing_is_closed(
 
 def test_a_session_is_opened_once(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
-        session.send(type="open")
+        session.send_message(type="open")
         assert "send open once" in session.text("problem")["problem"]["detail"]
         assert is_alive(session, 1)
 

@@ -6,7 +6,7 @@ from PIL import Image
 from shared_bakes import unmeasured
 
 from relume.brdf.channels import IMAGES
-from relume.images.shelf import keep
+from relume.images.shelf import store
 
 __all__ = ["unmeasured"]  # a fixture
 
@@ -30,5 +30,5 @@ def image_file(tmp_path_factory):
 @pytest.fixture(scope="session")
 def named(image_file, tmp_path_factory):
     """The name by which looks mean the image."""
-    with IMAGES.at(tmp_path_factory.mktemp("shelf") / "images") as shelf:
-        yield keep(shelf, image_file, "Stripes").texture
+    with IMAGES.with_search_folder(tmp_path_factory.mktemp("shelf") / "images") as library_folder:
+        yield store(library_folder, image_file, "Stripes").texture

@@ -5,19 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from opened_bakes import opened, shown
+from opened_bakes import open_small_bake, render_exact
 from sessions import relative_rmse
-from tiny_scenes import mesh, scene_of
+from tiny_scenes import make_tiny_scene, mesh
 
 from relume.errors import ParameterError
-from relume.images.shelf import texture_of
+from relume.images.shelf import load_texture
 from relume.look import default_look, validate
-from relume.moving.picture import MovingPicture
-from relume.moving.points.images import Wears, dressed
+from relume.moving.picture import FreeCameraPicture
+from relume.moving.points.images import ProbeMapOverrides, overridden_textures
 from relume.reference.image import reference_image
 from relume.scene.coding import decode
-from relume.trace.geometry import merge
-from relume.trace.primary import trace_from
+from relume.trace.geometry import build_scene_buffers
+from relume.trace.primary import trace_rays
 from relume.trace.surface import surface_at
 
 
@@ -39,23 +39,30 @@ def with_own(scene, texture):
 def bakes(request, corner, named, tmp_path_factory):
     """The corner, and the corner whose floor has the image: each with the method it was baked by."""
     folder = tmp_path_factory.mktemp("images")
-    scenes = corner, with_own(corner, texture_of(named))
-    return request.param, scenes, [opened(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)]
+    scenes = corner, with_own(corner, load_texture(named))
+    return (
+        request.param,
+        scenes,
+        [open_small_bake(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)],
+    )
 
 
 def test_pictures_are_those_of_a_scene_that_has_the_image(bakes, named):
     """A moving view's own textures are kept in half precision; those of looks are not."""
     method, (plain, own), (bare, baked) = bakes
-    found, expected = shown(bare, painted(plain, named), method), shown(baked, painted(own, "diffuse"), method)
-    assert relative_rmse(shown(bare, painted(plain, None), method), expected) > 0.1
+    found, expected = (
+        render_exact(bare, painted(plain, named), method),
+        render_exact(baked, painted(own, "diffuse"), method),
+    )
+    assert relative_rmse(render_exact(bare, painted(plain, None), method), expected) > 0.1
     assert relative_rmse(found, expected) < (1e-3 if method == "surface" else 1e-6)
 
 
 def test_a_look_without_it_shows_again_what_it_did(bakes, named):
     method, (plain, _), (bare, _) = bakes
-    before = shown(bare, painted(plain, None), method)
-    shown(bare, painted(plain, named), method)
-    np.testing.assert_array_equal(shown(bare, painted(plain, None), method), before)
+    before = render_exact(bare, painted(plain, None), method)
+    render_exact(bare, painted(plain, named), method)
+    np.testing.assert_array_equal(render_exact(bare, painted(plain, None), method), before)
 
 
 def test_what_other_surfaces_get_from_it_follows(bakes, named):
@@ -66,14 +73,14 @@ def test_what_other_surfaces_get_from_it_follows(bakes, named):
         look = painted(scene, texture)
         return look.model_copy(update={"transport": look.transport.model_copy(update={"show": "reflected"})})
 
-    found = shown(bare, reflected(plain, named), method)
-    expected = shown(baked, reflected(own, "diffuse"), method)
+    found = render_exact(bare, reflected(plain, named), method)
+    expected = render_exact(baked, reflected(own, "diffuse"), method)
     assert relative_rmse(found, expected) < (1e-3 if method == "surface" else 1e-6)
-    assert relative_rmse(shown(bare, reflected(plain, None), method), expected) > 0.1
+    assert relative_rmse(render_exact(bare, reflected(plain, None), method), expected) > 0.1
 
 
 def test_truths_show_it(corner, named):
-    own = with_own(corner, texture_of(named))
+    own = with_own(corner, load_texture(named))
     found, expected = (
         reference_image(scene, "front", painted(scene, texture), (20, 16), 16, reflects=True)
         for scene, texture in ((corner, named), (own, "diffuse"))
@@ -103,13 +110,13 @@ def test_where_there_is_no_place_in_textures_moving_views_project_as_fixed_ones_
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
     box = mesh("box", corners, faces, 0, normals=corners / np.sqrt(3))
-    scene = scene_of(box, camera=corner.cameras[0], materials=corner.materials[:1])
-    moving = opened(scene, "surface", tmp_path)
-    found = dressed(moving.surface, moving.positions, (Wears((named, None)),))
+    scene = make_tiny_scene(box, camera=corner.cameras[0], materials=corner.materials[:1])
+    moving = open_small_bake(scene, "surface", tmp_path)
+    found = overridden_textures(moving.stored_scene, moving.positions, (ProbeMapOverrides((named, None)),))
     eyes = np.random.default_rng(2).normal(size=(60, 3)).astype(np.float32)
     directions = -eyes / np.linalg.norm(eyes, axis=1, keepdims=True)
-    geometry = merge(scene)
-    hits = trace_from(geometry.embree, -4 * directions, directions)
+    geometry = build_scene_buffers(scene)
+    hits = trace_rays(geometry.embree, -4 * directions, directions)
     assert len(set(hits.face // 2)) == 6
     share = np.column_stack([1 - hits.uv.sum(axis=1), hits.uv])
     places = np.einsum("nk,nkc->nc", share, found.uvs[found.uv_faces[hits.face]])
@@ -123,18 +130,18 @@ def test_a_shader_is_sent_the_image_once_it_is_named(bakes, named):
     method, (plain, _), (bare, _) = bakes
     if method != "surface":
         pytest.skip("fixed views have no shader")
-    picture = MovingPicture(bare, "front")
+    picture = FreeCameraPicture(bare, "front")
     picture.set_look(painted(plain, None))
     picture.advance(None)
-    assert "images" not in picture.parts()[0]
+    assert "images" not in picture.array_blocks()[0]
     picture.set_look(painted(plain, named))
     picture.advance(None)
-    parts, _ = picture.parts()
+    parts, _ = picture.array_blocks()
     arrays, rows = parts["images"].make(), parts["materials"].make()["materials"].reshape(len(plain.materials), -1, 4)
     number, num_levels, *wraps = arrays["levels"][rows[0, 1, 3]]
     first, height, width, _ = arrays["levels"][number]
-    texture = texture_of(named)
+    texture = load_texture(named)
     assert (height, width, num_levels, wraps) == (32, 32, 6, [0, 0])
-    expected = decode(texture.pixels, texture.coding).reshape(-1, 3)
+    expected = decode(texture.pixels, texture.encoding).reshape(-1, 3)
     np.testing.assert_allclose(arrays["texels"][first : first + height * width, :3], expected, rtol=1e-3)
-    assert len(arrays["uvs"]) == 2 * len(bare.surface.uvs)
+    assert len(arrays["uvs"]) == 2 * len(bare.stored_scene.uvs)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from glb_builder import Glb
-from opened_bakes import opened
-from opened_bakes import shown as shown_by
+from opened_bakes import open_small_bake
+from opened_bakes import render_exact as shown_by
 from PIL import Image
 from sessions import relative_rmse
 from tiny_scenes import corner
@@ -18,7 +18,7 @@ from relume.brdf.document import complete_term
 from relume.environments.model import Environment
 from relume.errors import NotFoundError, ParameterError, SceneError
 from relume.images.metals import with_metalness
-from relume.images.shelf import get_record, keep, texture_of
+from relume.images.shelf import get_record, load_texture, store
 from relume.look import default_look, validate
 from relume.scene.archive import load_material, save_scene
 from relume.scene.coding import decode
@@ -48,7 +48,7 @@ def complete(terms):
 
 @pytest.fixture(scope="module")
 def shelf(tmp_path_factory):
-    with IMAGES.at(tmp_path_factory.mktemp("metal") / "images") as folder:
+    with IMAGES.with_search_folder(tmp_path_factory.mktemp("metal") / "images") as folder:
         yield folder
 
 
@@ -59,7 +59,7 @@ def sent(shelf, tmp_path_factory):
 
     def keep_pixels(pixels, name):
         Image.fromarray(pixels).save(folder / f"{name}.png")
-        return keep(shelf, folder / f"{name}.png", name)
+        return store(shelf, folder / f"{name}.png", name)
 
     return keep_pixels
 
@@ -68,8 +68,8 @@ def shown(scene, terms):
     """Diffuse colour and reflectance head-on of every texel. (side, side, 3) each"""
 
     def texels(name):
-        texture = scene.materials[0].textures.get(name) if name in ("diffuse", "specular", None) else texture_of(name)
-        return 1 if texture is None else decode(texture.pixels, texture.coding)
+        texture = scene.materials[0].textures.get(name) if name in ("diffuse", "specular", None) else load_texture(name)
+        return 1 if texture is None else decode(texture.pixels, texture.encoding)
 
     diffuse, ggx = terms
     f0 = np.broadcast_to(ggx["params"]["f0"], 3)
@@ -124,7 +124,7 @@ def test_a_metal_of_one_colour_scatters_where_it_is_none(shelf, sent):
 def test_one_texel_of_sixteen_bits_is_metal_everywhere_or_nowhere(value, shelf, tmp_path):
     Image.fromarray(np.full((1, 1), value, np.uint16)).save(tmp_path / "x.png")
     was, metallic = imported(BASE, metallic=0), value // 257 / 255
-    terms = made(shelf, was, complete(was.materials[0].terms), keep(shelf, tmp_path / "x.png", "x"))
+    terms = made(shelf, was, complete(was.materials[0].terms), store(shelf, tmp_path / "x.png", "x"))
     expected = imported(BASE, metallic=metallic)
     wanted = shown(expected, expected.materials[0].terms)
     np.testing.assert_allclose(shown(was, terms), np.broadcast_arrays(*wanted), atol=0.005)
@@ -153,7 +153,7 @@ def test_what_it_was_made_of_is_kept_and_checked(shelf, sent):
     scene, image = imported(BASE, metallic=0), sent(METAL, "Metal")
     diffuse, _ = made(shelf, scene, complete(scene.materials[0].terms), image)
     identity = diffuse["texture"].removeprefix("image:")
-    of = get_record(shelf, identity).made_of
+    of = get_record(shelf, identity).recipe
     assert (of.channel, of.metalness, of.base, of.scene) == ("diffuse", image.texture, "diffuse", scene.id)
     assert of.images == (image.texture,)
     record = shelf / identity / "image.json"
@@ -176,7 +176,7 @@ def test_pictures_are_those_of_a_scene_that_has_the_map(method, shelf, sent, tmp
     terms = document["materials"]["Floor"]["terms"]
     document["materials"]["Floor"]["terms"] = made(shelf, plain, complete(terms), sent(METAL, "Metal"))
     found, without, expected = (
-        shown_by(opened(scene, method, tmp_path / name), validate(look, default_look(scene.materials)), method)
+        shown_by(open_small_bake(scene, method, tmp_path / name), validate(look, default_look(scene.materials)), method)
         for scene, look, name in (
             (plain, document, "found"),
             (plain, default_look(plain.materials), "without"),

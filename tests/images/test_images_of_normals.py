@@ -5,27 +5,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from opened_bakes import opened, shown
+from opened_bakes import open_small_bake, render_exact
 from PIL import Image
-from sessions import bake_corner, relative_rmse, settle
+from sessions import bake_corner_scene, relative_rmse, run_until_exact
 from tiny_scenes import corner
 
 from relume.brdf.channels import IMAGES, NormalMap
 from relume.errors import CancelledError, ParameterError, StoreError
 from relume.eye.view_samples import sample_view
-from relume.images.shelf import keep, normals_of
+from relume.images.shelf import load_normal_map, store
 from relume.look import default_look, validate
-from relume.memory import Memory
-from relume.methods.gather import RAYS_A_SAMPLE
-from relume.methods.retracing import Retracing
-from relume.moving.points.images import OWN, Wears, dressed
+from relume.memory import Cache
+from relume.methods.gather import RAYS_PER_SAMPLE
+from relume.methods.retracing import NormalRetracer
+from relume.moving.points.images import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
 from relume.picture.picture import Picture
 from relume.reference.image import reference_image
-from relume.reference.images import wearing
+from relume.reference.images import with_overrides
 from relume.scene.coding import decode
-from relume.scene.gltf.uvs import made_tangents
-from relume.scene.model import Coding, Material, Texture
-from relume.trace.geometry import merge
+from relume.scene.gltf.uvs import compute_tangents
+from relume.scene.model import Material, Texture, TextureEncoding
+from relume.trace.geometry import build_scene_buffers
 from relume.views import worn_store
 
 SIDE = 64
@@ -46,13 +46,13 @@ def waves(side=SIDE, lean=0.4, seed=0):
 def named(tmp_path_factory):
     folder = tmp_path_factory.mktemp("normals")
     Image.fromarray(waves()).save(folder / "waves.png")
-    with IMAGES.at(folder / "images") as shelf:
-        yield keep(shelf, folder / "waves.png", "Waves").texture
+    with IMAGES.with_search_folder(folder / "images") as shelf:
+        yield store(shelf, folder / "waves.png", "Waves").texture
 
 
 def with_tangents(scene):
     """Tangents along u, as imports of materials with a normal map have them."""
-    meshes = [replace(m, tangents=made_tangents(m.positions, m.normals, m.uvs, m.faces)) for m in scene.meshes]
+    meshes = [replace(m, tangents=compute_tangents(m.positions, m.normals, m.uvs, m.faces)) for m in scene.meshes]
     return replace(scene, meshes=tuple(meshes))
 
 
@@ -62,21 +62,25 @@ def plain(request):
     shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": True}
     floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, shiny
     wall = {**floor[0], "color": [0.8, 0.5, 0.2]}, shiny
-    own = Texture(waves(seed=1, lean=0.3)[::-1].copy(), coding=Coding("normal")) if request.param == "bumpy" else None
+    own = (
+        Texture(waves(seed=1, lean=0.3)[::-1].copy(), encoding=TextureEncoding("normal"))
+        if request.param == "bumpy"
+        else None
+    )
     return with_tangents(corner([Material("Floor", floor, {}, own), Material("Wall", wall)]))
 
 
 def with_own(scene, name, scale=SCALE):
     """The scene whose floor has the map in its file; of the same id, which seeds what is drawn."""
     floor, *others = scene.materials
-    return replace(scene, materials=(replace(floor, normal_map=normals_of(NormalMap(name, scale))), *others))
+    return replace(scene, materials=(replace(floor, normal_map=load_normal_map(NormalMap(name, scale))), *others))
 
 
 @pytest.fixture(scope="module", params=["direct", pytest.param("gather", marks=pytest.mark.slow)])
 def bakes(request, plain, named, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bakes")
     scenes = plain, with_own(plain, named)
-    return [bake_corner(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)]
+    return [bake_corner_scene(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)]
 
 
 def bumpy(scene, name, scale=SCALE, **others):
@@ -93,11 +97,11 @@ def test_pictures_are_those_of_a_scene_that_has_the_map(bakes, plain, named):
     bare, baked = bakes
     most, usual = (0.015, 1e-6) if bare.method == "direct" else (0.015, 0.003)
     for others in ({}, {"environment": {"map": None, "rotation": 40.0}}):
-        found = shown(bare, bumpy(plain, named, **others), bare.method)
-        expected = shown(baked, bumpy(plain, None, **others), bare.method)
+        found = render_exact(bare, bumpy(plain, named, **others), bare.method)
+        expected = render_exact(baked, bumpy(plain, None, **others), bare.method)
         assert relative_rmse(found, expected) < most
         assert np.median(np.abs(found - expected) / expected) < usual
-        assert relative_rmse(shown(bare, bumpy(plain, None, **others), bare.method), expected) > 0.4
+        assert relative_rmse(render_exact(bare, bumpy(plain, None, **others), bare.method), expected) > 0.4
 
 
 @pytest.mark.slow
@@ -106,8 +110,8 @@ def test_what_surfaces_send_is_of_the_normals_that_are_seen(bakes, plain, named)
     """Of the normals of the bake it would be 27 % off."""
     bare, baked = bakes
     reflected = {"transport": {"show": "reflected"}}
-    found = shown(bare, bumpy(plain, named, **reflected), bare.method)
-    expected = shown(baked, bumpy(plain, None, **reflected), bare.method)
+    found = render_exact(bare, bumpy(plain, named, **reflected), bare.method)
+    expected = render_exact(baked, bumpy(plain, None, **reflected), bare.method)
     assert relative_rmse(found, expected) < 0.05
     assert np.median(np.abs(found - expected)) < 0.01 * expected.mean()
 
@@ -117,29 +121,29 @@ def test_what_surfaces_send_is_of_the_normals_that_are_seen(bakes, plain, named)
 def test_gather_rays_are_given_up_and_go_on(bakes, plain, named, monkeypatch):
     """Where a hand comes back while they are traced; what was traced is not traced again."""
     bare, _ = bakes
-    monkeypatch.setattr(worn_store, "_STEP", 64)
-    linked, traced = Retracing.linked, []
+    monkeypatch.setattr(worn_store, "_SAMPLES_PER_STEP", 64)
+    linked, traced = NormalRetracer.gather_hits, []
 
     def counted(self, points, wo, pattern):
-        traced.extend(points.seed.tolist() if pattern.num_rays == RAYS_A_SAMPLE else ())  # others are of cells
+        traced.extend(points.seed.tolist() if pattern.num_rays == RAYS_PER_SAMPLE else ())  # others are of cells
         return linked(self, points, wo, pattern)
 
-    monkeypatch.setattr(Retracing, "linked", counted)
-    picture = Picture(bare, "front", Memory(1 << 28))
+    monkeypatch.setattr(NormalRetracer, "gather_hits", counted)
+    picture = Picture(bare, "front", Cache(1 << 28))
     picture.set_look(bumpy(plain, named, 1.25))
     images = picture._images
     floor, light = images.by_name["Floor"], images.light
     with pytest.raises(CancelledError):
-        images.arriving(floor, light, lambda: len(traced) >= 128)
+        images.incident_light(floor, light, lambda: len(traced) >= 128)
     assert 128 <= len(traced) < 0.5 * floor.num_samples
-    images.arriving(floor, light, lambda: False)
-    assert sorted(traced) == sorted(images.view.points(0).seed.tolist())
+    images.incident_light(floor, light, lambda: False)
+    assert sorted(traced) == sorted(images.view.surface_points(0).seed.tolist())
 
 
 def test_lights_that_come_up_are_traced(bakes, plain, named):
     """And those that go down hidden: bits are those of the bake, on the floor, where frames are equal."""
     bare, baked = bakes
-    picture = Picture(bare, "front", bare.memory)
+    picture = Picture(bare, "front", bare.cache)
     picture.set_look(bumpy(plain, named))
     view, expected, before = picture._images.view, baked.views["front"], bare.views["front"]
     (rows, found), (their_rows, theirs), (_, old) = (_floor_of(each) for each in (view, expected, before))
@@ -150,15 +154,15 @@ def test_lights_that_come_up_are_traced(bakes, plain, named):
 
 def _floor_of(view):
     """Places of the floor's samples, in an order that views share, and the bits of each. (n, 3), (n, bytes)"""
-    position = view.points(0).position
+    position = view.surface_points(0).position
     rows = np.flatnonzero(position[:, 1] < 1e-3)
     rows = rows[np.lexsort(position[rows].T)]
-    return position[rows], view._visible(0)[rows]
+    return position[rows], view._read_visibility(0)[rows]
 
 
 def test_normals_and_levels_are_those_of_the_bake(bakes, plain, named):
     bare, baked = bakes
-    picture = Picture(bare, "front", bare.memory)
+    picture = Picture(bare, "front", bare.cache)
     picture.set_look(bumpy(plain, named))
     view, expected = picture._images.view, baked.views["front"]
     np.testing.assert_allclose(view.ratios[0], expected.ratios[0], rtol=1e-5)
@@ -171,18 +175,18 @@ def test_normals_and_levels_are_those_of_the_bake(bakes, plain, named):
 
 
 def _normals_of(view):
-    points = view.points(0)
+    points = view.surface_points(0)
     rows = np.lexsort(points.position.T)
     return points.position[rows], points.normal[rows]
 
 
 def test_a_look_without_it_shows_again_what_it_did(bakes, plain, named):
     bare, _ = bakes
-    picture = Picture(bare, "front", bare.memory)
+    picture = Picture(bare, "front", bare.cache)
     found = []
     for name in (None, named, None, named):
         picture.set_look(bumpy(plain, name))
-        found.append(settle(picture).image())
+        found.append(run_until_exact(picture).image())
     np.testing.assert_array_equal(found[2], found[0])
     np.testing.assert_array_equal(found[3], found[1])
 
@@ -190,7 +194,7 @@ def test_a_look_without_it_shows_again_what_it_did(bakes, plain, named):
 def test_no_strength_is_no_bumps(bakes, plain, named):
     """A scale of 0 leaves the surface as it is without any, whatever it had."""
     bare, _ = bakes
-    picture = Picture(bare, "front", bare.memory)
+    picture = Picture(bare, "front", bare.cache)
     picture.set_look(bumpy(plain, named, 0.0))
     positions, normals = _normals_of(picture._images.view)
     on_floor = positions[:, 1] < 1e-3
@@ -203,10 +207,10 @@ def test_what_is_seen_in_a_mirror_leans_as_well(named, method, tmp_path):
     chrome = {"model": "ggx", "texture": None, "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.03, "f0": 1.0}}
     shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": True}
     scene = with_tangents(corner([Material("Floor", (shiny,)), Material("Wall", (chrome,))]))
-    bare, baked = (opened(s, method, tmp_path / str(k)) for k, s in enumerate((scene, with_own(scene, named))))
+    bare, baked = (open_small_bake(s, method, tmp_path / str(k)) for k, s in enumerate((scene, with_own(scene, named))))
     in_mirror = bare.views["front"].material_ids() == 1
     found, plain, expected = (
-        shown(transfer, bumpy(scene, name), method)[in_mirror]
+        render_exact(transfer, bumpy(scene, name), method)[in_mirror]
         for transfer, name in ((bare, named), (bare, None), (baked, None))
     )
     assert relative_rmse(found, expected) < 0.01
@@ -225,23 +229,28 @@ def test_truths_show_it(plain, named):
 @pytest.mark.slow
 def test_moving_views_show_it(plain, named, tmp_path):
     """In straight light, and in all."""
-    bare, baked = (opened(s, "surface", tmp_path / str(k)) for k, s in enumerate((plain, with_own(plain, named))))
+    bare, baked = (
+        open_small_bake(s, "surface", tmp_path / str(k)) for k, s in enumerate((plain, with_own(plain, named)))
+    )
     for show, most in (("direct", 2e-3), ("all", 0.015)):
         light = {"transport": {"show": show}}
         found, expected = (
-            shown(transfer, bumpy(plain, name, **light), "surface") for transfer, name in ((bare, named), (baked, None))
+            render_exact(transfer, bumpy(plain, name, **light), "surface")
+            for transfer, name in ((bare, named), (baked, None))
         )
         assert relative_rmse(found, expected) < most
-        assert relative_rmse(shown(bare, bumpy(plain, None, **light), "surface"), expected) > 0.3
+        assert relative_rmse(render_exact(bare, bumpy(plain, None, **light), "surface"), expected) > 0.3
 
 
 @pytest.mark.slow
 def test_meshes_without_tangents_get_those_of_imports(named, tmp_path):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     none = replace(scene, meshes=tuple(replace(m, tangents=0 * m.tangents) for m in scene.meshes))
-    moving = opened(none, "surface", tmp_path)
-    assert len(moving.surface.tangents) == 0
-    found = dressed(moving.surface, moving.positions, (Wears(normals=NormalMap(named)), OWN)).tangents
+    moving = open_small_bake(none, "surface", tmp_path)
+    assert len(moving.stored_scene.tangents) == 0
+    found = overridden_textures(
+        moving.stored_scene, moving.positions, (ProbeMapOverrides(normals=NormalMap(named)), NO_OVERRIDES)
+    ).tangents
     expected = np.concatenate([mesh.tangents for mesh in with_tangents(scene).meshes])
     normals = np.concatenate([mesh.normals for mesh in scene.meshes])
     across = found[:, :3] - normals * np.einsum("nc,nc->n", found[:, :3], normals)[:, None]
@@ -291,8 +300,8 @@ def test_none_is_none_and_its_strength_is_one(named):
 
 
 def test_it_says_the_numbers_of_its_file(named):
-    texture = normals_of(NormalMap(named, 2.0))
-    values, plain = decode(texture.pixels, texture.coding), waves() / 127.5 - 1
+    texture = load_normal_map(NormalMap(named, 2.0))
+    values, plain = decode(texture.pixels, texture.encoding), waves() / 127.5 - 1
     np.testing.assert_array_equal(texture.pixels, waves())
     np.testing.assert_allclose(np.linalg.norm(values, axis=-1), 1, rtol=1e-5)
     np.testing.assert_allclose(values[..., 0] / values[..., 2], 2 * plain[..., 0] / plain[..., 2], rtol=1e-4, atol=1e-6)
@@ -304,11 +313,11 @@ def test_images_that_are_no_normals_leave_pictures_finite(pixel, tmp_path, named
     scene = with_tangents(
         corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     )
-    bare = bake_corner(scene, "direct", tmp_path)
+    bare = bake_corner_scene(scene, "direct", tmp_path)
     Image.fromarray(np.full((1, 1, 3), pixel, np.uint8)).save(tmp_path / "x.png")
-    with IMAGES.at(tmp_path / "images") as shelf:
-        record = keep(shelf, tmp_path / "x.png", "x")
-        assert np.isfinite(shown(bare, bumpy(scene, record.texture, 10.0), "direct")).all()
+    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
+        record = store(shelf, tmp_path / "x.png", "x")
+        assert np.isfinite(render_exact(bare, bumpy(scene, record.texture, 10.0), "direct")).all()
 
 
 class Older:
@@ -331,43 +340,43 @@ def test_bakes_of_before_show_them_where_they_know_enough(bakes, plain, named):
     """Without bumps of their own and without gather rays; else they say what to do, and the picture stays."""
     bare, _ = bakes
     older = Older(bare.store, ("scene/face_mesh", "surface_normal"))
-    view = replace(bare.views["front"], store=older, worn={})
+    view = replace(bare.views["front"], store=older, overridden={})
     transfer = replace(bare, store=older, views={"front": view})
-    picture = Picture(transfer, "front", bare.memory)
-    before = settle(picture).image()
+    picture = Picture(transfer, "front", bare.cache)
+    before = run_until_exact(picture).image()
     if bare.method == "direct" and plain.materials[0].normal_map is None:
         picture.set_look(bumpy(plain, named))
-        assert relative_rmse(settle(picture).image(), before) > 0.1
+        assert relative_rmse(run_until_exact(picture).image(), before) > 0.1
         return
     with pytest.raises(StoreError, match=r"too old.*bake the scene again"):
         picture.set_look(bumpy(plain, named))
-    np.testing.assert_array_equal(settle(picture).image(), before)
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
 def test_bakes_that_do_not_tell_bumps_are_refused(bakes, plain, named):
     bare, _ = bakes
-    view = replace(bare.views["front"], store=Older(bare.store, (), ("shortest_normals",)), worn={})
+    view = replace(bare.views["front"], store=Older(bare.store, (), ("shortest_normals",)), overridden={})
     with pytest.raises(StoreError, match="bake the scene again"):
-        Picture(replace(bare, views={"front": view}), "front", bare.memory).set_look(bumpy(plain, named))
+        Picture(replace(bare, views={"front": view}), "front", bare.cache).set_look(bumpy(plain, named))
 
 
 def test_what_has_no_place_in_textures_is_projected_on(tmp_path):
     """In pictures and truths alike, where pixels are not as wide: an image that leans alike everywhere."""
     Image.fromarray(np.full((4, 4, 3), (176, 100, 240), np.uint8)).save(tmp_path / "slope.png")
-    with IMAGES.at(tmp_path / "images") as shelf:
-        _project_on(keep(shelf, tmp_path / "slope.png", "Slope").texture, tmp_path)
+    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
+        _project_on(store(shelf, tmp_path / "slope.png", "Slope").texture, tmp_path)
 
 
 def _project_on(named, tmp_path):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     bare = replace(scene, meshes=tuple(replace(m, uvs=0 * m.uvs, tangents=0 * m.tangents) for m in scene.meshes[:2]))
-    transfer = bake_corner(replace(bare, id="0" * len(bare.id)), "direct", tmp_path)
+    transfer = bake_corner_scene(replace(bare, id="0" * len(bare.id)), "direct", tmp_path)
     look = bumpy(bare, named)
-    picture = Picture(transfer, "front", transfer.memory)
+    picture = Picture(transfer, "front", transfer.cache)
     picture.set_look(look)
     positions, normals = _normals_of(picture._images.view)
-    of_truth = wearing(bare, look)
-    samples = sample_view(of_truth, merge(of_truth), "front", (40, 30))
+    of_truth = with_overrides(bare, look)
+    samples = sample_view(of_truth, build_scene_buffers(of_truth), "front", (40, 30))
     points, rows = samples.surface.points, np.flatnonzero(samples.material == 0)
     rows = rows[np.lexsort(points.position[rows].T)]
     np.testing.assert_allclose(positions, points.position[rows], atol=1e-6)

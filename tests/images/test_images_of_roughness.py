@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from sessions import bake_corner, relative_rmse, settle
+from sessions import bake_corner_scene, relative_rmse, run_until_exact
 from tiny_scenes import corner
 
 from relume.brdf.channels import IMAGES
 from relume.errors import NotFoundError, ParameterError
-from relume.images.shelf import get_record, keep, mean_roughness, roughness_of
+from relume.images.shelf import get_record, load_roughness_map, mean_roughness, store
 from relume.look import default_look, validate
 from relume.picture.picture import Picture
 from relume.reference.image import reference_image
 from relume.scene.coding import decode
-from relume.scene.model import Coding, Material, Texture
+from relume.scene.model import Material, Texture, TextureEncoding
 
 SIDE = 64
 
@@ -28,8 +28,8 @@ def named(tmp_path_factory):
     y, x = np.mgrid[0:SIDE, 0:SIDE]
     green = np.where((x * 4 // SIDE + y * 4 // SIDE) % 2, 40 + x, 180)
     Image.fromarray(np.stack([255 - x, green, y], axis=-1).astype(np.uint8)).save(folder / "rough.png")
-    with IMAGES.at(folder / "images") as shelf:
-        yield keep(shelf, folder / "rough.png", "Rough").texture
+    with IMAGES.with_search_folder(folder / "images") as shelf:
+        yield store(shelf, folder / "rough.png", "Rough").texture
 
 
 def bumps():
@@ -37,7 +37,7 @@ def bumps():
     lean = np.random.default_rng(3).normal(0, 0.15, (128, 128, 2))
     normals = np.concatenate([lean, np.ones((128, 128, 1))], axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return Texture(np.round(127.5 * (normals + 1)).astype(np.uint8), coding=Coding("normal"))
+    return Texture(np.round(127.5 * (normals + 1)).astype(np.uint8), encoding=TextureEncoding("normal"))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def with_own(scene, name):
     floor, *others = scene.materials
     diffuse, shiny = floor.terms
     shiny = {**shiny, "params": {**shiny["params"], "roughness": mean_roughness(name)}}
-    own = replace(floor, terms=(diffuse, shiny), textures={"roughness": roughness_of(name)})
+    own = replace(floor, terms=(diffuse, shiny), textures={"roughness": load_roughness_map(name)})
     return replace(scene, materials=(own, *others))
 
 
@@ -63,7 +63,7 @@ def with_own(scene, name):
 def bakes(request, plain, named, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bakes")
     scenes = plain, with_own(plain, named)
-    return [bake_corner(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)]
+    return [bake_corner_scene(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)]
 
 
 def rough(scene, follows, roughness, **others):
@@ -76,10 +76,10 @@ def rough(scene, follows, roughness, **others):
 
 
 def shown(transfer, *looks):
-    picture = Picture(transfer, "front", transfer.memory)
+    picture = Picture(transfer, "front", transfer.cache)
     for look in looks:
         picture.set_look(look)
-        settle(picture)
+        run_until_exact(picture)
     return picture.image()
 
 
@@ -99,9 +99,9 @@ def test_pictures_are_those_of_a_scene_that_has_the_map(bakes, plain, named):
 
 def test_levels_are_those_of_the_bake(bakes, plain, named):
     bare, baked = bakes
-    picture = Picture(bare, "front", bare.memory)
+    picture = Picture(bare, "front", bare.cache)
     picture.set_look(rough(plain, named, 0.4))
-    other = Picture(bare, "front", bare.memory)
+    other = Picture(bare, "front", bare.cache)
     other.set_look(rough(plain, named, 0.3))
     view, expected = picture._images.view, baked.views["front"]
     assert other._images.view is view  # pictures of one image share what is sorted by it
@@ -118,9 +118,9 @@ def test_a_look_without_it_shows_again_what_it_did(bakes, plain, named):
 
 def test_the_picture_goes_on_showing_what_it_did_until_it_is_there(bakes, plain, named):
     bare, _ = bakes
-    picture = Picture(bare, "front", bare.memory)
+    picture = Picture(bare, "front", bare.cache)
     picture.set_look(rough(plain, True, 0.4))
-    before = settle(picture).image()
+    before = run_until_exact(picture).image()
     picture.set_look(rough(plain, named, 0.41))
     advance = picture.advance(None)
     assert advance.complete
@@ -155,21 +155,21 @@ def test_an_image_that_is_not_here_is_no_map(plain, follows):
 def test_one_that_is_gone_leaves_the_picture_as_it_was(bakes, plain, named, tmp_path):
     bare, _ = bakes
     Image.fromarray(np.full((4, 4, 3), 99, np.uint8)).save(tmp_path / "x.png")
-    picture = Picture(bare, "front", bare.memory)
-    before = settle(picture).image()
-    with IMAGES.at(tmp_path / "images") as shelf:
-        record = keep(shelf, tmp_path / "x.png", "x")
+    picture = Picture(bare, "front", bare.cache)
+    before = run_until_exact(picture).image()
+    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
+        record = store(shelf, tmp_path / "x.png", "x")
         look = rough(plain, record.texture, 0.4)
         IMAGES.remove(shelf, record.id)
         with pytest.raises(NotFoundError):
             picture.set_look(look)
-    np.testing.assert_array_equal(settle(picture).image(), before)
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
 def test_it_says_the_number_of_its_green(named):
-    texture = roughness_of(named)
+    texture = load_roughness_map(named)
     assert texture.pixels.shape == (SIDE, SIDE, 1)
-    assert decode(texture.pixels, texture.coding).mean() == pytest.approx(1, rel=1e-6)
+    assert decode(texture.pixels, texture.encoding).mean() == pytest.approx(1, rel=1e-6)
     assert mean_roughness(named) == pytest.approx(texture.pixels.mean() / 255)
 
 
@@ -177,9 +177,9 @@ def test_it_says_the_number_of_its_green(named):
 def test_images_of_one_value_have_no_levels(value, bakes, plain, tmp_path):
     bare, _ = bakes
     Image.fromarray(np.full((1, 1, 3), value, np.uint8)).save(tmp_path / "x.png")
-    with IMAGES.at(tmp_path / "images") as shelf:
-        record = keep(shelf, tmp_path / "x.png", "x")
+    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
+        record = store(shelf, tmp_path / "x.png", "x")
         assert get_record(shelf, record.id).roughness == value / 255
-        picture = Picture(bare, "front", bare.memory)
+        picture = Picture(bare, "front", bare.cache)
         picture.set_look(rough(plain, record.texture, 0.4))
-        assert np.isfinite(settle(picture).image()).all()
+        assert np.isfinite(run_until_exact(picture).image()).all()

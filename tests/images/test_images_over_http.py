@@ -15,10 +15,10 @@ from relume.bake import Recipe
 from relume.brdf.channels import IMAGES
 from relume.errors import SceneError
 from relume.images.reading import MAX_SIDE
-from relume.images.shelf import keep, records, texture_of
+from relume.images.shelf import load_texture, records, store
 from server.app import create_app
 from server.live.state.look_state import LookState
-from server.live.state.shown_views import ShownViews
+from server.live.state.shown_views import VisibleViews
 from server.settings import Settings
 from worker.scenes import register_scene
 
@@ -70,7 +70,7 @@ def png(width, height):
 def test_what_is_no_image_or_too_large_leaves_nothing(content, says, tmp_path):
     (tmp_path / "x.png").write_bytes(content)
     with pytest.raises(SceneError, match=says):
-        keep(tmp_path / "shelf", tmp_path / "x.png", "x")
+        store(tmp_path / "shelf", tmp_path / "x.png", "x")
     assert not (tmp_path / "shelf").exists()
 
 
@@ -78,16 +78,16 @@ def test_a_large_one_is_kept_smaller_and_says_so(tmp_path):
     texels = np.zeros((4, MAX_SIDE + 2, 3), np.uint8)
     texels[:, 1::2] = 100
     Image.fromarray(texels).save(tmp_path / "wide.png")
-    with IMAGES.at(tmp_path / "shelf") as shelf:
-        record = keep(shelf, tmp_path / "wide.png", "wide")
-        found = texture_of(record.texture).pixels
+    with IMAGES.with_search_folder(tmp_path / "shelf") as shelf:
+        record = store(shelf, tmp_path / "wide.png", "wide")
+        found = load_texture(record.texture).pixels
     assert record.size == (MAX_SIDE // 2 + 1, 2) == found.shape[1::-1]
     assert (found == 50).all()
     assert "4098×4" in record.warnings[0]
 
 
 def test_the_same_file_again_takes_the_new_name(image_file, tmp_path):
-    first, again = (keep(tmp_path / "shelf", image_file, name) for name in ("One", "Two"))
+    first, again = (store(tmp_path / "shelf", image_file, name) for name in ("One", "Two"))
     assert (again.id, again.name, len(records(tmp_path / "shelf"))) == (first.id, "Two", 1)
 
 
@@ -98,11 +98,11 @@ def test_an_exr_keeps_its_reflectances_and_says_what_was_held(tmp_path):
     assert out.open(path, OpenImageIO.ImageSpec(2, 1, 3, OpenImageIO.FLOAT))
     assert out.write_image(pixels)
     assert out.close()
-    with IMAGES.at(tmp_path / "shelf") as shelf:
-        record = keep(shelf, tmp_path / "map.exr", "map")
-        found = texture_of(record.texture).pixels.astype(np.float32)
+    with IMAGES.with_search_folder(tmp_path / "shelf") as shelf:
+        record = store(shelf, tmp_path / "map.exr", "map")
+        found = load_texture(record.texture).pixels.astype(np.float32)
         IMAGES.remove(shelf, record.id)
-        assert not IMAGES.is_known(record.texture)
+        assert not IMAGES.exists(record.texture)
     assert len(record.warnings) == 2
     np.testing.assert_allclose(found, [[[0.001, 0.5, 1.0], [0, 0, 0]]], rtol=1e-3)
 
@@ -121,7 +121,7 @@ def test_one_that_a_session_shows_stays_until_the_session_is_forgotten(client, s
     resumes = client.app.state.services.live.resumes
     default = {"materials": {"Ball": {"terms": []}}}
     shows = {"materials": {"Ball": {"terms": [{"model": "lambert", "texture": sent["texture"]}]}}}
-    token = resumes.open("0123456789abcdef", LookState(default, shows, 0), ShownViews(["front"], "front"))
+    token = resumes.open("0123456789abcdef", LookState(default, shows, 0), VisibleViews(["front"], "front"))
     url = f"{URL}/{sent['id']}"
     open_now = client.delete(url)
     resumes.close(token, time.monotonic())

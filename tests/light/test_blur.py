@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relume.environments.equirect import lookup, texel_directions, texel_solid_angles
-from relume.light.blur import MOST_ROWS, blurred, reduced
+from relume.light.blur import MAX_ROWS, downsampled, prefiltered
 
 HEIGHT = 128
 
@@ -28,25 +28,25 @@ def test_every_direction_shows_the_mean_about_it(towards, degrees):
     places = near / np.linalg.norm(near, axis=1, keepdims=True)
     weights = np.exp((places @ w.T - 1) / np.radians(degrees) ** 2) * area
     expected = weights @ sky.reshape(-1, 3) / weights.sum(axis=1, keepdims=True)
-    found = lookup(blurred(sky, degrees), places.astype(np.float32))
+    found = lookup(prefiltered(sky, degrees), places.astype(np.float32))
     assert np.abs(found - expected).max() < 0.03 * expected.max()
 
 
 def test_no_light_is_lost_and_even_light_stays():
     even = np.full((HEIGHT, 2 * HEIGHT, 3), [1.0, 2.0, 3.0], np.float32)
     for degrees in (2.0, 60.0):
-        found = blurred(even, degrees)
+        found = prefiltered(even, degrees)
         np.testing.assert_allclose(found, np.broadcast_to([1, 2, 3], found.shape), rtol=1e-5)
     sky = lamp_map((0.2, 1, 0.1), 100)
-    found = blurred(sky, 8.0)
+    found = prefiltered(sky, 8.0)
     sums = [np.tensordot(texel_solid_angles(*a.shape[:2]), a.sum(axis=1, dtype=float), 1) for a in (sky, found)]
     np.testing.assert_allclose(sums[1], sums[0], rtol=1e-3)
 
 
 def test_large_maps_are_reduced_by_means_of_their_light():
     sky = lamp_map((0.1, 1, 0.0), 600)
-    small = reduced(sky)
-    assert small.shape == (MOST_ROWS, 2 * MOST_ROWS, 3)
+    small = downsampled(sky)
+    assert small.shape == (MAX_ROWS, 2 * MAX_ROWS, 3)
     sums = [np.tensordot(texel_solid_angles(*a.shape[:2]), a.sum(axis=1, dtype=float), 1) for a in (sky, small)]
     np.testing.assert_allclose(sums[1], sums[0], rtol=1e-5)
-    assert reduced(small) is small or np.array_equal(reduced(small), small)
+    assert downsampled(small) is small or np.array_equal(downsampled(small), small)

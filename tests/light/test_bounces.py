@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from tiny_scenes import studio
 
-from relume.light.triangles import subdivide
-from relume.methods.cells.bounces import bounce, bounced, irradiance, preview_bounced
-from relume.trace.cell_tree import NO_CELL
+from relume.light.triangles import tessellate_environment
+from relume.methods.cells.bounces import bounces, irradiance, one_bounce, preview_bounces
+from relume.trace.cell_tree import NO_PATCH
 
 
 def some_links(num_cells, num_rays, seed, lost=0.2):
     rng = np.random.default_rng(seed)
     links = rng.integers(0, num_cells, (num_cells, num_rays)).astype(np.uint16)
-    links[rng.random(links.shape) < lost] = NO_CELL
+    links[rng.random(links.shape) < lost] = NO_PATCH
     return links
 
 
 def bounce_numpy(links, reflectance, radiance):
-    seen = np.concatenate([radiance, np.zeros((NO_CELL + 1 - len(radiance), 3))])[links]
+    seen = np.concatenate([radiance, np.zeros((NO_PATCH + 1 - len(radiance), 3))])[links]
     return reflectance * seen.mean(axis=1)
 
 
@@ -27,7 +27,7 @@ def test_bounce_is_its_twin():
     links = some_links(700, 33, seed=1)
     reflectance, radiance = np.random.default_rng(2).random((2, 700, 3), np.float32)
     np.testing.assert_allclose(
-        bounce(links, reflectance, radiance), bounce_numpy(links, reflectance, radiance), rtol=1e-5, atol=1e-7
+        one_bounce(links, reflectance, radiance), bounce_numpy(links, reflectance, radiance), rtol=1e-5, atol=1e-7
     )
 
 
@@ -37,7 +37,7 @@ def test_even_light_in_a_closed_room_grows_as_a_geometric_series(num_bounces):
     links = some_links(300, 64, seed=3, lost=0)
     rho = np.array([0.2, 0.5, 0.8], np.float32)
     direct = np.tile(np.array([1.0, 2.0, 3.0], np.float32), (300, 1))
-    found = bounced(links, np.tile(rho, (300, 1)), direct, num_bounces)
+    found = bounces(links, np.tile(rho, (300, 1)), direct, num_bounces)
     np.testing.assert_allclose(found, direct * (1 - rho ** (num_bounces + 1)) / (1 - rho), rtol=2e-5)
 
 
@@ -45,32 +45,32 @@ def test_even_light_in_a_closed_room_grows_as_a_geometric_series(num_bounces):
 def test_rough_bounces_are_those_that_settle_into_a_shape(num_bounces):
     links = some_links(400, 64, seed=8, lost=0.1)
     reflectance, direct = np.random.default_rng(9).random((2, 400, 3), np.float32)
-    found = preview_bounced(links, links, 0.8 * reflectance, direct, num_bounces)
-    expected = bounced(links, 0.8 * reflectance, direct, num_bounces)
+    found = preview_bounces(links, links, 0.8 * reflectance, direct, num_bounces)
+    expected = bounces(links, 0.8 * reflectance, direct, num_bounces)
     assert np.linalg.norm(found - expected) <= 1e-3 * np.linalg.norm(expected)
     if num_bounces <= 6:
         np.testing.assert_array_equal(found, expected)
-    assert not preview_bounced(links, links, reflectance, 0 * direct, num_bounces).any()
+    assert not preview_bounces(links, links, reflectance, 0 * direct, num_bounces).any()
 
 
 def test_what_is_black_reflects_nothing_and_what_is_lost_gives_nothing():
     links = some_links(50, 16, seed=4, lost=1.0)
     ones = np.ones((50, 3), np.float32)
-    assert not bounce(links, ones, ones).any()
-    assert not bounce(some_links(50, 16, seed=4), 0 * ones, ones).any()
+    assert not one_bounce(links, ones, ones).any()
+    assert not one_bounce(some_links(50, 16, seed=4), 0 * ones, ones).any()
 
 
 def test_bounces_are_linear_in_the_light():
     links, rng = some_links(200, 32, seed=5), np.random.default_rng(6)
     reflectance, one, two = rng.random((3, 200, 3), np.float32)
-    both = bounced(links, reflectance, 2 * one + 3 * two, 4)
+    both = bounces(links, reflectance, 2 * one + 3 * two, 4)
     np.testing.assert_allclose(
-        both, 2 * bounced(links, reflectance, one, 4) + 3 * bounced(links, reflectance, two, 4), rtol=2e-5
+        both, 2 * bounces(links, reflectance, one, 4) + 3 * bounces(links, reflectance, two, 4), rtol=2e-5
     )
 
 
 def test_irradiance_is_its_twin():
-    lights = subdivide(studio(), 100)
+    lights = tessellate_environment(studio(), 100)
     rng = np.random.default_rng(7)
     normal = rng.normal(size=(333, 3))
     normal = (normal / np.linalg.norm(normal, axis=1, keepdims=True)).astype(np.float32)
@@ -81,7 +81,7 @@ def test_irradiance_is_its_twin():
 
 
 def test_open_sky_of_one_radiance_gives_pi():
-    lights = subdivide(np.ones((64, 128, 3), np.float32), 2000)
+    lights = tessellate_environment(np.ones((64, 128, 3), np.float32), 2000)
     up = np.array([[0, 1, 0]], np.float32)
     everything = np.full((1, (lights.num_lights + 7) // 8), 255, np.uint8)
     np.testing.assert_allclose(irradiance(up, everything, lights), np.pi, rtol=2e-3)

@@ -7,11 +7,11 @@ import pytest
 from tiny_scenes import studio
 
 from relume.color import luminance
-from relume.environments.equirect import shrunk, texel_directions, texel_solid_angles
+from relume.environments.equirect import halve_to_width, texel_directions, texel_solid_angles
 from relume.errors import PlanError
-from relume.light.moments import Texels, moments_numpy, moments_of
+from relume.light.moments import LightTexels, compute_moments, compute_moments_numpy
 from relume.light.tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
-from relume.light.triangles import Unturned, subdivide, weigh
+from relume.light.triangles import RotatedEnvironment, integrate_environment, tessellate_environment
 
 
 def solid_angles(corners):
@@ -36,7 +36,7 @@ def corners_of(lights):
 
 
 def tiles_of(radiance, num_lights):
-    """The tiles behind `subdivide`, in its order: corners (M, 3, 3) and the texels in each."""
+    """The tiles behind `tessellate_environment`, in its order: corners (M, 3, 3) and the texels in each."""
     tiles = choose_tiles(radiance, num_lights)
     found = tiles.locate(texel_directions(*radiance.shape[:2]).reshape(-1, 3).astype(float))
     return tiles.corners, [np.nonzero(found == m)[0] for m in range(len(tiles.codes))]
@@ -49,7 +49,7 @@ def texel_power(radiance):
 
 @pytest.fixture(scope="module", params=[8, 100, 1003])
 def lights(request):
-    return subdivide(studio(), request.param)
+    return tessellate_environment(studio(), request.param)
 
 
 @pytest.mark.parametrize("num_lights", [8, 100, 1003])
@@ -78,7 +78,7 @@ def test_nodes_are_unit_and_midpoints_of_their_edges(lights):
 def test_triangles_have_the_moments_of_the_light_in_their_tiles(num_lights):
     """Mean direction, and spread in the plane that touches the sphere there, of each triangle, its light uniform."""
     radiance = studio(64)
-    lights, (tiles, texels) = subdivide(radiance, num_lights), tiles_of(radiance, num_lights)
+    lights, (tiles, texels) = tessellate_environment(radiance, num_lights), tiles_of(radiance, num_lights)
     directions = texel_directions(64, 128).reshape(-1, 3).astype(float)
     weight, extent = luminance(texel_power(radiance)), np.repeat(texel_solid_angles(64, 128), 128)
     compared = 0
@@ -111,20 +111,20 @@ def test_moments_of_texels_are_those_of_their_oracle():
     directions = axis + 0.3 * rng.normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     tile = (2 * axis.argmax(axis=1)).astype(np.int32)
-    texels = Texels(tile, rng.uniform(0, 9, 400), directions, rng.uniform(0, 0.1, 400))
+    texels = LightTexels(tile, rng.uniform(0, 9, 400), directions, rng.uniform(0, 0.1, 400))
     fitted = np.array([4, 0])  # of five tiles, of which two have no light and one is not asked about
     mean, total = np.eye(3)[[2, 0]], texels.sums(texels.luminous, 5)
     frames = np.array([[[1.0, 0, 0], [0, 1, 0]], [[0, 0.6, 0.8], [0, -0.8, 0.6]]])
-    centre, spread = moments_of(texels, total[fitted], mean, frames, fitted)
+    centre, spread = compute_moments(texels, total[fitted], mean, frames, fitted)
     for k, of_tile in enumerate(fitted):
-        expected = moments_numpy(texels, mean[k], frames[k], of_tile)
+        expected = compute_moments_numpy(texels, mean[k], frames[k], of_tile)
         np.testing.assert_allclose(centre[k], expected[0], atol=1e-12)
         np.testing.assert_allclose(spread[k], expected[1], atol=1e-12)
 
 
 def test_where_light_is_uniform_triangles_are_their_tiles():
     radiance = np.ones((256, 512, 3), np.float32)
-    found, (tiles, _) = corners_of(subdivide(radiance, 300)), tiles_of(radiance, 300)
+    found, (tiles, _) = corners_of(tessellate_environment(radiance, 300)), tiles_of(radiance, 300)
     angles = solid_angles(tiles)
     np.testing.assert_allclose(solid_angles(found), angles, rtol=0.1)
     assert solid_angles(found).sum() == pytest.approx(4 * np.pi, rel=0.02)
@@ -140,7 +140,7 @@ def test_power_is_the_environments(lights):
 @pytest.mark.parametrize("num_lights", [8, 100, 700])
 def test_each_texel_gives_its_light_to_the_one_triangle_it_lies_in(num_lights):
     radiance = np.random.default_rng(2).random((38, 76, 3), np.float32)  # few texels lie on an edge
-    lights = subdivide(radiance, num_lights)
+    lights = tessellate_environment(radiance, num_lights)
     depth = depth_inside(tiles_of(radiance, num_lights)[0], texel_directions(38, 76).reshape(-1, 3).astype(float))
     owner, power = depth.argmax(axis=1), texel_power(radiance)
     on_edge = depth.max(axis=1) < 1e-6
@@ -166,14 +166,14 @@ def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
 
 
 def test_same_environment_gives_the_same_triangles_bit_for_bit():
-    one, two = subdivide(studio(), 300), subdivide(studio(), 300)
+    one, two = tessellate_environment(studio(), 300), tessellate_environment(studio(), 300)
     for name in ("nodes", "direction", "irradiance"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
 @pytest.mark.parametrize("asked", [8, 9, 10, 11, 100, 101, 102, 500])
 def test_as_many_as_asked_and_never_more(asked):
-    count = subdivide(studio(), asked).num_lights
+    count = tessellate_environment(studio(), asked).num_lights
     assert asked - 3 < count <= asked
     assert (count - 8) % 3 == 0
 
@@ -183,7 +183,7 @@ def test_small_triangles_lie_on_bright_spots(spot):
     y, x = spot
     radiance = np.full((64, 128, 3), 0.1, np.float32)
     radiance[y - 2 : y + 3, x - 2 : x + 2] = 500.0
-    lights = subdivide(radiance, 500)
+    lights = tessellate_environment(radiance, 500)
     angles, mean = solid_angles(tiles_of(radiance, 500)[0]), 4 * np.pi / 500
     bright = lights.irradiance.sum(axis=1) / angles > 100
     assert bright.sum() >= 15  # of its twenty texels
@@ -197,7 +197,7 @@ def test_uniform_light_is_divided_evenly():
 
 
 def test_black_environment_has_black_lights_all_over_the_sphere():
-    lights = subdivide(np.zeros((8, 16, 3), np.float32), 200)
+    lights = tessellate_environment(np.zeros((8, 16, 3), np.float32), 200)
     assert solid_angles(corners_of(lights)).sum() == pytest.approx(4 * np.pi, rel=1e-6)
     assert not lights.irradiance.any()
     np.testing.assert_allclose(np.linalg.norm(lights.direction, axis=1), 1, atol=1e-6)
@@ -206,7 +206,7 @@ def test_black_environment_has_black_lights_all_over_the_sphere():
 @pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (2, 4), (3, 5)])
 def test_tiny_maps_end_when_there_is_nothing_left_to_split(shape):
     radiance = np.random.default_rng(3).random((*shape, 3), np.float32)
-    lights = subdivide(radiance, 4000)
+    lights = tessellate_environment(radiance, 4000)
     assert lights.num_lights <= 4000
     assert np.isfinite(lights.direction).all()
     assert np.isfinite(lights.nodes).all()
@@ -218,7 +218,7 @@ def test_tiny_maps_end_when_there_is_nothing_left_to_split(shape):
 def test_one_texel_of_light_is_kept_however_bright_or_dim(value):
     radiance = np.zeros((16, 32, 3), np.float32)
     radiance[4, 9] = [value, 0, value / 2]
-    lights = subdivide(radiance, 1000)
+    lights = tessellate_environment(radiance, 1000)
     lit = lights.irradiance.any(axis=1)
     assert lit.sum() == 1
     np.testing.assert_allclose(lights.irradiance[lit][0], texel_power(radiance).sum(axis=0), rtol=1e-6)
@@ -228,15 +228,15 @@ def test_one_texel_of_light_is_kept_however_bright_or_dim(value):
 @pytest.mark.parametrize("asked", [-1, 0, 7, MAX_LIGHTS + 1])
 def test_absurd_counts_are_refused(asked):
     with pytest.raises(PlanError, match="give 8 to"):
-        subdivide(np.ones((2, 4, 3), np.float32), asked)
+        tessellate_environment(np.ones((2, 4, 3), np.float32), asked)
 
 
 @pytest.mark.parametrize("columns", [0, 3, 16, 40])
 def test_a_turned_environment_weighs_as_its_turned_image(columns):
     radiance = studio()  # 64 texels wide
     tiles = choose_tiles(radiance, 200)
-    turned = weigh(tiles, Unturned.of(radiance), 360 * columns / 64)
-    rolled = weigh(tiles, Unturned.of(np.roll(radiance, -columns, axis=1)))
+    turned = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance), 360 * columns / 64)
+    rolled = integrate_environment(tiles, RotatedEnvironment.from_radiance(np.roll(radiance, -columns, axis=1)))
     # a texel's centre that rounding puts on the other side of an edge changes two tiles; most tiles have none there
     same = np.isclose(turned.irradiance, rolled.irradiance, rtol=1e-5, atol=1e-9).all(axis=1)
     assert same.mean() > 0.9
@@ -249,7 +249,7 @@ def test_a_turned_environment_weighs_as_its_turned_image(columns):
 def test_another_environment_keeps_all_its_light_in_the_tiles_it_lies_in():
     tiles = choose_tiles(studio(), 300)
     other = np.random.default_rng(4).random((38, 76, 3), np.float32)
-    lights = weigh(tiles, Unturned.of(other))
+    lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(other))
     np.testing.assert_allclose(lights.irradiance.sum(axis=0, dtype=float), texel_power(other).sum(axis=0), rtol=1e-6)
     depth = np.diagonal(depth_inside(tiles.corners, lights.direction.astype(float)))
     assert (depth > -1e-6).all()
@@ -300,9 +300,12 @@ def test_chosen_tiles_are_whole(num_lights):
 
 def test_a_shrunk_map_weighs_as_much():
     whole = studio().repeat(4, axis=0).repeat(4, axis=1)
-    small = shrunk(whole, studio().shape[1])
+    small = halve_to_width(whole, studio().shape[1])
     np.testing.assert_allclose(small, studio(), rtol=1e-6)
-    assert shrunk(small[:, :-1], 4).shape == small[:, :-1].shape  # an odd side cannot be halved
+    assert halve_to_width(small[:, :-1], 4).shape == small[:, :-1].shape  # an odd side cannot be halved
     tiles = choose_tiles(studio(), 60)
-    few, all_texels = (weigh(tiles, Unturned.of(texels)).irradiance.sum(0) for texels in (small, whole))
+    few, all_texels = (
+        integrate_environment(tiles, RotatedEnvironment.from_radiance(texels)).irradiance.sum(0)
+        for texels in (small, whole)
+    )
     np.testing.assert_allclose(few, all_texels, rtol=1e-2)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import points_at, shining
+from tiny_scenes import make_emissive_triangles, make_surface_points
 
-from relume.light.gather_rays import shift_of
-from relume.light.local import light_sample, make_local, rectangle, strata_of
+from relume.light.gather_rays import cranley_patterson_offset
+from relume.light.local import light_sample, make_light_strata, prepare_local_lights, rectangle
 from relume.look import LightGeometry
-from relume.trace.local_shadows import arriving
+from relume.trace.local_shadows import compute_irradiance
 
 RNG = np.random.default_rng(11)
 PIECES = RNG.normal(size=(5, 3, 3))
@@ -26,8 +26,8 @@ GEOMETRIES = {
 
 
 def light_of(name):
-    triangles = shining(PIECES, name == "two-sided") if "sided" in name else None
-    return make_local(GEOMETRIES[name], triangles)
+    triangles = make_emissive_triangles(PIECES, name == "two-sided") if "sided" in name else None
+    return prepare_local_lights(GEOMETRIES[name], triangles)
 
 
 def unit(v):
@@ -69,11 +69,11 @@ def sample_numpy(name, light, strata, k, shift, p):
 @pytest.mark.parametrize("name", GEOMETRIES)
 def test_samples_are_those_of_numpy(name):
     light = light_of(name)
-    strata = strata_of(light, 64)
+    strata = make_light_strata(light, 64)
     weights = []
     for number in range(12):
         p = RNG.normal(size=3).astype(np.float32)
-        shift = shift_of(strata, number)
+        shift = cranley_patterson_offset(strata, number)
         for k in range(len(strata.uv)):
             x, y, z, _, weight, *_ = light_sample(light, strata, k, *shift, *p)
             direction, expected = sample_numpy(name, light, strata, k, shift, p.astype(float))
@@ -99,8 +99,8 @@ def test_rectangle_gives_what_lambert_s_formula_says(direction, rotation):
     corner, (e, f) = rectangle(geometry)
     points = RNG.uniform([-0.5, 0, -0.5], [0.5, 0.3, 0.5], (200, 3)).astype(np.float32)
     normals = np.tile(np.array([0, 1, 0], np.float32), (200, 1))
-    light, seen = make_local(geometry), np.full((200, 8), 255, np.uint8)
-    found = arriving(light, strata_of(light, 64), points_at(points, normals), seen)
+    light, seen = prepare_local_lights(geometry), np.full((200, 8), 255, np.uint8)
+    found = compute_irradiance(light, make_light_strata(light, 64), make_surface_points(points, normals), seen)
     expected = [
         polygon_irradiance(np.array([corner, corner + e, corner + e + f, corner + f]), p, np.array([0, 1, 0]))
         for p in points.astype(float)
@@ -128,25 +128,28 @@ def test_two_triangles_shine_as_the_rectangle_they_make():
     triangles = np.array([[a, b, c], [a, c, d]], np.float32)
     points = RNG.uniform([-1, -0.5, -1], [1, 0.5, 1], (400, 3)).astype(np.float32)
     normals = np.tile(np.array([0, 1, 0], np.float32), (400, 1))
-    at, seen = points_at(points, normals), np.full((400, 32), 255, np.uint8)
-    one, two = make_local(geometry), make_local(GEOMETRIES["one-sided"], shining(triangles, False))
-    as_one, as_two = (arriving(light, strata_of(light, 64), at, seen) for light in (one, two))
+    at, seen = make_surface_points(points, normals), np.full((400, 32), 255, np.uint8)
+    one, two = (
+        prepare_local_lights(geometry),
+        prepare_local_lights(GEOMETRIES["one-sided"], make_emissive_triangles(triangles, False)),
+    )
+    as_one, as_two = (compute_irradiance(light, make_light_strata(light, 64), at, seen) for light in (one, two))
     np.testing.assert_allclose(as_two, as_one, rtol=0.05)
     np.testing.assert_allclose(as_two.mean(), as_one.mean(), rtol=2e-3)
 
 
 @pytest.mark.parametrize("corners", [np.zeros((0, 3, 3)), np.ones((2, 3, 3)), np.zeros((1, 3, 3))])
 def test_emitter_without_area_gives_no_light(corners):
-    light = make_local(GEOMETRIES["one-sided"], shining(corners, True))
-    strata = strata_of(light, 64)
+    light = prepare_local_lights(GEOMETRIES["one-sided"], make_emissive_triangles(corners, True))
+    strata = make_light_strata(light, 64)
     up = np.array([[0, 1, 0]], np.float32)
     seen = np.full((1, 32), 255, np.uint8)
-    assert arriving(light, strata, points_at(0 * up, up), seen) == 0
+    assert compute_irradiance(light, strata, make_surface_points(0 * up, up), seen) == 0
 
 
 def test_light_that_touches_a_surface_is_finite():
     up = np.array([[0, 1, 0]], np.float32)
     for geometry in (LightGeometry("point"), LightGeometry("rectangle", (0, 0, 0), (0, 1, 0), size=(1e-4, 1e4))):
-        light, seen = make_local(geometry), np.full((1, 32), 255, np.uint8)
-        found = arriving(light, strata_of(light, 64), points_at(0 * up, up), seen)
+        light, seen = prepare_local_lights(geometry), np.full((1, 32), 255, np.uint8)
+        found = compute_irradiance(light, make_light_strata(light, 64), make_surface_points(0 * up, up), seen)
         assert np.isfinite(found).all()

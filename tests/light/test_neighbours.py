@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from tiny_scenes import studio
 
-from relume.light.neighbours import neighbours_of
-from relume.light.triangles import subdivide
+from relume.light.neighbours import find_neighbors
+from relume.light.triangles import tessellate_environment
 
 
 def sets_of(neighbours):
-    return [set(part.tolist()) for part in np.split(neighbours.beside, neighbours.first[1:-1])]
+    return [set(part.tolist()) for part in np.split(neighbours.neighbors, neighbours.first[1:-1])]
 
 
 def random_directions(count):
@@ -20,8 +20,8 @@ def random_directions(count):
 
 
 def test_neighbourhood_is_mutual_and_a_triangulation_of_the_sphere():
-    directions = subdivide(studio(), 300).direction
-    beside = sets_of(neighbours_of(directions))
+    directions = tessellate_environment(studio(), 300).direction
+    beside = sets_of(find_neighbors(directions))
     assert len(beside) == len(directions)
     assert all(m not in near for m, near in enumerate(beside))
     assert all(m in beside[other] for m, near in enumerate(beside) for other in near)
@@ -32,14 +32,14 @@ def test_the_nearest_direction_is_a_neighbour():
     directions = random_directions(200)
     cosine = directions @ directions.T
     np.fill_diagonal(cosine, -1)
-    beside = sets_of(neighbours_of(directions))
+    beside = sets_of(find_neighbors(directions))
     assert all(int(near) in beside[m] for m, near in enumerate(cosine.argmax(axis=1)))
 
 
 def test_a_direction_twice_is_its_twins_neighbour():
     directions = random_directions(40)
     directions[17] = directions[4]
-    beside = sets_of(neighbours_of(directions))
+    beside = sets_of(find_neighbors(directions))
     assert 4 in beside[17]
     assert 17 in beside[4]
     assert all(beside)
@@ -47,6 +47,6 @@ def test_a_direction_twice_is_its_twins_neighbour():
 
 @pytest.mark.parametrize("count", [0, 1, 2, 8])
 def test_of_a_few_lights_all_are_neighbours(count):
-    beside = sets_of(neighbours_of(random_directions(count))) if count else []
+    beside = sets_of(find_neighbors(random_directions(count))) if count else []
     assert beside == [set(range(count)) - {m} for m in range(count)]
-    assert neighbours_of(random_directions(count)).first.tolist() == [max(0, count - 1) * m for m in range(count + 1)]
+    assert find_neighbors(random_directions(count)).first.tolist() == [max(0, count - 1) * m for m in range(count + 1)]

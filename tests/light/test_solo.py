@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from relume.look import Look, default_look, validate
-from relume.picture.light import gain_of, light_of
+from relume.picture.light import illumination_from_look, picture_gain
 from relume.scene.model import Material
 
 WHITE = Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
@@ -21,7 +21,7 @@ def look(lamp: bool = True, spot: bool = False, **environment: object) -> Look:
 
 def shown(of: Look, *solo: str) -> tuple[object, object]:
     alone = frozenset(solo) or None
-    return light_of(of, ["White"], has_bounces=True, solo=alone), gain_of(of, alone)
+    return illumination_from_look(of, ["White"], has_bounces=True, solo=alone), picture_gain(of, alone)
 
 
 @pytest.mark.parametrize(
@@ -44,4 +44,4 @@ def test_a_light_without_emission_is_as_dark_alone_as_it_is() -> None:
     dark = validate({"lights": {"Lamp": {**LAMP, "scale": 0.0}}}, default_look([WHITE]))
     light, gain = shown(dark, "Lamp")
     assert gain == (0.0, 0.0, 0.0)
-    assert light == light_of(dark, ["White"], has_bounces=True)
+    assert light == illumination_from_look(dark, ["White"], has_bounces=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.light.suns import NUM_TARGETS, TURNS, without_suns
+from relume.light.suns import NUM_TARGET_SETS, NUM_TARGETS, remove_sun_disks
 
 
 def sky(*suns, size=(128, 256)):
@@ -29,32 +29,32 @@ OTHER = ([-1, 0.4, 0.5], 1.5, [3e3, 4e3, 6e3])
 @pytest.mark.parametrize("suns", [(HARD,), (HARD, OTHER)])
 def test_suns_and_what_is_left_are_the_whole_map(suns):
     radiance = sky(*suns)
-    found = without_suns(radiance)
-    assert len(found.suns) == len(suns)
+    found = remove_sun_disks(radiance)
+    assert len(found.sun_disks) == len(suns)
     np.testing.assert_allclose(
-        sum(sun.irradiance for sun in found.suns) + brought(found.beside), brought(radiance), rtol=1e-5
+        sum(sun.irradiance for sun in found.sun_disks) + brought(found.residual), brought(radiance), rtol=1e-5
     )
-    np.testing.assert_allclose(found.beside, sky(), atol=0.1)
+    np.testing.assert_allclose(found.residual, sky(), atol=0.1)
     axis = np.asarray(HARD[0]) / np.linalg.norm(HARD[0])
-    first = max(found.suns, key=lambda sun: sun.mean @ axis)
+    first = max(found.sun_disks, key=lambda sun: sun.mean @ axis)
     assert first.mean @ axis > np.cos(np.radians(0.5)) * np.linalg.norm(first.mean)
     np.testing.assert_allclose(first.irradiance / first.irradiance[0], np.array(HARD[2]) / HARD[2][0], rtol=1e-3)
 
 
 def test_targets_are_spread_as_the_light_is():
-    sun = without_suns(sky(HARD)).suns[0]
-    assert sun.towards.shape == (TURNS, NUM_TARGETS, 3)
-    np.testing.assert_allclose(np.linalg.norm(sun.towards, axis=2), 1, atol=1e-12)
-    np.testing.assert_allclose(sun.towards.mean(axis=(0, 1)), sun.mean, atol=2e-3)
-    np.testing.assert_allclose(sun.towards.mean(axis=1), np.tile(sun.mean, (TURNS, 1)), atol=6e-3)
+    sun = remove_sun_disks(sky(HARD)).sun_disks[0]
+    assert sun.directions.shape == (NUM_TARGET_SETS, NUM_TARGETS, 3)
+    np.testing.assert_allclose(np.linalg.norm(sun.directions, axis=2), 1, atol=1e-12)
+    np.testing.assert_allclose(sun.directions.mean(axis=(0, 1)), sun.mean, atol=2e-3)
+    np.testing.assert_allclose(sun.directions.mean(axis=1), np.tile(sun.mean, (NUM_TARGET_SETS, 1)), atol=6e-3)
     width = np.sqrt(2 * (1 - np.linalg.norm(sun.mean)))
-    assert 0.8 * width < np.sqrt(2 * (1 - np.linalg.norm(sun.towards.mean(axis=(0, 1))))) < 1.4 * width
+    assert 0.8 * width < np.sqrt(2 * (1 - np.linalg.norm(sun.directions.mean(axis=(0, 1))))) < 1.4 * width
 
 
 @pytest.mark.parametrize(
     "radiance", [sky(), sky(([0, 1, 0.1], 4, [2e3] * 3)), sky((HARD[0], 1.5, [120.0] * 3))], ids=["none", "wide", "dim"]
 )
 def test_light_of_wide_or_dim_places_stays(radiance):
-    found = without_suns(radiance)
-    assert found.suns == ()
-    assert found.beside is radiance
+    found = remove_sun_disks(radiance)
+    assert found.sun_disks == ()
+    assert found.residual is radiance

@@ -34,5 +34,5 @@ def replace(path, value):
     return [{"op": "replace", "path": path, "value": value}]
 
 
-def points(count):
+def make_flat_curve(count):
     return [[90 * k / (count - 1), 1.0] for k in range(count)]

@@ -9,7 +9,7 @@ from relume.look import apply_patch, complete, default_look, validate
 from relume.scene.model import Material
 
 PLAIN = Material("Ball", ({"model": "lambert"},))
-GROUND = Material("Ground", ({"model": "lambert"},), catcher=True)
+GROUND = Material("Ground", ({"model": "lambert"},), shadow_catcher=True)
 DEFAULT = default_look([PLAIN, GROUND])
 
 
@@ -56,6 +56,6 @@ def test_only_a_ground_may_catch():
 
 
 def test_brute_force_is_asked_for_what_is_there():
-    look = validate({"background": {"kind": "transparent"}}, DEFAULT).on_the_map()
+    look = validate({"background": {"kind": "transparent"}}, DEFAULT).without_compositing()
     assert look.background.kind == "map"
     assert not look.materials["Ground"].catcher

@@ -9,7 +9,7 @@ import jsonpatch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relume.look.difference import difference
+from relume.look.difference import diff_looks
 
 LEAVES = st.one_of(st.none(), st.booleans(), st.integers(-3, 3), st.text("a/~", max_size=2))
 VALUES = st.recursive(
@@ -26,13 +26,13 @@ DOCUMENTS = st.dictionaries(st.sampled_from(["materials", "lights", "display"]),
 @given(DOCUMENTS, DOCUMENTS)
 def test_it_leads_from_one_look_to_another(before: dict[str, Any], after: dict[str, Any]) -> None:
     kept = copy.deepcopy((before, after))
-    assert jsonpatch.apply_patch(before, difference(before, after)) == after
+    assert jsonpatch.apply_patch(before, diff_looks(before, after)) == after
     assert (before, after) == kept
 
 
 @given(DOCUMENTS)
 def test_of_one_look_there_is_none(document: dict[str, Any]) -> None:
-    assert difference(document, copy.deepcopy(document)) == []
+    assert diff_looks(document, copy.deepcopy(document)) == []
 
 
 def test_places_are_as_near_as_they_can_be_and_curves_are_whole() -> None:
@@ -42,10 +42,10 @@ def test_places_are_as_near_as_they_can_be_and_curves_are_whole() -> None:
     drawn = {**term, "params": {"sigma": 0.3, "ior": 1.5}, "curves": {"theta_h": {"bands": [1, 2]}}}
     after = {"materials": {"a/b": {"terms": [term, drawn]}}, "display": {"exposure": 1}}
     at = "/materials/a~1b/terms/1"
-    assert difference(before, after, but=["display"]) == [
+    assert diff_looks(before, after, excluded=["display"]) == [
         {"op": "replace", "path": f"{at}/params/sigma", "value": 0.3},
         {"op": "replace", "path": f"{at}/curves/theta_h", "value": {"bands": [1, 2]}},
     ]
-    assert difference(before, {**after, "materials": {"a/b": {"terms": [term]}}}, but=["display"]) == [
+    assert diff_looks(before, {**after, "materials": {"a/b": {"terms": [term]}}}, excluded=["display"]) == [
         {"op": "replace", "path": "/materials/a~1b/terms", "value": [term]}
     ]

@@ -16,8 +16,8 @@ from relume.brdf.fresnel import fresnel, schlick
 from relume.brdf.registry import TERMS
 from relume.errors import ParameterError
 from relume.look.library import navigation_map, presets
-from relume.look.library.fits import CONVERSIONS, GROUPS, conductor_of, convert_all
-from relume.look.library.materials import DATA, presets_of
+from relume.look.library.fits import CONVERSIONS, GROUPS, convert_all, fit_conductor
+from relume.look.library.materials import DATA, read_presets
 
 # rows as the published tables have them, so that something is compared where the tables are not at hand
 EXAMPLES = {
@@ -96,7 +96,7 @@ def published(table, fit, wi, wo, cook_torrance_fresnel=None):
 
 
 def exact_fresnel(cos_theta_d, f0):
-    ior, extinction, gain = conductor_of(f0)
+    ior, extinction, gain = fit_conductor(f0)
     return gain * fresnel(cos_theta_d, ior, extinction)
 
 
@@ -115,7 +115,7 @@ def assert_is_the_fit(preset, fit):
 @pytest.mark.parametrize("table", CONVERSIONS)
 def test_a_converted_fit_evaluates_like_its_own_formula(table):
     data = convert_all({name: {"nickel": EXAMPLES[name]} if name == table else {} for name in CONVERSIONS})
-    (preset,) = presets_of(data)
+    (preset,) = read_presets(data)
     assert (preset.name, preset.group, preset.model) == ("Nickel", "metal", CONVERSIONS[table][0])
     assert_is_the_fit(preset, EXAMPLES[table])
 

@@ -6,7 +6,7 @@ import copy
 
 import jsonpatch
 import pytest
-from example_look import CURVES, INF, MATERIALS, NAN, SIGMA, points
+from example_look import CURVES, INF, MATERIALS, NAN, SIGMA, make_flat_curve
 
 from relume.errors import ParameterError
 from relume.look import apply_patch, default_look, validate
@@ -38,13 +38,13 @@ from relume.scene.model import Light, Material
         ("/materials/Teapot/terms/1/params", {"roughness": 1}, "/materials/Teapot/terms/1/params/roughness", "'sigma'"),
         ("/materials/a~1b~0c/terms/0/params/f0", [1, 2, 0], "/materials/a~1b~0c/terms/0/params/f0/1", "[0, 1]"),
         *((SIGMA, bad, SIGMA, "[0.005, 2]") for bad in (0, 2.5, NAN, INF, -INF, True, None, "0.2", 10**400, [], {})),
-        (CURVES, {"theta_i": {"points": points(3)}}, f"{CURVES}/theta_i", "'theta_h'"),
+        (CURVES, {"theta_i": {"points": make_flat_curve(3)}}, f"{CURVES}/theta_i", "'theta_h'"),
         (f"{CURVES}/theta_h", 7, f"{CURVES}/theta_h", "an object"),
         (f"{CURVES}/theta_h", {}, f"{CURVES}/theta_h", "points or bands"),
-        (f"{CURVES}/theta_h", {"points": points(3), "bands": []}, f"{CURVES}/theta_h", "points or bands"),
-        (f"{CURVES}/theta_h", {"points": points(3), "x": 1}, f"{CURVES}/theta_h/x", "leave it out"),
-        (f"{CURVES}/theta_h", {"points": points(4097)}, f"{CURVES}/theta_h/points", "2 to 4096"),
-        (f"{CURVES}/theta_h", {"points": points(20_000)}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": make_flat_curve(3), "bands": []}, f"{CURVES}/theta_h", "points or bands"),
+        (f"{CURVES}/theta_h", {"points": make_flat_curve(3), "x": 1}, f"{CURVES}/theta_h/x", "leave it out"),
+        (f"{CURVES}/theta_h", {"points": make_flat_curve(4097)}, f"{CURVES}/theta_h/points", "2 to 4096"),
+        (f"{CURVES}/theta_h", {"points": make_flat_curve(20_000)}, f"{CURVES}/theta_h/points", "2 to 4096"),
         (f"{CURVES}/theta_h", {"points": [[0, 1]]}, f"{CURVES}/theta_h/points", "2 to 4096"),
         (f"{CURVES}/theta_h", {"points": [[0, 1], [0, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
         (f"{CURVES}/theta_h", {"points": [[3, 1], [2, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
@@ -58,7 +58,7 @@ from relume.scene.model import Light, Material
         (f"{CURVES}/theta_h", {"points": ["ab", "cd"]}, f"{CURVES}/theta_h/points/0", "a point"),
         (f"{CURVES}/theta_h", {"points": "0123"}, f"{CURVES}/theta_h/points", "2 to 4096"),
         (f"{CURVES}/theta_h", {"channels": "r"}, f"{CURVES}/theta_h", "'handles'"),
-        (f"{CURVES}/theta_h", {"handles": points(3)}, f"{CURVES}/theta_h/handles/0", "a handle"),
+        (f"{CURVES}/theta_h", {"handles": make_flat_curve(3)}, f"{CURVES}/theta_h/handles/0", "a handle"),
         (f"{CURVES}/theta_h", {"handles": [[0, 1, 1]]}, f"{CURVES}/theta_h/handles", "2 to 4096"),
         (f"{CURVES}/theta_h", {"handles": [[0, 1, 1], [0, 1, 1]]}, f"{CURVES}/theta_h/handles/1/0", "greater"),
         (f"{CURVES}/theta_h", {"handles": [[0, 1, 1], [9, 1, INF]]}, f"{CURVES}/theta_h/handles/1/2", "[0, 1e+06]"),
@@ -75,14 +75,24 @@ from relume.scene.model import Light, Material
             "[0, 1e+06]",
         ),
         *(
-            (f"{CURVES}/theta_h", {"points": points(3), "channels": bad}, f"{CURVES}/theta_h/channels", "letters")
+            (
+                f"{CURVES}/theta_h",
+                {"points": make_flat_curve(3), "channels": bad},
+                f"{CURVES}/theta_h/channels",
+                "letters",
+            )
             for bad in ("", "rgba", "rr", 1, ["r"])
         ),
         (f"{CURVES}/theta_h", [], f"{CURVES}/theta_h", "one to three"),
-        (f"{CURVES}/theta_h", [{"points": points(3), "channels": "r"}] * 4, f"{CURVES}/theta_h", "one to three"),
         (
             f"{CURVES}/theta_h",
-            [{"points": points(3), "channels": "rg"}, {"points": points(3), "channels": "gb"}],
+            [{"points": make_flat_curve(3), "channels": "r"}] * 4,
+            f"{CURVES}/theta_h",
+            "one to three",
+        ),
+        (
+            f"{CURVES}/theta_h",
+            [{"points": make_flat_curve(3), "channels": "rg"}, {"points": make_flat_curve(3), "channels": "gb"}],
             f"{CURVES}/theta_h/1/channels",
             "no other object",
         ),

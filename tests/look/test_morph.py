@@ -8,7 +8,7 @@ import pytest
 
 from relume.look import complete, default_look
 from relume.look.library.navigation import navigation_map
-from relume.look.morph import morph
+from relume.look.morph import interpolate_looks
 from relume.scene.model import Material
 
 LOBE = {"model": "blinn_phong", "color": [1.0, 1.0, 1.0], "params": {"exponent": 10.0}}
@@ -26,9 +26,9 @@ def ball(document):
 
 def test_keyframes_are_themselves_and_numbers_between_go_evenly():
     first, last = look(), look(environment={"rotation": 90.0, "scale": 3.0})
-    assert morph([first, last], 0.0) == first
-    assert morph([first, last], 1.0) == last
-    between = morph([first, last], 0.25)
+    assert interpolate_looks([first, last], 0.0) == first
+    assert interpolate_looks([first, last], 1.0) == last
+    between = interpolate_looks([first, last], 0.25)
     assert between["environment"]["rotation"] == pytest.approx(22.5)
     assert between["environment"]["scale"] == pytest.approx(1.5)
     assert complete(between, DEFAULT) == between
@@ -38,9 +38,9 @@ def test_what_sliders_move_by_its_logarithm_goes_so():
     last = look()
     last = copy.deepcopy(last)
     ball(last)[1]["params"]["exponent"] = 1000.0
-    assert ball(morph([look(), last], 0.5))[1]["params"]["exponent"] == pytest.approx(100.0)
+    assert ball(interpolate_looks([look(), last], 0.5))[1]["params"]["exponent"] == pytest.approx(100.0)
     ball(last)[1]["params"]["exponent"] = [1000.0, 10.0, 40.0]
-    assert ball(morph([look(), last], 0.5))[1]["params"]["exponent"] == pytest.approx([100.0, 10.0, 20.0])
+    assert ball(interpolate_looks([look(), last], 0.5))[1]["params"]["exponent"] == pytest.approx([100.0, 10.0, 20.0])
 
 
 def test_what_has_nothing_between_changes_half_way_and_stays_valid():
@@ -50,7 +50,7 @@ def test_what_has_nothing_between_changes_half_way_and_stays_valid():
     last = complete(last, DEFAULT)
     last["lights"]["Lamp"] = {"kind": "point", "position": [0.0, 1.0, 0.0], "emission": [1.0, 1.0, 1.0]}
     last = complete(last, DEFAULT)
-    before, after = morph([look(), last], 0.49), morph([look(), last], 0.51)
+    before, after = interpolate_looks([look(), last], 0.49), interpolate_looks([look(), last], 0.51)
     assert (ball(before)[1]["model"], ball(after)[1]["model"]) == ("blinn_phong", "phong")
     assert ("Lamp" in before["lights"], "Lamp" in after["lights"]) == (False, True)
     assert ball(after)[0]["color"] == pytest.approx([0.302, 0.4, 0.498])
@@ -60,15 +60,23 @@ def test_what_has_nothing_between_changes_half_way_and_stays_valid():
 
 def test_many_keyframes_share_the_way_and_whole_numbers_stay_whole():
     keys = [look(transport={"bounces": k}) for k in (0, 8, 2)]
-    assert [morph(keys, share)["transport"]["bounces"] for share in (0.0, 0.25, 0.5, 0.75, 1.0)] == [0, 4, 8, 5, 2]
-    assert morph(keys[:1], 0.7) == keys[0]
+    assert [interpolate_looks(keys, share)["transport"]["bounces"] for share in (0.0, 0.25, 0.5, 0.75, 1.0)] == [
+        0,
+        4,
+        8,
+        5,
+        2,
+    ]
+    assert interpolate_looks(keys[:1], 0.7) == keys[0]
 
 
 def test_drawn_curves_of_as_many_points_go_point_by_point():
     first, last = copy.deepcopy(look()), copy.deepcopy(look())
     ball(first)[1]["curves"] = {"theta_h": {"points": [[0.0, 1.0], [30.0, 0.0]]}}
     ball(last)[1]["curves"] = {"theta_h": {"points": [[0.0, 3.0], [50.0, 0.0]]}}
-    found = ball(morph([complete(first, DEFAULT), complete(last, DEFAULT)], 0.5))[1]["curves"]["theta_h"]["points"]
+    found = ball(interpolate_looks([complete(first, DEFAULT), complete(last, DEFAULT)], 0.5))[1]["curves"]["theta_h"][
+        "points"
+    ]
     assert found == [[0.0, 2.0], [40.0, 0.0]]
 
 
@@ -86,11 +94,11 @@ def test_a_way_across_the_map_goes_through_what_lies_between():
     """Straight in reflectance and in the logarithm of roughness, from and to materials that are not of the map."""
     ends = [look(materials={"Ball": {"terms": of_map(*end)}}) for end in ((0.9, 0.02, 0.05), (0.1, 0.5, 0.45))]
     for share, end in ((0.0, ends[0]), (1.0, ends[1])):
-        assert ball(morph(ends, share, "map"))[1]["params"] == ball(end)[1]["params"]
-    nearly = [ball(morph(ends, share, "map")) for share in (1e-9, 1 - 1e-9)]
+        assert ball(interpolate_looks(ends, share, "map"))[1]["params"] == ball(end)[1]["params"]
+    nearly = [ball(interpolate_looks(ends, share, "map")) for share in (1e-9, 1 - 1e-9)]
     for found, end in zip(nearly, ends, strict=True):
         np.testing.assert_allclose([t["color"] for t in found], [t["color"] for t in ball(end)], atol=1e-6)
-    between = morph(ends, 0.5, "map")
+    between = interpolate_looks(ends, 0.5, "map")
     assert complete(between, DEFAULT) == between
     params = ball(between)[1]["params"]
     assert params["sigma"] == pytest.approx(0.15)
@@ -107,4 +115,4 @@ def test_a_way_across_the_map_goes_through_what_lies_between():
 def test_what_is_not_of_the_map_goes_from_parameter_to_parameter():
     last = copy.deepcopy(look())
     ball(last)[1]["params"]["exponent"] = 1000.0
-    assert morph([look(), last], 0.3, "map") == morph([look(), last], 0.3)
+    assert interpolate_looks([look(), last], 0.3, "map") == interpolate_looks([look(), last], 0.3)

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from relume.light.local import rectangle
 from relume.look import complete, validate
-from relume.look.turned import with_turned_light, with_turned_sky
+from relume.look.turned import rotated_environment, rotated_lights
 
 MIDDLE = [1.0, 2.0, -3.0]
 PANEL = {"kind": "rectangle", "position": [2.0, 3.0, 1.0], "rotation": 25.0, "size": [0.5, 1.5]}
@@ -16,7 +16,7 @@ PANEL = {"kind": "rectangle", "position": [2.0, 3.0, 1.0], "rotation": 25.0, "si
 @pytest.mark.parametrize("degrees", [70.0, 500.0, -30.0])
 def test_a_panel_turns_as_a_whole(default, direction, degrees):
     document = complete({"lights": {"Sheet": {**PANEL, "direction": direction}}}, default)
-    lit, turned = (validate(of, default) for of in (document, with_turned_light(document, degrees, MIDDLE)))
+    lit, turned = (validate(of, default) for of in (document, rotated_lights(document, degrees, MIDDLE)))
     before, after = (rectangle(look.lights["Sheet"].geometry) for look in (lit, turned))
     turn = Rotation.from_euler("y", degrees, degrees=True)
     np.testing.assert_allclose(after[0], MIDDLE + turn.apply(before[0] - MIDDLE), atol=1e-9)
@@ -27,6 +27,6 @@ def test_a_panel_turns_as_a_whole(default, direction, degrees):
 
 def test_a_sky_alone_turns_further_than_it_was(default):
     document = complete({"environment": {"rotation": 350.0}}, default)
-    turned = validate(with_turned_sky(document, 30.0), default)
+    turned = validate(rotated_environment(document, 30.0), default)
     assert turned.environment.rotation == pytest.approx(20)
     assert turned.lights == validate(document, default).lights

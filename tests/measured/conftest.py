@@ -2,11 +2,11 @@
 
 import pytest
 from leaves import by_leaves
-from merl_files import planes_of
+from merl_files import make_planes
 from shared_bakes import baked, corner, gathered, transfer
 
-from relume.measured.asset_store import STORE, keep, records
-from relume.measured.lookup import table_of
+from relume.measured.asset_store import STORE, records, store_material
+from relume.measured.lookup import build_table
 from relume.measured.merl import write_merl
 
 __all__ = ["baked", "by_leaves", "corner", "gathered", "transfer"]  # fixtures
@@ -14,16 +14,16 @@ __all__ = ["baked", "by_leaves", "corner", "gathered", "transfer"]  # fixtures
 
 @pytest.fixture(scope="session")
 def planes():
-    made = planes_of()
-    made.flags.writeable = False
-    return made
+    measured_planes = make_planes()
+    measured_planes.flags.writeable = False
+    return measured_planes
 
 
 @pytest.fixture(scope="session")
 def table(planes):
-    made = table_of(planes)
-    made.flags.writeable = False
-    return made
+    merl_table = build_table(planes)
+    merl_table.flags.writeable = False
+    return merl_table
 
 
 @pytest.fixture(scope="session")
@@ -31,8 +31,8 @@ def shelf(planes, tmp_path_factory):
     """A folder with one imported material, in use."""
     folder = tmp_path_factory.mktemp("measured")
     write_merl(folder / "plastic.binary", planes)
-    with STORE.at(folder / "materials") as materials:
-        keep(materials, folder / "plastic.binary", "Plastic")
+    with STORE.with_search_folder(folder / "materials") as materials:
+        store_material(materials, folder / "plastic.binary", "Plastic")
         yield materials
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from merl_files import PLASTIC, planes_of
+from merl_files import PLASTIC, make_planes
 from test_lookup import directions
 
 from relume.brdf.curves import curve_bands
@@ -10,8 +10,8 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.merl_grid import sample_terms
 from relume.brdf.registry import TERMS
 from relume.errors import MaterialError
-from relume.measured.asset_store import STORE, keep
-from relume.measured.lookup import measured_brdf, table_of
+from relume.measured.asset_store import STORE, store_material
+from relume.measured.lookup import build_table, evaluate_measured
 from relume.measured.merl import grid_directions, is_measured, read_merl, write_merl
 
 
@@ -19,7 +19,7 @@ from relume.measured.merl import grid_directions, is_measured, read_merl, write_
 def edited(data):
     diffuse = {"model": "measured_lv", "data": data, "color": [0.2, 1.0, 1.5]}
     specular = {"model": "measured_hd", "data": data, "color": [1.0, 1.0, 1.0]}
-    curve = TERMS["measured_hd"].settled(specular).curve("theta_h")
+    curve = TERMS["measured_hd"].normalized(specular).curve("theta_h")
     drawn = 2 * curve_bands(specular, curve)
     return [diffuse, {**specular, "curves": {"theta_h": {"bands": drawn.tolist(), "channels": "rg"}}}]
 
@@ -34,7 +34,7 @@ def test_an_unedited_material_is_exported_as_it_was_measured(data, planes):
 
 def test_an_edited_material_is_the_same_when_it_is_imported_again(shelf, edited, tmp_path):
     write_merl(tmp_path / "edited.binary", sample_terms(edited))
-    again = keep(shelf, tmp_path / "edited.binary", "Edited")
+    again = store_material(shelf, tmp_path / "edited.binary", "Edited")
     try:
         wi, wo = grid_directions()
         kept = is_measured(read_merl(tmp_path / "edited.binary"))
@@ -49,13 +49,13 @@ def test_between_the_nodes_an_edited_export_is_near_the_edit(edited):
     rng = np.random.default_rng(1)
     wi, wo = directions(rng, 5000, 0.3), directions(rng, 5000, 0.3)
     expected = sum(eval_brdf(term, wi, wo) for term in edited)
-    found = measured_brdf(table_of(sample_terms(edited)), wi, wo)
+    found = evaluate_measured(build_table(sample_terms(edited)), wi, wo)
     # linear between nodes up to 2° apart, of curves that step from band to band
     assert np.sqrt(np.mean((found - expected) ** 2)) < 0.01 * np.sqrt(np.mean(expected**2))
 
 
 def test_analytic_terms_are_exported_too():
-    np.testing.assert_allclose(sample_terms(PLASTIC), planes_of(PLASTIC), rtol=1e-12)
+    np.testing.assert_allclose(sample_terms(PLASTIC), make_planes(PLASTIC), rtol=1e-12)
 
 
 def test_what_a_merl_file_cannot_hold_is_refused():

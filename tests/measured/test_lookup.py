@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from merl_files import PLASTIC, planes_of
+from merl_files import PLASTIC, make_planes
 
 from relume.brdf.evaluate import eval_brdf
-from relume.measured.factors import FLOOR, factorise, rank_one
-from relume.measured.lookup import NUM_KNOTS, Part, measured_brdf, quotients, table_of
+from relume.measured.factors import FLOOR, factorize, factorize_rank_one
+from relume.measured.lookup import NUM_KNOTS, QuotientKind, build_table, evaluate_measured, measured_over_model
 from relume.measured.merl import CHANNEL_SCALE, grid_directions, is_measured
 
 
@@ -61,33 +61,33 @@ def twin_quotient(part, table, curves, wi, wo):
     i, o = (np.arccos(v[:, 2]) / (np.pi / 2) * 90 for v in (wi, wo))
     product = twin_curve(curves[0], i) * twin_curve(curves[3], o)
     match part:
-        case Part.WHOLE:
+        case QuotientKind.WHOLE:
             return value
-        case Part.DIFFUSE:
+        case QuotientKind.DIFFUSE:
             return np.minimum(value, product) / product
-        case Part.SPECULAR:
+        case QuotientKind.SPECULAR:
             return np.maximum(value - product, 0) / (twin_curve(curves[1], h) * twin_curve(curves[2], d))
-        case Part.HOMOMORPHIC:
+        case QuotientKind.HOMOMORPHIC:
             return value / (product * twin_curve(curves[1], h))
 
 
 @pytest.fixture(scope="module")
 def factors(planes, table):
-    return factorise(planes, table)
+    return factorize(planes, table)
 
 
 def test_nodes_have_the_stored_values(planes, table):
     wi, wo = grid_directions()
     nodes = is_measured(planes) & (wi[..., 2] > 1e-6) & (wo[..., 2] > 1e-6)
     expected = np.moveaxis(planes, 0, -1)[nodes] * CHANNEL_SCALE
-    np.testing.assert_allclose(measured_brdf(table, wi[nodes], wo[nodes]), expected, rtol=2e-6, atol=1e-9)
+    np.testing.assert_allclose(evaluate_measured(table, wi[nodes], wo[nodes]), expected, rtol=2e-6, atol=1e-9)
 
 
 def test_between_the_nodes_it_is_near_what_was_sampled(table):
     rng = np.random.default_rng(1)
     wi, wo = directions(rng, 20_000, 0.3), directions(rng, 20_000, 0.3)
     expected = sum(eval_brdf(document, wi, wo) for document in PLASTIC)
-    found = measured_brdf(table, wi, wo)
+    found = evaluate_measured(table, wi, wo)
     # linear over at most 2°, Δ²/8 · f''/f with a lobe that changes e-fold within about 10°: half a per cent
     assert np.abs(found - expected).max() < 0.02 * expected.max()
     assert np.sqrt(np.mean((found - expected) ** 2)) < 5e-3 * np.sqrt(np.mean(expected**2))
@@ -96,38 +96,38 @@ def test_between_the_nodes_it_is_near_what_was_sampled(table):
 def test_it_is_reciprocal_and_turns_with_the_surface(table):
     rng = np.random.default_rng(2)
     wi, wo = directions(rng, 2000, 1e-3), directions(rng, 2000, 1e-3)
-    value = measured_brdf(table, wi, wo)
-    np.testing.assert_allclose(measured_brdf(table, wo, wi), value, rtol=1e-6, atol=1e-9)
+    value = evaluate_measured(table, wi, wo)
+    np.testing.assert_allclose(evaluate_measured(table, wo, wi), value, rtol=1e-6, atol=1e-9)
     angle = rng.uniform(0, 2 * np.pi, 2000)
     np.testing.assert_allclose(
-        measured_brdf(table, rotated(wi, 2, angle), rotated(wo, 2, angle)), value, rtol=1e-6, atol=1e-9
+        evaluate_measured(table, rotated(wi, 2, angle), rotated(wo, 2, angle)), value, rtol=1e-6, atol=1e-9
     )
 
 
-@pytest.mark.parametrize("part", list(Part))
+@pytest.mark.parametrize("part", list(QuotientKind))
 def test_quotients_equal_their_twin(table, factors, part):
     rng = np.random.default_rng(3)
     wi, wo = directions(rng, 5000, 1e-3), directions(rng, 5000, 1e-3)
-    curves = factors.homomorphic if part is Part.HOMOMORPHIC else factors.lobes
-    found = quotients(part, table, curves, *wi.T, *wo.T)
+    curves = factors.homomorphic if part is QuotientKind.HOMOMORPHIC else factors.lobes
+    found = measured_over_model(part, table, curves, *wi.T, *wo.T)
     expected = twin_quotient(part, table, curves, wi, wo)
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7 * expected.max())
 
 
-@pytest.mark.parametrize("part", list(Part))
+@pytest.mark.parametrize("part", list(QuotientKind))
 def test_quotients_are_bounded_and_zero_below_the_horizon(table, factors, part):
-    curves = factors.homomorphic if part is Part.HOMOMORPHIC else factors.lobes
+    curves = factors.homomorphic if part is QuotientKind.HOMOMORPHIC else factors.lobes
     rng = np.random.default_rng(4)
     for dtype in (np.float32, np.float64):
         wi, wo = directions(rng, 3000).astype(dtype).T, directions(rng, 3000).astype(dtype).T
         wi[2, :500] = np.geomspace(1e-30, 1e-3, 500)
-        value = quotients(part, table, curves, *wi, *wo)
+        value = measured_over_model(part, table, curves, *wi, *wo)
         assert value.dtype == dtype
         assert np.isfinite(value).all()
         assert (value >= 0).all()
         down = wi * np.array([[1], [1], [-1]], dtype)
         for a, b in ((down, wo), (wo, down), (down, down)):
-            assert not quotients(part, table, curves, *a, *b).any()
+            assert not measured_over_model(part, table, curves, *a, *b).any()
 
 
 def test_curves_can_be_divided_by(factors):
@@ -139,12 +139,12 @@ def test_curves_can_be_divided_by(factors):
 
 def test_a_separable_material_is_factorised_without_rest():
     """Lambert, and a lobe that is a product of θh and θd by construction."""
-    planes = planes_of(({"model": "blinn_phong", "color": [3.0, 2.0, 1.0], "params": {"exponent": 20.0}},))
-    table = table_of(planes)
-    found = factorise(planes, table)
+    planes = make_planes(({"model": "blinn_phong", "color": [3.0, 2.0, 1.0], "params": {"exponent": 20.0}},))
+    table = build_table(planes)
+    found = factorize(planes, table)
     np.testing.assert_allclose(found.homomorphic_error, 0, atol=0.02)
-    lambert = planes_of(({"model": "lambert", "color": [0.5, 0.2, 0.0]},))
-    found = factorise(lambert, table_of(lambert))
+    lambert = make_planes(({"model": "lambert", "color": [0.5, 0.2, 0.0]},))
+    found = factorize(lambert, build_table(lambert))
     np.testing.assert_allclose(found.lobes_error, 0, atol=2e-3)
     np.testing.assert_allclose(found.homomorphic_error[:2], 0, atol=1e-3)
     np.testing.assert_allclose(found.lobes[0, 0] * found.lobes[3, 0], 0.5 / np.pi, rtol=2e-3)
@@ -163,11 +163,11 @@ def test_rank_one_finds_the_factors_and_leaves_a_quotient_of_one():
     rng = np.random.default_rng(5)
     u, v, weight = rng.uniform(0.1, 9, 30), rng.uniform(0.1, 1, 20), rng.uniform(0.5, 1, (30, 20))
     v /= v.max()
-    found_u, found_v = rank_one(np.outer(u, v), weight)
+    found_u, found_v = factorize_rank_one(np.outer(u, v), weight)
     np.testing.assert_allclose(found_u, u, rtol=1e-9)
     np.testing.assert_allclose(found_v, v, rtol=1e-9)
     noisy = np.outer(u, v) * rng.uniform(0.5, 1.5, (30, 20))
-    found_u, found_v = rank_one(noisy, weight)
+    found_u, found_v = factorize_rank_one(noisy, weight)
     quotient = noisy / np.outer(found_u, found_v)
     np.testing.assert_allclose((quotient * weight).sum(axis=0) / weight.sum(axis=0), 1, rtol=1e-6)
     np.testing.assert_allclose((quotient * weight).sum(axis=1) / weight.sum(axis=1), 1, rtol=1e-6)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from merl_files import PLASTIC, planes_of
+from merl_files import PLASTIC, make_planes
 from oracle import exact_image
-from sessions import relative_rmse, settle
+from sessions import relative_rmse, run_until_exact
 from test_lookup import directions
 from tiny_scenes import still_life
 
@@ -13,16 +13,16 @@ from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
 from relume.look import default_look, validate
-from relume.measured.asset_store import STORE, keep
-from relume.measured.lookup import measured_brdf
+from relume.measured.asset_store import STORE, store_material
+from relume.measured.lookup import evaluate_measured
 from relume.measured.merl import write_merl
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
 from relume.picture.picture import Picture
 from relume.reference import reference_image
 from relume.render.image import render_image
-from relume.store import bake_here
+from relume.store import bake_in_process
 from server.live.state.pointers import find_curve
 
 LOBES, HOMOMORPHIC = ("measured_lv", "measured_hd"), ("measured_hf",)
@@ -38,7 +38,7 @@ def total(documents, wi, wo):
 
 
 def settled_curve(document, name):
-    return TERMS[document["model"]].settled(document).curve(name)
+    return TERMS[document["model"]].normalized(document).curve(name)
 
 
 @pytest.mark.parametrize("models", [LOBES, HOMOMORPHIC])
@@ -47,7 +47,7 @@ def test_unedited_terms_add_up_to_the_measurement(data, table, models):
     wi, wo = directions(rng, 20_000), directions(rng, 20_000)
     wi[:5] = wo[:5] = np.array([0.0, 0.0, 1.0])
     found = total(material_of(models, data), wi, wo)
-    expected = measured_brdf(table, wi, wo)
+    expected = evaluate_measured(table, wi, wo)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * expected.max())
 
 
@@ -109,7 +109,8 @@ def scene():
 def transfer(scene, tmp_path_factory):
     folder = tmp_path_factory.mktemp("frames")
     return open_transfer(
-        bake_here(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 4000), folder / "s"), Memory(1 << 30)
+        bake_in_process(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 4000), folder / "s"),
+        Cache(1 << 30),
     )
 
 
@@ -148,18 +149,18 @@ def test_brute_force_of_the_unedited_material_is_that_of_what_was_measured(scene
 
 def test_a_live_edit_of_a_measured_curve_ends_where_a_fresh_picture_begins(transfer, data):
     pointer = "/materials/Ball/terms/1/curves/theta_h"
-    picture = Picture(transfer, "front", Memory(1 << 30))
+    picture = Picture(transfer, "front", Cache(1 << 30))
     picture.set_look(look_with(transfer, material_of(LOBES, data)))
-    before = settle(picture).image().copy()
-    picture.touch(pointer)
-    settle(picture)
+    before = run_until_exact(picture).image().copy()
+    picture.prepare(pointer)
+    run_until_exact(picture)
     np.testing.assert_allclose(picture.image(), before, rtol=1e-4, atol=1e-5 * before.max())
     bands, generated = picture.curve(pointer)
     np.testing.assert_array_equal(bands, generated)
     doubled = {"measured_hd": {"curves": {"theta_h": {"bands": (2 * bands).tolist()}}}}
     edited = look_with(transfer, material_of(LOBES, data, **doubled))
     picture.set_look(edited)
-    after = settle(picture).image().copy()
+    after = run_until_exact(picture).image().copy()
     np.testing.assert_allclose(after, exact_image(transfer, edited), rtol=1e-4, atol=1e-5 * after.max())
     without = look_with(transfer, material_of(LOBES[:1], data))
     diffuse = exact_image(transfer, without)
@@ -167,15 +168,15 @@ def test_a_live_edit_of_a_measured_curve_ends_where_a_fresh_picture_begins(trans
 
 
 def test_another_material_is_another_operator(transfer, shelf, data, tmp_path):
-    write_merl(tmp_path / "red.binary", planes_of(({"model": "lambert", "color": [0.9, 0.0, 0.0]},)))
-    red = keep(shelf, tmp_path / "red.binary", "Red")
+    write_merl(tmp_path / "red.binary", make_planes(({"model": "lambert", "color": [0.9, 0.0, 0.0]},)))
+    red = store_material(shelf, tmp_path / "red.binary", "Red")
     try:
-        picture = Picture(transfer, "front", Memory(1 << 30))
+        picture = Picture(transfer, "front", Cache(1 << 30))
         picture.set_look(look_with(transfer, material_of(LOBES, data)))
-        settle(picture)
+        run_until_exact(picture)
         look = look_with(transfer, material_of(LOBES, red.data))
         picture.set_look(look)
-        np.testing.assert_array_equal(settle(picture).image(), exact_image(transfer, look))
+        np.testing.assert_array_equal(run_until_exact(picture).image(), exact_image(transfer, look))
         view = transfer.views["front"]
         inside = (view.material_ids() == 2) & (np.bincount(view.pixel).reshape(36, 48) == 1)
         assert picture.image()[inside, 0].all()

@@ -10,7 +10,7 @@ import pytest
 from relume.brdf.document import complete_term
 from relume.errors import MaterialError, NotFoundError, ParameterError
 from relume.measured import asset_store as shelves
-from relume.measured.asset_store import STORE, get_record, keep, material, records
+from relume.measured.asset_store import STORE, get_record, load_material, records, store_material
 from relume.measured.merl import write_merl
 
 
@@ -29,20 +29,20 @@ def test_an_import_is_listed_and_can_be_used(shelf, data, table, planes):
     assert max(record.lobes_error) < 0.2
     models = [(term["model"], term["data"], term["texture"]) for term in record.terms()]
     assert models == [("measured_lv", data, None), ("measured_hd", data, None)]
-    np.testing.assert_array_equal(material(data).table, table)
-    assert not material(data).table.flags.writeable
+    np.testing.assert_array_equal(load_material(data).table, table)
+    assert not load_material(data).table.flags.writeable
     assert sorted(path.name for path in shelf.iterdir()) == [record.id]
 
 
 def test_the_source_is_kept_bit_for_bit(shelf, data, planes, tmp_path):
     write_merl(tmp_path / "again.binary", planes)
-    assert shelves.source_of(data).read_bytes() == (tmp_path / "again.binary").read_bytes()
+    assert shelves.source_path(data).read_bytes() == (tmp_path / "again.binary").read_bytes()
 
 
 def test_the_same_file_again_is_the_same_material_under_its_newest_name(copied):
     folder, identity = copied
     created = get_record(folder, identity).created
-    keep(folder, folder / identity / "measured.binary", "Renamed")
+    store_material(folder, folder / identity / "measured.binary", "Renamed")
     (record,) = records(folder)
     assert (record.id, record.name, record.created) == (identity, "Renamed", created)
 
@@ -55,17 +55,17 @@ def test_another_file_of_the_same_id_is_not_taken_for_it(copied, planes, tmp_pat
     assert kept["sha256"][:16] == identity
     record.write_text(json.dumps({**kept, "sha256": identity + "0" * 48}))
     with pytest.raises(MaterialError, match=f"another file is the measured material {identity}; delete that one first"):
-        keep(folder, tmp_path / "a.binary", "Mine")
+        store_material(folder, tmp_path / "a.binary", "Mine")
     assert get_record(folder, identity).name == kept["name"]
     del kept["sha256"]  # as it was kept before
     record.write_text(json.dumps(kept))
-    keep(folder, tmp_path / "a.binary", "Mine")
+    store_material(folder, tmp_path / "a.binary", "Mine")
 
 
 def test_a_bad_file_leaves_nothing_behind(tmp_path):
     (tmp_path / "bad.binary").write_bytes(b"no")
     with pytest.raises(MaterialError):
-        keep(tmp_path / "materials", tmp_path / "bad.binary", "Bad")
+        store_material(tmp_path / "materials", tmp_path / "bad.binary", "Bad")
     assert not (tmp_path / "materials").exists()
 
 
@@ -75,7 +75,7 @@ def test_a_full_shelf_says_so(shelf, tmp_path, planes, monkeypatch):
     other[0, 0, 0, 0] += 1
     write_merl(tmp_path / "other.binary", other)
     with pytest.raises(MaterialError, match="delete one first"):
-        keep(shelf, tmp_path / "other.binary", "Other")
+        store_material(shelf, tmp_path / "other.binary", "Other")
 
 
 def test_what_is_removed_is_known_no_more(copied):
@@ -92,20 +92,20 @@ def test_what_is_removed_is_known_no_more(copied):
     "name", ["", "merl:", "merl:../../../etc/passwd", "merl:0000000000000000", "0000000000000000", "merl:" + "G" * 16]
 )
 def test_only_names_of_imported_materials_are_known(shelf, name):
-    assert not STORE.is_known(name)
+    assert not STORE.exists(name)
     with pytest.raises(NotFoundError):
-        material(name)
+        load_material(name)
 
 
 def test_names_are_known_while_their_folder_is_in_use(shelf, data, copied):
     folder, identity = copied
     (folder / identity).rename(folder / "fedcba9876543210")
     name = "merl:fedcba9876543210"
-    assert not STORE.is_known(name)
-    with STORE.at(folder):
-        assert STORE.is_known(name)
-        assert set(STORE.known_names()) >= {name, data}
-    assert not STORE.is_known(name)
+    assert not STORE.exists(name)
+    with STORE.with_search_folder(folder):
+        assert STORE.exists(name)
+        assert set(STORE.list_names()) >= {name, data}
+    assert not STORE.exists(name)
 
 
 def change(document, key, value):
@@ -130,8 +130,8 @@ def test_damaged_files_are_named(copied, file, content):
     path = folder / identity / file
     path.write_bytes(content(json.loads((folder / identity / "material.json").read_text())))
     (folder / identity).rename(folder / "fedcba9876543210")
-    with STORE.at(folder), pytest.raises(MaterialError, match="import it again"):
-        material("merl:fedcba9876543210")
+    with STORE.with_search_folder(folder), pytest.raises(MaterialError, match="import it again"):
+        load_material("merl:fedcba9876543210")
 
 
 def test_a_look_names_known_data_for_measured_terms_and_no_other(data):

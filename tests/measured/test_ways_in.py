@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
-from merl_files import planes_of
+from merl_files import make_planes
 from PIL import Image
 
 from cli.main import main
@@ -21,7 +21,7 @@ RED = ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)
 @pytest.fixture(scope="module")
 def red(tmp_path_factory):
     path = tmp_path_factory.mktemp("red") / "red.binary"
-    write_merl(path, planes_of(RED))
+    write_merl(path, make_planes(RED))
     return path
 
 

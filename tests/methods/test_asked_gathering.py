@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from sessions import relative_rmse
 from shared_bakes import unmeasured
-from tiny_scenes import looking, quad, scene_of
+from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.bake import Recipe
 from relume.errors import PlanError
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.render.image import render_image
-from relume.store import bake_here, open_store
+from relume.store import bake_in_process, open_store
 from worker.status import recipe_from_json, recipe_json
 
 __all__ = ["unmeasured"]  # a fixture
@@ -31,7 +31,7 @@ def corner():
         quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
         quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 2, -1], [-1, 2, -1]], 1),
     ]
-    return scene_of(*parts, camera=looking("front", [0, 0.7, 2.4], [0, 0.5, -0.5], 0.5))
+    return make_tiny_scene(*parts, camera=make_camera("front", [0, 0.7, 2.4], [0, 0.5, -0.5], 0.5))
 
 
 def recipe_of(method: str, **asked: int) -> Recipe:
@@ -41,14 +41,14 @@ def recipe_of(method: str, **asked: int) -> Recipe:
 @pytest.mark.parametrize("method", GATHERING)
 def test_a_store_has_as_many_as_its_recipe_asks_for(corner, tmp_path: Path, method: str) -> None:
     recipe = recipe_of(method, gather_samples=200, gather_rays=100)
-    path = bake_here(METHODS[method], corner, recipe, tmp_path / "s.zarr")
+    path = bake_in_process(METHODS[method], corner, recipe, tmp_path / "s.zarr")
     store = open_store(path)
     links = "views/0/links" if method == "gather" else "points/links"
     assert store.shape(links)[1] == 100
     assert 150 <= store.shape("cells/material")[0] <= 200
     if method == "gather":
-        usual = bake_here(METHODS[method], corner, recipe_of(method), tmp_path / "t.zarr")
-        few, plenty = (open_transfer(of, Memory(1 << 30)) for of in (path, usual))
+        usual = bake_in_process(METHODS[method], corner, recipe_of(method), tmp_path / "t.zarr")
+        few, plenty = (open_transfer(of, Cache(1 << 30)) for of in (path, usual))
         look = validate({"transport": {"show": "reflected"}}, few.default_look)
         assert relative_rmse(*(render_image(transfer, "front", look) for transfer in (few, plenty))) < 0.08
 

@@ -9,19 +9,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shared_bakes import unmeasured
-from tiny_scenes import looking, quad, scene_of, sphere, studio
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
 from relume import memory as memories
 from relume.bake import Recipe
 from relume.errors import DiskBudgetError, DiskFullError
 from relume.folders import folder_bytes
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods import disk
-from relume.methods.disk import SMALL_BYTES, disk_of
+from relume.methods.disk import SMALL_BYTES, estimate_disk
 from relume.methods.registry import METHODS
 from relume.scene.cornell import cornell_box
 from relume.scene.model import Glass, Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 from relume.store.room import scratch_file
 from relume.store.writer import create_store
 from worker.budget import check_budget
@@ -41,19 +41,19 @@ def glasses():
         Material("Ball", (clear,), glass=Glass(thickness=0.8, absorbed=(2.0, 0.2, 0.2))),
         Material("Pane", (clear,), glass=Glass(tint=(0.4, 0.9, 0.6))),
     ]
-    camera = looking("front", (0, 0.4, 4), (0, 0, 0), 0.6)
-    ball = sphere("ball", [-0.7, -0.3, 0], 0.6, 1, rings=24)
-    return scene_of(floor, ball, pane, camera=camera, environment=studio(), materials=materials)
+    camera = make_camera("front", (0, 0.4, 4), (0, 0, 0), 0.6)
+    ball = sphere("ball", [-0.7, -0.3, 0], 0.6, 1, num_rings=24)
+    return make_tiny_scene(floor, ball, pane, camera=camera, environment=studio(), materials=materials)
 
 
 @pytest.fixture(autouse=True)
 def nothing_was_tried(monkeypatch):
-    monkeypatch.setattr(memories._Assets, "memory", Memory(1 << 20))
+    monkeypatch.setattr(memories._AssetCache, "cache", Cache(1 << 20))
 
 
 def planned(scene, recipe):
     plan = METHODS[recipe.method].plan(scene, recipe)
-    found = disk_of(METHODS[recipe.method], scene, recipe, plan)
+    found = estimate_disk(METHODS[recipe.method], scene, recipe, plan)
     return replace(plan, disk_bytes=found.store, scratch_bytes=found.scratch)
 
 
@@ -69,7 +69,10 @@ def planned(scene, recipe):
 )
 def test_fixed_views_take_a_third_of_their_plan_at_least_and_never_more(make, recipe, tmp_path):
     scene = make()
-    plan, taken = planned(scene, recipe), folder_bytes(bake_here(METHODS[recipe.method], scene, recipe, tmp_path / "s"))
+    plan, taken = (
+        planned(scene, recipe),
+        folder_bytes(bake_in_process(METHODS[recipe.method], scene, recipe, tmp_path / "s")),
+    )
     assert plan.store_bytes > SMALL_BYTES
     assert taken <= plan.planned_bytes <= 3 * taken
 
@@ -78,7 +81,10 @@ def test_fixed_views_take_a_third_of_their_plan_at_least_and_never_more(make, re
 @pytest.mark.parametrize("make", [glasses, lambda: cornell_box("sky")], ids=["glass", "box"])
 def test_so_do_points_of_the_free_camera(make, tmp_path, unmeasured):
     scene, recipe = make(), Recipe("surface", ("front",), (64, 48), 300, num_points=30_000)
-    plan, taken = planned(scene, recipe), folder_bytes(bake_here(METHODS["surface"], scene, recipe, tmp_path / "s"))
+    plan, taken = (
+        planned(scene, recipe),
+        folder_bytes(bake_in_process(METHODS["surface"], scene, recipe, tmp_path / "s")),
+    )
     assert taken <= plan.planned_bytes <= 3 * taken
 
 
@@ -95,7 +101,7 @@ def test_a_scene_of_glass_is_baked_where_its_bound_does_not_fit(tmp_path, monkey
 def test_a_plan_that_is_asked_for_again_tries_nothing(monkeypatch):
     scene, recipe = glasses(), Recipe("direct", ("front",), (240, 180), 300)
     first = planned(scene, recipe)
-    monkeypatch.setattr(disk, "bake_here", lambda *_: pytest.fail("baked again"))
+    monkeypatch.setattr(disk, "bake_in_process", lambda *_: pytest.fail("baked again"))
     assert planned(scene, recipe) == first
     larger = planned(scene, replace(recipe, size=(480, 360), num_lights=2000))
     assert larger.planned_bytes > 3 * first.planned_bytes
@@ -103,13 +109,13 @@ def test_a_plan_that_is_asked_for_again_tries_nothing(monkeypatch):
 
 def test_small_bounds_are_plans_and_so_are_those_where_nothing_can_be_tried(monkeypatch):
     scene, small = glasses(), Recipe("direct", ("front",), (64, 48), 100)
-    monkeypatch.setattr(disk, "bake_here", lambda *_: pytest.fail("tried"))
+    monkeypatch.setattr(disk, "bake_in_process", lambda *_: pytest.fail("tried"))
     assert planned(scene, small).planned_bytes == METHODS["direct"].plan(scene, small).store_bytes
 
     def no_room(*_):
         raise OSError("no room")
 
-    monkeypatch.setattr(disk, "bake_here", no_room)
+    monkeypatch.setattr(disk, "bake_in_process", no_room)
     large = replace(small, size=(240, 180))
     assert planned(scene, large).planned_bytes == METHODS["direct"].plan(scene, large).store_bytes
 

@@ -10,58 +10,58 @@ import numpy as np
 import pytest
 import twins
 from analytic_terms import ANALYTIC
-from oracle import rendered_afresh
-from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
-from tiny_scenes import looking, quad, scene_of
+from oracle import render_uncached
+from sessions import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.basis.zernike import SENT_DEGREE
-from relume.brdf.albedo import reflectance, reflectances_of, shares_in
+from relume.basis.zernike import OUTGOING_DEGREE
+from relume.brdf.albedo import pack_reflectance, reflectance, unpack_reflectance
 from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions
-from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of, weight_of
-from relume.light.triangles import subdivide
-from relume.look import Paths, validate
-from relume.memory import Memory
-from relume.methods.cells.between import sent_between
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.reflecting import Arrived
+from relume.light.gather_rays import lattice_offsets, local_ray, make_pattern, ray_weight
+from relume.light.triangles import tessellate_environment
+from relume.look import LightPaths, validate
+from relume.memory import Cache
+from relume.methods.cells.between import solve_indirect
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.reflecting import IncidentLight
 from relume.methods.registry import open_transfer
-from relume.picture.light import light_of
+from relume.picture.light import illumination_from_look
 from relume.picture.picture import Picture
-from relume.picture.routes.preview import Preview
+from relume.picture.routes.preview import SparsePreview
 from relume.project.contraction import contract
 from relume.project.projector import Projector
-from relume.project.receivers import GatherRays, Receivers
+from relume.project.receivers import GatherRays, ShadingPoints
 from relume.project.sent import SIDE
-from relume.reference import Points, texels_of
+from relume.reference import ReferencePoints, environment_texels
 from relume.reference.indirect import reference_indirect
-from relume.reference.radiance import lobes_of
+from relume.reference.radiance import material_lobes
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.trace.cell_tree import NO_CELL
-from relume.trace.cells import gather_samples_of
-from relume.trace.geometry import merge
+from relume.trace.cell_tree import NO_PATCH
+from relume.trace.cells import patch_sample_points
+from relume.trace.geometry import build_scene_buffers
 
 NUM_CELLS = 90
-CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.outgoing]
+CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
 PLAIN = {"texture": None, "params": {}, "curves": {}}
 REFLECTANCES = (
-    reflectances_of([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}]),
-    reflectances_of(
+    pack_reflectance([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}]),
+    pack_reflectance(
         [
             {**PLAIN, "model": "lambert", "color": [0.6, 0.2, 0.4], "texture": "diffuse"},
             {**PLAIN, "model": "blinn_phong", "color": [0.1, 0.1, 0.2], "params": {"exponent": 30.0}},
         ]
     ),
 )
-BLACK = reflectances_of([])
+BLACK = pack_reflectance([])
 
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(np.random.default_rng(3).random((16, 32, 3), np.float32), 40)
+    return tessellate_environment(np.random.default_rng(3).random((16, 32, 3), np.float32), 40)
 
 
 @pytest.fixture(scope="module")
@@ -71,19 +71,23 @@ def cells(lights):
     visible = rng.integers(0, 256, (NUM_CELLS, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
     links = rng.integers(0, NUM_CELLS, (NUM_CELLS, 16)).astype(np.uint16)
     material = rng.integers(0, 2, NUM_CELLS).astype(np.uint16)
-    points = gather_samples_of(normal, normal)
-    return CellLight(points, visible, links, make_pattern(4, 0, 9), material, rng.random((2, NUM_CELLS, 3), np.float32))
+    points = patch_sample_points(normal, normal)
+    return PatchLight(
+        points, visible, links, make_pattern(4, 0, 9), material, rng.random((2, NUM_CELLS, 3), np.float32)
+    )
 
 
 def sent_by_cells(cells, lights, first=1, last=24, reflectances=REFLECTANCES):
-    reflecting = cells.reflecting(reflectances)
-    vectors = cells.vectors(reflecting.rows, lights, SENT_DEGREE)
-    return sent_between(cells, reflecting, Arrived(cells.irradiance(lights), vectors), first, last).sent(cells)
+    reflecting = cells.reflectance_operator(reflectances)
+    vectors = cells.incident_coefficients(reflecting.rows, lights, OUTGOING_DEGREE)
+    return solve_indirect(
+        cells, reflecting, IncidentLight(cells.irradiance(lights), vectors), first, last
+    ).outgoing_light(cells)
 
 
 def by_square(sent):
     """All that is sent, in every direction that is told apart. (cells, squares, 3)"""
-    found = np.repeat(sent.even[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
+    found = np.repeat(sent.isotropic[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
     has = sent.lobe[:NUM_CELLS] >= 0
     found[has] += (sent.scale[:, None] * sent.table)[sent.lobe[:NUM_CELLS][has]]
     return found
@@ -93,18 +97,18 @@ def by_square(sent):
 def receivers(cells, lights):
     """Points in the dark but for reflected light; a tenth of the rays finds nothing."""
     rng = np.random.default_rng(5)
-    dark = twins.make_receivers(30, lights.num_lights, seed=6)
+    dark = twins.make_random_receivers(30, lights.num_lights, seed=6)
     pattern = make_pattern(20, 13, 7)
     links = rng.integers(0, NUM_CELLS, (30, 33)).astype(np.uint16)
     for p in range(30):
         wo = twins.frames(dark)[p] @ dark.wo[p]
         for ray in range(33):
-            below = local_ray(pattern, ray, small_shifts_of(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
+            below = local_ray(pattern, ray, lattice_offsets(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
             if below or rng.random() < 0.1:
-                links[p, ray] = NO_CELL
+                links[p, ray] = NO_PATCH
     rays = GatherRays(links, pattern, sent_by_cells(cells, lights))
     points = dark.points._replace(seed=np.arange(50, 80, dtype=np.uint32))
-    return Receivers(points, dark.wo, np.zeros_like(dark.visible), (rays,))
+    return ShadingPoints(points, dark.wo, np.zeros_like(dark.visible), (rays,))
 
 
 def bands_of(model):
@@ -128,18 +132,18 @@ def image_numpy(model, bands, receivers):
     out = np.zeros((len(receivers.normal), 3))
     for p, frame in enumerate(twins.frames(receivers)):
         wo = frame @ receivers.wo[p].astype(float)
-        shift = small_shifts_of(rays.pattern, receivers.points.seed[p])
-        for ray, cell in enumerate(rays.links[p]):
-            if cell == NO_CELL:
+        shift = lattice_offsets(rays.pattern, receivers.points.seed[p])
+        for ray, cell in enumerate(rays.gather_hits[p]):
+            if cell == NO_PATCH:
                 continue
             wi = np.array(local_ray(rays.pattern, ray, shift, *wo.astype(np.float32)))
-            weight = weight_of(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32))
+            weight = ray_weight(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32))
             is_narrow = 2 * rays.pattern.num_cosine * weight < np.pi
-            value = weight * twins.sent_towards(rays.sent, cell, -(wi @ frame), is_narrow=is_narrow)
+            value = weight * twins.evaluate_outgoing(rays.outgoing, cell, -(wi @ frame), is_narrow=is_narrow)
             value = value * term.quotients(*wi.astype(float), *wo)
             for curve in term.curves:
-                if not curve.outgoing:
-                    value = value * bands[curve.name][:, twins.band_of(curve, wi.astype(float)[None], wo)[0]]
+                if not curve.depends_on_view:
+                    value = value * bands[curve.name][:, twins.find_bands(curve, wi.astype(float)[None], wo)[0]]
             out[p] += value
     return out
 
@@ -184,7 +188,7 @@ def test_several_settings_at_once_are_those_one_by_one(lights, receivers):
 
 
 def test_reflected_light_adds_to_the_lights_own(lights, receivers):
-    lit = twins.only_above(twins.make_receivers(30, lights.num_lights, seed=6), lights)
+    lit = twins.only_above(twins.make_random_receivers(30, lights.num_lights, seed=6), lights)
     both = replace(receivers, visible=lit.visible)
     bands = bands_of("blinn_phong")
     parts = [image("blinn_phong", bands, None, lights, r) for r in (lit, receivers)]
@@ -207,8 +211,8 @@ def test_first_and_further_reflections_are_all_of_them(cells, lights):
 
 
 def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
-    found = cells.reflecting(REFLECTANCES)
-    known = [shares_in(of_material)[..., 0] for of_material in REFLECTANCES]
+    found = cells.reflectance_operator(REFLECTANCES)
+    known = [unpack_reflectance(of_material)[..., 0] for of_material in REFLECTANCES]
     expected = np.where(cells.material[:, None] == 0, known[0][0], known[1][0] + known[1][1] * cells.textures[0])
     np.testing.assert_allclose(found.reflectance, np.minimum(expected, 1), rtol=1e-5)
     np.testing.assert_array_equal(found.rows, np.flatnonzero(cells.material == 1))
@@ -228,7 +232,7 @@ def test_reflectance_of_highlights():
         blinn = {**plain, "model": "blinn_phong", "params": {"exponent": exponent}}
         np.testing.assert_allclose(reflectance(blinn), _by_drawing(blinn), rtol=0.02)
     lambert = {**plain, "model": "lambert", "params": {}}
-    both = shares_in(reflectances_of([lambert, {**blinn, "texture": "specular"}]))[..., 0]
+    both = unpack_reflectance(pack_reflectance([lambert, {**blinn, "texture": "specular"}]))[..., 0]
     np.testing.assert_allclose(both[0], [1.0, 0.5, 0.0], rtol=1e-6)
     np.testing.assert_allclose(both[2], reflectance(blinn), atol=0.5 / 128)
 
@@ -238,9 +242,9 @@ def _by_drawing(document):
     rng = np.random.default_rng(3)
     r, phi = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
     wo = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
-    lobe = lobes_of([document])[1]
+    lobe = material_lobes([document])[1]
     wi = lobe.draw(wo, 64, rng)
-    weight = np.where(wi[..., 2] > 0, wi[..., 2] / np.maximum(lobe.density_of(wi, wo), 1e-12), 0.0)
+    weight = np.where(wi[..., 2] > 0, wi[..., 2] / np.maximum(lobe.pdf(wi, wo), 1e-12), 0.0)
     wi[wi[..., 2] <= 0] = [0.0, 0.0, 1.0]
     return (eval_brdf(document, wi, wo[:, None]) * weight[..., None]).mean(axis=(0, 1))
 
@@ -252,7 +256,7 @@ def default_look(transfer):
 def against_paths(scene, transfer, index, every, spp):
     """Light that surfaces have reflected onto samples of a material, and by path tracing with its variance. (n, 3)"""
     view, look, name = transfer.views["front"], default_look(transfer), transfer.material_names[index]
-    reflected = transfer.reflected_in(light_of(look, transfer.material_names, has_bounces=True))
+    reflected = transfer.outgoing_patch_light(illumination_from_look(look, transfer.material_names, has_bounces=True))
     rows, lit = view.rows(index), view.receivers(index, reflected)
     chosen, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
     radiance = np.zeros((len(lit.normal), 3))
@@ -261,10 +265,16 @@ def against_paths(scene, transfer, index, every, spp):
         radiance += image(document["model"], bands, None, transfer.lights, dark) * document["color"]
     position = view.store.read("views/0/position", rows.start, rows.stop)
     ones = np.ones_like(position)
-    points = Points(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}, ones[:, 0])
-    points = points.rows(chosen)
-    traced = merge(scene), texels_of(scene.environment), look, points, np.full(len(chosen), index)
-    found = reference_indirect(scene, *traced, [Paths(False, 1, 4)], 48, spp, seed=index)
+    points = ReferencePoints(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}, ones[:, 0])
+    points = points.samples_of(chosen)
+    traced = (
+        build_scene_buffers(scene),
+        environment_texels(scene.environment),
+        look,
+        points,
+        np.full(len(chosen), index),
+    )
+    found = reference_indirect(scene, *traced, [LightPaths(False, 1, 4)], 48, spp, seed=index)
     return radiance[chosen], found.mean[0], found.variance[0], position[chosen]
 
 
@@ -288,9 +298,11 @@ def test_a_metal_floor_throws_light_where_it_goes(tmp_path):
     floor = quad("floor", [(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], 1)
     east = quad("east", [(1, 0, -1), (1, 0, 1), (1, 1.2, 1), (1, 1.2, -1)], 0, (0, 0, 1))
     north = quad("north", [(-1, 0, -1), (1, 0, -1), (1, 1.2, -1), (-1, 1.2, -1)], 0)
-    eye = looking("front", (-0.9, 0.9, 2.2), (0.2, 0.5, -0.3), 0.9)
-    scene = scene_of(floor, east, north, camera=eye, environment=sky, materials=[white, Material("Metal", [rough])])
-    transfer = bake_corner(scene, "gather", tmp_path)
+    eye = make_camera("front", (-0.9, 0.9, 2.2), (0.2, 0.5, -0.3), 0.9)
+    scene = make_tiny_scene(
+        floor, east, north, camera=eye, environment=sky, materials=[white, Material("Metal", [rough])]
+    )
+    transfer = bake_corner_scene(scene, "gather", tmp_path)
     found, expected, variance, place = against_paths(scene, transfer, 0, 1, 64)  # its noise is that of the 48 paths
     means = []
     for wall in (place[:, 0] > 0.99, place[:, 2] < -0.99):
@@ -308,14 +320,14 @@ def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp
     def green(document):
         document["materials"]["Red"]["terms"][0]["color"] = [0.1, 0.7, 0.2]
 
-    edited = render_image(gathered, "front", look_of(gathered, green))
+    edited = render_image(gathered, "front", make_look(gathered, green))
     terms = copy.deepcopy(corner.materials[1].terms)
     terms[0]["color"] = [0.1, 0.7, 0.2]
     materials = [corner.materials[0], Material("Red", terms), corner.materials[2]]
-    other = scene_of(
+    other = make_tiny_scene(
         *corner.meshes, camera=corner.cameras[0], environment=corner.environment.radiance, materials=materials
     )
-    green_bake = bake_corner(other, "gather", tmp_path)
+    green_bake = bake_corner_scene(other, "gather", tmp_path)
     expected = render_image(green_bake, "front", default_look(green_bake))
     before = render_image(gathered, "front", default_look(gathered))
     assert np.abs(edited - before).mean() > 0.05 * before.mean()
@@ -325,7 +337,7 @@ def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp
 
 @pytest.fixture(scope="module")
 def direct(corner, tmp_path_factory):
-    return bake_corner(corner, "direct", tmp_path_factory.mktemp("direct"))
+    return bake_corner_scene(corner, "direct", tmp_path_factory.mktemp("direct"))
 
 
 def test_without_reflection_a_picture_is_the_direct_one(gathered, direct):
@@ -335,8 +347,8 @@ def test_without_reflection_a_picture_is_the_direct_one(gathered, direct):
         for material in document["materials"].values():
             material["terms"][0]["color"] = [0.0, 0.0, 0.0]
 
-    expected = render_image(direct, "front", look_of(direct, black))
-    np.testing.assert_allclose(render_image(gathered, "front", look_of(gathered, black)), expected, rtol=1e-5)
+    expected = render_image(direct, "front", make_look(direct, black))
+    np.testing.assert_allclose(render_image(gathered, "front", make_look(gathered, black)), expected, rtol=1e-5)
     brighter = render_image(gathered, "front", default_look(gathered)) - render_image(
         direct, "front", default_look(direct)
     )
@@ -350,7 +362,7 @@ def showing(transfer, show, bounces=24):
     def change(document):
         document["transport"] = {"show": show, "bounces": bounces}
 
-    return rendered_afresh(transfer, look_of(transfer, change))
+    return render_uncached(transfer, make_look(transfer, change))
 
 
 def test_pictures_of_some_paths_add_up_to_that_of_all(gathered):
@@ -375,49 +387,51 @@ def test_bounces_are_counted_from_direct_light(gathered, direct):
 
 def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
     """From reflected light alone, glimpsed before there is any other, to all light."""
-    monkeypatch.setattr("relume.picture.routes.preview._MOST_SHADED", 300)
-    picture = Picture(gathered, "front", Memory(BUDGET))
+    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 300)
+    picture = Picture(gathered, "front", Cache(BUDGET))
     for show in ("first_bounce", "all", "direct"):
 
         def change(document, show=show):
             document["transport"]["show"] = show
 
-        picture.set_look(look_of(gathered, change))
+        picture.set_look(make_look(gathered, change))
         if show == "all":
             picture.advance(None)
             need = picture.next_job()
-            assert isinstance(need, Preview)
-            picture.install(need, need.make(lambda share: None, lambda: False))
+            assert isinstance(need, SparsePreview)
+            picture.install(need, need.run(lambda share: None, lambda: False))
             picture.advance(None)
             glimpse = picture.image()
-            exact = settle(picture).image()
+            exact = run_until_exact(picture).image()
             assert relative_rmse(glimpse, exact) < 0.5 * relative_rmse(showing(gathered, "first_bounce"), exact)
-        np.testing.assert_array_equal(settle(picture).image(), showing(gathered, show))
+        np.testing.assert_array_equal(run_until_exact(picture).image(), showing(gathered, show))
 
 
 def test_a_thinned_bake_has_the_same_light(gathered, monkeypatch):
     """Its samples keep the rays that were traced for them; its neighbours are others."""
-    monkeypatch.setattr("relume.views.view.sharing", lambda *of_samples: None)
-    transfer, step = open_transfer(Path(gathered.key), Memory(1 << 30)), 3
-    whole = Picture(transfer, "front", Memory(BUDGET))
-    few = Picture(transfer.thinned("front", step), "front", Memory(BUDGET))
+    monkeypatch.setattr("relume.views.view.make_neighbor_filter", lambda *of_samples: None)
+    transfer, step = open_transfer(Path(gathered.key), Cache(1 << 30)), 3
+    whole = Picture(transfer, "front", Cache(BUDGET))
+    few = Picture(transfer.downsampled("front", step), "front", Cache(BUDGET))
     for picture in (whole, few):  # no look whose images are kept beside the store
-        picture.set_look(look_of(transfer, lambda document: document["transport"].update(bounces=5)))
-    np.testing.assert_allclose(settle(few).image(), settle(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6)
+        picture.set_look(make_look(transfer, lambda document: document["transport"].update(bounces=5)))
+    np.testing.assert_allclose(
+        run_until_exact(few).image(), run_until_exact(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6
+    )
 
 
 def test_light_that_is_turned_is_glimpsed_with_what_it_reflects(gathered, monkeypatch):
-    monkeypatch.setattr("relume.picture.routes.preview._MOST_SHADED", 300)
-    picture = settle(Picture(gathered, "front", Memory(BUDGET)))
+    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 300)
+    picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
 
     def turn(document):
         document["environment"]["rotation"] = 90.0
 
-    picture.set_look(look_of(gathered, turn))
+    picture.set_look(make_look(gathered, turn))
     picture.advance(None)
     still, need = picture.image(), picture.next_job()
-    assert isinstance(need, Preview)
-    picture.install(need, need.make(lambda share: None, lambda: False))
+    assert isinstance(need, SparsePreview)
+    picture.install(need, need.run(lambda share: None, lambda: False))
     assert not picture.advance(None).exact
-    glimpse, exact = picture.image(), settle(picture).image()
+    glimpse, exact = picture.image(), run_until_exact(picture).image()
     assert relative_rmse(glimpse, exact) < 0.7 * relative_rmse(still, exact)

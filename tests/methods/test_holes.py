@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sessions import look_of, relative_rmse
+from sessions import make_look, relative_rmse
 from shared_bakes import unmeasured
-from tiny_scenes import looking, points_at, quad, scene_of, studio
+from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad, studio
 
 from relume.bake import Recipe
-from relume.light.local import make_local, strata_of
+from relume.light.local import make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
 from relume.moving.shader.geometry import constants
 from relume.reference.image import reference_image
 from relume.render.image import render_image
 from relume.scene.model import Material, Opacity
-from relume.store import bake_here
-from relume.trace.geometry import merge
-from relume.trace.local_shadows import trace_local
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
+from relume.trace.local_shadows import trace_light_visibility
 
 __all__ = ["unmeasured"]  # a fixture
 
@@ -40,13 +40,13 @@ def scene():
         Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]},)),
         Material("Card", ({"model": "lambert", "color": [0.2, 0.6, 0.2]},), opacity=Opacity(bars(), cutoff=0.5)),
     ]
-    camera = looking("front", (0.5, 2.2, 3), (0, 0.2, 0), 0.8)
-    return scene_of(floor, card, camera=camera, environment=studio(), materials=materials)
+    camera = make_camera("front", (0.5, 2.2, 3), (0, 0.2, 0), 0.8)
+    return make_tiny_scene(floor, card, camera=camera, environment=studio(), materials=materials)
 
 
 def opened(scene, method, folder):
     recipe = Recipe(method, ("front",), (48, 36), 500, num_points=2000)
-    return open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 @pytest.fixture(scope="module")
@@ -56,10 +56,10 @@ def direct(scene, tmp_path_factory):
 
 def test_lamps_of_an_opened_bake_shine_through(scene, direct):
     x, z = np.random.default_rng(1).uniform(-1, 1, (2, 2000))
-    points = points_at(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
-    geometry = merge(scene)
-    lamp = make_local(LAMP)
-    wanted = trace_local(geometry.embree, geometry.epsilon, lamp, strata_of(lamp, 64), points)
+    points = make_surface_points(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
+    geometry = build_scene_buffers(scene)
+    lamp = prepare_local_lights(LAMP)
+    wanted = trace_light_visibility(geometry.embree, geometry.epsilon, lamp, make_light_strata(lamp, 64), points)
     found = direct.local.shadows(LAMP, points).visible
     np.testing.assert_array_equal(found, wanted)
     assert 0.3 < (found & 1).mean() < 0.9
@@ -68,32 +68,32 @@ def test_lamps_of_an_opened_bake_shine_through(scene, direct):
 @pytest.mark.parametrize("method", ["direct", "gather"])
 def test_pictures_agree_with_brute_force(scene, method, tmp_path):
     found = opened(scene, method, tmp_path)
-    look = look_of(found)
+    look = make_look(found)
     wanted = reference_image(
         scene, "front", look, (48, 36), 0 if method == "direct" else 1024, reflects=method == "gather"
     )
     picture = render_image(found, "front", look)
     assert relative_rmse(picture, wanted) < 0.03
     whole = [Material(material.name, material.terms) for material in scene.materials]
-    without = scene_of(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
+    without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
     assert relative_rmse(picture, reference_image(without, "front", look, (48, 36), 0)) > 0.15
 
 
 def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
     found = opened(scene, "surface", tmp_path)
-    holes = found.embree.holes
+    holes = found.embree.alpha_test
     assert holes is not None
-    np.testing.assert_array_equal(holes.image >= 0, found.surface.face_material == 1)
+    np.testing.assert_array_equal(holes.image >= 0, found.stored_scene.face_material == 1)
     assert constants(found)["has_holes"]
-    look = look_of(found)
+    look = make_look(found)
     wanted = reference_image(scene, "front", look, (48, 36), 0)
     assert relative_rmse(render_image(found, "front", look), wanted) < 0.2
 
 
 def test_bakes_of_whole_surfaces_hold_nothing_of_holes(scene, tmp_path):
     whole = [Material(material.name, material.terms) for material in scene.materials]
-    without = scene_of(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
+    without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
     found = opened(without, "surface", tmp_path)
-    assert found.embree.holes is None
+    assert found.embree.alpha_test is None
     assert not constants(found)["has_holes"]
     assert not (tmp_path / "surface.zarr" / "cutouts").exists()

@@ -7,24 +7,24 @@ import pytest
 import twins
 
 from relume.basis.lobe_grid import (
-    NUM_BINS,
+    NUM_FINE_BINS,
     SIDE,
-    bin_middles,
+    bin_index,
+    bin_solid_angles,
     directions_at,
-    mirrored_squares,
-    square_areas,
-    squares_of,
+    fine_bin_centers,
+    reflected_bins,
 )
-from relume.brdf.albedo import lobes_in, reflectances_of, shares, sharp_lobes
+from relume.brdf.albedo import narrow_lobes, pack_reflectance, reflectance_matrix, unpack_lobes
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.lobe_tables import lobe_table
 from relume.light.gather_rays import make_pattern
-from relume.light.triangles import subdivide
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.in_lobes import Coming, sent_in_lobes
-from relume.methods.cells.leaving import InSquares, sent_once
-from relume.methods.cells.reflecting import Arrived
-from relume.trace.cells import gather_samples_of
+from relume.light.triangles import tessellate_environment
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.in_lobes import DirectLobes, outgoing_in_highlights
+from relume.methods.cells.leaving import BinnedRadiance, first_bounce
+from relume.methods.cells.reflecting import IncidentLight
+from relume.trace.cells import patch_sample_points
 
 PLAIN = {"texture": None, "curves": {}}
 NUM_CELLS = 12
@@ -42,8 +42,8 @@ def cells_of(normal):
     visible = rng.integers(0, 256, (NUM_CELLS, 4, 6)).astype(np.uint8)
     links = np.zeros((NUM_CELLS, 4 * 5), np.uint16)
     material, white = np.zeros(NUM_CELLS, np.uint16), np.ones((2, NUM_CELLS, 3), np.float32)
-    points = gather_samples_of(normal, normal)
-    return CellLight(points, visible, links, make_pattern(5, 0, 9), material, white)
+    points = patch_sample_points(normal, normal)
+    return PatchLight(points, visible, links, make_pattern(5, 0, 9), material, white)
 
 
 def flat(spread=0.0):
@@ -54,7 +54,7 @@ def flat(spread=0.0):
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(np.random.default_rng(3).random((16, 32, 3), np.float32), 48)
+    return tessellate_environment(np.random.default_rng(3).random((16, 32, 3), np.float32), 48)
 
 
 def mean_over_squares(document, wi):
@@ -74,9 +74,9 @@ def mean_over_squares(document, wi):
 
 @pytest.mark.parametrize("roughness", [0.3, 0.5])
 def test_tables_are_means_over_squares(roughness):
-    table, document, area = lobe_table(json.dumps(metal(roughness))), metal(roughness), square_areas()
+    table, document, area = lobe_table(json.dumps(metal(roughness))), metal(roughness), bin_solid_angles()
     for b in (0, 60, 200):
-        exact = mean_over_squares(document, bin_middles()[b])
+        exact = mean_over_squares(document, fine_bin_centers()[b])
         missed = np.sqrt(np.sum(area * (table[b] - exact) ** 2) / np.sum(area * exact**2))
         assert missed < 0.03
 
@@ -84,7 +84,7 @@ def test_tables_are_means_over_squares(roughness):
 @pytest.mark.parametrize("roughness", [0.03, 0.1])
 def test_tables_of_lobes_narrower_than_squares_send_all_of_them(roughness):
     """A mirror head-on sends what it does, 0.9 of it, wherever in a square the lobe lies."""
-    sent = lobe_table(json.dumps(metal(roughness)))[:60] @ square_areas()
+    sent = lobe_table(json.dumps(metal(roughness)))[:60] @ bin_solid_angles()
     np.testing.assert_allclose(sent, 0.9, rtol=0.02)
 
 
@@ -92,10 +92,10 @@ def test_mirrorings_take_squares_where_they_take_directions():
     rng = np.random.default_rng(1)
     wo = twins.unit(rng.normal(size=(500, 3))) * [1, 1, np.sign(1)]
     wo[:, 2] = np.abs(wo[:, 2])
-    for mirroring, squares in enumerate(mirrored_squares()):
+    for mirroring, squares in enumerate(reflected_bins()):
         moved = wo * [-1 if mirroring & 1 else 1, -1 if mirroring & 2 else 1, 1]
         moved = moved[:, [1, 0, 2]] if mirroring & 4 else moved
-        np.testing.assert_array_equal(squares[squares_of(wo)], squares_of(moved))
+        np.testing.assert_array_equal(squares[bin_index(wo)], bin_index(moved))
 
 
 def expected(cells, lights, documents, cell):
@@ -119,22 +119,22 @@ def expected(cells, lights, documents, cell):
 @pytest.mark.parametrize("spread", [0.0, 0.1])
 def test_cells_send_lights_as_their_highlights_do(lights, spread):
     cells, documents = cells_of(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
-    reflectances = (reflectances_of([MATT, *documents]),)
-    lobes = cells.lobes(reflectances, cells.reflecting(reflectances))
-    found = sent_in_lobes(cells, lobes, Coming(lights, cells.seen_by(lobes.rows)))
-    area = square_areas()
-    exact = expected(cells, lights, lobes_in(reflectances[0]), 3)
+    reflectances = (pack_reflectance([MATT, *documents]),)
+    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
+    found = outgoing_in_highlights(cells, lobes, DirectLobes(lights, cells.visibility_bits(lobes.rows)))
+    area = bin_solid_angles()
+    exact = expected(cells, lights, unpack_lobes(reflectances[0]), 3)
     assert np.sqrt(np.sum(area * (found[3] - exact) ** 2) / np.sum(area * exact**2)) < 0.06
     np.testing.assert_allclose(found[3] @ area, exact @ area, rtol=0.04)
 
 
-_LOCAL = bin_middles()[60]
+_LOCAL = fine_bin_centers()[60]
 
 
 class _OneRay:
     """A light that comes to every point from one side, as one ray."""
 
-    rays_a_point = 1
+    max_rays_per_point = 1
 
     def list_into(self, listed, receivers, start, stop):
         num = stop - start
@@ -144,10 +144,10 @@ class _OneRay:
 
 
 def test_rays_of_lamps_are_sent_as_lights_are():
-    cells, reflectances = cells_of(flat()), (reflectances_of([metal(0.3)]),)
-    lobes = cells.lobes(reflectances, cells.reflecting(reflectances))
-    found = sent_in_lobes(cells, lobes, Coming(rays=[_OneRay()]))
-    exact = mean_over_squares(lobes_in(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
+    cells, reflectances = cells_of(flat()), (pack_reflectance([metal(0.3)]),)
+    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
+    found = outgoing_in_highlights(cells, lobes, DirectLobes(rays=[_OneRay()]))
+    exact = mean_over_squares(unpack_lobes(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
     for cell in range(NUM_CELLS):
         assert np.linalg.norm(found[cell] - exact) < 0.03 * np.linalg.norm(exact)
 
@@ -155,44 +155,44 @@ def test_rays_of_lamps_are_sent_as_lights_are():
 def test_nothing_of_a_highlight_is_sent_twice(lights):
     """With its table, functions and the even part say what is matt alone."""
     cells = cells_of(flat())
-    both, matt = ((reflectances_of(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
-    reflecting, plain = cells.reflecting(both), cells.reflecting(matt)
+    both, matt = ((pack_reflectance(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
+    reflecting, plain = cells.reflectance_operator(both), cells.reflectance_operator(matt)
     rows = reflecting.rows
-    arrived = Arrived(cells.irradiance(lights), cells.vectors(rows, lights, 6))
-    lobes = cells.lobes(both, reflecting)
-    found = sent_once(reflecting, arrived, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
-    held = plain.reflectance * reflecting.held
-    np.testing.assert_allclose(found.even, held / np.pi * arrived.irradiance, atol=1e-5)
-    assert not found.vectors.any()
+    arrived = IncidentLight(cells.irradiance(lights), cells.incident_coefficients(rows, lights, 6))
+    lobes = cells.highlight_tables(both, reflecting)
+    found = first_bounce(reflecting, arrived, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
+    held = plain.reflectance * reflecting.energy_scale
+    np.testing.assert_allclose(found.isotropic, held / np.pi * arrived.irradiance, atol=1e-5)
+    assert not found.coefficients.any()
 
 
 def test_only_highlights_that_functions_miss_have_tables():
-    assert sharp_lobes([metal(0.8)]) == []
-    assert sharp_lobes([{**metal(0.2), "params": {"roughness": 0.2, "f0": 0.0}, "color": [0.1, 0.1, 0.1]}]) == []
-    assert len(sharp_lobes([metal(0.2), metal(0.8)])) == 2  # all or none of a material
+    assert narrow_lobes([metal(0.8)]) == []
+    assert narrow_lobes([{**metal(0.2), "params": {"roughness": 0.2, "f0": 0.0}, "color": [0.1, 0.1, 0.1]}]) == []
+    assert len(narrow_lobes([metal(0.2), metal(0.8)])) == 2  # all or none of a material
     cells = cells_of(flat())
-    reflectances = (reflectances_of([metal(0.8)]),)
-    lobes = cells.lobes(reflectances, cells.reflecting(reflectances))
+    reflectances = (pack_reflectance([metal(0.8)]),)
+    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
     assert len(lobes.rows) == 0
-    assert sent_in_lobes(cells, lobes, Coming()).shape == (0, 3, SIDE * SIDE)
+    assert outgoing_in_highlights(cells, lobes, DirectLobes()).shape == (0, 3, SIDE * SIDE)
 
 
 def test_small_steps_of_a_hand_make_no_other_light():
-    assert reflectances_of([metal(0.3)]) == reflectances_of([metal(0.3001)])
-    assert reflectances_of([metal(0.3)]) != reflectances_of([metal(0.31)])
-    one, other = lobes_in(reflectances_of([metal(0.3)])), lobes_in(reflectances_of([metal(0.31)]))
+    assert pack_reflectance([metal(0.3)]) == pack_reflectance([metal(0.3001)])
+    assert pack_reflectance([metal(0.3)]) != pack_reflectance([metal(0.31)])
+    one, other = unpack_lobes(pack_reflectance([metal(0.3)])), unpack_lobes(pack_reflectance([metal(0.31)]))
     assert abs(one[0]["params"]["roughness"] - 0.3) < 0.003
     assert abs(other[0]["params"]["roughness"] - 0.31) < 0.003
-    assert abs(shares(one[0])[0, 0] - shares(metal(0.3))[0, 0]) < 0.01
+    assert abs(reflectance_matrix(one[0])[0, 0] - reflectance_matrix(metal(0.3))[0, 0]) < 0.01
 
 
 def test_squares_of_different_cells_are_subtracted_by_cell():
     ones = np.ones((2, 3, SIDE * SIDE), np.float32)
-    found = InSquares(np.array([1, 4]), 3 * ones).less(InSquares(np.array([4, 7]), ones))
+    found = BinnedRadiance(np.array([1, 4]), 3 * ones).subtract(BinnedRadiance(np.array([4, 7]), ones))
     np.testing.assert_array_equal(found.rows, [1, 4, 7])
     np.testing.assert_array_equal(found.radiance[:, 0, 0], [3, 2, -1])
 
 
 def test_every_bin_has_one_number():
-    assert len(bin_middles()) == NUM_BINS
-    assert (bin_middles()[:, 0] >= bin_middles()[:, 1] - 1e-12).all()
+    assert len(fine_bin_centers()) == NUM_FINE_BINS
+    assert (fine_bin_centers()[:, 0] >= fine_bin_centers()[:, 1] - 1e-12).all()

@@ -8,27 +8,27 @@ from PIL import Image
 
 from relume.brdf.channels import IMAGES, NormalMap
 from relume.errors import CancelledError
-from relume.images.shelf import keep
+from relume.images.shelf import store
 from relume.light.gather_rays import make_pattern
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.leaning import leant_cells
-from relume.trace.cells import gather_samples_of
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.leaning import normal_mapped_patches
+from relume.trace.cells import patch_sample_points
 
 NUM_CELLS, POINTS, RAYS = 6, 4, 5
 LEAN = 0.6, -0.2, 0.77  # of a texel, about
 
 
 class Traced:
-    """A `Tracer` that says what it was asked for."""
+    """A `RayTracer` that says what it was asked for."""
 
     def check(self):
         """Nothing lacks."""
 
-    def seen(self, points, before, known):
+    def visibility(self, points, before, known):
         self.points, self.before, self.known = points, before, known
         return np.full_like(known, 7)
 
-    def linked(self, points, wo, pattern):
+    def gather_hits(self, points, wo, pattern):
         assert wo is points.normal
         return np.full((points.num_points, pattern.num_rays), 9, np.uint16)
 
@@ -38,8 +38,8 @@ def named(tmp_path_factory):
     folder = tmp_path_factory.mktemp("normals")
     texel = np.round(127.5 * (np.array(LEAN) / np.linalg.norm(LEAN) + 1)).astype(np.uint8)
     Image.fromarray(np.broadcast_to(texel, (2, 2, 3)).copy()).save(folder / "slope.png")
-    with IMAGES.at(folder / "images") as shelf:
-        yield keep(shelf, folder / "slope.png", "Slope").texture
+    with IMAGES.with_search_folder(folder / "images") as shelf:
+        yield store(shelf, folder / "slope.png", "Slope").texture
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def cells():
     """Of two materials in turn, on a floor; u runs along x, and v along z."""
     rng = np.random.default_rng(1)
     normal = np.broadcast_to(np.float32([0, 1, 0]), (NUM_CELLS, POINTS, 3)).copy()
-    points = gather_samples_of(rng.random((NUM_CELLS, POINTS, 3), np.float32), normal)
+    points = patch_sample_points(rng.random((NUM_CELLS, POINTS, 3), np.float32), normal)
     across = np.cross(points.normal, points.tangent)
     turn = np.arctan2(across[:, 0], points.tangent[:, 0]).reshape(NUM_CELLS, POINTS, 1)
     uv = np.concatenate([rng.random((NUM_CELLS, POINTS, 2)), 0 * turn, turn, 0 * turn + 1], axis=2)
@@ -55,12 +55,12 @@ def cells():
     links = rng.integers(0, NUM_CELLS, (NUM_CELLS, POINTS * RAYS)).astype(np.uint16)
     material, white = (np.arange(NUM_CELLS) % 2).astype(np.uint16), np.ones((2, NUM_CELLS, 3), np.float32)
     pattern = make_pattern(RAYS, 0, 9)
-    return CellLight(points, bits, links, pattern, material, white, uv.astype(np.float32), normal)
+    return PatchLight(points, bits, links, pattern, material, white, uv.astype(np.float32), normal)
 
 
 def test_they_lean_as_their_texels_do(cells, named):
     """Green leans up the image, against v."""
-    found = leant_cells(cells, (None, NormalMap(named)), Traced())
+    found = normal_mapped_patches(cells, (None, NormalMap(named)), Traced())
     normal = found.points.normal.reshape(NUM_CELLS, POINTS, 3)
     x, y, z = np.array(LEAN) / np.linalg.norm(LEAN)
     np.testing.assert_allclose(normal[1::2], np.broadcast_to([x, z, -y], normal[1::2].shape), atol=0.01)
@@ -70,11 +70,11 @@ def test_they_lean_as_their_texels_do(cells, named):
 
 def test_their_rays_are_traced_and_no_others(cells, named):
     traced = Traced()
-    found = leant_cells(cells, (None, NormalMap(named)), traced)
+    found = normal_mapped_patches(cells, (None, NormalMap(named)), traced)
     assert (found.visible[1::2] == 7).all()
-    assert (found.links[1::2] == 9).all()
+    assert (found.gather_hits[1::2] == 9).all()
     np.testing.assert_array_equal(found.visible[::2], cells.visible[::2])
-    np.testing.assert_array_equal(found.links[::2], cells.links[::2])
+    np.testing.assert_array_equal(found.gather_hits[::2], cells.gather_hits[::2])
     np.testing.assert_array_equal(traced.known, cells.visible[1::2].reshape(-1, 3))
     np.testing.assert_array_equal(traced.before, np.broadcast_to(np.float32([0, 1, 0]), traced.before.shape))
     seeds = cells.points.seed.reshape(NUM_CELLS, POINTS)
@@ -84,7 +84,7 @@ def test_their_rays_are_traced_and_no_others(cells, named):
 def test_frames_are_those_of_the_normals(cells, named):
     """What they send is turned with them, whatever was known of the others."""
     assert np.allclose(cells.frames[:, 0] @ [0, 1, 0], 0, atol=1e-6)
-    found = leant_cells(cells, (None, NormalMap(named)), Traced())
+    found = normal_mapped_patches(cells, (None, NormalMap(named)), Traced())
     mean = found.points.normal.reshape(NUM_CELLS, POINTS, 3).mean(axis=1)
     np.testing.assert_allclose(np.einsum("gfc,gc->gf", found.frames, mean), 0, atol=1e-5)
 
@@ -92,13 +92,13 @@ def test_frames_are_those_of_the_normals(cells, named):
 @pytest.mark.parametrize("lacking", ["uv", "surface_normal"])
 def test_those_of_bakes_that_do_not_say_how_textures_lie_stay(cells, named, lacking):
     older = replace(cells, **{lacking: None})
-    assert leant_cells(older, (NormalMap(named), None), Traced()) is older
+    assert normal_mapped_patches(older, (NormalMap(named), None), Traced()) is older
 
 
 def test_who_does_not_want_them_any_more_gets_none(cells, named):
     with pytest.raises(CancelledError):
-        leant_cells(cells, (None, NormalMap(named)), Traced(), lambda: True)
+        normal_mapped_patches(cells, (None, NormalMap(named)), Traced(), lambda: True)
 
 
 def test_images_on_what_has_no_cells_trace_nothing(cells, named):
-    assert leant_cells(cells, (None, None, NormalMap(named)), None) is cells
+    assert normal_mapped_patches(cells, (None, None, NormalMap(named)), None) is cells

@@ -2,32 +2,32 @@
 
 import numpy as np
 from sessions import relative_rmse
-from tiny_scenes import scene_of
+from tiny_scenes import make_tiny_scene
 
 from relume import look as looks
 from relume.bake import Recipe
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.methods.stills import Stills
-from relume.moving.picture import MovingPicture
+from relume.methods.stills import StaticViewBuilder
+from relume.moving.picture import FreeCameraPicture
 from relume.render.image import render_image
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 SIZE = (80, 60)
 
 
 def baked(scene, folder, num_points):
     recipe = Recipe("surface", ("front",), SIZE, 100, num_points=num_points)
-    return open_bake(bake_here(METHODS["surface"], scene, recipe, folder / f"{num_points}.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS["surface"], scene, recipe, folder / f"{num_points}.zarr"), Cache(1 << 30))
 
 
 def off_in_a_whole_picture(transfer, scene):
     look, view = looks.validate(transfer.default_look, transfer.default_look), transfer.views["front"]
-    moving = MovingPicture(transfer, "front")
+    moving = FreeCameraPicture(transfer, "front")
     moving.set_look(look)
-    moving.set_eye(view.camera, SIZE)
+    moving.set_camera(view.camera, SIZE)
     moving.advance(None)
-    exact = render_image(transfer, "front", look, stills=Stills(transfer.lit, scene))
+    exact = render_image(transfer, "front", look, static_views=StaticViewBuilder(transfer.light_transport, scene))
     return relative_rmse(moving.image(), exact)
 
 
@@ -42,7 +42,7 @@ def test_a_bake_knows_what_its_pictures_are_off_by(corner, tmp_path):
 
 
 def test_what_is_dark_is_off_by_nothing_that_is_known(corner, tmp_path):
-    dark = scene_of(
+    dark = make_tiny_scene(
         *corner.meshes,
         camera=corner.cameras[0],
         environment=np.zeros((16, 32, 3), np.float32),

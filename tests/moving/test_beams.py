@@ -4,23 +4,23 @@ import copy
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, quad, scene_of, sphere
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
 from relume.bake import Recipe
 from relume.environments.equirect import texel_directions
 from relume.look import complete, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.beams.shadows import shares_seen
-from relume.moving.picture import MovingPicture
-from relume.moving.vectors.arriving import wholly
-from relume.picture.light import light_of
+from relume.moving.beams.shadows import visible_fractions
+from relume.moving.picture import FreeCameraPicture
+from relume.moving.vectors.arriving import combine_all
+from relume.picture.light import illumination_from_look
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 from relume.trace.visibility import trace_visibility
 
-CAMERA = looking("front", [0.5, 2.2, 2.6], [0, 0.2, 0], 0.7)
+CAMERA = make_camera("front", [0.5, 2.2, 2.6], [0, 0.2, 0], 0.7)
 SIZE = (96, 72)
 SUN = np.array([0.5, 1.0, 0.25]) / np.linalg.norm([0.5, 1.0, 0.25])
 FLOOR = quad("floor", [[-3, 0, 3], [3, 0, 3], [3, 0, -3], [-3, 0, -3]], 0)
@@ -51,12 +51,12 @@ def scene(environment, terms=(LAMBERT,)):
         quad("wall", [[-1, 0, 0], [-1, 0, -1], [-1, 1, -1], [-1, 1, 0]], 1),
     )
     materials = [Material("Floor", terms), Material("Things", (LAMBERT,))]
-    return scene_of(FLOOR, ball, wall, camera=CAMERA, environment=environment, materials=materials)
+    return make_tiny_scene(FLOOR, ball, wall, camera=CAMERA, environment=environment, materials=materials)
 
 
 def opened(of, method, folder, num_points=2000):
     recipe = Recipe(method, ("front",), SIZE, 200, num_points=num_points)
-    return open_bake(bake_here(METHODS[method], of, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS[method], of, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 def look_of(bake, change=lambda document: None):
@@ -67,9 +67,9 @@ def look_of(bake, change=lambda document: None):
 
 
 def picture_of(bake, look, *, draws=True):
-    picture = MovingPicture(bake, "front")
+    picture = FreeCameraPicture(bake, "front")
     picture.set_look(look)
-    picture.draws = draws
+    picture.renders_pixels = draws
     picture.advance(None)
     return picture
 
@@ -93,15 +93,15 @@ def test_shares_are_those_of_all_shadow_rays(sunlit):
     """Where all targets say the same about a pixel and its neighbours, so does what is predicted."""
     picture = picture_of(sunlit, look_of(sunlit))
     picture.image()
-    seen, solid = picture._look_around(), sunlit.solid
-    (beam,) = sunlit.beams(picture._now(), None)
-    found = shares_seen(solid, seen, CAMERA, SIZE, beam.targets)
+    seen, solid = picture._current_gbuffer(), sunlit.occlusion_mesh
+    (beam,) = sunlit.hard_shadow_lights(picture._current_light(), None)
+    found = visible_fractions(solid, seen, CAMERA, SIZE, beam.targets)
     face, place = seen.hits.face, CAMERA.to_world[:3, 3] + seen.hits.distance[:, None] * seen.directions
-    normal = solid.surface.face_normal[face] * -np.sign(
-        np.einsum("nc,nc->n", solid.surface.face_normal[face], seen.directions)
+    normal = solid.stored_scene.face_normal[face] * -np.sign(
+        np.einsum("nc,nc->n", solid.stored_scene.face_normal[face], seen.directions)
     )[:, None].astype(np.float32)
     hits = np.flatnonzero(face >= 0)
-    origins = (place + solid.off_surface * normal)[hits].astype(np.float32)
+    origins = (place + solid.surface_offset * normal)[hits].astype(np.float32)
     towards = np.ascontiguousarray(beam.targets.towards.reshape(-1, 3))
     bits = trace_visibility(sunlit.embree, origins, np.ascontiguousarray(normal[hits]), towards).visible
     expected = np.zeros(len(face))
@@ -157,10 +157,10 @@ def test_small_lamps_cast_the_shadows_of_a_fixed_view(kind, sunlit, fixed):
 
 def test_points_know_all_light_that_beams_take_from_them(sunlit):
     """Where nothing hides the sun, what a shader gets is what is interpolated and the beam."""
-    light = light_of(look_of(sunlit), sunlit.material_names, has_bounces=True)
-    whole, apart = wholly(sunlit, light), wholly(sunlit, light, has_beams=True)
-    (beam,) = apart.beams
-    assert not whole.beams
+    light = illumination_from_look(look_of(sunlit), sunlit.material_names, has_bounces=True)
+    whole, apart = combine_all(sunlit, light), combine_all(sunlit, light, has_hard_shadows=True)
+    (beam,) = apart.hard_shadow_lights
+    assert not whole.hard_shadow_lights
     together = apart.total[:, :, 0] + beam.gain * beam.vectors[:, :, 0]
     is_lit = whole.total[:, 0, 0] > 0.9 * together[:, 0]
     assert 0.2 < is_lit.mean() < 0.9

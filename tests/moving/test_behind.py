@@ -3,28 +3,28 @@
 import numpy as np
 import pytest
 from grounds import (
-    POINT,
+    POINT_LIGHT,
     SIZE,
     background,
     ball_scene,
     changes,
     environment,
     inner,
-    lamp_alone,
     plain_ground,
-    shining_ball_alone,
-    show,
-    spot_alone,
+    set_only_area_light,
+    set_only_emissive_ball,
+    set_only_spot_light,
+    set_paths,
 )
-from sessions import bake_corner, look_of
+from sessions import bake_corner_scene, make_look
 from tiny_scenes import studio
 
 from relume.bake import Recipe
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.picture import MovingPicture
+from relume.moving.picture import FreeCameraPicture
 from relume.render.image import render_image
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 WHITE, COLOUR = background(kind="color", color=[1.0, 1.0, 1.0]), background(kind="color", color=[2.0, 1.0, 0.5])
 TRANSPARENT = background(kind="transparent")
@@ -32,18 +32,20 @@ TRANSPARENT = background(kind="transparent")
 
 @pytest.fixture(scope="module")
 def fixed(tmp_path_factory):
-    return bake_corner(ball_scene(studio()), "gather", tmp_path_factory.mktemp("fixed"))
+    return bake_corner_scene(ball_scene(studio()), "gather", tmp_path_factory.mktemp("fixed"))
 
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
     recipe = Recipe("surface", ("front",), SIZE, 400, num_points=20000)
-    store = bake_here(METHODS["surface"], ball_scene(studio()), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
-    return open_bake(store, Memory(1 << 30))
+    store = bake_in_process(
+        METHODS["surface"], ball_scene(studio()), recipe, tmp_path_factory.mktemp("moving") / "s.zarr"
+    )
+    return open_bake(store, Cache(1 << 30))
 
 
 def rendered(transfer, *several, **kwargs):
-    return render_image(transfer, "front", look_of(transfer, changes(*several)), **kwargs)
+    return render_image(transfer, "front", make_look(transfer, changes(*several)), **kwargs)
 
 
 @pytest.mark.parametrize(
@@ -53,10 +55,10 @@ def rendered(transfer, *several, **kwargs):
         ((WHITE,), 0.05),
         ((WHITE, environment(rotation=70.0)), 0.05),
         ((background(kind="blurred", blur=12.0), environment(rotation=40.0, scale=2.0)), 0.03),
-        ((COLOUR, lamp_alone), 0.15),
-        ((COLOUR, spot_alone, show("direct")), 0.15),
-        ((COLOUR, shining_ball_alone), 0.01),
-        ((WHITE, show("direct")), 0.05),
+        ((COLOUR, set_only_area_light), 0.15),
+        ((COLOUR, set_only_spot_light, set_paths("direct")), 0.15),
+        ((COLOUR, set_only_emissive_ball), 0.01),
+        ((WHITE, set_paths("direct")), 0.05),
         ((WHITE, plain_ground), 0.05),
     ],
 )
@@ -69,14 +71,14 @@ def test_grounds_are_as_dark_as_in_fixed_views(fixed, moving, several, at_most):
 
 def test_where_nothing_hides_light_nothing_is_hidden(moving, fixed):
     """To rounding: both are sums of the same light."""
-    lit = changes(WHITE, show("direct"), lambda d: d["lights"].update(Lamp=POINT))
+    lit = changes(WHITE, set_paths("direct"), lambda d: d["lights"].update(Lamp=POINT_LIGHT))
     found = rendered(moving, lit)[inner(fixed, "Ground")]
     assert (np.abs(found - 1) < 1e-3).all(axis=1).mean() > 0.25  # points lie where it is not so
     assert found.min() < 0.5
 
 
 def test_light_between_surfaces_alone_has_no_background(moving, fixed):
-    found = rendered(moving, COLOUR, show("first_bounce"))
+    found = rendered(moving, COLOUR, set_paths("first_bounce"))
     assert not found[inner(fixed, None)].any()
     assert found[inner(fixed, "Ground")].any()
 
@@ -93,13 +95,13 @@ def test_transparent_pictures_hide_what_fixed_ones_hide(fixed, moving):
 
 
 def test_a_live_picture_becomes_transparent_and_opaque_again(moving):
-    picture = MovingPicture(moving, "front")
+    picture = FreeCameraPicture(moving, "front")
     for _ in range(2):
-        picture.set_look(look_of(moving, TRANSPARENT))
+        picture.set_look(make_look(moving, TRANSPARENT))
         picture.advance(None)
         alpha = np.frombuffer(picture.encode_alpha(picture.all_tiles()), np.uint8)
         assert len(alpha) == SIZE[0] * SIZE[1]
         assert {0, 255} <= set(alpha)
-        picture.set_look(look_of(moving))
+        picture.set_look(make_look(moving))
         picture.advance(None)
         assert picture.encode_alpha(picture.all_tiles()) is None

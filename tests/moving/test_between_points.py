@@ -2,60 +2,60 @@
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, mesh, quad, scene_of, sphere, studio
+from tiny_scenes import make_camera, make_tiny_scene, mesh, quad, sphere, studio
 
 from relume.bake import Recipe
-from relume.environments.equirect import lookup, texel_directions, turned
-from relume.light.blur import blurred
-from relume.light.suns import LAMPS as LAMPS_OF_SKIES
-from relume.light.suns import without_suns
+from relume.environments.equirect import lookup, rotate_about_y, texel_directions
+from relume.light.blur import prefiltered
+from relume.light.suns import BRIGHT_LIGHT_BOUNDS as LAMPS_OF_SKIES
+from relume.light.suns import remove_sun_disks
 from relume.look import complete, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
 from relume.moving import frame as frame_module
 from relume.moving.basis import lobes as lobes_module
-from relume.moving.basis.lobes import is_narrow, lobes_of
-from relume.moving.basis.out_factors import NUM_ROWS, of_white
-from relume.moving.basis.rows import LEAST_COSINE
-from relume.moving.evaluate import Sent
-from relume.moving.highlights.between_points import add_sky_in_highlights
-from relume.moving.highlights.glances import glance
+from relume.moving.basis.lobes import build_lobes, is_narrow
+from relume.moving.basis.out_factors import NUM_ROWS, white_coefficients
+from relume.moving.basis.rows import MIN_COSINE
+from relume.moving.evaluate import ProbeRadiance
+from relume.moving.highlights.between_points import add_environment_highlights
+from relume.moving.highlights.glances import trace_lobe_visibility
 from relume.moving.highlights.lobe_lights import (
     NUM_LISTED,
     NUM_WIDTHS,
     SIDE,
+    build_light_lists,
     lists_numpy,
-    lobe_lights,
-    widths_of,
+    lobe_widths,
 )
-from relume.moving.highlights.looking import SkyLight
-from relume.moving.pixels import combine
-from relume.moving.points.density import by_distance
-from relume.moving.points.lattice import one_row, pieces_of, place_points
-from relume.moving.points.sides import open_sides
-from relume.moving.sky import sky_of, turn_of
+from relume.moving.highlights.looking import PrefilteredEnvironment
+from relume.moving.pixels import shade_pixels
+from relume.moving.points.density import density_from_distance
+from relume.moving.points.lattice import make_corner_grid, mesh_components, place_probes
+from relume.moving.points.sides import visible_sides
+from relume.moving.sky import build_environment_lookup, rotation_of
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
 
 GLOSSY = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 30.0}}
 TOLD = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}
 SKIRTED = {"model": "ggx", "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.6, "f0": 0.9}}
 NARROW = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 3000.0}}
-CAMERA = looking("front", [0, 0.5, 3], [0, 0, 0], 0.75)
+CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 
 
 def ball(terms):
     material = Material("Ball", terms)
-    return scene_of(
+    return make_tiny_scene(
         sphere("ball", [0, 0, 0], 1, 0, 48), camera=CAMERA, environment=studio(64, 20.0), materials=[material]
     )
 
 
 def opened(scene, method, folder, num_points=400):
     recipe = Recipe(method, ("front",), (64, 48), 2000, num_points=num_points)
-    return open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 def picture_of(bake):
@@ -86,9 +86,11 @@ def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball
 def test_points_take_no_more_than_half_of_what_a_pixel_finds_in_its_lobe(shiny_ball, monkeypatch):
     def shown_beside(broad):
         def changed(surface, seen, pixel_angle, sent, *others):
-            return combine(surface, seen, pixel_angle, sent._replace(broad=np.full_like(sent.broad, broad)), *others)
+            return shade_pixels(
+                surface, seen, pixel_angle, sent._replace(broad=np.full_like(sent.radiance, broad)), *others
+            )
 
-        monkeypatch.setattr(frame_module, "combine", changed)
+        monkeypatch.setattr(frame_module, "shade_pixels", changed)
         return picture_of(shiny_ball[0])[18:30, 26:38]  # the ball's middle, beside rims, which have rays of their own
 
     alone, most = shown_beside(0.0), shown_beside(-1e4)
@@ -101,17 +103,19 @@ LAMPS = np.array([[0.0, 0.6, 0.8, 3.0, 2.0, 1.0, 3e-4], [1.0, 0.0, 0.0, 0.5, 1.0
 
 def sky_light(rotation=0.0, gain=(1.0, 0.5, 2.0), lamps=LAMPS):
     rng = np.random.default_rng(5)
-    sky = sky_of(rng.random((16, 32, 3), np.float32), lambda degrees: rng.random((16, 32, 3), np.float32))
-    return SkyLight(sky, lamps, turn_of(rotation), np.array(gain, np.float32))
+    sky = build_environment_lookup(
+        rng.random((16, 32, 3), np.float32), lambda degrees: rng.random((16, 32, 3), np.float32)
+    )
+    return PrefilteredEnvironment(sky, lamps, rotation_of(rotation), np.array(gain, np.float32))
 
 
 def seen_along(lobes, surface, eye, point):
     """Reads a lobe's tables for a point; its normal; where the eye's ray goes on along the surface. In plain NumPy."""
-    lobe = lobes.of[surface.material[point]]
-    n = surface.points.normal[point].astype(np.float64)
-    wo = eye - surface.points.position[point].astype(np.float64)
+    lobe = lobes.lobe_index[surface.material[point]]
+    n = surface.probes.normal[point].astype(np.float64)
+    wo = eye - surface.probes.position[point].astype(np.float64)
     wo /= np.linalg.norm(wo)
-    place = np.sqrt(1 - np.clip(wo @ n, LEAST_COSINE, 1)) * (NUM_ROWS - 1)
+    place = np.sqrt(1 - np.clip(wo @ n, MIN_COSINE, 1)) * (NUM_ROWS - 1)
     row = min(int(place), NUM_ROWS - 2)
     aside = (wo @ n) * n - wo
 
@@ -131,7 +135,7 @@ def two_numpy(lobes, surface, eye, point):
 def one_numpy(lobes, surface, eye, point):
     """Where the lobe of a pixel at a point looks, its share, and its width."""
     at, n, aside = seen_along(lobes, surface, eye, point)
-    return (np.sqrt(1 - at(lobes.mean) ** 2) * aside + at(lobes.mean) * n)[None], np.ones(1), at(lobes.wide)
+    return (np.sqrt(1 - at(lobes.mean) ** 2) * aside + at(lobes.mean) * n)[None], np.ones(1), at(lobes.single_sigma)
 
 
 def sky_numpy(directions, shares, sigma, light, glance):
@@ -143,7 +147,7 @@ def sky_numpy(directions, shares, sigma, light, glance):
 def one_sky_numpy(direction, sigma, light, glance):
     """What one lobe shows of it."""
     level = np.clip(2 * np.log2(np.degrees(sigma) / 2) + 1, 0, len(light.sky.levels) - 1)
-    rotated = turned(direction[None], 360 * (0.5 - float(light.turn)))
+    rotated = rotate_about_y(direction[None], 360 * (0.5 - float(light.turn)))
     found = np.zeros(3)
     for k, share in ((int(level), 1 - level % 1), (int(np.ceil(level)), level % 1)):
         first, height, width = light.sky.levels[k]
@@ -163,25 +167,30 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_or_what_ligh
     shiny_ball, term, rotation, is_fine
 ):
     moving, _ = shiny_ball
-    surface, rng, light = moving.surface, np.random.default_rng(7), sky_light(rotation)
-    num, eye = surface.points.num_points, np.array([0.4, 1.5, 3.0], np.float32)
+    surface, rng, light = moving.stored_scene, np.random.default_rng(7), sky_light(rotation)
+    num, eye = surface.probes.num_points, np.array([0.4, 1.5, 3.0], np.float32)
     glances = rng.random((num, 3), np.float32)
-    lobes = lobes_of([[{**term, "texture": "diffuse"}]])
-    assert (lobes.most[0] > 1) == (lobes.believed == 1).all() == (term is not SKIRTED)
+    lobes = build_lobes([[{**term, "texture": "diffuse"}]])
+    assert (lobes.max_ratio[0] > 1) == (lobes.lobe_confidence == 1).all() == (term is not SKIRTED)
     lit = rng.random((num, 3), np.float32)
     sky = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
     sent = np.zeros((num, 3, 3), np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    add_sky_in_highlights(surface, lobes, light, eye, glances, lit, is_needed, Sent(sent, sky), is_fine=is_fine)
+    add_environment_highlights(
+        surface, lobes, light, eye, glances, lit, is_needed, ProbeRadiance(sent, sky), is_fine=is_fine
+    )
     assert not sent[is_needed == 0].any()
-    held, most = 0, float(lobes.most[0])
+    held, most = 0, float(lobes.max_ratio[0])
     for point in np.flatnonzero(is_needed)[::17]:
         at, _, _ = seen_along(lobes, surface, eye.astype(np.float64), point)
         both, shown = (
             sky_numpy(*lobe(lobes, surface, eye.astype(np.float64), point), light, glances[point])
             for lobe in (two_numpy, two_numpy if is_fine or lobes.is_two[0] else one_numpy)
         )
-        said, found = at(lobes.albedo) * (at(lobes.believed) * both + lit[point] * light.gain), at(lobes.albedo) * shown
+        said, found = (
+            at(lobes.albedo) * (at(lobes.lobe_confidence) * both + lit[point] * light.gain),
+            at(lobes.albedo) * shown,
+        )
         expected = np.clip(sky[point], said / most, said * most)
         held += int((expected != sky[point]).sum()) if term is not SKIRTED else 9
         np.testing.assert_allclose(sent[point], expected - found, rtol=2e-3, atol=3e-4 * max(1, np.abs(said).max()))
@@ -191,32 +200,34 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_or_what_ligh
 
 
 def test_what_is_narrower_than_lights_is_a_lobe_alone(shiny_ball):
-    surface, rng = shiny_ball[0].surface, np.random.default_rng(7)
-    assert is_narrow(of_white(NARROW))
-    lobes = lobes_of([[NARROW, GLOSSY]])
-    assert lobes.most.tolist() == [1]
-    np.testing.assert_allclose(lobes.believed, 1, atol=1e-5)
-    num = surface.points.num_points
+    surface, rng = shiny_ball[0].stored_scene, np.random.default_rng(7)
+    assert is_narrow(white_coefficients(NARROW))
+    lobes = build_lobes([[NARROW, GLOSSY]])
+    assert lobes.max_ratio.tolist() == [1]
+    np.testing.assert_allclose(lobes.lobe_confidence, 1, atol=1e-5)
+    num = surface.probes.num_points
     sent, everywhere = np.zeros((num, 3, 3), np.float32), np.ones(num, np.uint8)
     sky = rng.normal(size=(num, 3, 3)).astype(np.float32)
     eye, glances = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
     nothing, light = np.zeros((num, 3), np.float32), sky_light()
-    add_sky_in_highlights(surface, lobes, light, eye, glances, nothing, everywhere, Sent(sent, sky), is_fine=True)
+    add_environment_highlights(
+        surface, lobes, light, eye, glances, nothing, everywhere, ProbeRadiance(sent, sky), is_fine=True
+    )
     assert np.abs(sent).max() < 1e-4 * lobes.albedo.max()
 
 
 def test_points_see_of_the_sky_in_their_lobes_what_their_bits_say(shiny_ball):
-    surface, rng = shiny_ball[0].surface, np.random.default_rng(3)
-    num, num_lights, lobes = surface.points.num_points, 20, lobes_of([[NARROW]])
+    surface, rng = shiny_ball[0].stored_scene, np.random.default_rng(3)
+    num, num_lights, lobes = surface.probes.num_points, 20, build_lobes([[NARROW]])
     directions = rng.normal(size=(num_lights, 3)).astype(np.float32)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     of_lamps = np.zeros((2, num_lights), np.float32)
     of_lamps[0, [2, 5]], of_lamps[1, 11] = (0.25, 0.75), 1
     radius, luminous = (rng.uniform(low, high, num_lights).astype(np.float32) for low, high in ((0.3, 0.8), (1, 9)))
-    listed = lobe_lights(directions, radius, luminous, of_lamps, widths_of(lobes))
+    listed = build_light_lists(directions, radius, luminous, of_lamps, lobe_widths(lobes))
     bits = rng.integers(0, 2, (num, 8 * ((num_lights + 7) // 8)), np.uint8)
     eye, is_needed = np.array([0.4, 1.5, 3.0], np.float32), (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = glance(surface, np.packbits(bits, axis=1, bitorder="little"), listed, lobes, eye, is_needed)
+    found = trace_lobe_visibility(surface, np.packbits(bits, axis=1, bitorder="little"), listed, lobes, eye, is_needed)
     assert not found[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::13]:
         towards, shares, sigma = two_numpy(lobes, surface, eye.astype(np.float64), point)
@@ -235,7 +246,7 @@ def test_lists_have_the_lights_that_weigh_most(width):
     directions = rng.normal(size=(300, 3)).astype(np.float32)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     radius, luminous = rng.uniform(0.02, 0.3, 300).astype(np.float32), rng.uniform(0, 9, 300).astype(np.float32)
-    listed = lobe_lights(directions, radius, luminous, np.zeros((0, 300), np.float32), (width,))
+    listed = build_light_lists(directions, radius, luminous, np.zeros((0, 300), np.float32), (width,))
     for square in range(0, SIDE * SIDE, 31):
         found = listed.lists[listed.first[width] + square]
         assert set(found[found >= 0]) == set(lists_numpy(listed, width, square))
@@ -245,11 +256,11 @@ def test_lists_are_full_where_lights_weigh_alike():
     directions, radius = np.tile(np.array([0, 0.6, 0.8], np.float32), (100, 1)), np.full(100, 0.1, np.float32)
     luminous = np.where(np.arange(100) < 20, 2, 1).astype(np.float32)
     none = np.zeros((0, 100), np.float32)
-    for found in lobe_lights(directions, radius, luminous, none, (NUM_WIDTHS - 1,)).lists:
+    for found in build_light_lists(directions, radius, luminous, none, (NUM_WIDTHS - 1,)).lists:
         assert len(set(found)) == NUM_LISTED
         assert set(range(20)) < set(found) <= set(range(100))
     few = np.where(np.arange(100) < 90, 0, 1).astype(np.float32)
-    found = {tuple(each[each >= 0]) for each in lobe_lights(directions, radius, few, none, (0,)).lists}
+    found = {tuple(each[each >= 0]) for each in build_light_lists(directions, radius, few, none, (0,)).lists}
     assert found == {(), tuple(range(90, 100))}
 
 
@@ -259,10 +270,14 @@ def test_a_blurred_sky_and_its_lamp_are_the_blurred_whole(degrees):
     towards, axis = texel_directions(256, 512), np.array([0.0, 0.6, 0.8])
     sky = np.where((towards @ axis > np.cos(np.radians(2)))[..., None], 3000.0, 1 + towards[..., 1:2] ** 2)
     whole = np.repeat(sky, 3, axis=2).astype(np.float32)
-    assert not without_suns(whole).suns
-    (lamp,), beside = without_suns(whole, LAMPS_OF_SKIES)
+    assert not remove_sun_disks(whole).sun_disks
+    (lamp,), beside = remove_sun_disks(whole, LAMPS_OF_SKIES)
     spread = 1 - np.linalg.norm(lamp.mean)
-    expected, rest, per = blurred(whole, degrees), blurred(beside, degrees), 1 / (np.radians(degrees) ** 2 + spread)
+    expected, rest, per = (
+        prefiltered(whole, degrees),
+        prefiltered(beside, degrees),
+        1 / (np.radians(degrees) ** 2 + spread),
+    )
     cosine = texel_directions(*expected.shape[:2]) @ lamp.mean / np.linalg.norm(lamp.mean)
     density = np.exp(per * (cosine - 1)) * per / (2 * np.pi) / (1 - np.exp(-2 * per))
     found = rest + density[..., None] * lamp.irradiance
@@ -275,11 +290,11 @@ def test_a_surface_takes_from_its_own_points_and_not_from_what_lies_beside_it():
     balls = [sphere(f"ball {k}", [0.102 * k, 0.05, 0], 0.05, 0, 24) for k in range(2)]
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 1)
     materials = [Material(name, ({"model": "lambert", "color": [1, 1, 1]},)) for name in ("Balls", "Ground")]
-    scene = scene_of(*balls, ground, camera=looking("front", [0, 1, 3], [0, 0, 0], 0.5), materials=materials)
-    geometry, eyes = merge(scene), np.array([[0.0, 1.0, 3.0]])
-    is_open = open_sides(geometry, scene.cameras, 1)
-    found = place_points(geometry, is_open, by_distance(geometry, eyes, one_row(is_open)), 1500)
-    vertices, points = found.vertices, found.points
+    scene = make_tiny_scene(*balls, ground, camera=make_camera("front", [0, 1, 3], [0, 0, 0], 0.5), materials=materials)
+    geometry, eyes = build_scene_buffers(scene), np.array([[0.0, 1.0, 3.0]])
+    is_open = visible_sides(geometry, scene.cameras, 1)
+    found = place_probes(geometry, is_open, density_from_distance(geometry, eyes, make_corner_grid(is_open)), 1500)
+    vertices, points = found.lattice_nodes, found.probes
     of_ball = found.material[vertices.point[:, 0]] == 0
     place = np.einsum("vk,vkc->vc", vertices.weight, points.position[vertices.point])
     for vertex in np.flatnonzero(of_ball):
@@ -294,5 +309,5 @@ def test_faces_hang_together_by_places_of_corners():
         mesh("b", [[1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2]], 0),
     ]
     far = mesh("c", [[5, 0, 0], [6, 0, 0], [5, 1, 0]], [[0, 1, 2]], 0)
-    found = pieces_of(merge(scene_of(*apart, far, camera=CAMERA)))
+    found = mesh_components(build_scene_buffers(make_tiny_scene(*apart, far, camera=CAMERA)))
     assert found[0] == found[1] != found[2]

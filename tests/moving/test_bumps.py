@@ -2,22 +2,22 @@
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, quad, scene_of, studio
+from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
 from relume.bake import Recipe
-from relume.basis.zernike import NUM_FUNCTIONS, in_basis
+from relume.basis.zernike import NUM_FUNCTIONS, project
 from relume.look import complete, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.bumps import expansions, towards_light, towards_light_numpy
+from relume.moving.bumps import basis_gradients, light_gradient, light_gradient_numpy
 from relume.render.image import render_image
 from relume.scene.model import Material, Texture
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 WAVES = 4
 LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)
 METAL = ({"model": "ggx", "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.25}},)
-CAMERA = looking("front", [0.4, 1.6, 1.8], [0, 0, 0], 0.35)  # sees nothing but floor
+CAMERA = make_camera("front", [0.4, 1.6, 1.8], [0, 0, 0], 0.35)  # sees nothing but floor
 SIZE = (64, 48)
 
 
@@ -31,12 +31,12 @@ def waves(size=128, slope=0.35, wrap=("repeat", "repeat")):
 def floor(terms, normal_map):
     material = Material("Floor", terms, normal_map=normal_map)
     ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    return scene_of(ground, camera=CAMERA, environment=studio(64, 20.0), materials=[material])
+    return make_tiny_scene(ground, camera=CAMERA, environment=studio(64, 20.0), materials=[material])
 
 
 def picture_of(scene, method, folder):
     recipe = Recipe(method, ("front",), SIZE, 1000, num_points=2000)
-    opened = open_bake(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    opened = open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
     return render_image(opened, "front", validate(complete({}, opened.default_look), opened.default_look))
 
 
@@ -64,23 +64,25 @@ def test_light_of_a_few_directions_comes_from_their_mean(tmp_path):
     rng = np.random.default_rng(4)
     wi = rng.normal(size=(400, 3)) * [0.5, 0.5, 0.2] + [0, 0, 1]
     wi /= np.linalg.norm(wi, axis=1, keepdims=True)
-    vectors = np.einsum("s,sk->k", wi[:, 2], in_basis(wi)) / len(wi)
-    np.testing.assert_allclose(expansions() @ vectors, wi.mean(axis=0), atol=0.03)
+    vectors = np.einsum("s,sk->k", wi[:, 2], project(wi)) / len(wi)
+    np.testing.assert_allclose(basis_gradients() @ vectors, wi.mean(axis=0), atol=0.03)
 
 
 def test_points_are_told_where_light_comes_from_as_in_numpy(tmp_path):
     scene = floor(LAMBERT, waves())
     recipe = Recipe("surface", ("front",), (16, 12), 60, num_points=500)
-    surface = open_bake(bake_here(METHODS["surface"], scene, recipe, tmp_path / "s.zarr"), Memory(1 << 30)).surface
-    num = surface.points.num_points
+    surface = open_bake(
+        bake_in_process(METHODS["surface"], scene, recipe, tmp_path / "s.zarr"), Cache(1 << 30)
+    ).stored_scene
+    num = surface.probes.num_points
     vectors = np.random.default_rng(1).normal(size=(num, 3, NUM_FUNCTIONS)).astype(np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = towards_light(surface, vectors, is_needed)
-    expected = np.array([towards_light_numpy(surface, vectors, point) for point in range(num)])
+    found = light_gradient(surface, vectors, is_needed)
+    expected = np.array([light_gradient_numpy(surface, vectors, point) for point in range(num)])
     np.testing.assert_allclose(found, expected * is_needed[:, None], atol=1e-4)
 
 
 def test_scenes_without_normal_maps_keep_no_tangents(tmp_path):
     recipe = Recipe("surface", ("front",), (16, 12), 60, num_points=500)
-    store = bake_here(METHODS["surface"], floor(LAMBERT, None), recipe, tmp_path / "s.zarr")
-    assert open_bake(store, Memory(1 << 30)).surface.tangents.shape == (0, 4)
+    store = bake_in_process(METHODS["surface"], floor(LAMBERT, None), recipe, tmp_path / "s.zarr")
+    assert open_bake(store, Cache(1 << 30)).stored_scene.tangents.shape == (0, 4)

@@ -2,20 +2,20 @@
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, scene_of, sphere, studio
+from tiny_scenes import make_camera, make_tiny_scene, sphere, studio
 
 from relume.bake import Recipe
 from relume.brdf.evaluate import eval_brdf
 from relume.light.tiles import Tiles
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.basis.lobes import lobes_of
+from relume.moving.basis.lobes import build_lobes
 from relume.moving.basis.out_factors import cosines
-from relume.moving.highlights.by_lights import SkyLights, by_lights, by_lights_numpy
+from relume.moving.highlights.by_lights import EnvironmentLights, sum_lights, sum_lights_numpy
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
-CAMERA = looking("front", [0, 0.5, 3], [0, 0, 0], 0.75)
+CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 EYE = np.array([0.4, 1.5, 3.0], np.float32)
 
 
@@ -27,10 +27,10 @@ def document(model, **params):
 def surface(tmp_path_factory):
     material = Material("Ball", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
     ball = sphere("ball", [0, 0, 0], 1, 0, 24)
-    scene = scene_of(ball, camera=CAMERA, environment=studio(64, 20.0), materials=[material])
+    scene = make_tiny_scene(ball, camera=CAMERA, environment=studio(64, 20.0), materials=[material])
     store = tmp_path_factory.mktemp("ball") / "surface.zarr"
-    bake_here(METHODS["surface"], scene, Recipe("surface", ("front",), (32, 24), 500, num_points=300), store)
-    return open_bake(store, Memory(1 << 30)).surface
+    bake_in_process(METHODS["surface"], scene, Recipe("surface", ("front",), (32, 24), 500, num_points=300), store)
+    return open_bake(store, Cache(1 << 30)).stored_scene
 
 
 def lights_of(rng, num, radius):
@@ -45,22 +45,22 @@ def lights_of(rng, num, radius):
 
 def facing(surface, least):
     """Points that see the eye from not too aslant."""
-    towards = EYE - surface.points.position
-    cosine = np.einsum("pk,pk->p", surface.points.normal, towards) / np.linalg.norm(towards, axis=1)
+    towards = EYE - surface.probes.position
+    cosine = np.einsum("pk,pk->p", surface.probes.normal, towards) / np.linalg.norm(towards, axis=1)
     return np.flatnonzero(cosine > least)
 
 
 @pytest.mark.parametrize("term", [document("ggx", roughness=0.4, f0=0.9), document("blinn_phong", exponent=400.0)])
 def test_the_kernel_does_what_its_twin_does(surface, term):
-    rng, num = np.random.default_rng(5), surface.points.num_points
-    lobes = lobes_of([[term]])
-    lights = SkyLights.of(*lights_of(rng, 152, rng.uniform(0, 0.3, 152)))
+    rng, num = np.random.default_rng(5), surface.probes.num_points
+    lobes = build_lobes([[term]])
+    lights = EnvironmentLights.from_lights(*lights_of(rng, 152, rng.uniform(0, 0.3, 152)))
     visible = rng.integers(0, 256, (num, 19)).astype(np.uint8)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = by_lights(surface, visible, lights, lobes, EYE, is_needed)
+    found = sum_lights(surface, visible, lights, lobes, EYE, is_needed)
     assert not found[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::7]:
-        expected = by_lights_numpy(surface, visible, lights, lobes, EYE, point)
+        expected = sum_lights_numpy(surface, visible, lights, lobes, EYE, point)
         np.testing.assert_allclose(found[point], expected, rtol=2e-3, atol=2e-3 * np.abs(found).max())
 
 
@@ -75,16 +75,18 @@ def test_the_kernel_does_what_its_twin_does(surface, term):
 )
 def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
     """Small lights, some of them seen, against the terms themselves."""
-    rng, num, lobes = np.random.default_rng(6), surface.points.num_points, lobes_of([[term]])
-    assert not lobes.believed[0, cosines() > 0.4].any()
+    rng, num, lobes = np.random.default_rng(6), surface.probes.num_points, build_lobes([[term]])
+    assert not lobes.lobe_confidence[0, cosines() > 0.4].any()
     towards, light, radius = lights_of(rng, 400, 0.01)
     bits = rng.integers(0, 256, (num, 50)).astype(np.uint8)
-    found = by_lights(surface, bits, SkyLights.of(towards, light, radius), lobes, EYE, np.ones(num, np.uint8))
+    found = sum_lights(
+        surface, bits, EnvironmentLights.from_lights(towards, light, radius), lobes, EYE, np.ones(num, np.uint8)
+    )
     off, size = [], []
     for point in facing(surface, 0.4):
-        n, t = surface.points.normal[point], surface.points.tangent[point, :3]
+        n, t = surface.probes.normal[point], surface.probes.tangent[point, :3]
         to_local = np.stack([t, np.cross(n, t), n]).astype(np.float64)
-        wo = to_local @ (EYE - surface.points.position[point])
+        wo = to_local @ (EYE - surface.probes.position[point])
         wi = towards @ to_local.T
         sent = eval_brdf(term, wi, wo / np.linalg.norm(wo)) * np.maximum(wi[:, 2:], 0)
         expected = np.unpackbits(bits[point], bitorder="little") @ (sent * light)
@@ -98,17 +100,19 @@ def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
 @pytest.mark.parametrize("roughness", [0.02, 0.1, 0.25])
 def test_under_a_white_sky_nothing_is_gained_or_lost(surface, roughness):
     """Lights as wide as those of a bake; what lobes show of it is one."""
-    num, lobes = surface.points.num_points, lobes_of([[document("ggx", roughness=roughness, f0=0.9)]])
+    num, lobes = surface.probes.num_points, build_lobes([[document("ggx", roughness=roughness, f0=0.9)]])
     tiles = Tiles(np.arange(8 << 8, 16 << 8, dtype=np.uint64))
     light = np.broadcast_to(tiles.solid_angles[:, None], (2048, 3)).astype(np.float32)
     radius = np.linalg.norm(tiles.corners[:, 0] - tiles.centroids, axis=1)
-    lights = SkyLights.of(tiles.centroids.astype(np.float32), light, radius.astype(np.float32))
-    summed = by_lights(surface, np.full((num, 256), 255, np.uint8), lights, lobes, EYE, np.ones(num, np.uint8))
+    lights = EnvironmentLights.from_lights(tiles.centroids.astype(np.float32), light, radius.astype(np.float32))
+    summed = sum_lights(surface, np.full((num, 256), 255, np.uint8), lights, lobes, EYE, np.ones(num, np.uint8))
     seen = []
     for point in facing(surface, 0.4)[::3]:
-        wo = EYE - surface.points.position[point]
-        place = np.sqrt(1 - surface.points.normal[point] @ wo / np.linalg.norm(wo)) * (lobes.believed.shape[1] - 1)
-        believed = np.interp(place, np.arange(lobes.believed.shape[1]), lobes.believed[0])
+        wo = EYE - surface.probes.position[point]
+        place = np.sqrt(1 - surface.probes.normal[point] @ wo / np.linalg.norm(wo)) * (
+            lobes.lobe_confidence.shape[1] - 1
+        )
+        believed = np.interp(place, np.arange(lobes.lobe_confidence.shape[1]), lobes.lobe_confidence[0])
         seen.append(believed + summed[point, 0])
     np.testing.assert_allclose(seen, 1, atol=0.1)
     assert np.sqrt(np.mean(np.square(np.subtract(seen, 1)))) < 0.05

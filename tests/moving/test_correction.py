@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.moving.correction import Places, corrected, correction
+from relume.moving.correction import CorrectionSamples, apply_residual, residual
 
 STEP, WIDTH, HEIGHT = 4, 48, 32
 
@@ -17,7 +17,7 @@ def places(width, height):
     position = np.stack([u, v, -0.005 * along**2], axis=1).astype(np.float32)
     normal = np.stack([np.sin(bend), 0 * u, np.cos(bend)], axis=1).astype(np.float32)
     material = np.where(v < 4, -1, (u >= WIDTH / 2).astype(int)).astype(np.int32)
-    return Places(position, normal, material, width)
+    return CorrectionSamples(position, normal, material, width)
 
 
 def likeness(at, p, samples, q):
@@ -81,7 +81,7 @@ def test_between_samples_it_is_what_loops_find(both):
     off = np.where(samples.material[:, None] == 0, smooth, rng.normal(size=smooth.shape))
     off[samples.material < 0] = 0
     radiance = rng.random(off.shape) + 2
-    by = correction(image(samples, radiance), image(samples, radiance + off), samples, pixels)
+    by = residual(image(samples, radiance), image(samples, radiance + off), samples, pixels)
     wanted = image(pixels, expected(off, samples, pixels))
     np.testing.assert_allclose(by, wanted, atol=2e-6)
     assert np.abs(by).max() > 0.1
@@ -95,22 +95,22 @@ def test_what_is_off_smoothly_is_mended_and_noise_is_not_believed(both):
         return np.repeat(0.5 + 0.01 * at.position[:, :1], 3, axis=1) * (at.material >= 0)[:, None]
 
     zero = np.zeros((len(samples.material), 3))
-    by = correction(image(samples, zero), image(samples, smooth(samples)), samples, pixels)
+    by = residual(image(samples, zero), image(samples, smooth(samples)), samples, pixels)
     wanted = image(pixels, smooth(pixels))
     assert np.sqrt(np.mean((by - wanted) ** 2)) < 0.1 * np.sqrt(np.mean(wanted**2))
     noise = np.random.default_rng(3).normal(size=zero.shape)
-    by = correction(image(samples, zero), image(samples, noise), samples, pixels)
+    by = residual(image(samples, zero), image(samples, noise), samples, pixels)
     assert not by.any()
 
 
 def test_samples_beside_edges_say_nothing(both):
     samples, _ = both
     edges = np.array([10 * WIDTH + 21, 11 * WIDTH])  # a sample lies at x = 22, y = 10; the other is far from any
-    left = samples.off_edges(edges, (WIDTH, HEIGHT)).material
+    left = samples.exclude_edges(edges, (WIDTH, HEIGHT)).material
     assert np.flatnonzero(left != samples.material).tolist() == [2 * samples.width + 5]
     assert left[2 * samples.width + 5] == -1
 
 
 def test_nothing_is_darker_than_black():
-    found = corrected(np.full((1, 2, 3), 0.5, np.float32), np.float32([[[-1, 0, 1], [0.25, -0.5, -0.25]]]))
+    found = apply_residual(np.full((1, 2, 3), 0.5, np.float32), np.float32([[[-1, 0, 1], [0.25, -0.5, -0.25]]]))
     np.testing.assert_array_equal(found, np.float32([[[0, 0.5, 1.5], [0.75, 0, 0.25]]]))

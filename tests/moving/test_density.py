@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 from sessions import relative_rmse
-from tiny_scenes import looking, quad, scene_of, studio
+from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
 from relume.bake import Recipe
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.points.density import by_distance, by_shadows
-from relume.moving.points.following import linear
-from relume.moving.points.grids import steps_of
-from relume.moving.points.lattice import one_row, place_points
-from relume.moving.points.sides import open_sides
+from relume.moving.points.density import density_from_distance, density_from_shadows
+from relume.moving.points.following import make_weights_linear
+from relume.moving.points.grids import enumerate_nodes
+from relume.moving.points.lattice import make_corner_grid, place_probes
+from relume.moving.points.sides import visible_sides
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
 
 EYE = np.array([[0.0, 3.0, 4.0]])
 
@@ -29,26 +29,26 @@ def scene():
     floor = quad("floor", [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]], 0)
     card = quad("card", [[-0.3, 0, 0.1], [0.3, 0, 0.1], [0.3, 0.5, 0.1], [-0.3, 0.5, 0.1]], 1)
     grey = [Material(name, ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)) for name in ("Floor", "Card")]
-    camera = looking("front", EYE[0], [0, 0, 0], 0.5)
-    return scene_of(floor, card, camera=camera, environment=studio(32, 20.0), materials=grey)
+    camera = make_camera("front", EYE[0], [0, 0, 0], 0.5)
+    return make_tiny_scene(floor, card, camera=camera, environment=studio(32, 20.0), materials=grey)
 
 
 def first_placed(scene, num_points=1500):
-    geometry = merge(scene)
-    is_open = open_sides(geometry, scene.cameras, 1)
-    density = by_distance(geometry, EYE, one_row(is_open))
-    return geometry, is_open, place_points(geometry, is_open, density, num_points)
+    geometry = build_scene_buffers(scene)
+    is_open = visible_sides(geometry, scene.cameras, 1)
+    density = density_from_distance(geometry, EYE, make_corner_grid(is_open))
+    return geometry, is_open, place_probes(geometry, is_open, density, num_points)
 
 
 def by_shadows_of(scene, geometry, placed):
-    return by_shadows(geometry, placed, EYE, subdivide(scene.environment.radiance, 300))
+    return density_from_shadows(geometry, placed, EYE, tessellate_environment(scene.environment.radiance, 300))
 
 
 def test_far_from_the_eye_points_are_farther_apart(scene):
     geometry, _, placed = first_placed(scene)
-    eye, steps = np.array([0.0, 0.5, 2.0]), steps_of(placed.lattice.num_rows)
-    power = by_distance(geometry, eye[None], placed.lattice).power
-    where = placed.points.position[placed.vertices.point[placed.lattice.node, 0]]
+    eye, steps = np.array([0.0, 0.5, 2.0]), enumerate_nodes(placed.probe_grid.num_rows)
+    power = density_from_distance(geometry, eye[None], placed.probe_grid).power
+    where = placed.probes.position[placed.lattice_nodes.point[placed.probe_grid.node, 0]]
     distance = np.linalg.norm(where - eye, axis=1)
     is_floor = geometry.face_material[steps.grid // 2] == 0
     assert power[is_floor][distance[is_floor].argmax()] == 3 + power[is_floor][distance[is_floor].argmin()]
@@ -61,23 +61,23 @@ def test_both_halves_of_narrow_strips_have_grids_alike():
     corners = [[[w, 0, -4], [w, 0, 4], [w + 0.02, 0, 4], [w + 0.02, 0, -4]] for w in x]
     strips = [quad(f"strip {k}", corners[k], 0) for k in range(len(x))]
     grey = [Material("Strips", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))]
-    scene = scene_of(*strips, camera=looking("front", EYE[0], [0, 0, 0], 0.5), materials=grey)
-    geometry = merge(scene)
-    is_open = open_sides(geometry, scene.cameras, 1)
-    density = by_distance(geometry, np.array([[0.0, 1.0, 3.0]]), one_row(is_open))
-    power, _ = density.of_faces()
+    scene = make_tiny_scene(*strips, camera=make_camera("front", EYE[0], [0, 0, 0], 0.5), materials=grey)
+    geometry = build_scene_buffers(scene)
+    is_open = visible_sides(geometry, scene.cameras, 1)
+    density = density_from_distance(geometry, np.array([[0.0, 1.0, 3.0]]), make_corner_grid(is_open))
+    power, _ = density.face_extremes()
     assert (power[::2] != power[1::2]).all()
-    rows = place_points(geometry, is_open, density, 300).lattice.num_rows.max(axis=1)
+    rows = place_probes(geometry, is_open, density, 300).probe_grid.num_rows.max(axis=1)
     assert rows.max() > 1
     np.testing.assert_array_equal(rows[::2], rows[1::2])
 
 
 def test_they_are_dense_where_shadows_end(scene):
     geometry, is_open, before = first_placed(scene)
-    after = place_points(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+    after = place_probes(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
     near, far = [], []
     for placed in (before, after):
-        distance = np.linalg.norm(placed.points.position[placed.material == 0], axis=1)
+        distance = np.linalg.norm(placed.probes.position[placed.material == 0], axis=1)
         near.append((distance < 0.8).sum())
         far.append((distance > 3).sum())
     assert near[1] > 2 * near[0]
@@ -86,16 +86,16 @@ def test_they_are_dense_where_shadows_end(scene):
 
 def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
     geometry, is_open, before = first_placed(scene)
-    placed = place_points(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
-    lattice, vertices, steps = placed.lattice, placed.vertices, steps_of(placed.lattice.num_rows)
+    placed = place_probes(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+    lattice, vertices, steps = placed.probe_grid, placed.lattice_nodes, enumerate_nodes(placed.probe_grid.num_rows)
     is_floor = geometry.face_material[steps.grid // 2] == 0
     a, b, c = geometry.positions[geometry.faces[steps.grid // 2]].transpose(1, 0, 2)
     u, v = (steps.i / steps.rows)[:, None], (steps.j / steps.rows)[:, None]
     where = ((1 - u - v) * a + u * b + v * c)[is_floor]
     of_nodes = vertices.point[lattice.node], vertices.weight[lattice.node]
-    found = np.einsum("npc,np->nc", placed.points.position[of_nodes[0]], of_nodes[1])[is_floor]
+    found = np.einsum("npc,np->nc", placed.probes.position[of_nodes[0]], of_nodes[1])[is_floor]
     off = np.linalg.norm((found - where)[:, [0, 2]], axis=1) / placed.spacing
-    assert len(where) > 2 * len(placed.points.position)
+    assert len(where) > 2 * len(placed.probes.position)
     assert np.quantile(off, 0.98) < 0.05
     assert off.max() < 1  # beside nodes that are one with others of another face
     np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
@@ -104,22 +104,22 @@ def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
 def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
     def shown(method, name):
         recipe = Recipe(method, ("front",), (64, 48), 300, num_points=1500)
-        bake = open_bake(bake_here(METHODS[method], scene, recipe, tmp_path / f"{name}.zarr"), Memory(1 << 30))
+        bake = open_bake(bake_in_process(METHODS[method], scene, recipe, tmp_path / f"{name}.zarr"), Cache(1 << 30))
         look = validate({"transport": {"bounces": 0}} if method == "surface" else {}, bake.default_look)
         return render_image(bake, "front", look)[..., :3]
 
     truth, now = shown("direct", "truth"), shown("surface", "now")
-    alike = lambda geometry, placed, eyes, lights: by_distance(geometry, eyes, placed.lattice)  # noqa: E731
-    monkeypatch.setattr("relume.methods.surface.by_shadows", alike)
+    alike = lambda geometry, placed, eyes, lights: density_from_distance(geometry, eyes, placed.probe_grid)  # noqa: E731
+    monkeypatch.setattr("relume.methods.surface.density_from_shadows", alike)
     assert relative_rmse(now, truth) < 0.7 * relative_rmse(shown("surface", "before"), truth)
 
 
 def test_where_nothing_is_in_the_way_distance_counts_alone():
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    scene = scene_of(ground, camera=looking("front", EYE[0], [0, 0, 0], 0.8), environment=studio(32, 20.0))
+    scene = make_tiny_scene(ground, camera=make_camera("front", EYE[0], [0, 0, 0], 0.8), environment=studio(32, 20.0))
     geometry, _, placed = first_placed(scene)
     after = by_shadows_of(scene, geometry, placed)
-    np.testing.assert_array_equal(by_distance(geometry, EYE, placed.lattice).power, after.power)
+    np.testing.assert_array_equal(density_from_distance(geometry, EYE, placed.probe_grid).power, after.power)
 
 
 def test_weights_meet_light_that_is_linear():
@@ -127,7 +127,7 @@ def test_weights_meet_light_that_is_linear():
     towards, normal = rng.normal(size=(200, 3, 4)), np.tile([0.0, 0, 1], (200, 1))
     weight = rng.random((200, 4))
     weight /= weight.sum(axis=1, keepdims=True)
-    found = linear(weight, towards, normal)
+    found = make_weights_linear(weight, towards, normal)
     off = [np.linalg.norm(np.einsum("vcp,vp->vc", towards[:, :2], w), axis=1) for w in (weight, found)]
     assert np.median(off[1] / off[0]) < 0.35
     assert (off[1] < 1.01 * off[0]).all()

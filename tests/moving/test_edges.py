@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, quad, scene_of, sphere
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
 from relume.bake import Recipe
 from relume.look import complete, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.edges import POSITIONS, rays_an_edge, resolve
-from relume.moving.look_up import look
+from relume.moving.edges import EDGE_SAMPLE_POSITIONS, resolve, samples_per_edge
+from relume.moving.look_up import trace_primary
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
-CAMERA = looking("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
+CAMERA = make_camera("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
 SIZE = (48, 36)
 FINER = 8
 
@@ -26,30 +26,32 @@ def opened(tmp_path_factory):
         Material(name, ({"model": "lambert", "color": [c] * 3},)) for name, c in (("Ball", 0.0), ("Wall", 1.0))
     )
     wall = quad("wall", [[-3, -2, -1], [3, -2, -1], [3, 3, -1], [-3, 3, -1]], 1)
-    scene = scene_of(sphere("ball", (0, 0.5, 0), 0.5, 0, rings=24), wall, camera=CAMERA, materials=[black, white])
+    scene = make_tiny_scene(
+        sphere("ball", (0, 0.5, 0), 0.5, 0, num_rings=24), wall, camera=CAMERA, materials=[black, white]
+    )
     recipe = Recipe("surface", ("front",), SIZE, 60, num_points=1500)
     folder = tmp_path_factory.mktemp("edges")
-    return open_bake(bake_here(METHODS["surface"], scene, recipe, folder / "s.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS["surface"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
 
 
 def picture(opened, scale):
     look_ = validate(complete({}, opened.default_look), opened.default_look)
     size = SIZE[0] * scale, SIZE[1] * scale
-    image = render_image(opened, "front", look_, eye=(CAMERA, size))[..., 0]
+    image = render_image(opened, "front", look_, camera_and_size=(CAMERA, size))[..., 0]
     return image.reshape(SIZE[1], scale, SIZE[0], scale).mean(axis=(1, 3))
 
 
 def coverage(opened):
     """Share of each pixel that the ball takes. (height, width)"""
     size = SIZE[0] * FINER, SIZE[1] * FINER
-    face = look(opened.surface, opened.embree, CAMERA, size).hits.face[: size[0] * size[1]]
-    is_ball = (face >= 0) & (opened.surface.face_material[np.maximum(face, 0)] == 0)
+    face = trace_primary(opened.stored_scene, opened.embree, CAMERA, size).hits.face[: size[0] * size[1]]
+    is_ball = (face >= 0) & (opened.stored_scene.face_material[np.maximum(face, 0)] == 0)
     return is_ball.reshape(SIZE[1], FINER, SIZE[0], FINER).mean(axis=(1, 3))
 
 
 def test_edges_are_the_means_of_what_their_pixels_see(opened):
     found, truth = picture(opened, 1), picture(opened, FINER)
-    seen = look(opened.surface, opened.embree, CAMERA, SIZE)
+    seen = trace_primary(opened.stored_scene, opened.embree, CAMERA, SIZE)
     is_edge = np.zeros(SIZE[::-1], bool).ravel()
     is_edge[seen.owner] = True
     is_edge = is_edge.reshape(SIZE[::-1])
@@ -64,15 +66,15 @@ def test_edges_are_the_means_of_what_their_pixels_see(opened):
 
 
 def test_pixels_within_one_surface_take_one_ray(opened):
-    seen = look(opened.surface, opened.embree, looking("near", [2, 2, 1], [2, 2, -1], 0.3), SIZE)
+    seen = trace_primary(opened.stored_scene, opened.embree, make_camera("near", [2, 2, 1], [2, 2, -1], 0.3), SIZE)
     assert len(seen.owner) == 0
     assert len(seen.directions) == SIZE[0] * SIZE[1]
 
 
 def test_a_picture_of_edges_alone_takes_fewer_rays_for_each():
-    assert rays_an_edge(0, 1000) == rays_an_edge(100, 1000) == len(POSITIONS)
-    assert rays_an_edge(250, 1000) == 2
-    assert rays_an_edge(900, 1000) == 0
+    assert samples_per_edge(0, 1000) == samples_per_edge(100, 1000) == len(EDGE_SAMPLE_POSITIONS)
+    assert samples_per_edge(250, 1000) == 2
+    assert samples_per_edge(900, 1000) == 0
 
 
 def test_pixels_without_more_rays_stay_what_they_were():

@@ -5,20 +5,20 @@ import pytest
 from test_out_factors import document
 from test_zernike import hemisphere
 
-from relume.basis.zernike import NUM_FUNCTIONS, in_basis, num_functions
+from relume.basis.zernike import NUM_FUNCTIONS, num_functions, project
 from relume.brdf.evaluate import eval_brdf
-from relume.moving.basis.in_out import BOUND, in_out
-from relume.moving.basis.out_factors import cosines, out_factors
+from relume.moving.basis.in_out import BOUND, factorization_error
+from relume.moving.basis.out_factors import cosines, outgoing_coefficients
 
 
 def test_one_function_is_enough_for_a_diffuse_surface():
-    told = in_out(document("lambert"))
+    told = factorization_error(document("lambert"))
     assert (told.functions, told.needed, told.is_mirror) == (NUM_FUNCTIONS, 1, False)
     assert told.missed < 1e-3
 
 
 def test_sharper_highlights_need_more_until_they_are_mirrors():
-    told = [in_out(document("phong", params={"exponent": e})) for e in (4.0, 8.0, 10.0, 300.0)]
+    told = [factorization_error(document("phong", params={"exponent": e})) for e in (4.0, 8.0, 10.0, 300.0)]
     needed = [one.needed or 1000 for one in told]
     assert needed == sorted(needed)
     assert len(set(needed)) > 2
@@ -32,8 +32,8 @@ def test_sharper_highlights_need_more_until_they_are_mirrors():
 def test_what_is_missed_is_what_a_projection_onto_a_prefix_leaves(exponent):
     term = document("blinn_phong", params={"exponent": exponent})
     wi, weight = hemisphere(64, 128)
-    functions, cosine = in_basis(wi), cosines()
-    missed = out_factors(term).missed_by_degree
+    functions, cosine = project(wi), cosines()
+    missed = outgoing_coefficients(term).residual_by_degree
     for degree in (0, 3, 7):
         basis, left = functions[:, : num_functions(degree)], []
         for z in cosine:
@@ -41,4 +41,7 @@ def test_what_is_missed_is_what_a_projection_onto_a_prefix_leaves(exponent):
             fitted = basis @ np.linalg.lstsq(basis * np.sqrt(weight)[:, None], value * np.sqrt(weight), rcond=None)[0]
             left.append(np.sqrt((weight * (value - fitted) ** 2).sum() / (weight * value**2).sum()))
         assert missed[degree] == pytest.approx(np.average(left, weights=cosine), abs=0.01)
-    assert in_out(term).needed in (None, *(num_functions(n) for n, share in enumerate(missed) if share <= BOUND))
+    assert factorization_error(term).needed in (
+        None,
+        *(num_functions(n) for n, share in enumerate(missed) if share <= BOUND),
+    )

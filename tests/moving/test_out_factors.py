@@ -5,13 +5,19 @@ import pytest
 from analytic_terms import ANALYTIC
 from test_zernike import hemisphere
 
-from relume.basis.zernike import NUM_FUNCTIONS, in_basis
+from relume.basis.zernike import NUM_FUNCTIONS, project
 from relume.brdf.evaluate import eval_brdf
 from relume.moving.basis import lobes as lobes_module
-from relume.moving.basis.lobes import is_narrow, lobes_of
-from relume.moving.basis.out_factors import NUM_ROWS, cosines, of_white, out_factors, turned
-from relume.moving.basis.tables import tables_of
-from relume.moving.basis.two_lobes import fit_two, fit_two_numpy
+from relume.moving.basis.lobes import build_lobes, is_narrow
+from relume.moving.basis.out_factors import (
+    NUM_ROWS,
+    cosines,
+    outgoing_coefficients,
+    rotate_coefficients,
+    white_coefficients,
+)
+from relume.moving.basis.tables import build_tables
+from relume.moving.basis.two_lobes import fit_two_lobes, fit_two_lobes_numpy
 
 
 def document(model, **fields):
@@ -19,13 +25,13 @@ def document(model, **fields):
 
 
 def test_a_diffuse_surface_is_one_number():
-    found = out_factors(document("lambert", color=[0.2, 0.4, 0.8]))
+    found = outgoing_coefficients(document("lambert", color=[0.2, 0.4, 0.8]))
     assert found.table.shape == (NUM_ROWS, 1, 3, NUM_FUNCTIONS)
     np.testing.assert_allclose(
         found.table[:, 0, :, 0], np.tile(np.array([0.2, 0.4, 0.8]) / np.sqrt(np.pi), (32, 1)), rtol=1e-5
     )
     assert np.abs(found.table[..., 1:]).max() < 1e-6
-    assert found.missed < 1e-3
+    assert found.residual_energy < 1e-3
 
 
 @pytest.mark.parametrize("around", [5, 13, 22, 30])  # in each quarter, of which one alone is integrated
@@ -34,7 +40,7 @@ def test_factors_are_the_integrals_of_the_term(model, around):
     """By another quadrature, finer than the one under test; highlights that no quadrature of it resolves are blurred by
     the same functions."""
     term = document(model)
-    found = out_factors(term)
+    found = outgoing_coefficients(term)
     wi, weight = hemisphere(96, 192)
     row = 18
     cosine = cosines()[row]
@@ -43,31 +49,36 @@ def test_factors_are_the_integrals_of_the_term(model, around):
     sine = np.sqrt(1 - cosine**2)
     wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
     value = eval_brdf(term, wi, wo)
-    expected = np.einsum("nc,n,nk->ck", value, weight, in_basis(wi))
+    expected = np.einsum("nc,n,nk->ck", value, weight, project(wi))
     scale = np.sqrt((value**2 * weight[:, None]).sum(axis=0).max())
     assert np.abs(found.table[row, column] - expected).max() < 0.05 * scale
 
 
 def test_factors_turn_with_the_eye():
     term, wi_weights = document("blinn_phong", params={"exponent": 20.0}), hemisphere(48, 96)
-    found, (wi, weight) = out_factors(term), wi_weights
+    found, (wi, weight) = outgoing_coefficients(term), wi_weights
     row, phi = 14, 1.1
     cosine = cosines()[row]
     sine = np.sqrt(1 - cosine**2)
     wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
-    expected = np.einsum("nc,n,nk->ck", eval_brdf(term, wi, wo), weight, in_basis(wi))
-    np.testing.assert_allclose(turned(found.table[row, 0], phi), expected, atol=2e-3 * np.abs(expected).max())
+    expected = np.einsum("nc,n,nk->ck", eval_brdf(term, wi, wo), weight, project(wi))
+    np.testing.assert_allclose(
+        rotate_coefficients(found.table[row, 0], phi), expected, atol=2e-3 * np.abs(expected).max()
+    )
 
 
 def test_what_is_missed_grows_with_the_exponent():
-    missed = [out_factors(document("blinn_phong", params={"exponent": e})).missed for e in (5.0, 20.0, 80.0, 300.0)]
+    missed = [
+        outgoing_coefficients(document("blinn_phong", params={"exponent": e})).residual_energy
+        for e in (5.0, 20.0, 80.0, 300.0)
+    ]
     assert missed == sorted(missed)
     assert missed[0] < 0.05
     assert missed[-1] > 0.5
 
 
 def test_terms_with_a_highlight_along_the_tangent_have_tables_over_both_angles():
-    uneven = {model for model in ANALYTIC if out_factors(document(model)).table.shape[1] > 1}
+    uneven = {model for model in ANALYTIC if outgoing_coefficients(document(model)).table.shape[1] > 1}
     assert "ward_anisotropic" in uneven
     assert not uneven & {"lambert", "oren_nayar", "blinn_phong", "cook_torrance", "ggx"}
 
@@ -79,19 +90,19 @@ def test_terms_of_one_texture_are_summed_and_others_kept_apart():
         document("lambert", texture="diffuse", color=[0, 0, 1.0]),
         document("ward_anisotropic", params={"alpha_x": 0.9, "alpha_y": 0.5}),
     ]
-    assert not is_narrow(of_white(terms[-1]))
-    tables = tables_of([terms, []])
+    assert not is_narrow(white_coefficients(terms[-1]))
+    tables = build_tables([terms, []])
     of = [[0, 0, -1, -1, -1, -1], [1, -1, -1, -1, -1, -1], [-1] * 6]
-    assert tables.of.tolist() == [of, [[-1] * 6] * 3]
-    np.testing.assert_allclose(tables.even[1, 0, :, 0], np.array([1, 1, 2]) / np.sqrt(np.pi), rtol=1e-5)
+    assert tables.table_index.tolist() == [of, [[-1] * 6] * 3]
+    np.testing.assert_allclose(tables.isotropic[1, 0, :, 0], np.array([1, 1, 2]) / np.sqrt(np.pi), rtol=1e-5)
 
 
 @pytest.mark.parametrize("roughness", [0.1, 0.2, 0.3])
 def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
     """The integral of the term, by a quadrature of its half vectors: dωi = 4 cos θd dωh."""
     term = document("ggx", params={"roughness": roughness, "f0": 0.5}, color=[1.0, 0.5, 0.25], texture="specular")
-    lobes = lobes_of([[document("lambert")], [term]])
-    assert lobes.of.tolist() == [-1, 0]
+    lobes = build_lobes([[document("lambert")], [term]])
+    assert lobes.lobe_index.tolist() == [-1, 0]
     nodes, weights = np.polynomial.legendre.leggauss(400)
     alpha = roughness**2
     u, phi = np.repeat((nodes + 1) / 2, 64), np.tile((np.arange(64) + 0.5) * (2 * np.pi / 64), 400)
@@ -112,9 +123,9 @@ def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
 
 
 def test_a_sharp_lobe_looks_where_a_mirror_does_and_a_wider_one_is_wider():
-    found = [lobes_of([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
+    found = [build_lobes([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
     np.testing.assert_allclose(found[0].cosine[0, :24].mean(axis=1), cosines()[:24], atol=0.02)
-    widths = [lobe.wide[0, 8] for lobe in found]
+    widths = [lobe.single_sigma[0, 8] for lobe in found]
     assert widths == sorted(widths)
     assert all((lobe.sigma[0, :24, 1] > 2 * lobe.sigma[0, :24, 0]).all() for lobe in found)  # a core and its skirt
     assert all(lobe.is_two.all() for lobe in found)
@@ -125,7 +136,7 @@ def test_a_sharp_lobe_looks_where_a_mirror_does_and_a_wider_one_is_wider():
 def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponent):
     """Mean and variances over all directions, by another quadrature."""
     term = document("blinn_phong", params={"exponent": exponent})
-    lobes = lobes_of([[term]])
+    lobes = build_lobes([[term]])
     assert not lobes.is_two.any()
     cosine = cosines()[row]
     eye = np.arccos(cosine)
@@ -152,13 +163,13 @@ def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponen
     [("ggx", {"roughness": 0.3, "f0": 0.9}), ("cook_torrance", {}), ("blinn_phong", {"exponent": 3000.0})],
 )
 def test_two_lobes_are_fitted_as_their_twin_does_and_better_than_one(model, params):
-    even = lobes_module._even()
+    even = lobes_module._isotropic_grid()
     value = even.quadrature.values(document(model, params=params))
     sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
-    found = fit_two(even.x, even.z, even.area, sent)
+    found = fit_two_lobes(even.x, even.z, even.area, sent)
     for row in (12, 24):
         x, z, area, of_row = (np.asarray(one, np.float64) for one in (even.x[row], even.z[row], even.area, sent[row]))
-        np.testing.assert_allclose(found[row], fit_two_numpy(x, z, area, of_row), rtol=2e-3, atol=2e-4)
+        np.testing.assert_allclose(found[row], fit_two_lobes_numpy(x, z, area, of_row), rtol=2e-3, atol=2e-4)
         weight = of_row * area / (of_row @ area)
         towards = np.array([weight @ x, weight @ z])
         length = np.linalg.norm(towards)
@@ -175,18 +186,18 @@ def test_two_lobes_are_fitted_as_their_twin_does_and_better_than_one(model, para
 
 def test_what_sends_nothing_has_lobes_that_do_no_harm():
     nothing = np.zeros((2, 8), np.float32)
-    found = fit_two(nothing, nothing + 1, nothing[0] + 1, nothing)
+    found = fit_two_lobes(nothing, nothing + 1, nothing[0] + 1, nothing)
     np.testing.assert_array_equal(found, [[1, 1, 0.5, 1, 1]] * 2)
 
 
 def test_terms_along_the_tangent_have_one_lobe_of_the_mean_width():
     term = document("ward_anisotropic", params={"alpha_x": 0.4, "alpha_y": 0.1})
-    lobes = lobes_of([[term]])
-    assert lobes.of.tolist() == [0]
+    lobes = build_lobes([[term]])
+    assert lobes.lobe_index.tolist() == [0]
     np.testing.assert_array_equal(lobes.cosine[0, :, 0], lobes.cosine[0, :, 1])
 
 
 def test_what_the_in_basis_cannot_tell_is_not_believed_and_what_it_tells_well_is():
-    most = [lobes_of([[document("blinn_phong", params={"exponent": e})]]).most[0] for e in (20.0, 30.0, 300.0)]
+    most = [build_lobes([[document("blinn_phong", params={"exponent": e})]]).max_ratio[0] for e in (20.0, 30.0, 300.0)]
     assert most[0] > most[1] > most[2] == 1
     assert most[0] > 5

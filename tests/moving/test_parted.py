@@ -2,22 +2,22 @@
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, mesh, quad, scene_of
+from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 
 from relume.bake import Recipe
 from relume.environments.equirect import texel_directions
 from relume.look import complete, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
 from relume.moving import picture as picture_module
-from relume.moving.look_up import look
-from relume.moving.parted import mend
+from relume.moving.has_occluded_neighbor import reweight
+from relume.moving.look_up import trace_primary
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 SIZE = (64, 48)
-CAMERA = looking("front", [0.9, 1.4, 2.4], [0, 0.1, 0], 0.6)
+CAMERA = make_camera("front", [0.9, 1.4, 2.4], [0, 0.1, 0], 0.6)
 BOX = [[x, y, z] for x in (-0.33, 0.33) for y in (0, 0.6) for z in (-0.33, 0.33)]
 
 
@@ -29,14 +29,15 @@ def scene():
     radiance = np.where(texel_directions(16, 32)[..., 1:2] > 0, 1.0, 0.0) * np.ones(3)
     materials = [Material(name, ({"model": "lambert", "color": [0.7, 0.7, 0.7]},)) for name in ("Floor", "Box")]
     sky = radiance.astype(np.float32)
-    return scene_of(floor, *box, camera=CAMERA, environment=sky, materials=materials)
+    return make_tiny_scene(floor, *box, camera=CAMERA, environment=sky, materials=materials)
 
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
     recipe = Recipe("surface", ("front",), SIZE, 100, num_points=500)
     return open_bake(
-        bake_here(METHODS["surface"], scene(), recipe, tmp_path_factory.mktemp("parted") / "s.zarr"), Memory(1 << 30)
+        bake_in_process(METHODS["surface"], scene(), recipe, tmp_path_factory.mktemp("parted") / "s.zarr"),
+        Cache(1 << 30),
     )
 
 
@@ -47,19 +48,19 @@ def is_inside(place):
 
 def test_pixels_beside_a_box_do_without_what_lies_under_it(moving):
     """Of every pixel of the floor, the nodes under the box have no weight, unless all three lie there."""
-    seen = look(moving.surface, moving.embree, CAMERA, SIZE)
+    seen = trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE)
     before = seen.weight.copy()
-    mend(seen, moving.parted, moving.solid)
-    surface = moving.surface
-    place = surface.points.position[surface.vertices.point[:, 0]]
+    reweight(seen, moving.has_occluded_neighbor, moving.occlusion_mesh)
+    surface = moving.stored_scene
+    place = surface.probes.position[surface.lattice_nodes.point[:, 0]]
     on_floor = (seen.hits.face >= 0) & (surface.face_material[seen.hits.face] == 0)
-    under = np.stack([is_inside(place[seen.vertex[:, k]]) for k in range(3)], axis=1)
+    under = np.stack([is_inside(place[seen.lattice_node[:, k]]) for k in range(3)], axis=1)
     is_mixed = on_floor & under.any(axis=1) & ~under.all(axis=1)
     assert is_mixed.sum() > 10
     assert (before[is_mixed][under[is_mixed]] > 0.1).any()
     assert (seen.weight[is_mixed][under[is_mixed]] == 0).all()
     np.testing.assert_allclose(seen.weight[on_floor].sum(axis=1), 1, atol=1e-5)
-    is_far = on_floor & ~(moving.parted[seen.vertex] > 0).any(axis=1)
+    is_far = on_floor & ~(moving.has_occluded_neighbor[seen.lattice_node] > 0).any(axis=1)
     np.testing.assert_array_equal(seen.weight[is_far], before[is_far])
     changed = (seen.weight != before).any(axis=1)
     assert 0 < changed.mean() < 0.1
@@ -67,7 +68,7 @@ def test_pixels_beside_a_box_do_without_what_lies_under_it(moving):
 
 def test_the_line_where_it_stands_is_as_bright_as_in_a_fixed_view(moving, monkeypatch, tmp_path):
     recipe = Recipe("gather", ("front",), SIZE, 100)
-    fixed = open_bake(bake_here(METHODS["gather"], scene(), recipe, tmp_path / "g.zarr"), Memory(1 << 30))
+    fixed = open_bake(bake_in_process(METHODS["gather"], scene(), recipe, tmp_path / "g.zarr"), Cache(1 << 30))
     plain = validate(complete({}, moving.default_look), moving.default_look)
     expected = render_image(fixed, "front", plain)
 
@@ -76,7 +77,7 @@ def test_the_line_where_it_stands_is_as_bright_as_in_a_fixed_view(moving, monkey
         return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
 
     mended = error()
-    monkeypatch.setattr(picture_module, "mend", lambda *args: None)
+    monkeypatch.setattr(picture_module, "reweight", lambda *args: None)
     assert mended < 0.8 * error()
 
 
@@ -85,7 +86,7 @@ def test_faces_that_meet_do_not_part_each_other(tmp_path):
     corners = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [0, 2, 2]]
     walls = mesh("walls", corners, [[0, 1, 2], [0, 2, 3], [4, 0, 3], [4, 3, 5]], 0)
     floor = quad("floor", [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]], 0)
-    of = scene_of(walls, floor, camera=looking("front", [3, 2, 4], [0, 0.5, 0], 0.6))
+    of = make_tiny_scene(walls, floor, camera=make_camera("front", [3, 2, 4], [0, 0.5, 0], 0.6))
     recipe = Recipe("surface", ("front",), SIZE, 60, num_points=800)
-    found = open_bake(bake_here(METHODS["surface"], of, recipe, tmp_path / "s.zarr"), Memory(1 << 30))
-    assert not found.parted.any()
+    found = open_bake(bake_in_process(METHODS["surface"], of, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
+    assert not found.has_occluded_neighbor.any()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from relume.moving.paths import along, looked_at, turntable
+from relume.moving.paths import interpolate_cameras, pivot_of, turntable
 from relume.scene.model import Camera
 from relume.trace.embree import EmbreeScene
 
@@ -34,17 +34,17 @@ def test_a_picture_is_about_what_its_middle_shows_or_is_as_deep_as_the_scene():
     aside = [[8, 0, 0], [9, 0, 0], [8, 1, 0]]
     positions, faces = np.array([*near, *far, *aside], np.float32), np.arange(9, dtype=np.uint32).reshape(3, 3)
     view = SimpleNamespace(bounds=(np.array([-1.0, 0, 2]), np.array([3.0, 2, 4])))
-    surface = SimpleNamespace(faces=faces, face_material=np.array([1, 1, 0]))
+    stored_scene = SimpleNamespace(faces=faces, face_material=np.array([1, 1, 0]))
     scene = EmbreeScene.build(positions, faces)
-    transfer = SimpleNamespace(surface=surface, positions=positions, embree=scene, views={"front": view})
-    np.testing.assert_allclose(looked_at(transfer, camera([2, 1.5, 9])), [2, 1.5, 3.4], atol=1e-6)
-    np.testing.assert_allclose(looked_at(transfer, camera([0, 1.5, 9])), [0, 1.5, 3], atol=1e-12)
-    np.testing.assert_allclose(looked_at(transfer, camera([0, 1.5, -9])), [1, 1, 3], atol=1e-12)
+    transfer = SimpleNamespace(stored_scene=stored_scene, positions=positions, embree=scene, views={"front": view})
+    np.testing.assert_allclose(pivot_of(transfer, camera([2, 1.5, 9])), [2, 1.5, 3.4], atol=1e-6)
+    np.testing.assert_allclose(pivot_of(transfer, camera([0, 1.5, 9])), [0, 1.5, 3], atol=1e-12)
+    np.testing.assert_allclose(pivot_of(transfer, camera([0, 1.5, -9])), [1, 1, 3], atol=1e-12)
 
 
 def test_a_way_goes_through_its_cameras_and_never_leaves_the_rotations():
     keys = [camera([0, 1, 5]), camera([4, 2, 3], 0.9, 0.5), camera([5, 1, -1], 2.0, 1.0)]
-    found = along(keys, 9)
+    found = interpolate_cameras(keys, 9)
     for key, frame in zip(keys, found[::4], strict=True):
         np.testing.assert_allclose(frame.to_world, key.to_world, atol=1e-12)
         assert frame.yfov == pytest.approx(key.yfov)
@@ -57,11 +57,11 @@ def test_a_way_goes_through_its_cameras_and_never_leaves_the_rotations():
 
 @pytest.mark.parametrize("num", [1, 2, 7])
 def test_one_camera_stays_where_it_is(num):
-    assert [one.to_world.tolist() for one in along([camera([0, 1, 5])], num)] == [
+    assert [one.to_world.tolist() for one in interpolate_cameras([camera([0, 1, 5])], num)] == [
         camera([0, 1, 5]).to_world.tolist()
     ] * num
 
 
 def test_as_many_frames_as_cameras_are_these():
     keys = [camera([0, 1, 5]), camera([4, 2, 3], 0.9)]
-    assert along(keys, 2) == keys
+    assert interpolate_cameras(keys, 2) == keys

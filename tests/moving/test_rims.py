@@ -2,20 +2,20 @@
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, scene_of, sphere
+from tiny_scenes import make_camera, make_tiny_scene, sphere
 
 from relume.bake import Recipe
 from relume.color import LUMINANCE
 from relume.look import complete, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
 from relume.moving import rims
-from relume.moving.rims import PLACES, find_rims
+from relume.moving.rims import RAY_POSITIONS, find_highlight_edges
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
-CAMERA = looking("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
+CAMERA = make_camera("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
 SIZE, FINER = (32, 24), 6
 
 
@@ -28,7 +28,7 @@ def beside(luminance, y, x):
 
 @pytest.mark.parametrize("share", [1.0, 0.05])
 def test_rims_are_the_pixels_that_differ_most_from_one_beside_them(monkeypatch, share):
-    monkeypatch.setattr(rims, "_MOST", share)
+    monkeypatch.setattr(rims, "_MAX_EDGE_FRACTION", share)
     rng = np.random.default_rng(1)
     image = rng.exponential(size=(13, 17, 3)).astype(np.float32) ** 3
     is_asked = rng.random(13 * 17) > 0.2
@@ -38,13 +38,13 @@ def test_rims_are_the_pixels_that_differ_most_from_one_beside_them(monkeypatch, 
     expected = np.flatnonzero(jump > luminance.mean())
     assert 0 < len(expected) < is_asked.sum()
     expected = np.sort(expected[np.argsort(-jump[expected])][: int(share * 13 * 17)])
-    np.testing.assert_array_equal(find_rims(image, is_asked), expected)
+    np.testing.assert_array_equal(find_highlight_edges(image, is_asked), expected)
 
 
 def test_rays_share_no_row_and_no_column():
-    assert len(np.unique(PLACES[:, 0])) == len(np.unique(PLACES[:, 1])) == len(PLACES)
-    assert ((PLACES > 0) & (PLACES < 1)).all()
-    np.testing.assert_allclose(PLACES.mean(axis=0), 0.5)
+    assert len(np.unique(RAY_POSITIONS[:, 0])) == len(np.unique(RAY_POSITIONS[:, 1])) == len(RAY_POSITIONS)
+    assert ((RAY_POSITIONS > 0) & (RAY_POSITIONS < 1)).all()
+    np.testing.assert_allclose(RAY_POSITIONS.mean(axis=0), 0.5)
 
 
 @pytest.fixture(scope="module")
@@ -53,22 +53,22 @@ def shiny(tmp_path_factory):
     term = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.25, "f0": 0.9}}
     sky = np.full((32, 64, 3), 0.05, np.float32)
     sky[12, ::8] = 60
-    ball = sphere("ball", (0, 0.5, 0), 0.5, 0, rings=24)
-    scene = scene_of(ball, camera=CAMERA, environment=sky, materials=[Material("B", (term,))])
+    ball = sphere("ball", (0, 0.5, 0), 0.5, 0, num_rings=24)
+    scene = make_tiny_scene(ball, camera=CAMERA, environment=sky, materials=[Material("B", (term,))])
     recipe = Recipe("surface", ("front",), SIZE, 60, num_points=1500)
     folder = tmp_path_factory.mktemp("rims")
-    return open_bake(bake_here(METHODS["surface"], scene, recipe, folder / "s.zarr"), Memory(1 << 30))
+    return open_bake(bake_in_process(METHODS["surface"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
 
 
 def shown(opened, scale):
     look = validate(complete({}, opened.default_look), opened.default_look)
-    image = render_image(opened, "front", look, eye=(CAMERA, (SIZE[0] * scale, SIZE[1] * scale)))[..., :3]
+    image = render_image(opened, "front", look, camera_and_size=(CAMERA, (SIZE[0] * scale, SIZE[1] * scale)))[..., :3]
     return image.reshape(SIZE[1], scale, SIZE[0], scale, 3).mean(axis=(1, 3))
 
 
 def test_rims_show_what_their_pixels_see(shiny, monkeypatch):
     found = shown(shiny, 1)
-    monkeypatch.setattr(rims, "_MOST", 0.0)
+    monkeypatch.setattr(rims, "_MAX_EDGE_FRACTION", 0.0)
     without, truth = shown(shiny, 1), shown(shiny, FINER)
     changed = (found != without).any(axis=2)
     assert 0 < changed.sum() <= 0.02 * changed.size

@@ -4,28 +4,28 @@ import math
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, mesh, scene_of, sphere, still_life
+from tiny_scenes import make_camera, make_tiny_scene, mesh, sphere, still_life
 
 from relume.bake import Recipe
-from relume.environments.equirect import lookup, turned
+from relume.environments.equirect import lookup, rotate_about_y
 from relume.errors import PlanError
 from relume.look import EnvironmentKey
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.basis.lobes import lobes_of
-from relume.moving.basis.tables import tables_of
-from relume.moving.evaluate import send, send_numpy
-from relume.moving.highlights.looking import SkyLight
-from relume.moving.look_up import at_vertices, look
-from relume.moving.pixels import FromVertices, Mirrored, combine
-from relume.moving.points.density import by_distance
-from relume.moving.points.grids import Density, node_of, num_nodes
-from relume.moving.points.lattice import one_row, place_points
-from relume.moving.points.sides import open_sides
-from relume.moving.sky import fill_sky, turn_of
+from relume.moving.basis.lobes import build_lobes
+from relume.moving.basis.tables import build_tables
+from relume.moving.evaluate import shade_probes, shade_probes_numpy
+from relume.moving.highlights.looking import PrefilteredEnvironment
+from relume.moving.look_up import interpolate_to_nodes, trace_primary
+from relume.moving.pixels import InterpolatedProbes, MirrorData, shade_pixels
+from relume.moving.points.density import density_from_distance
+from relume.moving.points.grids import ProbeDensity, node_index, num_nodes
+from relume.moving.points.lattice import make_corner_grid, place_probes
+from relume.moving.points.sides import visible_sides
+from relume.moving.sky import rotation_of, sample
 from relume.scene.model import Camera
-from relume.store import bake_here
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
 from relume.trace.texture import MipMap
 
 TOLD = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells from around
@@ -34,35 +34,37 @@ TOLD = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
     recipe = Recipe("surface", ("front",), (48, 36), 60, num_points=1000)
-    store = bake_here(METHODS["surface"], still_life(), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
-    return open_bake(store, Memory(1 << 30))
+    store = bake_in_process(METHODS["surface"], still_life(), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
+    return open_bake(store, Cache(1 << 30))
 
 
 def placed(scene, num_points=500):
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     eyes = np.array([camera.to_world[:3, 3] for camera in scene.cameras])
-    is_open = open_sides(geometry, scene.cameras, 1)
-    return geometry, place_points(geometry, is_open, by_distance(geometry, eyes, one_row(is_open)), num_points)
+    is_open = visible_sides(geometry, scene.cameras, 1)
+    return geometry, place_probes(
+        geometry, is_open, density_from_distance(geometry, eyes, make_corner_grid(is_open)), num_points
+    )
 
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 255])
 def test_nodes_are_numbered_once_each(rows):
-    numbers = [node_of(rows, i, j) for i in range(rows + 1) for j in range(rows + 1 - i)]
+    numbers = [node_index(rows, i, j) for i in range(rows + 1) for j in range(rows + 1 - i)]
     assert numbers == list(range(int(num_nodes(np.array([rows]))[0])))
 
 
 @pytest.mark.parametrize("num_points", [200, 500, 5000])
 def test_about_as_many_points_as_asked_for_and_none_twice(num_points):
     _, found = placed(still_life(), num_points)
-    assert 0.5 * num_points < found.points.num_points <= 1.05 * num_points + 1
-    together = np.column_stack([found.points.position, found.points.normal, found.material])
+    assert 0.5 * num_points < found.probes.num_points <= 1.05 * num_points + 1
+    together = np.column_stack([found.probes.position, found.probes.normal, found.material])
     assert len(np.unique(together, axis=0)) == len(together)
 
 
 def test_what_vertices_take_is_from_about_them():
     """Of their own side, where points are what they take."""
     geometry, found = placed(still_life(), 4000)
-    lattice, vertices, points = found.lattice, found.vertices, found.points
+    lattice, vertices, points = found.probe_grid, found.lattice_nodes, found.probes
     np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
     assert vertices.weight.min() >= 0
     for face, side in np.argwhere(lattice.num_rows > 0)[::37]:
@@ -70,7 +72,7 @@ def test_what_vertices_take_is_from_about_them():
         a, b, c = geometry.positions[geometry.faces[face]]
         for i, j in ((0, 0), (rows, 0), (0, rows), (rows // 2, rows // 3 if rows > 2 else 0)):
             place = a + (b - a) * (i / rows) + (c - a) * (j / rows)
-            vertex = lattice.node[first + node_of(rows, i, j)]
+            vertex = lattice.node[first + node_index(rows, i, j)]
             taken = vertices.weight[vertex] @ points.position[vertices.point[vertex]]
             assert np.linalg.norm(taken - place) < 2 * found.spacing
             outward = np.cross(b - a, c - a) * (1 if side == 0 else -1)
@@ -80,49 +82,53 @@ def test_what_vertices_take_is_from_about_them():
 def test_a_smooth_field_is_smooth_between_points():
     """What a mesh finer than its points shows of light that changes slowly errs by what it changes over a spacing and a
     half, and nowhere by steps."""
-    scene = scene_of(sphere("ball", (0, 0, 0), 1.0, 0, rings=96), camera=looking("front", (0, 0, 4), (0, 0, 0), 0.7))
+    scene = make_tiny_scene(
+        sphere("ball", (0, 0, 0), 1.0, 0, num_rings=96), camera=make_camera("front", (0, 0, 4), (0, 0, 0), 0.7)
+    )
     _, found = placed(scene, 600)
     slope = np.array([0.3, 0.5, -0.2], np.float32)
-    field = 1 + found.points.position @ slope
-    shown = np.einsum("vk,vk->v", found.vertices.weight, field[found.vertices.point])
+    field = 1 + found.probes.position @ slope
+    shown = np.einsum("vk,vk->v", found.lattice_nodes.weight, field[found.lattice_nodes.point])
     over_a_spacing = float(np.linalg.norm(slope)) * found.spacing
     assert len(shown) > 4 * 600
-    assert np.abs(shown - 1 - found.vertices.normal @ slope).max() < 1.5 * over_a_spacing
-    assert np.ptp(shown[found.lattice.node.reshape(-1, 3)], axis=1).max() < over_a_spacing  # between corners of a face
+    assert np.abs(shown - 1 - found.lattice_nodes.normal @ slope).max() < 1.5 * over_a_spacing
+    assert (
+        np.ptp(shown[found.probe_grid.node.reshape(-1, 3)], axis=1).max() < over_a_spacing
+    )  # between corners of a face
 
 
 def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside():
-    solid = scene_of(sphere("ball", (0, 0, 0), 1.0, 0), camera=looking("front", (0, 0, 4), (0, 0, 0), 0.7))
-    sides = open_sides(merge(solid), solid.cameras, 3)
+    solid = make_tiny_scene(sphere("ball", (0, 0, 0), 1.0, 0), camera=make_camera("front", (0, 0, 4), (0, 0, 0), 0.7))
+    sides = visible_sides(build_scene_buffers(solid), solid.cameras, 3)
     assert sides[:, 0].all()
     assert not sides[:, 1].any()
-    room = scene_of(sphere("room", (0, 0, 0), 1.0, 0), camera=looking("front", (0, 0, 0.2), (0, 0, -1), 1.2))
-    assert open_sides(merge(room), room.cameras, 3).all()
+    room = make_tiny_scene(sphere("room", (0, 0, 0), 1.0, 0), camera=make_camera("front", (0, 0, 0.2), (0, 0, -1), 1.2))
+    assert visible_sides(build_scene_buffers(room), room.cameras, 3).all()
 
 
 def test_a_scene_without_area_is_refused():
     flat = mesh("line", [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], 0, normals=[[0, 1, 0]] * 3)
-    geometry = merge(scene_of(flat, camera=looking("front", (0, 1, 3), (0, 0, 0), 0.7)))
+    geometry = build_scene_buffers(make_tiny_scene(flat, camera=make_camera("front", (0, 1, 3), (0, 0, 0), 0.7)))
     is_open = np.ones((1, 2), bool)
-    density = Density(one_row(is_open), np.zeros(6, np.int8))
+    density = ProbeDensity(make_corner_grid(is_open), np.zeros(6, np.int8))
     with pytest.raises(PlanError, match="no surface"):
-        place_points(geometry, is_open, density, 100)
+        place_probes(geometry, is_open, density, 100)
 
 
 def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
     view = moving.views["front"]
-    seen = look(moving.surface, moving.embree, view.camera, (96, 72))
+    seen = trace_primary(moving.stored_scene, moving.embree, view.camera, (96, 72))
     hit = seen.hits.face >= 0
     np.testing.assert_allclose(seen.weight[hit].sum(axis=1), 1, atol=1e-5)
     assert seen.weight[hit].min() > -1e-5
-    of_vertices = at_vertices(moving.surface, seen.is_seen, moving.surface.points.position)
-    place = np.einsum("nk,nkc->nc", seen.weight, of_vertices[seen.vertex])
+    of_vertices = interpolate_to_nodes(moving.stored_scene, seen.is_visible, moving.stored_scene.probes.position)
+    place = np.einsum("nk,nkc->nc", seen.weight, of_vertices[seen.lattice_node])
     truth = view.camera.to_world[:3, 3] + seen.hits.distance[:, None] * seen.directions
     apart = np.linalg.norm(place - truth, axis=1)[hit]
     assert np.median(apart) < 0.03
-    vertices = moving.surface.vertices
-    assert set(np.flatnonzero(seen.is_seen)) == set(seen.vertex[hit].ravel())
-    taken = vertices.point[seen.is_seen > 0][vertices.weight[seen.is_seen > 0] > 0]
+    vertices = moving.stored_scene.lattice_nodes
+    assert set(np.flatnonzero(seen.is_visible)) == set(seen.lattice_node[hit].ravel())
+    taken = vertices.point[seen.is_visible > 0][vertices.weight[seen.is_visible > 0] > 0]
     assert set(np.flatnonzero(seen.is_needed)) == set(taken)
 
 
@@ -134,44 +140,49 @@ def test_what_points_send_is_that_of_the_oracle(moving):
         [{"model": "blinn_phong", "color": [0.2, 0.1, 0.3], "params": {"exponent": 20.0}, "texture": None}],
     ]
     names = len(moving.material_names)
-    tables = tables_of([materials[k % 3] for k in range(names)])
+    tables = build_tables([materials[k % 3] for k in range(names)])
     rng = np.random.default_rng(9)
-    num = moving.surface.points.num_points
+    num = moving.stored_scene.probes.num_points
     vectors, others = (rng.normal(size=(num, 3, 36)).astype(np.float32) for _ in range(2))
     eye, everywhere = np.array([0.3, 1.2, 2.0], np.float32), np.ones(num, np.uint8)
-    found = send(moving.surface, vectors, others, tables, eye, everywhere)
+    found = shade_probes(moving.stored_scene, vectors, others, tables, eye, everywhere)
     for point in range(0, num, num // 60):
-        for of, expected in zip(found, send_numpy(moving.surface, vectors, others, tables, eye, point), strict=True):
+        for of, expected in zip(
+            found, shade_probes_numpy(moving.stored_scene, vectors, others, tables, eye, point), strict=True
+        ):
             np.testing.assert_allclose(of[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
-    assert found.sky.any()
-    none = send(moving.surface, vectors, others, tables, eye, np.zeros(num, np.uint8))
+    assert found.environment.any()
+    none = shade_probes(moving.stored_scene, vectors, others, tables, eye, np.zeros(num, np.uint8))
     assert not none.radiance.any()
-    assert not none.sky.any()
-    has_highlight = (moving.surface.material % 3 > 0) & (found.radiance[:, 0].max(axis=1) > 0)
+    assert not none.environment.any()
+    has_highlight = (moving.stored_scene.material % 3 > 0) & (found.radiance[:, 0].max(axis=1) > 0)
     assert has_highlight.any()
-    assert not send(moving.surface, vectors, None, tables, eye, everywhere).radiance[has_highlight].any()
+    assert not shade_probes(moving.stored_scene, vectors, None, tables, eye, everywhere).radiance[has_highlight].any()
 
 
 def test_textures_of_pixels_are_those_of_the_bakes(moving):
     """White points under a texture show the texture; the same filter as view samples have."""
     scene, view, size = still_life(), moving.views["front"], (96, 72)
-    surface = moving.surface
-    seen = look(surface, moving.embree, view.camera, size)
-    sent = np.zeros((len(surface.vertices.normal), 3, 3), np.float32)
+    surface = moving.stored_scene
+    seen = trace_primary(surface, moving.embree, view.camera, size)
+    sent = np.zeros((len(surface.lattice_nodes.normal), 3, 3), np.float32)
     sent[:, 1] = 1
     angle = view.camera.yfov / size[1]
     dark = np.zeros((len(moving.material_names), 3), np.float32)
-    mirrored = Mirrored(
-        lobes_of([()] * len(dark)),
-        SkyLight(
-            moving.sky_in(None), moving.lamps_in(EnvironmentKey(None, 0.0)), turn_of(0.0), np.zeros(3, np.float32)
+    mirrored = MirrorData(
+        build_lobes([()] * len(dark)),
+        PrefilteredEnvironment(
+            moving.prefiltered(None),
+            moving.bright_lights(EnvironmentKey(None, 0.0)),
+            rotation_of(0.0),
+            np.zeros(3, np.float32),
         ),
         np.zeros((len(sent), 3), np.float32),
         np.zeros((len(sent), 4), np.float32),
         False,
     )
-    all_groups = FromVertices(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))
-    found = combine(surface, seen, angle, all_groups, dark, mirrored)
+    all_groups = InterpolatedProbes(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))
+    found = shade_pixels(surface, seen, angle, all_groups, dark, mirrored)
     textured = [k for k, material in enumerate(scene.materials) if "diffuse" in material.textures]
     assert textured
     for index in textured:
@@ -179,13 +190,15 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
         corners = surface.faces[seen.hits.face[rows]]
         b = np.column_stack([1 - seen.hits.uv[rows].sum(axis=1), seen.hits.uv[rows]])
         uv = np.einsum("nk,nkc->nc", b, surface.uvs[corners]).astype(np.float32)
-        p, q = moving.lit.local.positions[corners], surface.uvs[corners]
+        p, q = moving.light_transport.local.positions[corners], surface.uvs[corners]
         normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         area = np.linalg.norm(normal, axis=1)
         cosine = np.maximum(np.abs(np.einsum("nc,nc->n", normal, seen.directions[rows])) / area, 0.05)
         (du0, dv0), (du1, dv1) = (q[:, 1] - q[:, 0]).T, (q[:, 2] - q[:, 0]).T
         footprint = seen.hits.distance[rows] * angle * np.sqrt(np.abs(du0 * dv1 - dv0 * du1) / area / cosine)
-        expected = MipMap.of(scene.materials[index].textures["diffuse"]).sample(uv, footprint.astype(np.float32))
+        expected = MipMap.for_texture(scene.materials[index].textures["diffuse"]).sample(
+            uv, footprint.astype(np.float32)
+        )
         np.testing.assert_allclose(found[rows], expected, atol=2e-3)
 
 
@@ -197,15 +210,15 @@ def test_the_sky_is_that_of_fixed_views(rotation):
     directions = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).astype(np.float32)
     face, out = np.full(500, -1, np.int32), np.zeros((500, 3), np.float32)
     face[::7] = 3
-    fill_sky(radiance, rotation, gain, face, directions, out)
-    expected = gain * lookup(radiance, turned(directions.astype(np.float64), -rotation).astype(np.float32))
+    sample(radiance, rotation, gain, face, directions, out)
+    expected = gain * lookup(radiance, rotate_about_y(directions.astype(np.float64), -rotation).astype(np.float32))
     assert not out[::7].any()
     np.testing.assert_allclose(out[face < 0], expected[face < 0], atol=2e-3)
 
 
 def test_rays_go_through_the_middles_of_pixels(moving):
     camera = Camera("level", np.eye(4), math.radians(90))
-    seen = look(moving.surface, moving.embree, camera, (4, 2))
+    seen = trace_primary(moving.stored_scene, moving.embree, camera, (4, 2))
     first, last = seen.directions[0], seen.directions[7]
     np.testing.assert_allclose(first * np.sign(first), np.abs(last), atol=1e-6)
     np.testing.assert_allclose(first / -first[2], [-1.5, 0.5, -1], atol=1e-5)

@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, QUICK_DEGREE, ladder, num_functions
-from relume.moving.basis.tables import tables_of
-from relume.moving.frame import Materials
-from relume.moving.points.grids import Lattice, node_of, num_nodes
+from relume.basis.zernike import DEGREE, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
+from relume.moving.basis.tables import build_tables
+from relume.moving.frame import MaterialState
+from relume.moving.points.grids import ProbeGrid, node_index, num_nodes
 from relume.moving.points.surface import Textures
 from relume.moving.shader import geometry, tables
 
@@ -18,9 +18,9 @@ GLOSSY = {**LAMBERT, "model": "blinn_phong", "params": {"exponent": 20.0}}
 
 
 def degrees_of(term: dict[str, object]) -> int:
-    even = tables_of([[term]]).even
+    even = build_tables([[term]]).isotropic
     of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
-    return int(tables._degrees(even, of_function[ladder().cosine])[0])
+    return int(tables._degrees(even, of_function[recurrence().cosine])[0])
 
 
 def test_a_diffuse_table_needs_one_function_and_a_shiny_one_all() -> None:
@@ -41,7 +41,7 @@ def test_a_degree_below_the_bound_is_left_out() -> None:
 @pytest.mark.parametrize("num", [1, 15, NUM_FUNCTIONS])
 def test_light_vectors_survive_half_precision_whatever_their_size(size: float, num: int) -> None:
     truth = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
-    sent = tables._light("vectors/4", truth, num)
+    sent = tables._vector_arrays("vectors/4", truth, num)
     scale, told = sent["vectors/4/scale"][0]
     assert told == num
     numbers = sent["vectors/4"].astype(np.float64).reshape(50, -1)
@@ -52,15 +52,15 @@ def test_light_vectors_survive_half_precision_whatever_their_size(size: float, n
 
 def test_materials_get_the_functions_that_they_know() -> None:
     bump, narrow = np.array([False, True, False, False]), {**LAMBERT, "model": "ggx", "params": {"alpha": 0.02}}
-    materials = Materials.of([[LAMBERT], [LAMBERT], [LAMBERT, GLOSSY], [narrow]])
-    total, others = tables.needed_functions(materials, bump)
+    materials = MaterialState.from_terms([[LAMBERT], [LAMBERT], [LAMBERT, GLOSSY], [narrow]])
+    total, others = tables.needed_function_counts(materials, bump)
     assert total.tolist() == [1, NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
     assert others.tolist() == [0, 0, NUM_FUNCTIONS, NUM_FUNCTIONS]
-    even = materials.tables.even.copy()
-    even[0, ..., np.flatnonzero(ladder().order == 2)[0]] = 0.1  # of degree 2
-    materials = materials._replace(tables=materials.tables._replace(even=even))
-    total, _ = tables.needed_functions(materials, bump)
-    assert total.tolist() == [num_functions(QUICK_DEGREE), NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
+    even = materials.tables.isotropic.copy()
+    even[0, ..., np.flatnonzero(recurrence().order == 2)[0]] = 0.1  # of degree 2
+    materials = materials._replace(tables=materials.tables._replace(isotropic=even))
+    total, _ = tables.needed_function_counts(materials, bump)
+    assert total.tolist() == [num_functions(FAST_DEGREE), NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
 
 
 def test_slots_are_the_vertices_of_the_lattice() -> None:
@@ -68,17 +68,17 @@ def test_slots_are_the_vertices_of_the_lattice() -> None:
     counts = num_nodes(rows).ravel()
     first = (np.cumsum(counts) - counts).reshape(rows.shape).astype(np.uint32)
     node = np.random.default_rng(SEED).integers(0, 9, int(counts.sum())).astype(np.uint32)
-    slots = geometry.slots_of(Lattice(rows, first, node))
+    slots = geometry.node_arrays(ProbeGrid(rows, first, node))
     narrow = node[[0, 1, 2, *(first[2, 0] + np.arange(3))]]
-    assert len(slots.vertex) == 10 + 6 + len(np.unique(narrow))
+    assert len(slots.lattice_node) == 10 + 6 + len(np.unique(narrow))
     for face, side in np.argwhere(rows > 0):
         r, own, begin = int(rows[face, side]), slots.sides[face, side], int(first[face, side])
         assert own[3] == r
         for i, j in itertools.product(range(r + 1), repeat=2):
             if i + j > r:
                 continue
-            slot = own[0] + node_of(r, i, j) if r > 1 else own[[0, 2, 1][node_of(r, i, j)]]
-            assert slots.vertex[slot] == node[begin + node_of(r, i, j)]
+            slot = own[0] + node_index(r, i, j) if r > 1 else own[[0, 2, 1][node_index(r, i, j)]]
+            assert slots.lattice_node[slot] == node[begin + node_index(r, i, j)]
     assert (slots.sides[1, 0] == slots.sides[1, 1]).all()  # a side without any has what the other has
     assert (slots.sides[2, 1] == slots.sides[2, 0]).all()
     assert not slots.sides[3].any()
@@ -96,8 +96,8 @@ def test_the_finest_level_of_the_largest_texture_goes_first(monkeypatch: pytest.
     textures = Textures(
         texels, np.array(levels), np.array(first), np.zeros((2, 2), np.int64), np.zeros((1, 3), np.int64)
     )
-    kept, begins = geometry._kept_levels(textures)
+    kept, begins = geometry._select_levels(textures)
     assert kept.tolist() == [0, 1, 2, 3, 4, 5, 6]
-    monkeypatch.setattr(geometry, "MOST_TEXELS", 50)
-    kept, begins = geometry._kept_levels(textures)
+    monkeypatch.setattr(geometry, "MAX_TEXELS", 50)
+    kept, begins = geometry._select_levels(textures)
     assert (kept.tolist(), begins.tolist()) == ([1, 2, 3, 4, 5, 6], [0, 3, 6])

@@ -2,8 +2,15 @@
 
 import numpy as np
 
-from relume.moving.points.vertices import Nodes, _keys, extent_of, keys_numpy, num_shared, shared_points
-from relume.points import Points
+from relume.moving.points.vertices import (
+    NodeTable,
+    _keys,
+    bounding_cube,
+    keys_numpy,
+    num_representatives,
+    representative_nodes,
+)
+from relume.points import SurfacePoints
 
 
 def nodes(num, seed=3):
@@ -11,10 +18,10 @@ def nodes(num, seed=3):
     rng = np.random.default_rng(seed)
     normal = rng.choice(np.array([[0, 0, 1], [0, 1, 0], [0.6, -0.8, 0]], np.float32), num)
     position = rng.integers(-9, 9, (num, 3)).astype(np.float32) + rng.normal(scale=0.02, size=(num, 3))
-    points = Points(position.astype(np.float32), normal, normal[:, [1, 2, 0]], np.zeros(num, np.uint32))
+    points = SurfacePoints(position.astype(np.float32), normal, normal[:, [1, 2, 0]], np.zeros(num, np.uint32))
     material, side = rng.integers(0, 2, num).astype(np.uint16), rng.integers(0, 2, num).astype(np.uint8)
     spacing, piece = 0.3 * 2.0 ** rng.integers(0, 3, num), np.zeros(num, np.int32)
-    return Nodes(points, material, side, piece, spacing, rng.random(num) < 0.8, *extent_of(points))
+    return NodeTable(points, material, side, piece, spacing, rng.random(num) < 0.8, *bounding_cube(points))
 
 
 def test_keys_are_those_of_numpy():
@@ -27,6 +34,6 @@ def test_keys_are_those_of_numpy():
 def test_nodes_that_are_shared_are_counted_as_they_are_found():
     some = nodes(20_000)
     for alike in (1, 4):
-        found = len(shared_points(some, alike))
+        found = len(representative_nodes(some, alike))
         assert 100 < found < 20_000
-        assert num_shared(some, alike) == found
+        assert num_representatives(some, alike) == found

@@ -4,25 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, scene_of, sphere, studio
+from tiny_scenes import make_camera, make_tiny_scene, sphere, studio
 
 from relume.bake import Recipe
-from relume.basis.zernike import DEGREES, FALL, in_basis
-from relume.memory import Memory
+from relume.basis.zernike import DEGREES, WINDOW_DECAY, project
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.basis.lobes import lobes_of
-from relume.moving.basis.tables import tables_of, window
-from relume.moving.evaluate import send
-from relume.moving.highlights.looking import SkyLight
-from relume.moving.highlights.turning import turning, turning_numpy
-from relume.moving.look_up import at_vertices, look
-from relume.moving.pixels import FromVertices, Mirrored, combine
-from relume.moving.sky import turn_of
-from relume.points import Points
+from relume.moving.basis.lobes import build_lobes
+from relume.moving.basis.tables import build_tables, window
+from relume.moving.evaluate import shade_probes
+from relume.moving.highlights.looking import PrefilteredEnvironment
+from relume.moving.highlights.turning import gradients_along_lobe, gradients_along_lobe_numpy
+from relume.moving.look_up import interpolate_to_nodes, trace_primary
+from relume.moving.pixels import InterpolatedProbes, MirrorData, shade_pixels
+from relume.moving.sky import rotation_of
+from relume.points import SurfacePoints
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
-CAMERA, SIZE = looking("front", [0, 0.5, 3], [0, 0, 0], 0.75), (64, 48)
+CAMERA, SIZE = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75), (64, 48)
 EYE = CAMERA.to_world[:3, 3].astype(np.float32)
 WHITE = {"model": "ggx", "color": [1.0] * 3, "texture": None, "curves": {}}
 COAT = {**WHITE, "params": {"roughness": 0.3, "f0": 0.05}}
@@ -33,10 +33,10 @@ METAL = {**WHITE, "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.4, "f0": 0
 def moving(tmp_path_factory):
     material = Material("Ball", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
     ball = sphere("ball", [0, 0, 0], 1, 0, 24)
-    scene = scene_of(ball, camera=CAMERA, environment=studio(16, 20.0), materials=[material])
+    scene = make_tiny_scene(ball, camera=CAMERA, environment=studio(16, 20.0), materials=[material])
     store = tmp_path_factory.mktemp("ball") / "surface.zarr"
-    bake_here(METHODS["surface"], scene, Recipe("surface", ("front",), SIZE, 60, num_points=1500), store)
-    return open_bake(store, Memory(1 << 30))
+    bake_in_process(METHODS["surface"], scene, Recipe("surface", ("front",), SIZE, 60, num_points=1500), store)
+    return open_bake(store, Cache(1 << 30))
 
 
 def from_afar(points):
@@ -47,17 +47,17 @@ def from_afar(points):
     n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
     wi = np.einsum("nij,lj->nli", np.stack([t, np.cross(n, t), n], axis=1), towards)
     cosine = np.maximum(wi[..., 2], 0)
-    return np.einsum("nl,lc,nlk->nck", cosine, light, in_basis(wi)).astype(np.float32)
+    return np.einsum("nl,lc,nlk->nck", cosine, light, project(wi)).astype(np.float32)
 
 
 @pytest.mark.parametrize("terms", [[METAL], [METAL, COAT]])
 def test_gradients_are_what_points_send_otherwise_aside(moving, terms):
-    surface, tables, lobes = moving.surface, tables_of([terms]), lobes_of([terms])
-    others, num = from_afar(surface.points), surface.points.num_points
+    surface, tables, lobes = moving.stored_scene, build_tables([terms]), build_lobes([terms])
+    others, num = from_afar(surface.probes), surface.probes.num_points
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = turning(surface, others, tables, lobes, EYE, is_needed)
+    found = gradients_along_lobe(surface, others, tables, lobes, EYE, is_needed)
     assert not found[is_needed == 0].any()
-    expected = np.array([turning_numpy(surface, others, tables, lobes, EYE, p) for p in range(0, num, 5)])
+    expected = np.array([gradients_along_lobe_numpy(surface, others, tables, lobes, EYE, p) for p in range(0, num, 5)])
     is_asked = is_needed[::5] > 0
     largest = np.abs(expected[is_asked]).max()
     assert largest > 0.1
@@ -65,38 +65,40 @@ def test_gradients_are_what_points_send_otherwise_aside(moving, terms):
 
 
 def test_what_has_no_highlight_or_no_other_light_turns_nothing(moving):
-    surface, num = moving.surface, moving.surface.points.num_points
+    surface, num = moving.stored_scene, moving.stored_scene.probes.num_points
     dull, everywhere = [{**METAL, "model": "lambert", "params": {}}], np.ones(num, np.uint8)
-    others = from_afar(surface.points)
-    assert not turning(surface, others, tables_of([dull]), lobes_of([dull]), EYE, everywhere).any()
-    assert not turning(surface, 0 * others, tables_of([[METAL]]), lobes_of([[METAL]]), EYE, everywhere).any()
+    others = from_afar(surface.probes)
+    assert not gradients_along_lobe(surface, others, build_tables([dull]), build_lobes([dull]), EYE, everywhere).any()
+    assert not gradients_along_lobe(
+        surface, 0 * others, build_tables([[METAL]]), build_lobes([[METAL]]), EYE, everywhere
+    ).any()
 
 
 def pixels(moving, gain):
     """Pixels of a metal ball in that light, with gradients times a gain; and of points that lie where pixels look."""
-    surface, tables, lobes = moving.surface, tables_of([[METAL]]), lobes_of([[METAL]])
-    seen = look(surface, moving.embree, CAMERA, SIZE).middles(SIZE[0] * SIZE[1])
-    others, everywhere = from_afar(surface.points), np.ones(surface.points.num_points, np.uint8)
-    sent = send(surface, np.zeros_like(others), others, tables, EYE, everywhere).radiance
-    turns = np.float32(gain) * turning(surface, others, tables, lobes, EYE, everywhere)
-    broad, turn = (at_vertices(surface, seen.is_seen, of) for of in (sent, turns))
+    surface, tables, lobes = moving.stored_scene, build_tables([[METAL]]), build_lobes([[METAL]])
+    seen = trace_primary(surface, moving.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
+    others, everywhere = from_afar(surface.probes), np.ones(surface.probes.num_points, np.uint8)
+    sent = shade_probes(surface, np.zeros_like(others), others, tables, EYE, everywhere).radiance
+    turns = np.float32(gain) * gradients_along_lobe(surface, others, tables, lobes, EYE, everywhere)
+    broad, turn = (interpolate_to_nodes(surface, seen.is_visible, of) for of in (sent, turns))
     dark, nothing = np.zeros((1, 3), np.float32), np.empty((0, 3), np.float32)
-    no_sky = SkyLight(moving.sky_in(None), np.empty((0, 7), np.float32), turn_of(0.0), dark[0])
-    mirrored = Mirrored(lobes, no_sky, np.zeros((len(turn), 3), np.float32), turn, False)
-    shown = FromVertices(broad, np.ones((1, broad.shape[1]), bool), nothing)
-    found = combine(surface, seen, CAMERA.yfov / SIZE[1], shown, dark, mirrored)
+    no_sky = PrefilteredEnvironment(moving.prefiltered(None), np.empty((0, 7), np.float32), rotation_of(0.0), dark[0])
+    mirrored = MirrorData(lobes, no_sky, np.zeros((len(turn), 3), np.float32), turn, False)
+    shown = InterpolatedProbes(broad, np.ones((1, broad.shape[1]), bool), nothing)
+    found = shade_pixels(surface, seen, CAMERA.yfov / SIZE[1], shown, dark, mirrored)
 
     hit = np.flatnonzero(seen.hits.face >= 0)
     position = EYE + seen.hits.distance[hit, None] * seen.directions[hit]
-    normal = np.einsum("nk,nkc->nc", seen.weight[hit], surface.vertices.normal[seen.vertex[hit]])
+    normal = np.einsum("nk,nkc->nc", seen.weight[hit], surface.lattice_nodes.normal[seen.lattice_node[hit]])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     tangent = np.cross(normal, [0.0, 0.0, 1.0])
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     fields = (np.ascontiguousarray(of, np.float32) for of in (position, normal, tangent))
-    points = Points(*fields, hit.astype(np.uint32))
-    exactly = replace(surface, points=points, material=np.zeros(len(hit), surface.material.dtype))
+    points = SurfacePoints(*fields, hit.astype(np.uint32))
+    exactly = replace(surface, probes=points, material=np.zeros(len(hit), surface.material.dtype))
     light, every = from_afar(points), np.ones(len(hit), np.uint8)
-    expected = send(exactly, np.zeros_like(light), light, tables, EYE, every).radiance[:, 0]
+    expected = shade_probes(exactly, np.zeros_like(light), light, tables, EYE, every).radiance[:, 0]
     inside = np.einsum("nc,nc->n", normal, -seen.directions[hit]) > 0.3
     return found[hit][inside], expected[inside]
 
@@ -121,6 +123,6 @@ def test_a_gradient_changes_pixels_within_bounds(moving):
 
 def test_the_window_is_for_functions_that_miss_much():
     np.testing.assert_array_equal(window(0.0), 1)
-    np.testing.assert_allclose(window(0.9), np.exp(-FALL * DEGREES * (DEGREES + 2)), rtol=1e-6)
+    np.testing.assert_allclose(window(0.9), np.exp(-WINDOW_DECAY * DEGREES * (DEGREES + 2)), rtol=1e-6)
     assert np.all(window(0.9)[1:] < window(0.3)[1:])
     assert np.all(np.diff(window(0.3)) <= 0)

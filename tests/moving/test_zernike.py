@@ -4,10 +4,10 @@ import numba as nb
 import numpy as np
 import pytest
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, functions_along, in_basis, ladder, num_functions
+from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, evaluate_basis_along, num_functions, project, recurrence
 from relume.light.triangles import TriangleLights
-from relume.points import Points
-from relume.project.light_vectors import light_vectors, light_vectors_numpy
+from relume.points import SurfacePoints
+from relume.project.light_vectors import incident_coefficients, incident_coefficients_numpy
 from relume.trace.tangents import any_tangent
 
 
@@ -22,14 +22,14 @@ def hemisphere(radii=24, turns=48):
 def test_functions_are_orthonormal_under_the_cosine():
     wi, weight = hemisphere()
     assert weight.sum() == pytest.approx(np.pi)  # of a white sky
-    functions = in_basis(wi)
+    functions = project(wi)
     np.testing.assert_allclose(np.einsum("nk,nl,n->kl", functions, functions, weight), np.eye(NUM_FUNCTIONS), atol=1e-6)
 
 
 def test_functions_of_a_degree_are_polynomials_of_it_and_come_after_all_lower_ones():
     """So a prefix of them is the basis of a lower degree: x^a y^b lies in it where a + b is not higher."""
     wi, weight = hemisphere()
-    functions = in_basis(wi)
+    functions = project(wi)
     for degree in range(DEGREE + 1):
         monomial = wi[:, 0] ** degree
         share = np.einsum("n,nk,n->k", monomial, functions, weight)
@@ -38,11 +38,11 @@ def test_functions_of_a_degree_are_polynomials_of_it_and_come_after_all_lower_on
 
 
 def test_nothing_arrives_from_below():
-    assert not in_basis(np.array([[0.0, 0.6, -0.8], [0, 0, -1]])).any()
+    assert not project(np.array([[0.0, 0.6, -0.8], [0, 0, -1]])).any()
 
 
 def test_every_function_stands_on_one_rung():
-    rungs = ladder()
+    rungs = recurrence()
     places = [*rungs.cosine, *rungs.sine[rungs.order > 0]]
     assert sorted(places) == list(range(NUM_FUNCTIONS))
 
@@ -54,14 +54,17 @@ def scattered():
     normal, direction = (rng.normal(size=(num, 3)).astype(np.float32) for num in (40, 300))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    points = Points(normal, normal, any_tangent(normal), np.zeros(40, np.uint32))
+    points = SurfacePoints(normal, normal, any_tangent(normal), np.zeros(40, np.uint32))
     lights = TriangleLights(np.zeros((3, 6, 300), np.float32), direction, rng.random((300, 3), np.float32))
     return points, rng.integers(0, 256, (40, 38), dtype=np.uint8), lights
 
 
 def test_light_vectors_are_those_of_the_oracle(scattered):
     points, visible, lights = scattered
-    found, expected = light_vectors(points, visible, lights, ()), light_vectors_numpy(points, visible, lights)
+    found, expected = (
+        incident_coefficients(points, visible, lights, ()),
+        incident_coefficients_numpy(points, visible, lights),
+    )
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
 
 
@@ -71,7 +74,7 @@ def test_the_first_number_is_the_irradiance(scattered):
     seen = np.unpackbits(visible, axis=1, count=300, bitorder="little")
     irradiance = (seen * cosine) @ lights.irradiance
     np.testing.assert_allclose(
-        np.sqrt(np.pi) * light_vectors(points, visible, lights, ())[..., 0], irradiance, rtol=1e-4, atol=1e-4
+        np.sqrt(np.pi) * incident_coefficients(points, visible, lights, ())[..., 0], irradiance, rtol=1e-4, atol=1e-4
     )
 
 
@@ -80,9 +83,9 @@ def test_functions_along_one_direction_are_all_functions():
 
     @nb.njit
     def along(rungs, x, y, out):
-        functions_along(rungs, x, y, out)
+        evaluate_basis_along(rungs, x, y, out)
 
-    for one, expected in zip(wi, in_basis(wi), strict=True):
+    for one, expected in zip(wi, project(wi), strict=True):
         out = np.full(NUM_FUNCTIONS, np.nan, np.float32)
-        along(ladder(), np.float32(one[0]), np.float32(one[1]), out)
+        along(recurrence(), np.float32(one[0]), np.float32(one[1]), out)
         np.testing.assert_allclose(out, expected, atol=1e-5)

@@ -14,10 +14,10 @@ from relume.basis.daubechies import analysis, matrix, synthesis
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.errors import CancelledError, MemoryBudgetError
-from relume.light.triangles import subdivide
-from relume.memory import Memory
-from relume.operators.frozen import Frozen, freeze, frozen_bytes
-from relume.operators.stream import columns_of, stream
+from relume.light.triangles import tessellate_environment
+from relume.memory import Cache
+from relume.operators.frozen import LinearOperator, operator_bytes, precompute
+from relume.operators.stream import changed_columns, stream
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 
@@ -36,14 +36,14 @@ def test_streamed_columns_are_the_product(counts, shape):
     for channel, count in enumerate(counts):
         change[channel, RNG.permutation(64)[:count]] = RNG.normal(size=count)
     expected = twins.stream(transport, change, image)
-    stream(transport, columns_of(change), image)
+    stream(transport, changed_columns(change), image)
     np.testing.assert_allclose(image, expected, atol=1e-4)
 
 
 def test_columns_list_what_changes_and_nothing_else():
     change = np.zeros((3, 16))
     change[0, [3, 9]], change[2, 15] = [1.5, -2], 1e-20
-    columns = columns_of(change)
+    columns = changed_columns(change)
     assert columns.count.tolist() == [[2, 0, 1]]
     assert columns.index[0, 0, :2].tolist() == [3, 9]
     assert columns.change[0, 0, :2].tolist() == [1.5, -2]
@@ -55,7 +55,7 @@ def test_each_level_has_columns_of_its_own(bounds):
     transport = RNG.normal(size=(2, 3, 8, 48)).astype(np.float32)
     image = np.zeros((2, 3, 48), np.float32)
     change = RNG.normal(size=(len(bounds) - 1, 3, 8)) * (RNG.random((len(bounds) - 1, 3, 8)) < 0.7)
-    stream(transport, columns_of(change), image, np.array(bounds))
+    stream(transport, changed_columns(change), image, np.array(bounds))
     level = np.searchsorted(bounds, np.arange(96), side="right") - 1
     expected = np.zeros((2, 3, 48))
     for sample in range(bounds[-1]):
@@ -66,15 +66,15 @@ def test_each_level_has_columns_of_its_own(bounds):
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(studio(), 120)
+    return tessellate_environment(studio(), 120)
 
 
 def frozen_of(model, active, lights, receivers, **options):
     document = {"model": model, "params": {}}
     bands = {curve.name: curve_bands(document, curve) for curve in TERMS[model].curves}
     progress = options.get("progress", lambda share: None)
-    cancelled = options.get("cancelled", lambda: False)
-    return bands, freeze(TERMS[model], bands, active, lights, receivers, progress, cancelled)
+    is_canceled = options.get("cancelled", lambda: False)
+    return bands, precompute(TERMS[model], bands, active, lights, receivers, progress, is_canceled)
 
 
 def rows_of(frozen, count):
@@ -88,7 +88,7 @@ def rows_of(frozen, count):
     ("model", "active"), [("lambert", "theta_i"), ("cook_torrance", "theta_h"), ("ggx", "theta_d")]
 )
 def test_frozen_transport_is_the_projection_times_the_wavelet_matrix(count, model, active, lights):
-    receivers = twins.only_above(twins.make_receivers(count, lights.num_lights, seed=count), lights)
+    receivers = twins.only_above(twins.make_random_receivers(count, lights.num_lights, seed=count), lights)
     bands, frozen = frozen_of(model, active, lights, receivers)
     term = TERMS[model]
     boxes = Projector(term, contract(term, bands, active), lights, receivers).project(0, count).astype(float)
@@ -100,13 +100,13 @@ def test_frozen_transport_is_the_projection_times_the_wavelet_matrix(count, mode
     np.testing.assert_allclose(
         frozen.importance, np.sqrt((expected**2).sum(axis=0)), atol=1e-4 * np.sqrt(count) * scale
     )
-    assert frozen.num_bytes == frozen_bytes(count, boxes.shape[1])
+    assert frozen.num_bytes == operator_bytes(count, boxes.shape[1])
     assert frozen.transport.flags.c_contiguous
 
 
 def test_more_samples_than_a_tile_holds(monkeypatch, lights):
     monkeypatch.setattr("relume.operators.frozen.TILE_SAMPLES", 128)
-    receivers = twins.only_above(twins.make_receivers(700, lights.num_lights, seed=9), lights)
+    receivers = twins.only_above(twins.make_random_receivers(700, lights.num_lights, seed=9), lights)
     bands, frozen = frozen_of("blinn_phong", "theta_h", lights, receivers)
     assert len(frozen.transport) > 1
     term = TERMS["blinn_phong"]
@@ -116,78 +116,78 @@ def test_more_samples_than_a_tile_holds(monkeypatch, lights):
 
 
 def test_wavelet_product_is_the_product_in_bands(lights):
-    receivers = twins.only_above(twins.make_receivers(50, lights.num_lights, seed=3), lights)
+    receivers = twins.only_above(twins.make_random_receivers(50, lights.num_lights, seed=3), lights)
     bands, frozen = frozen_of("cook_torrance", "theta_h", lights, receivers)
     image = np.zeros((1, 3, frozen.transport.shape[3]), np.float32)
-    stream(frozen.transport, columns_of(analysis(bands["theta_h"])), image)
+    stream(frozen.transport, changed_columns(analysis(bands["theta_h"])), image)
     boxes = synthesis(rows_of(frozen, 50))
     expected = np.einsum("ncj,cj->cn", boxes, bands["theta_h"])
     np.testing.assert_allclose(image[0, :, :50], expected, rtol=2e-5, atol=1e-6 * expected.max())
 
 
 def test_progress_rises_to_one_and_cancelling_stops(lights):
-    receivers = twins.only_above(twins.make_receivers(3000, lights.num_lights, seed=4), lights)
+    receivers = twins.only_above(twins.make_random_receivers(3000, lights.num_lights, seed=4), lights)
     told = []
     frozen_of("lambert", "theta_i", lights, receivers, progress=told.append)
     assert max(told) == pytest.approx(1.0)
     assert min(told) > 0
     with pytest.raises(CancelledError):
-        frozen_of("lambert", "theta_i", lights, receivers, cancelled=lambda: True)
+        frozen_of("lambert", "theta_i", lights, receivers, is_canceled=lambda: True)
 
 
 def operator(num_bytes):
     transport = np.ones((1, 3, 4, num_bytes // 48), np.float32)
-    return Frozen(transport, np.ones((3, 4)))
+    return LinearOperator(transport, np.ones((3, 4)))
 
 
 def test_cache_drops_the_least_recently_used_and_keeps_its_budget():
-    cache = Memory(4800)
+    cache = Cache(4800)
     for key in "abc":
-        cache.get(key, Frozen, 1440, lambda: operator(1440))
+        cache.get(key, LinearOperator, 1440, lambda: operator(1440))
     assert cache.used_bytes == 4320
-    cache.find("a", Frozen)
-    cache.get("d", Frozen, 1440, lambda: operator(1440))
-    assert [cache.find(key, Frozen) is not None for key in "abcd"] == [True, False, True, True]
+    cache.get_cached("a", LinearOperator)
+    cache.get("d", LinearOperator, 1440, lambda: operator(1440))
+    assert [cache.get_cached(key, LinearOperator) is not None for key in "abcd"] == [True, False, True, True]
     assert cache.used_bytes == 4320 <= cache.budget_bytes
-    cache.get("all", Frozen, 4800, lambda: operator(4800))
+    cache.get("all", LinearOperator, 4800, lambda: operator(4800))
     assert cache.used_bytes == 4800
-    assert [cache.find(key, Frozen) for key in "abcd"] == [None] * 4
+    assert [cache.get_cached(key, LinearOperator) for key in "abcd"] == [None] * 4
 
 
 def test_cache_returns_what_it_has():
-    cache = Memory(10_000)
-    first = cache.get("k", Frozen, 480, lambda: operator(480))
-    assert cache.get("k", Frozen, 480, lambda: pytest.fail("made twice")) is first
-    assert cache.find("k", Frozen) is first
-    assert cache.find("other", Frozen) is None
+    cache = Cache(10_000)
+    first = cache.get("k", LinearOperator, 480, lambda: operator(480))
+    assert cache.get("k", LinearOperator, 480, lambda: pytest.fail("made twice")) is first
+    assert cache.get_cached("k", LinearOperator) is first
+    assert cache.get_cached("other", LinearOperator) is None
 
 
 def test_larger_than_the_budget_is_refused_before_anything_is_made_or_dropped():
-    cache = Memory(1000)
-    kept = cache.get("small", Frozen, 480, lambda: operator(480))
+    cache = Cache(1000)
+    kept = cache.get("small", LinearOperator, 480, lambda: operator(480))
     with pytest.raises(MemoryBudgetError) as refused:
-        cache.get("large", Frozen, 1001, lambda: pytest.fail("made"))
+        cache.get("large", LinearOperator, 1001, lambda: pytest.fail("made"))
     assert (refused.value.needed_bytes, refused.value.allowed_bytes) == (1001, 1000)
-    assert cache.find("small", Frozen) is kept
+    assert cache.get_cached("small", LinearOperator) is kept
 
 
 @pytest.mark.parametrize("problem", [CancelledError("cancelled"), MemoryError(), KeyboardInterrupt()])
 def test_freeze_that_ends_early_leaves_nothing(problem):
-    cache = Memory(1000)
+    cache = Cache(1000)
 
     def fails():
         raise problem
 
     for _ in range(5):
         with pytest.raises(type(problem)):
-            cache.get("k", Frozen, 960, fails)
+            cache.get("k", LinearOperator, 960, fails)
         assert cache.used_bytes == 0
-        assert cache.find("k", Frozen) is None
-    assert cache.get("k", Frozen, 960, lambda: operator(960)) is cache.find("k", Frozen)
+        assert cache.get_cached("k", LinearOperator) is None
+    assert cache.get("k", LinearOperator, 960, lambda: operator(960)) is cache.get_cached("k", LinearOperator)
 
 
 def test_two_who_want_the_same_thing_at_once_make_it_once():
-    cache, made, start = Memory(100_000), [], threading.Barrier(8)
+    cache, made, start = Cache(100_000), [], threading.Barrier(8)
 
     def make():
         made.append(1)
@@ -198,7 +198,7 @@ def test_two_who_want_the_same_thing_at_once_make_it_once():
 
     def want():
         start.wait()
-        found.append(cache.get("k", Frozen, 480, make))
+        found.append(cache.get("k", LinearOperator, 480, make))
 
     threads = [threading.Thread(target=want) for _ in range(8)]
     for thread in threads:
@@ -212,10 +212,10 @@ def test_two_who_want_the_same_thing_at_once_make_it_once():
 
 def test_one_who_gives_up_lets_the_others_make_it_once():
     """The first is cancelled while a second waits; a third comes when the second is at it: made once, for both."""
-    cache, made, outcome = Memory(100_000), [], []
+    cache, made, outcome = Cache(100_000), [], []
     first_runs, go_on, second_runs = threading.Event(), threading.Event(), threading.Event()
 
-    def cancelled():
+    def is_canceled():
         first_runs.set()
         go_on.wait(60)
         raise CancelledError("cancelled")
@@ -228,10 +228,10 @@ def test_one_who_gives_up_lets_the_others_make_it_once():
 
     def give_up():
         with pytest.raises(CancelledError):
-            cache.get("k", Frozen, 480, cancelled)
+            cache.get("k", LinearOperator, 480, is_canceled)
 
     def want():
-        outcome.append(cache.get("k", Frozen, 480, make))
+        outcome.append(cache.get("k", LinearOperator, 480, make))
 
     first, second, third = (threading.Thread(target=target) for target in (give_up, want, want))
     first.start()
@@ -250,7 +250,7 @@ def test_one_who_gives_up_lets_the_others_make_it_once():
 
 
 def test_many_threads_and_keys_never_lose_count():
-    cache, errors = Memory(5000), []
+    cache, errors = Cache(5000), []
 
     def work(seed):
         rng = np.random.default_rng(seed)
@@ -259,9 +259,11 @@ def test_many_threads_and_keys_never_lose_count():
             try:
                 if rng.random() < 0.2:
                     with pytest.raises(CancelledError):
-                        cache.get(("never", key), Frozen, size, lambda: (_ for _ in ()).throw(CancelledError("no")))
+                        cache.get(
+                            ("never", key), LinearOperator, size, lambda: (_ for _ in ()).throw(CancelledError("no"))
+                        )
                 else:
-                    cache.get((key, size), Frozen, size, lambda size=size: operator(size))
+                    cache.get((key, size), LinearOperator, size, lambda size=size: operator(size))
             except Exception as error:
                 errors.append(error)
 
@@ -272,6 +274,6 @@ def test_many_threads_and_keys_never_lose_count():
         thread.join()
     assert not errors
     keys = [(key, size) for key in range(12) for size in range(480, 2401, 480)]
-    held = sum(entry.num_bytes for key in keys if (entry := cache.find(key, Frozen)) is not None)
+    held = sum(entry.num_bytes for key in keys if (entry := cache.get_cached(key, LinearOperator)) is not None)
     assert cache.used_bytes == held
     assert held > 0

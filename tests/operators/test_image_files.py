@@ -7,15 +7,15 @@ import shutil
 
 import numpy as np
 import pytest
-from oracle import KEPT
-from pictures import opened, sigma
-from sessions import BUDGET, look_of
+from oracle import DERIVED_FOLDERS
+from pictures import open_exact_picture, set_sigma
+from sessions import BUDGET, make_look
 
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.opened import baked_views as transfer_module
 from relume.methods.registry import open_transfer
 from relume.operators.image_files import ImageFiles
-from relume.operators.shade import Shaded
+from relume.operators.shade import ShadedTerm
 from relume.picture.jobs import Shade
 
 SHAPE = (1, 3, 64)
@@ -24,7 +24,7 @@ CODE, OTHER = "0123456789abcdef", "fedcba9876543210"
 
 
 def shaded(value):
-    return Shaded(np.full(SHAPE, value, np.float32))
+    return ShadedTerm(np.full(SHAPE, value, np.float32))
 
 
 def refuse():
@@ -68,28 +68,28 @@ def test_what_other_code_made_is_never_found_and_goes_when_this_code_keeps_its_f
 
 
 def test_after_an_upgrade_an_image_is_made_anew(baked, tmp_path, monkeypatch):
-    store = shutil.copytree(baked, tmp_path / "store.zarr", ignore=shutil.ignore_patterns(*KEPT))
-    made, finished = [], Shade._finished
+    store = shutil.copytree(baked, tmp_path / "store.zarr", ignore=shutil.ignore_patterns(*DERIVED_FOLDERS))
+    made, finished = [], Shade._complete_image
 
     def counted(*args):
         made.append(1)
         return finished(*args)
 
-    monkeypatch.setattr(Shade, "_finished", counted)
-    opened(open_transfer(store, Memory(BUDGET)))
+    monkeypatch.setattr(Shade, "_complete_image", counted)
+    open_exact_picture(open_transfer(store, Cache(BUDGET)))
     num_images = len(made)
     assert num_images > 0
-    opened(open_transfer(store, Memory(BUDGET)))
+    open_exact_picture(open_transfer(store, Cache(BUDGET)))
     assert len(made) == num_images
     monkeypatch.setattr(transfer_module, "image_code", lambda: OTHER)
-    opened(open_transfer(store, Memory(BUDGET)))
+    open_exact_picture(open_transfer(store, Cache(BUDGET)))
     assert len(made) == 2 * num_images
 
 
 def test_the_image_of_an_edited_look_is_there_after_a_restart(transfer, monkeypatch):
-    look = look_of(transfer, sigma(0.23456))
-    before = opened(transfer, look=look).image()
-    monkeypatch.setattr(Shade, "_finished", lambda *args: refuse())
-    np.testing.assert_array_equal(opened(transfer, look=look).image(), before)
+    look = make_look(transfer, set_sigma(0.23456))
+    before = open_exact_picture(transfer, look=look).image()
+    monkeypatch.setattr(Shade, "_complete_image", lambda *args: refuse())
+    np.testing.assert_array_equal(open_exact_picture(transfer, look=look).image(), before)
     with pytest.raises(AssertionError, match="made again"):
-        opened(transfer, look=look_of(transfer, sigma(0.23457)))
+        open_exact_picture(transfer, look=make_look(transfer, set_sigma(0.23457)))

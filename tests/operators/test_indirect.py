@@ -15,39 +15,39 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.errors import CancelledError
 from relume.light.gather_rays import make_pattern
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.operators import indirect as rows_module
-from relume.operators.frozen import tiles_of
-from relume.operators.indirect import expected_light, freeze_rows, num_channels, rows_bytes
-from relume.operators.indirect_kernel import keep, transform
+from relume.operators.frozen import tile_layout
+from relume.operators.indirect import expected_light, num_channels, precompute_rows, row_bytes
+from relume.operators.indirect_kernel import select_coefficients, transform
 from relume.project.contraction import contract
 from relume.project.projector import Projector
-from relume.project.receivers import GatherRays, Receivers
-from relume.project.sent import evenly
-from relume.sharing import Sharing, Weights
-from relume.trace.cell_tree import NO_CELL
+from relume.project.receivers import GatherRays, ShadingPoints
+from relume.project.sent import isotropic
+from relume.sharing import FilterWeights, NeighborFilter
+from relume.trace.cell_tree import NO_PATCH
 
 NUM_CELLS, NUM_POINTS, NUM_RAYS = 90, 150, 33
-NONE = subdivide(np.ones((8, 16, 3), np.float32), 40).none()
+NONE = tessellate_environment(np.ones((8, 16, 3), np.float32), 40).empty()
 
 
 @pytest.fixture(scope="module")
 def receivers():
     """Points that see cells by neighbourhoods, so that their rows are smooth; a tenth of the rays finds nothing."""
     rng = np.random.default_rng(5)
-    dark = twins.make_receivers(NUM_POINTS, 8, seed=6)
+    dark = twins.make_random_receivers(NUM_POINTS, 8, seed=6)
     middle = np.linspace(0, NUM_CELLS, NUM_POINTS)[:, None]
     links = np.clip(middle + 12 * rng.normal(size=(NUM_POINTS, NUM_RAYS)), 0, NUM_CELLS - 1).astype(np.uint16)
-    links[rng.random(links.shape) < 0.1] = NO_CELL
-    rays = GatherRays(links, make_pattern(NUM_RAYS, 0, 7), evenly(light(1)))
-    return Receivers(dark.points, dark.wo, np.empty((NUM_POINTS, 0), np.uint8), (rays,))
+    links[rng.random(links.shape) < 0.1] = NO_PATCH
+    rays = GatherRays(links, make_pattern(NUM_RAYS, 0, 7), isotropic(light(1)))
+    return ShadingPoints(dark.points, dark.wo, np.empty((NUM_POINTS, 0), np.uint8), (rays,))
 
 
 def light(seed):
     """Of cells: smooth but for a step."""
     at = np.arange(NUM_CELLS)[:, None] / NUM_CELLS
     phase = np.random.default_rng(seed).random((2, 3))
-    radiance = np.zeros((NO_CELL + 1, 3), np.float32)
+    radiance = np.zeros((NO_PATCH + 1, 3), np.float32)
     radiance[:NUM_CELLS] = 2 + np.sin(6 * (at + phase[0])) + (at > phase[1])
     return radiance
 
@@ -58,16 +58,16 @@ def bands_of(term, **params):
 
 
 def exact_image(term, bands, receivers, radiance):
-    lit = replace(receivers, rays=(replace(receivers.rays[0], sent=evenly(radiance)),))
+    lit = replace(receivers, rays=(replace(receivers.rays[0], outgoing=isotropic(radiance)),))
     return Projector(term, contract(term, bands, None), NONE, lit).project(0, NUM_POINTS)[:, 0]
 
 
 def image_by_rows(term, bands, receivers, radiance):
-    tiles, samples = tiles_of(NUM_POINTS)
+    tiles, samples = tile_layout(NUM_POINTS)
     image = np.ones((tiles, 3, samples), np.float32)
     rows = freeze(term, bands, receivers)
     rows.add(haar(radiance[:NUM_CELLS]).astype(np.float32), image)
-    assert rows.num_bytes == rows_bytes(NUM_POINTS, num_channels(term, bands))
+    assert rows.num_bytes == row_bytes(NUM_POINTS, num_channels(term, bands))
     return image.transpose(0, 2, 1).reshape(-1, 3)[:NUM_POINTS] - 1
 
 
@@ -78,16 +78,16 @@ def test_rows_are_shared_as_rays_are(receivers, times):
     weights = csr_array(rng.random((NUM_POINTS,) * 2) * (rng.random((NUM_POINTS,) * 2) < 0.02) + np.eye(NUM_POINTS))
     (rays,) = receivers.rays
     weights = csr_array(weights / weights.sum(axis=1)[:, None]).astype(np.float32)
-    nobody = Weights(0 * weights, 1)
-    shared = replace(receivers, rays=(replace(rays, sharing=Sharing(Weights(weights, times), nobody)),))
+    nobody = FilterWeights(0 * weights, 1)
+    shared = replace(receivers, rays=(replace(rays, sharing=NeighborFilter(FilterWeights(weights, times), nobody)),))
     term, bands = TERMS["lambert"], bands_of(TERMS["lambert"])
     expected = np.linalg.matrix_power(weights.toarray(), times) @ image_by_rows(term, bands, receivers, light(1))
     np.testing.assert_allclose(image_by_rows(term, bands, shared, light(1)), expected, rtol=1e-4, atol=1e-4)
 
 
-def freeze(term, bands, receivers, cancelled=lambda: False):
+def freeze(term, bands, receivers, is_canceled=lambda: False):
     expected = expected_light(light(1)[:NUM_CELLS])
-    return freeze_rows(term, bands, receivers, receivers.rays[0], expected, lambda share: None, cancelled)
+    return precompute_rows(term, bands, receivers, receivers.rays[0], expected, lambda share: None, is_canceled)
 
 
 @pytest.mark.parametrize("model", list(ANALYTIC))
@@ -113,21 +113,21 @@ def test_error_falls_with_the_coefficients_kept(receivers, monkeypatch):
     term = TERMS["lambert"]
     expected, errors = exact_image(term, bands_of(term), receivers, light(2)), []
     for kept in (4, 16, 64):
-        monkeypatch.setattr(rows_module, "NUM_KEPT", kept)
+        monkeypatch.setattr(rows_module, "NUM_COEFFICIENTS", kept)
         errors.append(np.linalg.norm(image_by_rows(term, bands_of(term), receivers, light(2)) - expected))
     assert errors[0] > 3 * errors[1] > 9 * errors[2]
     assert errors[1] < 0.03 * np.linalg.norm(expected)
 
 
 def test_black_light_brings_nothing_and_may_be_what_is_expected(receivers):
-    black = np.zeros((NO_CELL + 1, 3), np.float32)
+    black = np.zeros((NO_PATCH + 1, 3), np.float32)
     term = TERMS["lambert"]
     assert not image_by_rows(term, bands_of(term), receivers, black).any()
     assert np.all(expected_light(black[:NUM_CELLS]) > 0)
 
 
 def test_points_that_see_no_cell_have_empty_rows(receivers):
-    lost = replace(receivers.rays[0], links=np.full_like(receivers.rays[0].links, NO_CELL))
+    lost = replace(receivers.rays[0], gather_hits=np.full_like(receivers.rays[0].gather_hits, NO_PATCH))
     term = TERMS["lambert"]
     assert not image_by_rows(term, bands_of(term), replace(receivers, rays=(lost,)), light(2)).any()
 
@@ -144,7 +144,7 @@ def test_of_coefficients_that_matter_alike_none_displaces_a_better_one():
     details[-1] = 100
     index = np.arange(8, -1, -1, dtype=np.int32)
     kept, scale, weights = np.empty(3, np.int32), np.empty(3, np.float32), np.empty((3, 4), np.int16)
-    keep(index, details, np.ones(16, np.float32), kept, scale, weights)
+    select_coefficients(index, details, np.ones(16, np.float32), kept, scale, weights)
     assert kept.tolist() == [0, 1, 2]
     np.testing.assert_allclose(scale[:, None] * weights, [[100] * 4, [1] * 4, [1] * 4], rtol=1e-4)
 

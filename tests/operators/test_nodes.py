@@ -11,36 +11,36 @@ from relume.basis.nodes import choose_nodes
 from relume.basis.pca import joint
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.brdf.sweep import moved_curves, slider_values, solid_angles
+from relume.brdf.sweep import curves_of_parameter, slider_values, solid_angles
 from relume.errors import CancelledError
-from relume.light.triangles import subdivide
-from relume.operators.nodes import MAX_ERROR, MAX_NODES, linearise
-from relume.operators.stream import columns_of, stream
+from relume.light.triangles import tessellate_environment
+from relume.operators.nodes import MAX_ERROR, MAX_NODES, linearize
+from relume.operators.stream import changed_columns, stream
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 
 SLIDERS = [("blinn_phong", "exponent"), ("cook_torrance", "ior"), ("cook_torrance", "sigma"), ("ggx", "roughness")]
-ALL = [(model, p.name) for model, term in TERMS.items() for p in term.parameters if moved_curves(term, p.name)]
+ALL = [(model, p.name) for model, term in TERMS.items() for p in term.parameters if curves_of_parameter(term, p.name)]
 
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(studio(), 150)
+    return tessellate_environment(studio(), 150)
 
 
 @pytest.fixture(scope="module")
 def receivers(lights):
-    return twins.only_above(twins.make_receivers(70, lights.num_lights, seed=11), lights)
+    return twins.only_above(twins.make_random_receivers(70, lights.num_lights, seed=11), lights)
 
 
 def bands_of(document):
-    term = TERMS[document["model"]].settled(document)
-    return {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
+    term = TERMS[document["model"]].normalized(document)
+    return {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
 
 
 def shaded(document, lights, receivers):
     """All curves contracted, straight from the projector. (n, 3)"""
-    term, bands = TERMS[document["model"]].settled(document), bands_of(document)
+    term, bands = TERMS[document["model"]].normalized(document), bands_of(document)
     return Projector(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
 
@@ -49,16 +49,16 @@ def image_of(along, document, count):
     linearised, frozen = along
     tiles, _, _, samples = frozen.transport.shape
     image = np.zeros((tiles, 3, samples), np.float32)
-    stream(frozen.transport, columns_of(linearised.coefficients(bands_of(document))), image)
+    stream(frozen.transport, changed_columns(linearised.coefficients(bands_of(document))), image)
     return image.transpose(0, 2, 1).reshape(-1, 3)[:count]
 
 
 def frozen_along(document, parameter, lights, receivers):
-    term = TERMS[document["model"]].settled(document)
-    linearised = linearise(document, parameter)
+    term = TERMS[document["model"]].normalized(document)
+    linearised = linearize(document, parameter)
     assert linearised is not None
     assert linearised.num_columns <= MAX_NODES
-    frozen = linearised.freeze(term, bands_of(document), lights, receivers, lambda share: None, lambda: False)
+    frozen = linearised.precompute(term, bands_of(document), lights, receivers, lambda share: None, lambda: False)
     return linearised, frozen
 
 
@@ -68,8 +68,8 @@ def relative(found, expected):
 
 def spread_evenly(document, parameter, lights, receivers):
     """What the samples would show if what the parameter moves were spread evenly over all directions. (n, 3)"""
-    term, bands = TERMS[document["model"]].settled(document), bands_of(document)
-    even = {c.name: solid_angles(c) / solid_angles(c).sum() for c in moved_curves(term, parameter)}
+    term, bands = TERMS[document["model"]].normalized(document), bands_of(document)
+    even = {c.name: solid_angles(c) / solid_angles(c).sum() for c in curves_of_parameter(term, parameter)}
     bands |= {name: np.repeat((bands[name] @ share)[:, None], len(share), axis=1) for name, share in even.items()}
     return Projector(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
@@ -84,7 +84,7 @@ def test_every_sample_is_held_at_any_value(model, parameter, lights, receivers):
     along = frozen_along({"model": model, "params": {}}, parameter, lights, receivers)
     declared = TERMS[model].parameter(parameter)
     # the sharpest tenth, and the whole range
-    for value in (*slider_values(declared, 60, between=True)[[0, 2, 5, -6, -3, -1]], *slider_values(declared, 7)):
+    for value in (*slider_values(declared, 60, at_midpoints=True)[[0, 2, 5, -6, -3, -1]], *slider_values(declared, 7)):
         document = {"model": model, "params": {parameter: float(value)}}
         expected = shaded(document, lights, receivers)
         even = spread_evenly(document, parameter, lights, receivers)
@@ -126,18 +126,18 @@ def test_several_settings_at_once_are_each_alone(lights, receivers):
 
 
 def test_what_cannot_be_linearised_is_left_to_the_bands():
-    assert linearise({"model": "lambert", "params": {}}, "nothing") is None
+    assert linearize({"model": "lambert", "params": {}}, "nothing") is None
     drawn = {"theta_h": {"points": [[0, 1], [90, 0]]}}
-    assert linearise({"model": "ggx", "params": {}, "curves": drawn}, "roughness") is None
+    assert linearize({"model": "ggx", "params": {}, "curves": drawn}, "roughness") is None
     # theta_h is not among those that f0 moves
-    assert linearise({"model": "ggx", "params": {}, "curves": drawn}, "f0") is not None
+    assert linearize({"model": "ggx", "params": {}, "curves": drawn}, "f0") is not None
 
 
 def test_cancelling_stops(lights, receivers):
     document = {"model": "ggx", "params": {}}
-    linearised = linearise(document, "f0")
+    linearised = linearize(document, "f0")
     with pytest.raises(CancelledError):
-        linearised.freeze(TERMS["ggx"], bands_of(document), lights, receivers, lambda share: None, lambda: True)
+        linearised.precompute(TERMS["ggx"], bands_of(document), lights, receivers, lambda share: None, lambda: True)
 
 
 def products(model, parameter, values):
@@ -145,19 +145,19 @@ def products(model, parameter, values):
     rows = []
     for value in values:
         bands = bands_of({"model": model, "params": {parameter: float(value)}})
-        of_curves = [bands[curve.name][0] for curve in moved_curves(TERMS[model], parameter)]
+        of_curves = [bands[curve.name][0] for curve in curves_of_parameter(TERMS[model], parameter)]
         rows.append(joint(of_curves))
     return np.array(rows)
 
 
 @pytest.mark.parametrize(("model", "parameter"), ALL)
 def test_every_band_is_held_at_any_value(model, parameter):
-    linearised, term = linearise({"model": model, "params": {}}, parameter), TERMS[model]
+    linearised, term = linearize({"model": model, "params": {}}, parameter), TERMS[model]
     assert linearised.num_columns <= MAX_NODES
-    weights = joint([solid_angles(curve) for curve in moved_curves(term, parameter)])
+    weights = joint([solid_angles(curve) for curve in curves_of_parameter(term, parameter)])
     nodes = products(model, parameter, linearised.nodes[0].values)
     brightest = float((nodes @ weights).max())
-    for value in slider_values(term.parameter(parameter), 61, between=True):
+    for value in slider_values(term.parameter(parameter), 61, at_midpoints=True):
         document = {"model": model, "params": {parameter: float(value)}}
         exact = products(model, parameter, [value])[0]
         floor = 0.01 * max(float(exact @ weights), 1e-3 * brightest) / weights.sum()
@@ -168,9 +168,9 @@ def test_every_band_is_held_at_any_value(model, parameter):
 @pytest.mark.parametrize(("model", "parameter"), SLIDERS)
 def test_images_at_the_nodes_do_not_cancel(model, parameter):
     """Coefficients of both signs are small enough that rounding, a millionth of an image, stays below the error."""
-    linearised = linearise({"model": model, "params": {}}, parameter)
+    linearised = linearize({"model": model, "params": {}}, parameter)
     nodes = products(model, parameter, linearised.nodes[0].values)
-    for value in slider_values(TERMS[model].parameter(parameter), 61, between=True):
+    for value in slider_values(TERMS[model].parameter(parameter), 61, at_midpoints=True):
         coefficients = linearised.coefficients(bands_of({"model": model, "params": {parameter: float(value)}}))[0]
         exact = products(model, parameter, [value])[0]
         assert (1e-6 * np.abs(coefficients) @ nodes <= MAX_ERROR / 2 * (exact + 0.01 * exact.mean())).all()

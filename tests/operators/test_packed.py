@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import twins
 
-from relume.operators.frozen import Frozen, packed_bytes, tiles_of
-from relume.operators.packed import BLOCK_SAMPLES, Packed, pack, stream_packed
-from relume.operators.stream import columns_of, stream
-from relume.operators.thin import Thin, spread, thin_bytes
+from relume.operators.frozen import LinearOperator, quantized_bytes, tile_layout
+from relume.operators.packed import BLOCK_SAMPLES, QuantizedOperator, quantize, stream_quantized
+from relume.operators.stream import changed_columns, stream
+from relume.operators.thin import SubsampledOperator, interpolate, subsampled_bytes
 
 RNG = np.random.default_rng(4)
 
@@ -22,9 +22,11 @@ def packed_of(transport):
     for tile in range(tiles):
         for block in range(blocks):
             here = slice(block * BLOCK_SAMPLES, (block + 1) * BLOCK_SAMPLES)
-            rows, scale[tile, :, :, block] = pack(np.ascontiguousarray(transport[tile, :, :, here].transpose(0, 2, 1)))
+            rows, scale[tile, :, :, block] = quantize(
+                np.ascontiguousarray(transport[tile, :, :, here].transpose(0, 2, 1))
+            )
             values[tile, :, :, here] = rows.transpose(0, 2, 1)
-    return Packed(values, scale, np.ones((3, num)))
+    return QuantizedOperator(values, scale, np.ones((3, num)))
 
 
 def whole_numbers(packed):
@@ -54,15 +56,15 @@ def test_levels_of_packed_columns_end_where_those_of_others_do():
     packed, bounds = packed_of(lively(2, 3, 6, 1040)), np.array([0, 500, 500, 1300, 2080])
     change = RNG.normal(size=(4, 3, 6))
     images = np.zeros((2, 2, 3, 1040), np.float32)
-    stream_packed(packed.transport, packed.scale, columns_of(change), images[0], bounds)
-    stream(whole_numbers(packed).astype(np.float32), columns_of(change), images[1], bounds)
+    stream_quantized(packed.transport, packed.scale, changed_columns(change), images[0], bounds)
+    stream(whole_numbers(packed).astype(np.float32), changed_columns(change), images[1], bounds)
     np.testing.assert_allclose(images[0], images[1], atol=1e-5 * np.abs(images[1]).max())
 
 
 def test_sixteen_bits_leave_half_a_step_of_each_block_s_largest_number():
     rows = (RNG.normal(size=(3, 100, 5)) * 10.0 ** RNG.integers(-20, 20, size=(3, 1, 5))).astype(np.float32)
     rows[0, :, 0], rows[1, :, 1] = 0, 1e-42  # nothing, and numbers that processors are slow with
-    values, scale = pack(rows)
+    values, scale = quantize(rows)
     rest = np.abs(values * scale[:, None].astype(float) - rows)
     assert np.all(rest <= 0.5001 * np.abs(rows).max(axis=1, keepdims=True) / 32767 + 1e-41)
     assert np.abs(values).max() == 32767
@@ -72,7 +74,7 @@ def test_sixteen_bits_leave_half_a_step_of_each_block_s_largest_number():
 def test_packed_columns_take_half_the_memory_and_tell_each_sample_s():
     transport = lively(2, 3, 64, 1040)
     packed = packed_of(transport)
-    assert packed.num_bytes == packed_bytes(2080, 64) if tiles_of(2080) == (2, 1040) else True
+    assert packed.num_bytes == quantized_bytes(2080, 64) if tile_layout(2080) == (2, 1040) else True
     assert packed.num_bytes < 0.51 * transport.nbytes
     np.testing.assert_allclose(packed.columns_at(1040 + 700), whole_numbers(packed)[1, :, :, 700])
 
@@ -87,19 +89,19 @@ def test_what_some_samples_say_is_spread_to_all():
     added = np.einsum("nk,nkc->nc", weight.astype(float), rows[near])
     for sample in range(90):
         expected[sample // 48, :, sample % 48] += added[sample]
-    spread(rows, near, weight, image)
+    interpolate(rows, near, weight, image)
     np.testing.assert_allclose(image, expected, atol=1e-5)
 
 
 def test_a_thin_operator_adds_what_its_chosen_samples_say():
-    few = Frozen(lively(1, 3, 4, 16), RNG.random((3, 4)))
+    few = LinearOperator(lively(1, 3, 4, 16), RNG.random((3, 4)))
     near = RNG.integers(0, 10, size=(40, 3)).astype(np.int32)
     weight = RNG.dirichlet(np.ones(3), 40).astype(np.float32)
-    thin = Thin(few, 10, near, weight)
+    thin = SubsampledOperator(few, 10, near, weight)
     change, image = RNG.normal(size=(3, 4)), np.zeros((1, 3, 48), np.float32)
     thin.add(change, image)
     for sample in (0, 17, 39):
         told = (thin.columns_at(sample) * change).sum(axis=1)
         np.testing.assert_allclose(image[0, :, sample], told, rtol=1e-4, atol=1e-5 * np.abs(image).max())
     np.testing.assert_allclose(thin.importance, 2 * few.importance)  # one stands for four
-    assert thin_bytes(40, 10, 4) == packed_bytes(10, 4) + near.nbytes + weight.nbytes
+    assert subsampled_bytes(40, 10, 4) == quantized_bytes(10, 4) + near.nbytes + weight.nbytes

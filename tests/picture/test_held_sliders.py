@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twins
-from sessions import BUDGET, look_of, relative_rmse, settle
+from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 
 from relume.errors import ParameterError
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.operators.edit_basis import CurveBasis
-from relume.operators.nodes import MAX_ERROR, Linearised
+from relume.operators.nodes import MAX_ERROR, ParameterOperator
 from relume.picture.picture import Picture
 
 TERM = "/materials/Ball/terms/1"
@@ -29,21 +29,21 @@ def shiny(roughness=0.4, curves=None, **more):
 
 @pytest.fixture
 def picture(transfer):
-    found = Picture(transfer, "front", Memory(BUDGET))
-    found.set_look(look_of(transfer, shiny()))
-    return settle(found)
+    found = Picture(transfer, "front", Cache(BUDGET))
+    found.set_look(make_look(transfer, shiny()))
+    return run_until_exact(found)
 
 
 def exact(transfer, change):
-    return twins.full_evaluation(transfer, "front", look_of(transfer, change))
+    return twins.full_evaluation(transfer, "front", make_look(transfer, change))
 
 
 def make(picture, need):
-    picture.install(need, need.make(lambda share: None, lambda: False))
+    picture.install(need, need.run(lambda share: None, lambda: False))
 
 
 def held(picture, pointer):
-    picture.touch(pointer)
+    picture.prepare(pointer)
     make(picture, picture.next_job())
     return picture
 
@@ -52,7 +52,7 @@ def test_a_slider_of_several_curves_is_followed_at_once_and_its_picture_is_near(
     held(picture, ROUGHNESS)
     assert picture.next_job() is None
     for roughness in (0.41, 0.1, 0.9, 0.33):
-        picture.set_look(look_of(transfer, shiny(roughness)))
+        picture.set_look(make_look(transfer, shiny(roughness)))
         need = picture.next_job()
         assert need is None
         advance = picture.advance(8)
@@ -64,27 +64,27 @@ def test_a_slider_of_several_curves_is_followed_at_once_and_its_picture_is_near(
 
 def test_at_rest_it_is_shaded_and_then_exact_and_the_slider_still_in_hand(transfer, picture):
     held(picture, ROUGHNESS)
-    picture.set_look(look_of(transfer, shiny(0.2)))
+    picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
     need = picture.next_job()
-    assert need.refines
+    assert need.is_refinement
     assert need.state == "shading"
     assert not picture.advance(None).exact
     make(picture, need)
     assert picture.advance(None).exact
     assert picture.next_job() is None
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.2))) < 1e-6
-    picture.set_look(look_of(transfer, shiny(0.7)))
+    picture.set_look(make_look(transfer, shiny(0.7)))
     assert picture.advance(None).changed
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.7))) < MAX_ERROR
 
 
 def test_shading_of_a_look_that_the_hand_has_left_is_not_shown(transfer, picture):
     held(picture, ROUGHNESS)
-    picture.set_look(look_of(transfer, shiny(0.2)))
+    picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
     old = picture.next_job()
-    picture.set_look(look_of(transfer, shiny(0.7)))
+    picture.set_look(make_look(transfer, shiny(0.7)))
     picture.advance(None)
     make(picture, old)
     assert not picture.advance(None).exact
@@ -93,24 +93,24 @@ def test_shading_of_a_look_that_the_hand_has_left_is_not_shown(transfer, picture
 
 @pytest.mark.parametrize("hand", [None, THETA_H, "/lights/Lamp"])
 def test_what_the_hand_is_on_is_never_guessed_from_looks(transfer, picture, hand):
-    picture.set_look(look_of(transfer, shiny(0.3)), hand=hand)
+    picture.set_look(make_look(transfer, shiny(0.3)), hand=hand)
     assert isinstance(picture.next_job().basis, CurveBasis)
 
 
 def test_pointer_to_nothing_that_a_hand_may_hold_is_refused_and_the_look_stays(transfer, picture):
     with pytest.raises(ParameterError):
-        picture.set_look(look_of(transfer, shiny(0.3)), hand="/display/exposure")
+        picture.set_look(make_look(transfer, shiny(0.3)), hand="/display/exposure")
     assert picture.next_job() is None
     assert picture.advance(None).exact
 
 
 def test_a_hand_that_took_hold_of_nothing_is_known_from_its_edits(transfer, picture):
-    picture.set_look(look_of(transfer, shiny(0.3)), hand=ROUGHNESS)
+    picture.set_look(make_look(transfer, shiny(0.3)), hand=ROUGHNESS)
     need = picture.next_job()
-    assert isinstance(need.basis, Linearised)
+    assert isinstance(need.basis, ParameterOperator)
     assert need.basis.parameter == "roughness"
     make(picture, need)
-    picture.set_look(look_of(transfer, shiny(0.6)))
+    picture.set_look(make_look(transfer, shiny(0.6)))
     assert picture.advance(None).changed
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.6))) < MAX_ERROR
 
@@ -118,32 +118,32 @@ def test_a_hand_that_took_hold_of_nothing_is_known_from_its_edits(transfer, pict
 def test_open_curve_hands_over_to_a_slider_that_moves_others_too(transfer, picture):
     held(picture, THETA_H)
     held(picture, ROUGHNESS)
-    picture.set_look(look_of(transfer, shiny(0.6)))
+    picture.set_look(make_look(transfer, shiny(0.6)))
     picture.advance(None)
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.6))) < MAX_ERROR
 
 
 def test_open_curve_is_enough_for_a_slider_that_moves_nothing_else(transfer):
     """Its wavelets are there, and exact: nodes would only be another freeze, and less true."""
-    picture = settle(Picture(transfer, "front", Memory(BUDGET)))
+    picture = run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
     held(picture, THETA_H)
-    picture.touch(f"{TERM}/params/sigma")
+    picture.prepare(f"{TERM}/params/sigma")
     assert picture.next_job() is None
 
     def change(document):
         document["materials"]["Ball"]["terms"][1]["params"]["sigma"] = 0.13
 
-    picture.set_look(look_of(transfer, change))
+    picture.set_look(make_look(transfer, change))
     assert picture.next_job() is None
     assert picture.advance(None).exact
 
 
 def test_a_drawn_curve_is_not_said_by_nodes(transfer, picture):
     held(picture, ROUGHNESS)
-    picture.set_look(look_of(transfer, shiny(0.2)))
+    picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
     drawn = shiny(0.2, {"theta_h": {"points": [[0, 3], [20, 0.2], [60, 2]]}})
-    picture.set_look(look_of(transfer, drawn))
+    picture.set_look(make_look(transfer, drawn))
     need = picture.next_job()
     assert isinstance(need.basis, CurveBasis)
     assert need.basis.name == "theta_h"
@@ -154,26 +154,26 @@ def test_a_drawn_curve_is_not_said_by_nodes(transfer, picture):
 
 def test_another_slider_of_the_term_takes_over(transfer, picture):
     held(picture, ROUGHNESS)
-    picture.set_look(look_of(transfer, shiny(0.2)))
+    picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
     held(picture, f"{TERM}/params/f0")
-    picture.set_look(look_of(transfer, shiny(0.2, f0=0.7)))
+    picture.set_look(make_look(transfer, shiny(0.2, f0=0.7)))
     picture.advance(None)
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.2, f0=0.7))) < MAX_ERROR
-    assert relative_rmse(settle(picture).image(), exact(transfer, shiny(0.2, f0=0.7))) < 1e-6
+    assert relative_rmse(run_until_exact(picture).image(), exact(transfer, shiny(0.2, f0=0.7))) < 1e-6
 
 
 def test_pictures_at_the_same_place_share_the_operator_of_a_slider(transfer):
-    cache = Memory(BUDGET)
+    cache = Cache(BUDGET)
     first, second = (Picture(transfer, "front", cache) for _ in range(2))
     for picture, roughness in ((first, 0.2), (second, 0.8)):
-        picture.set_look(look_of(transfer, shiny(roughness)))
-        settle(picture)
+        picture.set_look(make_look(transfer, shiny(roughness)))
+        run_until_exact(picture)
     held(first, ROUGHNESS)
     used = cache.used_bytes
     held(second, ROUGHNESS)
     assert cache.used_bytes == used
-    second.set_look(look_of(transfer, shiny(0.5)))
+    second.set_look(make_look(transfer, shiny(0.5)))
     second.advance(None)
     assert relative_rmse(second.image(), exact(transfer, shiny(0.5))) < MAX_ERROR
     np.testing.assert_allclose(first.image(), exact(transfer, shiny(0.2)), atol=1e-4)

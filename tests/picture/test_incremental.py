@@ -7,22 +7,22 @@ import copy
 import numpy as np
 import pytest
 import twins
-from sessions import BUDGET, look_of, random_edit, relative_rmse, settle
+from sessions import BUDGET, apply_random_edit, make_look, relative_rmse, run_until_exact
 
 from relume.basis import identity
 from relume.basis.daubechies import analysis, synthesis
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.look import BAKED_ENVIRONMENT, Paths, validate
-from relume.memory import Memory
+from relume.look import BAKED_ENVIRONMENT, LightPaths, validate
+from relume.memory import Cache
 from relume.operators.edit_basis import CurveBasis
-from relume.operators.frozen import Frozen, freeze
+from relume.operators.frozen import LinearOperator, precompute
 from relume.picture.fidelity import Fidelity
-from relume.picture.jobs import Settle
-from relume.picture.light import Light
+from relume.picture.jobs import Resum
+from relume.picture.light import Illumination
 from relume.picture.picture import Picture
 from relume.picture.routes.operator import advance
-from relume.picture.shown import Shown
+from relume.picture.shown import DisplayedImage
 
 BALL = "/materials/Ball/terms/1/curves/"
 
@@ -36,18 +36,18 @@ BALL = "/materials/Ball/terms/1/curves/"
     ],
 )
 def test_long_session_of_random_edits_is_what_a_full_evaluation_gives(transfer, seed, budget_bytes, num_steps):
-    rng, cache = np.random.default_rng(seed), Memory(budget_bytes)
-    picture = settle(Picture(transfer, "front", cache))
+    rng, cache = np.random.default_rng(seed), Cache(budget_bytes)
+    picture = run_until_exact(Picture(transfer, "front", cache))
     document, checked, inexact = copy.deepcopy(transfer.default_look), 0, 0
     for step in range(num_steps):
         for _ in range(int(rng.integers(1, 3))):
             document = copy.deepcopy(document)
-            random_edit(rng, document)
+            apply_random_edit(rng, document)
         look = validate(document, transfer.default_look)
         picture.set_look(look)
         for _ in range(int(rng.integers(0, 4))):
             if picture.next_job() is not None:
-                picture.freeze(lambda share: None, lambda: False)
+                picture.run_next_job(lambda share: None, lambda: False)
             advance = picture.advance(int(rng.integers(1, 30)) if rng.random() < 0.8 else None)
         advance = picture.advance(int(rng.integers(1, 30)))
         inexact += not advance.exact
@@ -55,7 +55,7 @@ def test_long_session_of_random_edits_is_what_a_full_evaluation_gives(transfer, 
             assert relative_rmse(picture.image(), twins.full_evaluation(transfer, "front", look)) < 1e-4, step
             checked += 1
         assert cache.used_bytes <= cache.budget_bytes
-    settle(picture)
+    run_until_exact(picture)
     assert relative_rmse(picture.image(), twins.full_evaluation(transfer, "front", look)) < 1e-4
     assert checked > num_steps // 10
     assert inexact > num_steps // 25
@@ -67,15 +67,15 @@ SLOW = [pytest.param(number, marks=pytest.mark.slow) for number in (1, 20)]
 @pytest.mark.parametrize("max_coefficients", [3, *SLOW])
 def test_five_hundred_drags_of_one_curve_leave_no_trace(transfer, max_coefficients):
     rng = np.random.default_rng(3)
-    picture = Picture(transfer, "front", Memory(BUDGET))
-    picture.touch(BALL + "theta_h")
-    settle(picture)
+    picture = Picture(transfer, "front", Cache(BUDGET))
+    picture.prepare(BALL + "theta_h")
+    run_until_exact(picture)
     for _ in range(500):
         sigma = float(rng.uniform(0.05, 0.6))
-        picture.set_look(look_of(transfer, lambda d, s=sigma: set_param(d, s)))
+        picture.set_look(make_look(transfer, lambda d, s=sigma: set_param(d, s)))
         picture.advance(max_coefficients)
-    assert picture.next_job() is None or isinstance(picture.next_job(), Settle)
-    look = look_of(transfer, lambda d: set_param(d, 0.11))
+    assert picture.next_job() is None or isinstance(picture.next_job(), Resum)
+    look = make_look(transfer, lambda d: set_param(d, 0.11))
     picture.set_look(look)
     steps = 1
     while not picture.advance(max_coefficients).exact:
@@ -90,10 +90,10 @@ def set_param(document, sigma):
 
 def test_refinement_only_ever_comes_nearer(transfer):
     """Every step adds the columns that move the picture most; the rest of the difference shrinks to nothing."""
-    picture = Picture(transfer, "front", Memory(BUDGET))
-    picture.touch(BALL + "theta_h")
-    settle(picture)
-    look = look_of(transfer, lambda d: set_param(d, 0.07))
+    picture = Picture(transfer, "front", Cache(BUDGET))
+    picture.prepare(BALL + "theta_h")
+    run_until_exact(picture)
+    look = make_look(transfer, lambda d: set_param(d, 0.07))
     expected = twins.full_evaluation(transfer, "front", look)
     picture.set_look(look)
     errors, exact = [], False
@@ -111,7 +111,7 @@ def one_pixel(transport):
     """The operator of a single sample whose transport along a curve of 64 bands begins with these numbers."""
     columns = np.zeros((1, 3, 64, 16), np.float32)
     columns[0, :, : len(transport), 0] = transport
-    return Frozen(columns, np.sqrt((columns**2).sum(axis=(0, 3))).astype(float))
+    return LinearOperator(columns, np.sqrt((columns**2).sum(axis=(0, 3))).astype(float))
 
 
 def target_of(*bands):
@@ -121,9 +121,9 @@ def target_of(*bands):
 
 def start(frozen):
     """One pixel that shows nothing, under an operator along its whole curve."""
-    light = Light(BAKED_ENVIRONMENT, (), Paths(True, 1, 0))
-    empty = Shown(np.zeros((1, 3, frozen.transport.shape[3]), np.float32))
-    return empty.summed(frozen, CurveBasis("theta_i", "θi", 64), target_of(0), light)
+    light = Illumination(BAKED_ENVIRONMENT, (), LightPaths(True, 1, 0))
+    empty = DisplayedImage(np.zeros((1, 3, frozen.transport.shape[3]), np.float32))
+    return empty.evaluate_operator(frozen, CurveBasis("theta_i", "θi", 64), target_of(0), light)
 
 
 def test_what_moves_the_picture_most_goes_first(monkeypatch):
@@ -131,7 +131,7 @@ def test_what_moves_the_picture_most_goes_first(monkeypatch):
     monkeypatch.setattr("relume.operators.edit_basis.analysis", identity.analysis)
     frozen = one_pixel([0.01, 100, 2])
     shown, target, seen = start(frozen), target_of(50, 1, 10), []
-    while shown.differing(target):
+    while shown.changed_curves(target):
         shown = advance(shown, target, frozen, 1)
         seen.append(float(shown.image[0, 0, 0]))
     assert seen == pytest.approx([100, 120, 120.5])
@@ -157,7 +157,7 @@ def test_didactic_example_of_table_2(monkeypatch):
         shown = advance(shown, target, frozen, 1)
         np.testing.assert_allclose(shown.image[0, :, 0], r_effective)
         np.testing.assert_allclose(shown.coefficients[:, :3], [effective] * 3)
-        assert (not shown.differing(target)) == (effective == perfect)
+        assert (not shown.changed_curves(target)) == (effective == perfect)
         largest = int(np.argmax(perfect))
         non_linear.append(abs(r_perfect - [3, 5, 2][largest] * perfect[largest]))
         incremental.append(abs(r_perfect - r_effective))
@@ -172,7 +172,7 @@ def test_images_know_what_float32_sums_have_left_in_them(common, is_exact):
     columns = (rng.normal(size=(1, 3, 64, 1024)) + common * rng.normal(size=1024)).astype(np.float32)
     coefficients = rng.integers(-100, 100, 64).astype(float)  # float32 has them
     coefficients[-1] -= coefficients.sum()
-    frozen = Frozen(columns, np.sqrt((columns.astype(float) ** 2).sum(axis=(0, 3))))
+    frozen = LinearOperator(columns, np.sqrt((columns.astype(float) ** 2).sum(axis=(0, 3))))
     empty = start(frozen)
     shown = advance(empty, {"theta_i": synthesis(np.tile(coefficients, (3, 1)))}, frozen, None)
     true = np.einsum("j,tcjs->tcs", coefficients, columns, dtype=float)
@@ -198,12 +198,12 @@ def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is
         def change(document):
             document["materials"]["Ball"]["terms"][1]["curves"] = {"theta_h": {"bands": drawn(rise).tolist()}}
 
-        return look_of(transfer, change)
+        return make_look(transfer, change)
 
-    picture = Picture(transfer, "front", Memory(BUDGET))
+    picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(with_rise(0.0))
-    picture.touch(BALL + "theta_h")
-    settle(picture)
+    picture.prepare(BALL + "theta_h")
+    run_until_exact(picture)
     before = picture.image()
     picture.set_look(with_rise(6.0))
     assert picture.next_job() is None
@@ -215,7 +215,7 @@ def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is
     view, term = transfer.views["front"], TERMS["cook_torrance"]
     document = with_rise(6.0).materials["Ball"].terms[1]
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
-    operator = freeze(term, bands, "theta_h", transfer.lights, view.receivers(2), lambda s: None, lambda: False)
+    operator = precompute(term, bands, "theta_h", transfer.lights, view.receivers(2), lambda s: None, lambda: False)
     perfect = analysis(drawn(6.0))
     kept = np.where(np.abs(perfect) >= np.sort(np.abs(perfect))[-20], perfect, 0)
     exact, approximate = (twins.stream(operator.transport, np.tile(c, (3, 1)), 0) for c in (perfect, kept))

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import exact_image, rendered_afresh
-from sessions import BUDGET, look_of, settle
-from tiny_scenes import looking, mesh, quad
+from oracle import exact_image, render_uncached
+from sessions import BUDGET, make_look, run_until_exact
+from tiny_scenes import make_camera, mesh, quad
 
 from relume.bake import Recipe
 from relume.environments.model import Environment
 from relume.look import LightGeometry
-from relume.memory import Memory
-from relume.methods.on_cells import SAMPLES_OF_CELLS, LocalOnCells
+from relume.memory import Cache
+from relume.methods.on_cells import SAMPLES_PER_PATCH_POINT, LocalPatchLight
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.scene.archive import make_scene
 from relume.scene.model import Light, Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 LAMP = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {
@@ -38,7 +38,7 @@ def rendered(transfer, lights, environment=None, change=lambda document: None, v
         document["environment"].update(environment or {})
         change(document)
 
-    return rendered_afresh(transfer, look_of(transfer, edit), view)
+    return render_uncached(transfer, make_look(transfer, edit), view)
 
 
 @pytest.mark.parametrize("light", [LAMP, PANEL, SPOT, SUN], ids=lambda light: light["kind"])
@@ -71,28 +71,28 @@ def test_curves_are_edited_under_local_lights_and_stay_exact(transfer):
         document["lights"].update(lights)
         document["materials"]["Wall"]["terms"][1]["params"]["exponent"] = 90.0
 
-    picture = Picture(transfer, "front", Memory(BUDGET))
-    picture.set_look(look_of(transfer, lambda document: document["lights"].update(lights)))
-    settle(picture)
-    picture.touch("/materials/Wall/terms/1/params/exponent")
-    settle(picture)
-    picture.set_look(look_of(transfer, steeper))
-    found = settle(picture).image()
-    np.testing.assert_allclose(found, exact_image(transfer, look_of(transfer, steeper)), rtol=2e-3, atol=1e-4)
+    picture = Picture(transfer, "front", Cache(BUDGET))
+    picture.set_look(make_look(transfer, lambda document: document["lights"].update(lights)))
+    run_until_exact(picture)
+    picture.prepare("/materials/Wall/terms/1/params/exponent")
+    run_until_exact(picture)
+    picture.set_look(make_look(transfer, steeper))
+    found = run_until_exact(picture).image()
+    np.testing.assert_allclose(found, exact_image(transfer, make_look(transfer, steeper)), rtol=2e-3, atol=1e-4)
 
 
 def test_moving_light_is_followed_and_then_exact(transfer):
     def moved(document):
         document["lights"]["A"] = LAMP | {"position": [-0.9, 1.2, 1.0]}
 
-    picture = Picture(transfer, "front", Memory(BUDGET))
-    picture.set_look(look_of(transfer, lambda document: document["lights"].update(A=LAMP)))
-    before = settle(picture).image()
-    picture.set_look(look_of(transfer, moved))
+    picture = Picture(transfer, "front", Cache(BUDGET))
+    picture.set_look(make_look(transfer, lambda document: document["lights"].update(A=LAMP)))
+    before = run_until_exact(picture).image()
+    picture.set_look(make_look(transfer, moved))
     assert not picture.advance(None).exact
-    followed, exact = picture.image(), exact_image(transfer, look_of(transfer, moved))
+    followed, exact = picture.image(), exact_image(transfer, make_look(transfer, moved))
     assert np.abs(followed - exact).mean() < 0.1 * np.abs(before - exact).mean()
-    np.testing.assert_array_equal(settle(picture).image(), exact)
+    np.testing.assert_array_equal(run_until_exact(picture).image(), exact)
 
 
 def showing(show):
@@ -106,7 +106,10 @@ def room(*, lamp_sides=True, lights=(), lamp=None):
     lamp = lamp or quad("lamp", [[-0.3, 1, -0.3], [0.3, 1, -0.3], [0.3, 1, 0.3], [-0.3, 1, 0.3]], 1)
     grey = ({"model": "lambert", "color": [0.5, 0.5, 0.5]},)
     materials = [Material("Floor", grey), Material("Lamp", grey, double_sided=lamp_sides)]
-    cameras = [looking("below", [0, 0.3, 3], [0, 0.55, 0], 0.8), looking("above", [0, 2.0, 3], [0, 0.55, 0], 0.8)]
+    cameras = [
+        make_camera("below", [0, 0.3, 3], [0, 0.55, 0], 0.8),
+        make_camera("above", [0, 2.0, 3], [0, 0.55, 0], 0.8),
+    ]
     sky = Environment("dim", np.full((4, 8, 3), 1e-3, np.float32))
     return make_scene("room", [floor, lamp], materials, cameras, sky, lights=lights)
 
@@ -118,15 +121,16 @@ OFF = {"Lamp": {"on": False}}
 def baked(scene, folder, method="direct"):
     views = tuple(camera.name for camera in scene.cameras)
     return open_transfer(
-        bake_here(METHODS[method], scene, Recipe(method, views, (48, 36), 100), folder / "store.zarr"), Memory(1 << 30)
+        bake_in_process(METHODS[method], scene, Recipe(method, views, (48, 36), 100), folder / "store.zarr"),
+        Cache(1 << 30),
     )
 
 
 @pytest.mark.parametrize("is_two_sided", [True, False])
 def test_shining_surface_is_seen_and_lights_the_floor(tmp_path, is_two_sided):
     transfer = baked(room(lamp_sides=is_two_sided, lights=[SHINING]), tmp_path)
-    assert [transfer.local.samples_of(LightGeometry(kind)) for kind in ("mesh", "rectangle")] == [256, 64]
-    assert transfer.local.samples_of(LightGeometry("mesh"), SAMPLES_OF_CELLS) == 4 * SAMPLES_OF_CELLS
+    assert [transfer.local.num_samples(LightGeometry(kind)) for kind in ("mesh", "rectangle")] == [256, 64]
+    assert transfer.local.num_samples(LightGeometry("mesh"), SAMPLES_PER_PATCH_POINT) == 4 * SAMPLES_PER_PATCH_POINT
     below, above = (rendered(transfer, {}, view=view) for view in ("below", "above"))
     lamp = transfer.views["above"].material_ids() == 1
     assert np.all(np.abs(below.max(axis=(0, 1)) - [4, 2, 1]) < 0.1), "its lower side shines"
@@ -165,8 +169,8 @@ def test_cells_reflect_local_light(tmp_path):
     assert shown["first_bounce"][ids == 1].mean() > 0.01
     parts = shown["direct"] + shown["first_bounce"] + shown["further_bounces"]
     np.testing.assert_allclose(shown["all"], parts, rtol=1e-3, atol=1e-5)
-    cells = transfer.cells
-    on_cells = LocalOnCells(transfer.local, cells, transfer.memory, transfer.key, ())
+    cells = transfer.patches
+    on_cells = LocalPatchLight(transfer.local, cells, transfer.cache, transfer.key, ())
     arriving = on_cells.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
     on_floor = cells.material == 0
     position = transfer.store.read("cells/position").mean(axis=1)[on_floor]
@@ -184,7 +188,7 @@ def test_closed_box_has_the_light_inside_it_and_none_from_outside(tmp_path):
     sides += [np.array([corners[k], corners[k - 1], corners[k - 1] + up, corners[k] + up]) for k in range(4)]
     meshes = [quad(f"side {k}", side, 0) for k, side in enumerate(sides)]
     white = [Material("Wall", ({"model": "lambert", "color": [0.7, 0.7, 0.7]},))]
-    camera = looking("inside", [0, 1, 0.9], [0, 1, 0], 1.2)
+    camera = make_camera("inside", [0, 1, 0.9], [0, 1, 0], 1.2)
     box = make_scene("box", meshes, white, [camera], Environment("sky", np.ones((4, 8, 3), np.float32)))
     transfer = baked(box, tmp_path, "gather")
     assert not rendered(transfer, {}, view="inside").any()

@@ -6,19 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sessions import look_of, settle
-from tiny_scenes import looking, quad, scene_of, sphere, studio
+from sessions import make_look, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 from twins import unit
 
 from relume.bake import Recipe
 from relume.brdf.fresnel import schlick
 from relume.environments.equirect import lookup, texel_directions
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.store import bake_here
+from relume.store import bake_in_process
 from relume.trace.primary import camera_directions
 
 SIZE = (64, 48)
@@ -34,14 +34,14 @@ def metal(roughness=0.03, name="Mirror"):
 
 def box(name, x, material):
     """A ball that stands for a thing in a room."""
-    return sphere(name, [x, 0.1, 0.6], 0.35, material, rings=24)
+    return sphere(name, [x, 0.1, 0.6], 0.35, material, num_rings=24)
 
 
 def room(mirror, light=None):
     """A mirror at z = −1 that fills the picture, and two things of which one is between it and the eye's side."""
     wall = quad("mirror", [[-4, -4, -1], [4, -4, -1], [4, 4, -1], [-4, 4, -1]], 0)
-    camera = looking("front", (0, 0.3, 2.4), (0.2, 0, -1), 0.8)
-    return scene_of(
+    camera = make_camera("front", (0, 0.3, 2.4), (0.2, 0, -1), 0.8)
+    return make_tiny_scene(
         wall, box("left", -0.9, 1), box("right", 1.0, 2), camera=camera, materials=[mirror, RED, GREEN],
         environment=studio(64) if light is None else light,
     )  # fmt: skip
@@ -49,11 +49,11 @@ def room(mirror, light=None):
 
 def baked(scene, folder, method="direct", size=SIZE):
     recipe = Recipe(method, tuple(camera.name for camera in scene.cameras), size, 400)
-    return open_transfer(bake_here(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Memory(1 << 30))
+    return open_transfer(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 def shown(transfer, change=lambda document: None):
-    return render_image(transfer, "front", look_of(transfer, change)).astype(float)
+    return render_image(transfer, "front", make_look(transfer, change)).astype(float)
 
 
 def through_the_mirror(scene):
@@ -61,7 +61,7 @@ def through_the_mirror(scene):
     flip = np.diag([1.0, 1.0, -1.0, 1.0])
     flip[2, 3] = -2.0
     to_world = flip @ scene.cameras[0].to_world @ np.diag([-1.0, 1.0, 1.0, 1.0])  # right is left, or it were no frame
-    return scene_of(
+    return make_tiny_scene(
         *scene.meshes[1:], camera=replace(scene.cameras[0], to_world=to_world), materials=list(scene.materials),
         environment=scene.environment.radiance,
     )  # fmt: skip
@@ -94,9 +94,9 @@ def test_a_mirror_shows_what_is_seen_from_behind_it(tmp_path):
 
 
 def test_a_ball_of_chrome_shows_the_light_around(tmp_path):
-    ball = sphere("ball", [0, 0, 0], 0.8, 0, rings=200)
-    scene = scene_of(
-        ball, camera=looking("front", (0, 0.3, 3), (0, 0, 0), 0.6), environment=studio(128), materials=[metal()]
+    ball = sphere("ball", [0, 0, 0], 0.8, 0, num_rings=200)
+    scene = make_tiny_scene(
+        ball, camera=make_camera("front", (0, 0.3, 3), (0, 0, 0), 0.6), environment=studio(128), materials=[metal()]
     )
     picture = shown(baked(scene, tmp_path))
     rays, _ = angles(scene)
@@ -117,8 +117,8 @@ def test_a_ball_of_chrome_shows_the_light_around(tmp_path):
 def test_two_mirrors_that_face_each_other_end(tmp_path):
     front = quad("front", [[-2, -2, -1], [2, -2, -1], [2, 2, -1], [-2, 2, -1]], 0)
     back = quad("back", [[2, -2, 3], [-2, -2, 3], [-2, 2, 3], [2, 2, 3]], 0)
-    camera = looking("front", (0, 0.1, 1), (0.1, 0, -1), 0.8)
-    scene = scene_of(front, back, camera=camera, environment=studio(), materials=[metal()])
+    camera = make_camera("front", (0, 0.1, 1), (0.1, 0, -1), 0.8)
+    scene = make_tiny_scene(front, back, camera=camera, environment=studio(), materials=[metal()])
     transfer = baked(scene, tmp_path)
     mirrored = transfer.views["front"].mirrored
     assert mirrored.chain.material.shape[1] == 2
@@ -142,22 +142,22 @@ def test_roughened_it_is_a_lobe_again(hung, tmp_path):
 
 
 def test_a_mirror_stays_until_its_lobe_can_be_shown(hung):
-    picture = Picture(hung, "front", Memory(1 << 30))
-    sharp, wanted = settle(picture).image(), shown(hung, set_roughness(0.3))
+    picture = Picture(hung, "front", Cache(1 << 30))
+    sharp, wanted = run_until_exact(picture).image(), shown(hung, set_roughness(0.3))
     is_mirror = hung.views["front"].material_ids() == 0
     for time in ("first", "second"):
-        picture.set_look(look_of(hung, set_roughness(0.3)))
+        picture.set_look(make_look(hung, set_roughness(0.3)))
         step, at_once = picture.advance(None), picture.image()
         if time == "first":
             assert not step.exact
             np.testing.assert_array_equal(at_once, sharp)
-        lobe = settle(picture).image()
+        lobe = run_until_exact(picture).image()
         np.testing.assert_allclose(lobe, wanted, atol=1e-4)
         assert min(np.abs(at_once - other)[is_mirror].max() for other in (sharp, lobe)) < 1e-4
-        picture.set_look(look_of(hung))
+        picture.set_look(make_look(hung))
         picture.advance(None)
         np.testing.assert_allclose(picture.image()[is_mirror], sharp[is_mirror], atol=1e-4)
-        settle(picture)
+        run_until_exact(picture)
 
 
 def test_it_stays_as_well_while_another_light_is_awaited(hung):
@@ -165,14 +165,14 @@ def test_it_stays_as_well_while_another_light_is_awaited(hung):
         set_roughness(0.3)(document)
         document["environment"]["rotation"] = 90.0
 
-    picture = Picture(hung, "front", Memory(1 << 30))
-    settle(picture)
-    picture.touch("/materials/Mirror/terms/0/params/roughness")  # the operator that a hand would follow
-    sharp = settle(picture).image()
-    picture.set_look(look_of(hung, rough_and_turned))
+    picture = Picture(hung, "front", Cache(1 << 30))
+    run_until_exact(picture)
+    picture.prepare("/materials/Mirror/terms/0/params/roughness")  # the operator that a hand would follow
+    sharp = run_until_exact(picture).image()
+    picture.set_look(make_look(hung, rough_and_turned))
     assert not picture.advance(None).exact
     np.testing.assert_array_equal(picture.image(), sharp)
-    np.testing.assert_allclose(settle(picture).image(), shown(hung, rough_and_turned), atol=1e-4)
+    np.testing.assert_allclose(run_until_exact(picture).image(), shown(hung, rough_and_turned), atol=1e-4)
 
 
 def test_between_mirror_and_lobe_is_a_mixture(hung):
@@ -210,26 +210,26 @@ def test_its_colour_and_its_fresnel_curve_multiply(hung):
 
 
 def test_edits_in_a_session_end_where_a_render_does(hung):
-    picture = Picture(hung, "front", Memory(1 << 30))
+    picture = Picture(hung, "front", Cache(1 << 30))
     for roughness in (0.03, 0.3, 0.045, 0.03):
-        look = look_of(hung, set_roughness(roughness))
+        look = make_look(hung, set_roughness(roughness))
         picture.set_look(look)
-        settle(picture)
+        run_until_exact(picture)
         np.testing.assert_allclose(picture.image(), render_image(hung, "front", look), rtol=1e-4, atol=1e-5)
 
 
 def test_an_edit_of_a_mirror_sends_its_tiles_and_the_things_in_it_are_not_pointed_at(hung):
-    picture = Picture(hung, "front", Memory(1 << 30))
-    picture.set_look(look_of(hung))
-    settle(picture)
+    picture = Picture(hung, "front", Cache(1 << 30))
+    picture.set_look(make_look(hung))
+    run_until_exact(picture)
     picture.advance(None)
 
     def tinted(document):
         document["materials"]["Mirror"]["terms"][0]["color"] = [1, 0.5, 0.5]
 
-    picture.set_look(look_of(hung, tinted))
-    assert set(hung.views["front"].tiles_of_material[0]) <= set(picture.advance(None).tiles)
-    assert picture.probe(SIZE[0] // 2, 4)["material"] == "Mirror"
+    picture.set_look(make_look(hung, tinted))
+    assert set(hung.views["front"].material_tiles[0]) <= set(picture.advance(None).tiles)
+    assert picture.inspect(SIZE[0] // 2, 4)["material"] == "Mirror"
 
 
 def test_mirrors_show_the_light_whatever_is_put_behind(hung):
@@ -286,9 +286,9 @@ def test_a_rectangle_that_is_dimmed_in_a_session_is_dimmed_in_the_mirror(hung):
 
         return change
 
-    picture = Picture(hung, "front", Memory(1 << 30))
+    picture = Picture(hung, "front", Cache(1 << 30))
     for change in (lamp(7), lamp(2), lamp(2, on=False), lamp(3), lambda document: None):
-        look = look_of(hung, change)
+        look = make_look(hung, change)
         picture.set_look(look)
-        settle(picture)
+        run_until_exact(picture)
         np.testing.assert_allclose(picture.image(), render_image(hung, "front", look), rtol=1e-4, atol=1e-4)

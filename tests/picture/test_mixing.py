@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import exact_image
-from sessions import BUDGET, look_of, settle
+from sessions import BUDGET, make_look, run_until_exact
 
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.picture.picture import Picture
-from relume.picture.routes.preview import Preview
+from relume.picture.routes.preview import SparsePreview
 
 LAMP = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {
@@ -21,7 +21,7 @@ ALL = {"Lamp": LAMP, "Panel": PANEL, "Sun": SUN}
 
 
 def look_with(transfer, lights, environment=None):
-    return look_of(transfer, lambda d: (d["lights"].update(lights), d["environment"].update(environment or {})))
+    return make_look(transfer, lambda d: (d["lights"].update(lights), d["environment"].update(environment or {})))
 
 
 def changed(name, **fields):
@@ -31,17 +31,17 @@ def changed(name, **fields):
 @pytest.fixture
 def lit(transfer):
     """A picture under three lights and the environment, at rest."""
-    picture = Picture(transfer, "front", Memory(BUDGET))
+    picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(look_with(transfer, ALL))
-    return settle(picture)
+    return run_until_exact(picture)
 
 
 def num_made(picture):
     """What is made until the picture rests, glimpses aside."""
     made = 0
     while (need := picture.next_job()) is not None:
-        made += not isinstance(need, Preview)
-        picture.freeze(lambda share: None, lambda: False)
+        made += not isinstance(need, SparsePreview)
+        picture.run_next_job(lambda share: None, lambda: False)
         picture.advance(None)
     return made
 
@@ -81,12 +81,12 @@ def test_environment_s_brightness_is_mixed_beside_lights(transfer, lit):
 def test_solo_shows_what_the_others_switched_off_would_show(transfer, lit):
     whole = look_with(transfer, ALL)
     lit.set_look(whole, solo=frozenset({"Sun"}))
-    settle(lit)
+    run_until_exact(lit)
     alone = {name: light | {"on": name == "Sun"} for name, light in ALL.items()}
     expected = exact_image(transfer, look_with(transfer, alone, {"scale": 0.0}))
     np.testing.assert_allclose(lit.image(), expected, rtol=1e-4, atol=1e-5)
     lit.set_look(whole)
-    np.testing.assert_allclose(settle(lit).image(), exact_image(transfer, whole), rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(run_until_exact(lit).image(), exact_image(transfer, whole), rtol=1e-4, atol=1e-5)
 
 
 def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer, lit):
@@ -110,9 +110,9 @@ def test_after_a_solo_the_others_come_back_without_being_shaded(transfer, lit, e
         return look_with(transfer, lights, environment)
 
     lit.set_look(look_at(1.0))
-    settle(lit).set_look(look_at(1.0), solo=frozenset({"Sun"}))
-    settle(lit).set_look(look_at(2.0), solo=frozenset({"Sun"}))
-    settle(lit).set_look(look_at(2.0))
+    run_until_exact(lit).set_look(look_at(1.0), solo=frozenset({"Sun"}))
+    run_until_exact(lit).set_look(look_at(2.0), solo=frozenset({"Sun"}))
+    run_until_exact(lit).set_look(look_at(2.0))
     assert lit.advance(None).exact
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look_at(2.0)), rtol=1e-4, atol=1e-5)
 
@@ -123,10 +123,10 @@ def test_curves_that_were_changed_under_one_light_are_shaded_under_all(transfer,
         document["materials"]["Wall"]["terms"][1]["params"].update(exponent=20.0)
 
     lit.set_look(look_with(transfer, ALL), solo=frozenset({"Sun"}))
-    settle(lit).set_look(look_of(transfer, dull), solo=frozenset({"Sun"}))
-    settle(lit).set_look(look_of(transfer, dull))
-    expected = exact_image(transfer, look_of(transfer, dull))
-    np.testing.assert_allclose(settle(lit).image(), expected, rtol=1e-4, atol=1e-5)
+    run_until_exact(lit).set_look(make_look(transfer, dull), solo=frozenset({"Sun"}))
+    run_until_exact(lit).set_look(make_look(transfer, dull))
+    expected = exact_image(transfer, make_look(transfer, dull))
+    np.testing.assert_allclose(run_until_exact(lit).image(), expected, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
 
     def edited(scale, exponent):
         lights = changed("Lamp", scale=scale)
-        return look_of(
+        return make_look(
             transfer,
             lambda d: (
                 d["lights"].update(lights),
@@ -145,15 +145,15 @@ def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
 
     for scale, exponent in ((1.0, 60.0), (2.0, 60.0), (2.0, 20.0), (0.5, 20.0), (0.5, 45.0)):
         lit.set_look(edited(scale, exponent))
-        settle(lit)
+        run_until_exact(lit)
         expected = exact_image(transfer, edited(scale, exponent))
         np.testing.assert_allclose(lit.image(), expected, rtol=3e-3, atol=1e-4)
 
 
 def test_touching_a_light_makes_its_own_image_ahead(transfer, lit):
-    lit.touch("/lights/Panel")
+    lit.prepare("/lights/Panel")
     while (need := lit.next_job()) is not None:
-        lit.install(need, need.make(lambda share: None, lambda: False))
+        lit.install(need, need.run(lambda share: None, lambda: False))
         assert lit.advance(None).exact
     look = look_with(transfer, changed("Panel", scale=0.3))
     lit.set_look(look)
@@ -162,9 +162,9 @@ def test_touching_a_light_makes_its_own_image_ahead(transfer, lit):
 
 
 def test_a_light_in_hand_is_prepared_again_where_it_was_put(transfer, lit):
-    lit.touch("/lights/Panel")
-    settle(lit).set_look(look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0])))
-    settle(lit)
+    lit.prepare("/lights/Panel")
+    run_until_exact(lit).set_look(look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0])))
+    run_until_exact(lit)
     look = look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0], scale=0.3))
     lit.set_look(look)
     assert lit.advance(None).exact
@@ -172,13 +172,13 @@ def test_a_light_in_hand_is_prepared_again_where_it_was_put(transfer, lit):
 
 
 def test_nothing_is_made_ahead_where_the_cache_would_drop_something_for_it(transfer):
-    picture = Picture(transfer, "front", Memory(BUDGET))
+    picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(look_with(transfer, ALL))
-    settle(picture).touch("/lights/Panel")
+    run_until_exact(picture).prepare("/lights/Panel")
     assert picture.next_job() is not None
-    full = Picture(transfer, "front", cache := Memory(BUDGET))
+    full = Picture(transfer, "front", cache := Cache(BUDGET))
     full.set_look(look_with(transfer, ALL))
-    settle(full)
-    cache._room.budget_bytes = cache.used_bytes
-    full.touch("/lights/Panel")
+    run_until_exact(full)
+    cache._state.budget_bytes = cache.used_bytes
+    full.prepare("/lights/Panel")
     assert full.next_job() is None

@@ -7,63 +7,65 @@ import threading
 import numpy as np
 import pytest
 import twins
-from pictures import BALL, WALL, ball_alone, opened, quiet, sigma
-from sessions import BUDGET, look_of, relative_rmse, settle
+from pictures import BALL, WALL, ignore_progress, open_exact_picture, set_sigma, set_single_term_ball
+from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 
 from relume.errors import CancelledError, MemoryBudgetError
-from relume.memory import Memory
-from relume.operators.frozen import frozen_bytes
-from relume.picture.jobs import Settle, Shade
+from relume.memory import Cache
+from relume.operators.frozen import operator_bytes
+from relume.picture.jobs import Resum, Shade
 from relume.picture.picture import Picture
-from relume.picture.routes.preview import Preview
+from relume.picture.routes.preview import SparsePreview
 
 
 def test_evicted_in_mid_drag_recovers(transfer):
     """Half of a change has been shown when another session takes the cache; the rest comes after freezing again."""
     rows = transfer.views["front"].rows(2)
-    cache = Memory(frozen_bytes(rows.stop - rows.start, 256) + 200_000)  # one operator, and the images
-    picture = opened(transfer, BALL + "theta_h", cache=cache)
-    look = look_of(transfer, sigma(0.06))
+    cache = Cache(operator_bytes(rows.stop - rows.start, 256) + 200_000)  # one operator, and the images
+    picture = open_exact_picture(transfer, BALL + "theta_h", cache=cache)
+    look = make_look(transfer, set_sigma(0.06))
     picture.set_look(look)
     assert not picture.advance(5).exact
-    opened(transfer, BALL + "theta_h", cache=cache, look=look_of(transfer, sigma(0.3, ior=2.5)))
+    open_exact_picture(transfer, BALL + "theta_h", cache=cache, look=make_look(transfer, set_sigma(0.3, ior=2.5)))
     assert picture.next_job() is not None
     assert not picture.advance(5).exact
-    settle(picture)
+    run_until_exact(picture)
     assert np.isfinite(picture.image()).all()
     assert relative_rmse(picture.image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
 def test_sessions_that_agree_share_and_those_that_do_not_are_kept_apart(transfer):
-    cache = Memory(BUDGET)
-    opened(transfer, BALL + "theta_h", cache=cache)
+    cache = Cache(BUDGET)
+    open_exact_picture(transfer, BALL + "theta_h", cache=cache)
     used = cache.used_bytes
     second = Picture(transfer, "front", cache)
-    second.set_look(look_of(transfer, sigma(0.5)))
-    second.touch(BALL + "theta_h")
-    settle(second)
-    assert cache.used_bytes - used < frozen_bytes(297, 256) / 2  # θh's own values are no part of its operator
-    third = opened(transfer, BALL + "theta_h", cache=cache, look=look_of(transfer, sigma(0.5, ior=3.0)))
+    second.set_look(make_look(transfer, set_sigma(0.5)))
+    second.prepare(BALL + "theta_h")
+    run_until_exact(second)
+    assert cache.used_bytes - used < operator_bytes(297, 256) / 2  # θh's own values are no part of its operator
+    third = open_exact_picture(
+        transfer, BALL + "theta_h", cache=cache, look=make_look(transfer, set_sigma(0.5, ior=3.0))
+    )
     assert relative_rmse(third.image(), second.image()) > 1e-3
-    for picture, change in ((second, sigma(0.5)), (third, sigma(0.5, ior=3.0))):
-        expected = twins.full_evaluation(transfer, "front", look_of(transfer, change))
+    for picture, change in ((second, set_sigma(0.5)), (third, set_sigma(0.5, ior=3.0))):
+        expected = twins.full_evaluation(transfer, "front", make_look(transfer, change))
         assert relative_rmse(picture.image(), expected) < 1e-6
 
 
 def test_cancelled_freeze_leaves_picture_and_cache_as_they_were(transfer):
-    cache = Memory(BUDGET)
-    picture = opened(transfer, cache=cache)
+    cache = Cache(BUDGET)
+    picture = open_exact_picture(transfer, cache=cache)
     before, used = picture.image(), cache.used_bytes
-    look = look_of(transfer, sigma(0.07))
+    look = make_look(transfer, set_sigma(0.07))
     picture.set_look(look)
     waiting = picture.next_job().key
     with pytest.raises(CancelledError):
-        picture.freeze(quiet, lambda: True)
+        picture.run_next_job(ignore_progress, lambda: True)
     assert cache.used_bytes == used
     assert picture.next_job().key == waiting
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
-    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
+    assert relative_rmse(run_until_exact(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
 def drawn(document):
@@ -72,34 +74,34 @@ def drawn(document):
 
 def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
     """It can be opened and drawn; the picture stands until the hand rests, and then shows it."""
-    picture = opened(transfer, cache=Memory(400_000))
+    picture = open_exact_picture(transfer, cache=Cache(400_000))
     before = picture.image()
-    picture.touch(BALL + "theta_h")
+    picture.prepare(BALL + "theta_h")
     assert picture.next_job() is None
-    look = look_of(transfer, drawn)
+    look = make_look(transfer, drawn)
     picture.set_look(look, hand=BALL + "theta_h")
     advance = picture.advance(None)
     assert advance.fidelity == "approximate"
     np.testing.assert_array_equal(picture.image(), before)
     job = picture.next_job()
     assert isinstance(job, Shade)
-    assert job.refines
+    assert job.is_refinement
     expected = twins.full_evaluation(transfer, "front", look)
-    assert relative_rmse(settle(picture).image(), expected) < 1e-6
-    picture.set_look(look_of(transfer), hand=BALL + "theta_h")
-    np.testing.assert_array_equal(settle(picture).image(), before)
+    assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
+    picture.set_look(make_look(transfer), hand=BALL + "theta_h")
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
 def test_a_curve_whose_operator_does_not_fit_is_shaded_while_a_turned_light_is_prepared(transfer):
-    picture = opened(transfer, cache=Memory(400_000))
-    picture.touch("/environment/rotation")
+    picture = open_exact_picture(transfer, cache=Cache(400_000))
+    picture.prepare("/environment/rotation")
     job = picture.next_job()
-    assert isinstance(job, Preview)
-    look = look_of(transfer, drawn)
+    assert isinstance(job, SparsePreview)
+    look = make_look(transfer, drawn)
     picture.check(look)
     picture.set_look(look)
-    picture.install(job, job.make(quiet, lambda: False))
-    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
+    picture.install(job, job.run(ignore_progress, lambda: False))
+    assert relative_rmse(run_until_exact(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
 def many_terms(document):
@@ -108,10 +110,10 @@ def many_terms(document):
 
 
 def test_a_look_whose_images_do_not_fit_is_refused_and_the_picture_stands(transfer):
-    picture = opened(transfer, cache=Memory(400_000))
+    picture = open_exact_picture(transfer, cache=Cache(400_000))
     before = picture.image()
     with pytest.raises(MemoryBudgetError):
-        picture.check(look_of(transfer, many_terms))
+        picture.check(make_look(transfer, many_terms))
     assert picture.next_job() is None
     assert picture.advance(None).exact
     np.testing.assert_array_equal(picture.image(), before)
@@ -119,15 +121,15 @@ def test_a_look_whose_images_do_not_fit_is_refused_and_the_picture_stands(transf
 
 def test_picture_follows_what_is_open_while_a_freeze_of_something_else_is_made(transfer):
     """What a need makes does not depend on what is done to its picture meanwhile."""
-    picture = opened(transfer, BALL + "theta_h")
-    picture.touch(WALL + "alpha")
+    picture = open_exact_picture(transfer, BALL + "theta_h")
+    picture.prepare(WALL + "alpha")
     need = picture.next_job()
-    assert "Wall" in need.what
+    assert "Wall" in need.label
     made = []
-    thread = threading.Thread(target=lambda: made.append(need.make(quiet, lambda: False)))
+    thread = threading.Thread(target=lambda: made.append(need.run(ignore_progress, lambda: False)))
     thread.start()
     for value in (0.1, 0.4, 0.15):
-        look = look_of(transfer, sigma(value))
+        look = make_look(transfer, set_sigma(value))
         picture.set_look(look)
         assert picture.advance(None).exact
         assert picture.next_job().key == need.key
@@ -136,36 +138,36 @@ def test_picture_follows_what_is_open_while_a_freeze_of_something_else_is_made(t
     before = picture.image()
     picture.install(need, made[0])
     job = picture.next_job()
-    assert job is None or isinstance(job, Settle)  # the steps of the drag, when the hand rests
+    assert job is None or isinstance(job, Resum)  # the steps of the drag, when the hand rests
     np.testing.assert_array_equal(picture.image(), before)
-    picture.brush(WALL + "alpha", 0, 10)  # it is open now
+    picture.highlight_pixels(WALL + "alpha", 0, 10)  # it is open now
 
 
 def test_operator_of_dormant_curves_that_changed_meanwhile_is_not_adopted(transfer):
-    picture = opened(transfer, BALL + "theta_d")
-    picture.touch(BALL + "theta_h")
+    picture = open_exact_picture(transfer, BALL + "theta_d")
+    picture.prepare(BALL + "theta_h")
     need = picture.next_job()
-    look = look_of(transfer, sigma(0.2, ior=3.0))
+    look = make_look(transfer, set_sigma(0.2, ior=3.0))
     picture.set_look(look)
     assert picture.advance(None).exact  # θd, which is dormant in what is made
-    picture.install(need, need.make(quiet, lambda: False))
+    picture.install(need, need.run(ignore_progress, lambda: False))
     assert picture.next_job().key != need.key
-    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
+    assert relative_rmse(run_until_exact(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
 def test_image_of_an_older_look_is_shown_until_there_is_a_newer_one(transfer):
     """Else a hand that does not rest would never see the material."""
-    picture = Picture(transfer, "front", Memory(BUDGET))
+    picture = Picture(transfer, "front", Cache(BUDGET))
     while (need := picture.next_job()).term.model != "cook_torrance":
-        picture.install(need, need.make(quiet, lambda: False))
-    look = look_of(transfer, sigma(0.1))
+        picture.install(need, need.run(ignore_progress, lambda: False))
+    look = make_look(transfer, set_sigma(0.1))
     picture.set_look(look)
-    picture.install(need, need.make(quiet, lambda: False))
+    picture.install(need, need.run(ignore_progress, lambda: False))
     advance = picture.advance(None)
     assert advance.changed
     assert not advance.exact
-    assert picture.next_job().basis.moves == ("theta_h",)
-    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
+    assert picture.next_job().basis.affected_curves == ("theta_h",)
+    assert relative_rmse(run_until_exact(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
 
 
 def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
@@ -174,14 +176,14 @@ def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
             material["terms"] = [{"model": "cook_torrance"}, {"model": "lambert"}]
 
     def order(*touched):
-        picture = Picture(transfer, "front", Memory(BUDGET))
-        picture.set_look(look_of(transfer, lambert_and_glossy))
+        picture = Picture(transfer, "front", Cache(BUDGET))
+        picture.set_look(make_look(transfer, lambert_and_glossy))
         for pointer in touched:
-            picture.touch(pointer)
+            picture.prepare(pointer)
         made = []
         while (need := picture.next_job()) is not None and isinstance(need, Shade):
-            made.append((need.place.name, need.term.model))
-            picture.install(need, need.make(quiet, lambda: False))
+            made.append((need.target.name, need.term.model))
+            picture.install(need, need.run(ignore_progress, lambda: False))
         return made, need
 
     shaded, _ = order()
@@ -191,14 +193,14 @@ def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
     assert [name for name, _ in shaded[:num_materials]] == sorted(sizes, key=sizes.get)[-num_materials:]
     shaded, need = order("/materials/Wall/terms/0/curves/theta_d")
     assert shaded == [("Wall", "lambert")]
-    assert need.basis.moves == ("theta_d",)  # its operator gives the image as well
+    assert need.basis.affected_curves == ("theta_d",)  # its operator gives the image as well
 
 
 def test_what_is_made_for_a_term_that_is_gone_is_dropped(transfer):
-    picture = opened(transfer)
-    picture.touch(BALL + "theta_h")
+    picture = open_exact_picture(transfer)
+    picture.prepare(BALL + "theta_h")
     need = picture.next_job()
-    look = look_of(transfer, ball_alone)
+    look = make_look(transfer, set_single_term_ball)
     picture.set_look(look)
-    picture.install(need, need.make(quiet, lambda: False))
-    assert relative_rmse(settle(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6
+    picture.install(need, need.run(ignore_progress, lambda: False))
+    assert relative_rmse(run_until_exact(picture).image(), twins.full_evaluation(transfer, "front", look)) < 1e-6

@@ -7,15 +7,15 @@ from itertools import count
 import numpy as np
 import pytest
 import twins
-from sessions import BUDGET, look_of, make_next, settle
+from sessions import BUDGET, make_look, run_next_job, run_until_exact
 
 from relume.errors import CancelledError
-from relume.memory import Memory
-from relume.operators.shade import shaded_rows
+from relume.memory import Cache
+from relume.operators.shade import shade_rows
 from relume.picture.jobs import Shade
 from relume.picture.picture import Picture
 from relume.picture.region import ShadeRegion
-from relume.picture.routes.preview import Preview
+from relume.picture.routes.preview import SparsePreview
 
 REGION = (4, 6, 16, 12)
 
@@ -29,7 +29,7 @@ def large(monkeypatch):
         "routes.preview._MOST_SHADED": 40,
     }.items():
         monkeypatch.setattr(f"relume.picture.{name}", value)
-    monkeypatch.setattr("relume.operators.shade._FEWEST_A_STEP", 16)
+    monkeypatch.setattr("relume.operators.shade._MIN_ROWS_PER_STEP", 16)
 
 
 def seen(image):
@@ -42,12 +42,12 @@ TURNS = count(1)
 
 def opened(transfer, region=REGION):
     """A picture of a look of which no image is kept, its first preview shown."""
-    picture = Picture(transfer, "front", Memory(BUDGET), is_watched=True)
+    picture = Picture(transfer, "front", Cache(BUDGET), is_watched=True)
     degrees = float(next(TURNS))
-    picture.set_look(look_of(transfer, lambda document: document["environment"].update(rotation=degrees)))
+    picture.set_look(make_look(transfer, lambda document: document["environment"].update(rotation=degrees)))
     picture.look_at(region)
     picture.advance(None)
-    assert isinstance(make_next(picture), Preview)
+    assert isinstance(run_next_job(picture), SparsePreview)
     return picture
 
 
@@ -55,7 +55,7 @@ def until_seen(picture):
     """Make what is wanted until what is seen is exact; what was made."""
     made = []
     while picture.advance(None).fidelity != "exact":
-        made.append(make_next(picture))
+        made.append(run_next_job(picture))
     return made
 
 
@@ -67,7 +67,7 @@ def test_what_is_seen_is_exact_before_the_rest(request, method):
     assert any(isinstance(job, ShadeRegion) for job in made)
     assert not picture.advance(None).exact
     early = picture.image()
-    whole = settle(picture).image()
+    whole = run_until_exact(picture).image()
     np.testing.assert_array_equal(seen(early), seen(whole))
     assert np.abs(early - whole).max() > 1e-3
     np.testing.assert_allclose(whole, twins.full_evaluation(transfer, "front", picture._look), rtol=1e-3, atol=1e-5)
@@ -86,25 +86,25 @@ def test_somewhere_else_is_exact_when_that_is_looked_at(transfer):
 
 def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
     picture = opened(transfer, None)
-    while isinstance(job := picture.next_job(), Preview) or job.place.material.num_samples < 100:
-        make_next(picture)
+    while isinstance(job := picture.next_job(), SparsePreview) or job.place.material.num_samples < 100:
+        run_next_job(picture)
     shaded, asked = [], []
-    monkeypatch.setattr("relume.operators.shade.shaded_rows", lambda *of: shaded.append(of[4:6]) or shaded_rows(*of))
+    monkeypatch.setattr("relume.operators.shade.shade_rows", lambda *of: shaded.append(of[4:6]) or shade_rows(*of))
     with pytest.raises(CancelledError):
-        job.make(lambda share: None, lambda: asked.append(1) or len(asked) > 2)
+        job.run(lambda share: None, lambda: asked.append(1) or len(asked) > 2)
     assert isinstance(job, Shade)
     assert shaded
-    job.make(lambda share: None, lambda: False)
+    job.run(lambda share: None, lambda: False)
     assert sorted(shaded) == sorted(set(shaded))
-    assert sum(stop - start for start, stop in shaded) == job.place.material.num_samples
+    assert sum(stop - start for start, stop in shaded) == job.target.material.num_samples
 
 
 def test_a_large_picture_is_seen_finer_and_finer(transfer, monkeypatch):
-    monkeypatch.setattr("relume.picture.routes.preview._MOST_SHADED", 4)
-    monkeypatch.setattr("relume.picture.routes.preview._LONG", 1)
+    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 4)
+    monkeypatch.setattr("relume.picture.routes.preview._MIN_FINER_RATIO", 1)
     picture, images = opened(transfer, None), []
     while not picture.advance(None).exact:
-        if isinstance(make_next(picture), Preview):
+        if isinstance(run_next_job(picture), SparsePreview):
             picture.advance(None)
             images.append(picture.image())
     errors = [float(np.sqrt(np.mean((image - picture.image()) ** 2))) for image in images]

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twins
-from pictures import opened
-from sessions import look_of, make_next, relative_rmse, settle
+from pictures import open_exact_picture
+from sessions import make_look, relative_rmse, run_next_job, run_until_exact
 
 from relume.color import luminance
-from relume.light.merged import merge, see_parts, see_parts_numpy
-from relume.memory import Memory
-from relume.operators.frozen import Frozen, Rough
+from relume.light.merged import cluster_lights, visible_fraction, visible_fraction_numpy
+from relume.memory import Cache
+from relume.operators.frozen import LinearOperator, MergedLightOperator
 from relume.picture import thinning
 
 FLOOR = "/materials/Floor/terms/1/"
@@ -39,15 +39,15 @@ def bent(value):
 @pytest.fixture
 def patience(monkeypatch):
     """None: no operator is made fast enough."""
-    monkeypatch.setattr(thinning, "_LONG", 0)
-    monkeypatch.setattr(thinning, "_FEW", 0)
+    monkeypatch.setattr(thinning, "_SLOW_PAIRS_PER_THREAD", 0)
+    monkeypatch.setattr(thinning, "_MIN_LIGHTS_TO_MERGE", 0)
 
 
 def test_merged_lights_bring_the_same_light_from_nearly_the_same_directions(transfer):
     lights = transfer.lights
-    merged = merge(lights, transfer.tiles, 100)
+    merged = cluster_lights(lights, transfer.tiles, 100)
     assert 90 < merged.num_lights <= 100
-    shares = np.bincount(merged.parts.group, merged.parts.share, merged.num_lights)
+    shares = np.bincount(merged.parts.group, merged.parts.fraction, merged.num_lights)
     np.testing.assert_allclose(shares[luminance(merged.irradiance) > 0], 1, rtol=1e-5)
     light = luminance(lights.irradiance)[:, None]
     towards = np.zeros((merged.num_lights, 3))
@@ -59,17 +59,17 @@ def test_merged_lights_bring_the_same_light_from_nearly_the_same_directions(tran
 
 def test_those_that_a_coarser_division_would_have_are_merged(transfer):
     """As few as there were to begin with: octants; as many: none is merged."""
-    assert merge(transfer.lights, transfer.tiles, 8).num_lights == 8
-    every = merge(transfer.lights, transfer.tiles, 10**6)
+    assert cluster_lights(transfer.lights, transfer.tiles, 8).num_lights == 8
+    every = cluster_lights(transfer.lights, transfer.tiles, 10**6)
     np.testing.assert_allclose(np.sort(every.irradiance[:, 0]), np.sort(transfer.lights.irradiance[:, 0]), rtol=1e-6)
 
 
 def test_points_see_the_share_of_the_parts_that_they_see(transfer):
-    merged = merge(transfer.lights, transfer.tiles, 100)
+    merged = cluster_lights(transfer.lights, transfer.tiles, 100)
     visible = transfer.views["front"].receivers(0).visible
     seen = np.full((merged.num_lights, len(visible)), np.nan, np.float32)
-    see_parts(visible, *merged.parts, 0, len(visible), seen)
-    np.testing.assert_allclose(seen.T, see_parts_numpy(visible, merged.parts, merged.num_lights), atol=1e-6)
+    visible_fraction(visible, *merged.parts, 0, len(visible), seen)
+    np.testing.assert_allclose(seen.T, visible_fraction_numpy(visible, merged.parts, merged.num_lights), atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -77,33 +77,33 @@ def test_points_see_the_share_of_the_parts_that_they_see(transfer):
     [("curves/theta_h", [bent(3), bent(5)]), ("params/roughness", [roughened(0.35), roughened(0.25)])],
 )
 def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, patience, held, drags):
-    memory = Memory(1 << 30)
-    picture = opened(transfer, cache=memory)
+    memory = Cache(1 << 30)
+    picture = open_exact_picture(transfer, cache=memory)
     before = picture.image()
-    picture.touch(FLOOR + held)
-    assert make_next(picture).form == thinning.ROUGH
+    picture.prepare(FLOOR + held)
+    assert run_next_job(picture).form == thinning.MERGED_LIGHT
     exact = picture.next_job()
     assert exact.form == thinning.EXACT
-    assert not exact.refines
+    assert not exact.is_refinement
     for change in drags:
-        picture.set_look(look_of(transfer, change), hand=FLOOR + held)
+        picture.set_look(make_look(transfer, change), hand=FLOOR + held)
         assert picture.advance(None).fidelity == "followed"
         assert picture.next_job().key == exact.key, "the hand does not stop it"
-        expected = twins.full_evaluation(transfer, "front", look_of(transfer, change))
+        expected = twins.full_evaluation(transfer, "front", make_look(transfer, change))
         assert relative_rmse(picture.image(), expected) < 0.5 * relative_rmse(before, expected)
-    assert memory.find((*exact.key, "roughly"), Rough) is not None
-    picture.install(exact, exact.make(lambda share: None, lambda: False))
-    assert memory.find((*exact.key, "roughly"), Rough) is None
-    assert isinstance(memory.find(exact.key, Frozen), Frozen)
+    assert memory.get_cached((*exact.key, "roughly"), MergedLightOperator) is not None
+    picture.install(exact, exact.run(lambda share: None, lambda: False))
+    assert memory.get_cached((*exact.key, "roughly"), MergedLightOperator) is None
+    assert isinstance(memory.get_cached(exact.key, LinearOperator), LinearOperator)
     assert picture.advance(None).exact == (held == "curves/theta_h")
-    assert relative_rmse(settle(picture).image(), expected) < 1e-6
-    picture.set_look(look_of(transfer), hand=FLOOR + held)
-    assert relative_rmse(settle(picture).image(), before) < 1e-6
+    assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
+    picture.set_look(make_look(transfer), hand=FLOOR + held)
+    assert relative_rmse(run_until_exact(picture).image(), before) < 1e-6
 
 
 def test_where_it_is_there_or_nothing_is_shown_yet_the_exact_one_is_made(transfer, patience):
-    memory = Memory(1 << 30)
-    opened(transfer, FLOOR + "curves/theta_h", cache=memory)
-    again = opened(transfer, cache=memory)
-    again.touch(FLOOR + "curves/theta_h")
+    memory = Cache(1 << 30)
+    open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=memory)
+    again = open_exact_picture(transfer, cache=memory)
+    again.prepare(FLOOR + "curves/theta_h")
     assert again.next_job().form == thinning.EXACT

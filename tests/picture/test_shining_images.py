@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twins
-from sessions import BUDGET, bake_corner, look_of, relative_rmse, settle
-from tiny_scenes import looking, mesh, quad, scene_of
+from sessions import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 
 from relume.bake import Recipe
 from relume.color import luminance
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
 from relume.picture.picture import Picture
 from relume.reference import reference_image
 from relume.render.image import render_image
-from relume.scene.emission import lit_surfaces
-from relume.scene.model import Coding, Light, Material, Texture
-from relume.store import bake_here
+from relume.scene.emission import normalize_emission
+from relume.scene.model import Light, Material, Texture, TextureEncoding
+from relume.store import bake_in_process
 
 SIZE = 40, 30
 
@@ -37,26 +37,26 @@ def scene():
     """A floor before a dark panel, of which an orange and a blue field shine."""
     pixels = np.zeros((16, 16, 3), np.uint8)
     pixels[4:8, 1:5], pixels[6:14, 11:15] = [255, 120, 20], [20, 80, 200]
-    texture = Texture(pixels, coding=Coding("srgb"))
+    texture = Texture(pixels, encoding=TextureEncoding("srgb"))
     floor = Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]},))
     wall = Material("Panel", ({"model": "lambert", "color": [0.1, 0.1, 0.1]},), {"emission": texture})
-    wall, emission = lit_surfaces(wall, np.array([30.0, 30.0, 30.0]), [panel()])
+    wall, emission = normalize_emission(wall, np.array([30.0, 30.0, 30.0]), [panel()])
     ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    camera, dark = looking("front", (0.2, 1.0, 2.4), (0, 0.3, -0.3), 0.8), np.full((4, 8, 3), 1e-3, np.float32)
-    made = scene_of(ground, panel(), camera=camera, environment=dark, materials=[floor, wall])
+    camera, dark = make_camera("front", (0.2, 1.0, 2.4), (0, 0.3, -0.3), 0.8), np.full((4, 8, 3), 1e-3, np.float32)
+    made = make_tiny_scene(ground, panel(), camera=camera, environment=dark, materials=[floor, wall])
     light = Light("Panel", {"kind": "mesh", "material": "Panel", "emission": emission.tolist()})
     return type(made)(**{**vars(made), "lights": (light,)})
 
 
 @pytest.fixture(scope="module")
 def transfer(scene, tmp_path_factory):
-    return bake_corner(scene, "direct", tmp_path_factory.mktemp("shining"))
+    return bake_corner_scene(scene, "direct", tmp_path_factory.mktemp("shining"))
 
 
 @pytest.fixture(scope="module")
 def pictures(scene, transfer):
-    look = look_of(transfer)
-    found = settle(Picture(transfer, "front", Memory(BUDGET))).image()
+    look = make_look(transfer)
+    found = run_until_exact(Picture(transfer, "front", Cache(BUDGET))).image()
     return found, reference_image(scene, "front", look, SIZE, 512), transfer.views["front"].material_ids()
 
 
@@ -80,22 +80,22 @@ def test_brightness_and_colour_of_the_light_multiply_the_image(transfer, picture
         red, green, _ = document["lights"]["Panel"]["emission"]
         document["lights"]["Panel"]["emission"] = [3 * red, green, 0.0]
 
-    picture = settle(Picture(transfer, "front", Memory(BUDGET)))
-    picture.set_look(look_of(transfer, brighter))
-    found, before, wall = settle(picture).image(), pictures[0], pictures[2] == 1
+    picture = run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
+    picture.set_look(make_look(transfer, brighter))
+    found, before, wall = run_until_exact(picture).image(), pictures[0], pictures[2] == 1
     inner = wall & np.roll(wall, 1, 0) & np.roll(wall, -1, 0) & np.roll(wall, 1, 1) & np.roll(wall, -1, 1)
     np.testing.assert_allclose(found[inner][:, :2], before[inner][:, :2] * [3, 1], rtol=2e-2, atol=2e-2)
     assert found[inner][:, 2].max() < 0.05 * before[inner][:, 2].max()
 
 
 def test_picture_is_what_the_twin_gives(transfer, pictures) -> None:
-    assert relative_rmse(pictures[0], twins.full_evaluation(transfer, "front", look_of(transfer))) < 1e-5
+    assert relative_rmse(pictures[0], twins.full_evaluation(transfer, "front", make_look(transfer))) < 1e-5
 
 
 def test_a_moving_eye_sees_the_image(scene, tmp_path, pictures) -> None:
     recipe = Recipe("surface", ("front",), SIZE, 400, num_points=2000)
-    moving = open_bake(bake_here(METHODS["surface"], scene, recipe, tmp_path / "surface.zarr"), Memory(1 << 30))
-    found, (_, truth, ids) = render_image(moving, "front", look_of(moving)), pictures
+    moving = open_bake(bake_in_process(METHODS["surface"], scene, recipe, tmp_path / "surface.zarr"), Cache(1 << 30))
+    found, (_, truth, ids) = render_image(moving, "front", make_look(moving)), pictures
     inner = (ids == 1) & np.roll(ids == 1, 1, 0) & np.roll(ids == 1, -1, 0) & np.roll(ids == 1, 1, 1)
     inner &= np.roll(ids == 1, -1, 1)
     off = np.abs(found - truth)[inner] / truth.max()

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 import twins
 from environment_files import dusk, write_map
-from sessions import BUDGET, look_of, relative_rmse, settle
+from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
 from relume.bake import Recipe
-from relume.environments.asset_store import STORE, keep
+from relume.environments.asset_store import STORE, store_environment
 from relume.errors import NotFoundError
 from relume.look import default_look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.reference import reference_image
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 SIZE = (48, 36)
 
@@ -33,7 +33,7 @@ def scene_under(radiance):
 
 def baked(scene, folder, relightable=False):
     recipe = Recipe("direct", ("front",), SIZE, 1000, relightable)
-    return open_transfer(bake_here(METHODS["direct"], scene, recipe, folder), Memory(1 << 30))
+    return open_transfer(bake_in_process(METHODS["direct"], scene, recipe, folder), Cache(1 << 30))
 
 
 @pytest.fixture(scope="module")
@@ -43,13 +43,13 @@ def plain(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def shelf(tmp_path_factory):
-    with STORE.at(tmp_path_factory.mktemp("shelf")) as folder:
+    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as folder:
         yield folder
 
 
 @pytest.fixture(scope="module")
 def map_name(shelf, tmp_path_factory):
-    return keep(shelf, write_map(tmp_path_factory.mktemp("maps") / "dusk.exr", dusk()), "Dusk").map
+    return store_environment(shelf, write_map(tmp_path_factory.mktemp("maps") / "dusk.exr", dusk()), "Dusk").map
 
 
 def under(name, **more):
@@ -60,16 +60,16 @@ def under(name, **more):
 
 
 def test_a_swap_is_weighed_again_and_back_again_is_as_before(plain, map_name):
-    picture = settle(Picture(plain, "front", Memory(BUDGET)))
+    picture = run_until_exact(Picture(plain, "front", Cache(BUDGET)))
     before = picture.image()
-    look = look_of(plain, under(map_name, rotation=30.0, scale=2.0))
+    look = make_look(plain, under(map_name, rotation=30.0, scale=2.0))
     picture.set_look(look)
     assert picture.next_job().state == "shading"
-    swapped = settle(picture).image()
+    swapped = run_until_exact(picture).image()
     assert relative_rmse(swapped, twins.full_evaluation(plain, "front", look)) < 1e-6
     assert relative_rmse(swapped, before) > 0.3
-    picture.set_look(look_of(plain))
-    np.testing.assert_allclose(settle(picture).image(), before, rtol=1e-5, atol=1e-6)
+    picture.set_look(make_look(plain))
+    np.testing.assert_allclose(run_until_exact(picture).image(), before, rtol=1e-5, atol=1e-6)
 
 
 def test_curves_follow_in_swapped_light(plain, map_name):
@@ -77,27 +77,27 @@ def test_curves_follow_in_swapped_light(plain, map_name):
         under(map_name)(document)
         document["materials"]["Ball"]["terms"][1]["params"]["sigma"] = 0.35
 
-    picture = settle(Picture(plain, "front", Memory(BUDGET)))
-    picture.set_look(look_of(plain, under(map_name)))
-    settle(picture).touch("/materials/Ball/terms/1/curves/theta_h")
-    settle(picture).set_look(look_of(plain, edit))
+    picture = run_until_exact(Picture(plain, "front", Cache(BUDGET)))
+    picture.set_look(make_look(plain, under(map_name)))
+    run_until_exact(picture).prepare("/materials/Ball/terms/1/curves/theta_h")
+    run_until_exact(picture).set_look(make_look(plain, edit))
     assert picture.next_job() is None
     assert picture.advance(None).exact
-    assert relative_rmse(picture.image(), twins.full_evaluation(plain, "front", look_of(plain, edit))) < 1e-5
+    assert relative_rmse(picture.image(), twins.full_evaluation(plain, "front", make_look(plain, edit))) < 1e-5
 
 
 def test_the_scene_s_own_map_from_the_shelf_changes_nothing(plain, shelf, tmp_path):
-    own = keep(shelf, write_map(tmp_path / "own.exr", still_life().environment.radiance), "Own")
-    images = [render_image(plain, "front", look_of(plain, under(name))) for name in (None, own.map)]
+    own = store_environment(shelf, write_map(tmp_path / "own.exr", still_life().environment.radiance), "Own")
+    images = [render_image(plain, "front", make_look(plain, under(name))) for name in (None, own.map)]
     assert relative_rmse(images[1], images[0]) < 1e-5
 
 
 def test_a_relightable_bake_is_nearer_to_a_fresh_one_than_a_plain_bake(plain, map_name, tmp_path):
     fresh = baked(scene_under(dusk()), tmp_path / "fresh.zarr")
-    expected = render_image(fresh, "front", look_of(fresh))
+    expected = render_image(fresh, "front", make_look(fresh))
     relightable = baked(still_life(), tmp_path / "relightable.zarr", relightable=True)
     errors = [
-        relative_rmse(render_image(transfer, "front", look_of(transfer, under(map_name))), expected)
+        relative_rmse(render_image(transfer, "front", make_look(transfer, under(map_name))), expected)
         for transfer in (plain, relightable)
     ]
     assert errors[1] < errors[0]
@@ -112,13 +112,13 @@ def test_brute_force_is_lit_by_the_swapped_map_too(map_name):
 
 
 def test_a_map_that_is_gone_is_refused_and_the_picture_stays(plain, map_name):
-    picture = settle(Picture(plain, "front", Memory(BUDGET)))
-    look = look_of(plain, under(map_name))
+    picture = run_until_exact(Picture(plain, "front", Cache(BUDGET)))
+    look = make_look(plain, under(map_name))
     gone = look.model_copy(update={"environment": look.environment.model_copy(update={"map": "env:" + 16 * "0"})})
     with pytest.raises(NotFoundError, match="import its file again"):
         picture.set_look(gone)
     assert picture.next_job() is None
-    picture.set_look(look_of(plain))
+    picture.set_look(make_look(plain))
     assert picture.advance(None).exact
 
 

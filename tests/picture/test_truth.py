@@ -9,7 +9,7 @@ import pytest
 import twins
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
-from sessions import BUDGET, relative_rmse, settle
+from sessions import BUDGET, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
 from relume.bake import Recipe
@@ -17,12 +17,12 @@ from relume.brdf.curves import curve_values
 from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.scene.archive import load_scene, save_scene
-from relume.store import bake_here
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
 
 EDITED = {
     "materials": {
@@ -55,13 +55,13 @@ def transfer(scene, tmp_path_factory):
     folder = tmp_path_factory.mktemp("truth")
     save_scene(scene, folder / "scene")
     recipe = Recipe("direct", ("front",), (48, 36), 1000)
-    bake_here(METHODS["direct"], load_scene(folder / "scene"), recipe, folder / "s.zarr")
-    return open_transfer(folder / "s.zarr", Memory(1 << 30))
+    bake_in_process(METHODS["direct"], load_scene(folder / "scene"), recipe, folder / "s.zarr")
+    return open_transfer(folder / "s.zarr", Cache(1 << 30))
 
 
 def visible_texels(scene, origins, normals, directions):
     """(n, texels) bool"""
-    geometry, embreex = merge(scene), rtcore_scene.EmbreeScene()
+    geometry, embreex = build_scene_buffers(scene), rtcore_scene.EmbreeScene()
     TriangleMesh(embreex, geometry.positions[geometry.faces])
     point, texel = np.nonzero(normals @ directions.T > 0)
     seen = np.zeros((len(origins), len(directions)), bool)
@@ -74,7 +74,7 @@ def truth_of(scene, transfer, material, rows, look):
     view = transfer.views["front"]
     receivers = view.receivers(material)
     first = view.rows(material).start
-    some = replace(receivers.places(rows), visible=receivers.visible[rows])
+    some = replace(receivers.without_light(rows), visible=receivers.visible[rows])
     position = transfer.store.read("views/0/position")[first + rows]
     directions = texel_directions(*scene.environment.radiance.shape[:2]).reshape(-1, 3)
     seen = visible_texels(scene, position, some.normal, directions)
@@ -83,7 +83,7 @@ def truth_of(scene, transfer, material, rows, look):
         image = twins.integrate_texels(document, scene.environment.radiance, some, seen) * document["color"]
         image *= transfer.store.read(f"views/0/{document['texture']}")[first + rows]
         for curve in TERMS[document["model"]].curves:
-            if curve.outgoing:
+            if curve.depends_on_view:
                 image *= curve_values(document, curve, np.arccos(view.cos_theta_o[first + rows])).T
         total += image
     return np.array(look.environment.gain) * total
@@ -92,12 +92,12 @@ def truth_of(scene, transfer, material, rows, look):
 @pytest.mark.parametrize(("edit", "bound"), [({}, 0.01), (EDITED, 0.01)], ids=["default", "edited"])
 def test_frame_is_the_reflection_integral(scene, transfer, edit, bound):
     look, view = validate(edit, transfer.default_look), transfer.views["front"]
-    picture = settle(Picture(transfer, "front", Memory(BUDGET)))
+    picture = run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
     picture.set_look(look)
-    image = settle(picture).image().reshape(-1, 3)
+    image = run_until_exact(picture).image().reshape(-1, 3)
     num_samples = np.bincount(view.pixel, minlength=48 * 36)
-    weight = np.empty_like(view.gains)
-    weight[view.order] = view.gains
+    weight = np.empty_like(view.throughput)
+    weight[view.order] = view.throughput
     found, expected = [], []
     for material in range(3):
         own = view.rows(material)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 from analytic_terms import ANALYTIC
-from sessions import BUDGET, relative_rmse, settle
+from sessions import BUDGET, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
 from relume.bake import Recipe
 from relume.look import validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.reference import reference_image
-from relume.store import bake_here
+from relume.store import bake_in_process
 
 SIZE, NUM_LIGHTS = (32, 24), 1500
 # What 1,500 triangles with one shadow ray each leave over: shadow edges move by up to a triangle, for all terms alike
@@ -51,9 +51,9 @@ def scene():
 @pytest.fixture(scope="module")
 def picture(scene, tmp_path_factory):
     recipe = Recipe("direct", ("front",), SIZE, NUM_LIGHTS)
-    store = bake_here(METHODS["direct"], scene, recipe, tmp_path_factory.mktemp("terms") / "s.zarr")
-    transfer = open_transfer(store, Memory(1 << 30))
-    return transfer, Picture(transfer, "front", Memory(BUDGET))
+    store = bake_in_process(METHODS["direct"], scene, recipe, tmp_path_factory.mktemp("terms") / "s.zarr")
+    transfer = open_transfer(store, Cache(1 << 30))
+    return transfer, Picture(transfer, "front", Cache(BUDGET))
 
 
 @pytest.mark.parametrize("model", CASES)
@@ -64,5 +64,5 @@ def test_picture_of_a_term_is_brute_force(model, scene, picture) -> None:
     term = {"model": model, "color": [0.8, 0.5, 0.3], "params": params, "texture": None, "curves": curves}
     look = validate({"materials": {m.name: {"terms": [term]} for m in scene.materials}}, transfer.default_look)
     live.set_look(look)
-    found = settle(live).image()
+    found = run_until_exact(live).image()
     assert relative_rmse(found, reference_image(scene, "front", look, SIZE, 0)) < bound

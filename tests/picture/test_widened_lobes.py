@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
-from sessions import relative_rmse, settle
-from tiny_scenes import looking, quad, scene_of
+from sessions import relative_rmse, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.bake import Recipe
 from relume.look import default_look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.picture.picture import Picture
 from relume.reference.image import reference_image
-from relume.scene.model import Coding, Material, Texture
-from relume.scene.roughness import levels_of, widened
-from relume.store import bake_here
+from relume.scene.model import Material, Texture, TextureEncoding
+from relume.scene.roughness import levels_of_material, rougher
+from relume.store import bake_in_process
 
 SIZE, FINER, BLOCK = (24, 16), 8, 4
 SLOPES = 0.12
@@ -28,7 +28,7 @@ def bumps(side=256):
     slopes *= SLOPES / slopes.std()
     normals = np.concatenate([-slopes, np.ones((side, side, 1))], axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return Texture(np.round(127.5 * (normals + 1)).astype(np.uint8), coding=Coding("normal"))
+    return Texture(np.round(127.5 * (normals + 1)).astype(np.uint8), encoding=TextureEncoding("normal"))
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +38,8 @@ def scene():
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     sky = np.full((32, 64, 3), 0.05, np.float32)
     sky[5:9, 14:19] = 20
-    camera = looking("front", (0, 1.6, 1.6), (0, 0, 0), 0.3)
-    return scene_of(floor, camera=camera, environment=sky, materials=[Material("Floor", (shiny,), {}, bumps())])
+    camera = make_camera("front", (0, 1.6, 1.6), (0, 0, 0), 0.3)
+    return make_tiny_scene(floor, camera=camera, environment=sky, materials=[Material("Floor", (shiny,), {}, bumps())])
 
 
 def followed(scene, follows):
@@ -50,9 +50,9 @@ def followed(scene, follows):
 
 def shown(scene, folder):
     folder.mkdir()
-    store = bake_here(METHODS["direct"], scene, Recipe("direct", ("front",), SIZE, 400), folder / "d.zarr")
-    picture = Picture(open_transfer(store, Memory(1 << 28)), "front", Memory(1 << 28))
-    settle(picture)
+    store = bake_in_process(METHODS["direct"], scene, Recipe("direct", ("front",), SIZE, 400), folder / "d.zarr")
+    picture = Picture(open_transfer(store, Cache(1 << 28)), "front", Cache(1 << 28))
+    run_until_exact(picture)
     return picture.image()
 
 
@@ -77,13 +77,13 @@ def test_the_widening_adds_the_variance_of_slopes():
     slopes = rng.normal(0, 0.05, (200_000, 2))
     normals = np.concatenate([-slopes, np.ones((len(slopes), 1))], axis=1)
     length = np.linalg.norm((normals / np.linalg.norm(normals, axis=1, keepdims=True)).mean(axis=0))
-    found = widened(np.ones(1, np.float32), np.array([length], np.float32), 0.3)[0] * 0.3
+    found = rougher(np.ones(1, np.float32), np.array([length], np.float32), 0.3)[0] * 0.3
     assert found**4 == pytest.approx(0.3**4 + 2 * 0.05**2, rel=0.02)
 
 
 def test_levels_reach_as_far_as_bumps_widen(scene):
-    levels = levels_of(scene.materials[0])
+    levels = levels_of_material(scene.materials[0])
     assert levels[0] == 1
     assert 1 < levels[-1] * 0.3 / (0.3**4 + 2 * SLOPES**2) ** 0.25 < 1.25  # some pixels cover steeper bumps than others
-    assert levels_of(followed(scene, False).materials[0]) == ()
-    assert levels_of(replace(scene.materials[0], normal_map=None)) == ()
+    assert levels_of_material(followed(scene, False).materials[0]) == ()
+    assert levels_of_material(replace(scene.materials[0], normal_map=None)) == ()

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from tiny_scenes import studio
 
-from relume.bits import into_rows, into_words
+from relume.bits import rows_to_words, words_to_rows
 from relume.color import luminance
-from relume.light.triangles import subdivide
-from relume.project.shading.group_kernel import take_whole
+from relume.light.triangles import tessellate_environment
+from relume.project.shading.group_kernel import select_groups
 
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(studio(), 600)
+    return tessellate_environment(studio(), 600)
 
 
 @pytest.mark.parametrize("num_points", [1, 48, 64])
@@ -23,19 +23,19 @@ def test_bits_turned_over_and_back_are_the_same(num_points, num_lights):
     seen = np.random.default_rng(1).random((num_points, num_lights)) < 0.5
     rows = np.packbits(seen, axis=1, bitorder="little")
     words = np.empty(num_lights, np.uint64)
-    into_words(rows, words)
+    rows_to_words(rows, words)
     expected = [sum(1 << k for k in np.flatnonzero(of_light).tolist()) for of_light in seen.T]
     assert words.tolist() == expected
     back = np.empty_like(rows)
-    into_rows(words, back)
+    words_to_rows(words, back)
     np.testing.assert_array_equal(back, rows)
 
 
 def test_groups_are_lights_below_one_node(lights):
     groups = lights.groups
-    assert len(np.unique(groups.part)) == len(groups.part) > 0.8 * lights.num_lights
+    assert len(np.unique(groups.light_index)) == len(groups.light_index) > 0.8 * lights.num_lights
     for first, end in zip(groups.first[:-1], groups.first[1:], strict=True):
-        codes = [int(code) for code in lights.codes[groups.part[first:end]]]
+        codes = [int(code) for code in lights.codes[groups.light_index[first:end]]]
         assert 2 <= len(codes) <= 12
         above = [{code >> shift for shift in range(0, code.bit_length() - 3, 2)} for code in codes]
         assert set.intersection(*above)
@@ -45,7 +45,7 @@ def test_a_group_is_as_bright_as_its_lights_from_every_side(lights):
     """Σ E cos θ, luminance, for normals that face all of it: the mean direction is that of the light."""
     groups, normals = lights.groups, np.random.default_rng(2).normal(size=(50, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    alone = luminance(lights.irradiance)[groups.part] * (normals @ lights.direction[groups.part].T)
+    alone = luminance(lights.irradiance)[groups.light_index] * (normals @ lights.direction[groups.part].T)
     expected = np.add.reduceat(alone, groups.first[:-1], axis=1)
     found = luminance(groups.lights.irradiance) * (normals @ groups.lights.direction.T)
     np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
@@ -56,9 +56,9 @@ def test_lights_of_groups_that_are_wholly_seen_are_taken(lights):
     seen = rng.random((lights.num_lights, 48)) < 0.8
     words = (seen * (np.uint64(1) << np.arange(48, dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
     whole = np.empty(groups.lights.num_lights, np.uint64)
-    take_whole(words, groups.first, groups.part, whole)
+    select_groups(words, groups.first, groups.light_index, whole)
     for g, (first, end) in enumerate(zip(groups.first[:-1], groups.first[1:], strict=True)):
-        parts = groups.part[first:end]
+        parts = groups.light_index[first:end]
         is_whole = seen[parts].all(axis=0)
         assert [bool(int(whole[g]) >> k & 1) for k in range(48)] == is_whole.tolist()
         seen[parts] &= ~is_whole

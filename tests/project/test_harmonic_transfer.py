@@ -7,23 +7,23 @@ import pytest
 from sessions import relative_rmse
 
 from relume.basis.harmonics import NUM_HARMONICS, harmonics
-from relume.basis.local_pca import strongest
+from relume.basis.local_pca import leading_components
 from relume.basis.zernike import num_functions
 from relume.environments.equirect import texel_directions, texel_solid_angles
 from relume.light.gather_rays import make_pattern
-from relume.light.smooth import divide
+from relume.light.smooth import split_frequencies
 from relume.light.tiles import choose_tiles
-from relume.light.triangles import Unturned, weigh
-from relume.points import Points
-from relume.project.alike_rays import alike_ray_vectors, weighed_functions
+from relume.light.triangles import RotatedEnvironment, integrate_environment
+from relume.points import SurfacePoints
+from relume.project.alike_rays import shared_direction_coefficients, weighted_basis
 from relume.project.harmonic_transfer import ClusteredTransfer, transfer_matrices, transfer_matrices_numpy
-from relume.project.light_vectors import light_vectors, ray_vectors
+from relume.project.light_vectors import incident_coefficients, ray_incident_coefficients
 from relume.project.receivers import GatherRays
-from relume.project.sent import NUM_SENT, evenly, sent_by
-from relume.project.squares import leaving_squares
-from relume.trace.cell_tree import NO_CELL
+from relume.project.sent import NUM_OUTGOING, isotropic, radiance_from_patch
+from relume.project.squares import outgoing_bins
+from relume.trace.cell_tree import NO_PATCH
 from relume.trace.tangents import any_tangent
-from relume.trace.visibility import visible_of
+from relume.trace.visibility import select_visibility
 
 DEGREE = 4
 SKY = np.ones((128, 256, 3), np.float32)
@@ -34,7 +34,10 @@ BROUGHT = harmonics(TILES.centroids) * TILES.solid_angles[:, None]
 
 def lights_of(radiance):
     """Triangles that shadows were asked for in the middles of."""
-    return replace(weigh(TILES, Unturned.of(radiance)), direction=TILES.centroids.astype(np.float32))
+    return replace(
+        integrate_environment(TILES, RotatedEnvironment.from_radiance(radiance)),
+        direction=TILES.centroids.astype(np.float32),
+    )
 
 
 def points_on_a_ball(num, seed=3):
@@ -43,7 +46,7 @@ def points_on_a_ball(num, seed=3):
     normal = rng.normal(size=(num, 3)).astype(np.float32)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     bits = rng.integers(0, 256, (num, -(-NUM_LIGHTS // 8)), dtype=np.uint8)
-    return Points(normal, normal, any_tangent(normal), np.zeros(num, np.uint32)), bits
+    return SurfacePoints(normal, normal, any_tangent(normal), np.zeros(num, np.uint32)), bits
 
 
 def matrices_of(points, visible):
@@ -69,7 +72,7 @@ def test_light_of_few_harmonics_arrives_as_from_all_triangles():
     points, visible = points_on_a_ball(40)
     smooth = np.random.default_rng(2).normal(size=(NUM_HARMONICS, 3))
     lights = replace(lights_of(SKY), irradiance=(BROUGHT @ smooth).astype(np.float32))
-    exact = light_vectors(points, visible, lights, (), DEGREE)
+    exact = incident_coefficients(points, visible, lights, (), DEGREE)
     found = np.einsum("nkl,lc->nck", matrices_of(points, visible), smooth)
     assert relative_rmse(found, exact) < 1e-5
 
@@ -79,12 +82,14 @@ def test_light_that_is_divided_arrives_as_if_it_were_not(lamp):
     sky = SKY * np.linspace(2, 0.5, 128, dtype=np.float32)[:, None, None]
     sky[32:36, 56:60] += lamp
     lights, (points, visible) = lights_of(sky), points_on_a_ball(200)
-    divided = divide(lights, BROUGHT)
-    assert len(divided.chosen) < 0.1 * NUM_LIGHTS
+    divided = split_frequencies(lights, BROUGHT)
+    assert len(divided.residual_triangles) < 0.1 * NUM_LIGHTS
     every = np.arange(points.num_points)
-    beyond = light_vectors(points, visible_of(visible, every, divided.chosen), divided.beyond, (), DEGREE)
-    found = beyond + np.einsum("nkl,lc->nck", matrices_of(points, visible), divided.smooth)
-    exact = light_vectors(points, visible, lights, (), DEGREE)
+    beyond = incident_coefficients(
+        points, select_visibility(visible, every, divided.residual_triangles), divided.residual, (), DEGREE
+    )
+    found = beyond + np.einsum("nkl,lc->nck", matrices_of(points, visible), divided.low_frequency)
+    exact = incident_coefficients(points, visible, lights, (), DEGREE)
     assert relative_rmse(found, exact) < 0.03
     harmonics_alone = np.einsum(
         "nkl,lc->nck", matrices_of(points, visible), harmonics(TILES.centroids).T @ lights.irradiance
@@ -94,29 +99,32 @@ def test_light_that_is_divided_arrives_as_if_it_were_not(lamp):
 
 
 def test_no_light_is_divided_into_nothing():
-    divided = divide(lights_of(0 * SKY), BROUGHT)
-    assert not divided.smooth.any()
-    assert divided.beyond.num_lights == len(divided.chosen) == 0
+    divided = split_frequencies(lights_of(0 * SKY), BROUGHT)
+    assert not divided.low_frequency.any()
+    assert divided.residual.num_lights == len(divided.residual_triangles) == 0
 
 
 def test_clusters_keep_matrices_of_points_that_they_were_not_found_from(monkeypatch):
-    monkeypatch.setattr("relume.project.harmonic_transfer._MOST_FITTED", 1500)
-    monkeypatch.setattr("relume.project.harmonic_transfer._POINTS_AT_ONCE", 700)
+    monkeypatch.setattr("relume.project.harmonic_transfer._MAX_FITTED_POINTS", 1500)
+    monkeypatch.setattr("relume.project.harmonic_transfer._POINTS_PER_BATCH", 700)
     points, _ = points_on_a_ball(3000)
     seen = TILES.centroids[:, 1] > 0.3 * points.normal[:, :1]  # shadows that change slowly from point to point
     matrices = matrices_of(points, np.packbits(seen, axis=1, bitorder="little"))
-    kept = ClusteredTransfer.of(len(matrices), lambda rows: matrices[rows], np.random.default_rng(1))
+    kept = ClusteredTransfer.fit(len(matrices), lambda rows: matrices[rows], np.random.default_rng(1))
     rows = np.arange(5, 3000, 7)
     smooth = np.random.default_rng(2).normal(size=(NUM_HARMONICS, 3)).astype(np.float32)
     exact = np.einsum("nkl,lc->nck", matrices[rows], smooth)
-    assert relative_rmse(kept.vectors(smooth, rows), exact) < 0.06
+    assert relative_rmse(kept.incident_coefficients(smooth, rows), exact) < 0.06
     mean = kept._replace(weight=0 * kept.weight)
-    assert relative_rmse(mean.vectors(smooth, rows), exact) > 0.15
+    assert relative_rmse(mean.incident_coefficients(smooth, rows), exact) > 0.15
 
 
 def test_few_rows_reach_where_many_do():
     rows = np.random.default_rng(4).normal(size=(6, 40)).astype(np.float32) * np.array([[9], [7], [5], [3], [2], [1]])
-    wide, tall = strongest(rows, 3), strongest(np.concatenate([rows, np.zeros((60, 40), np.float32)]), 3)
+    wide, tall = (
+        leading_components(rows, 3),
+        leading_components(np.concatenate([rows, np.zeros((60, 40), np.float32)]), 3),
+    )
     np.testing.assert_allclose(np.abs(np.sum(wide * tall, axis=1)), 1, atol=1e-4)
 
 
@@ -124,7 +132,7 @@ def test_chosen_lights_are_seen_as_among_all():
     visible = np.random.default_rng(6).integers(0, 256, (20, 9), dtype=np.uint8)
     rows, lights = np.array([3, 0, 19]), np.array([0, 7, 8, 22, 23, 40, 55, 56, 70])
     bits = np.unpackbits(visible, axis=1, bitorder="little")[rows][:, lights]
-    found = np.unpackbits(visible_of(visible, rows, lights), axis=1, count=len(lights), bitorder="little")
+    found = np.unpackbits(select_visibility(visible, rows, lights), axis=1, count=len(lights), bitorder="little")
     np.testing.assert_array_equal(found, bits)
 
 
@@ -132,19 +140,19 @@ def test_rays_that_go_alike_bring_what_listed_ones_do():
     points, _ = points_on_a_ball(50)
     pattern, rng = make_pattern(64, 0, 11), np.random.default_rng(7)
     links = rng.integers(0, 30, (50, 64)).astype(np.uint16)
-    links[rng.random(links.shape) < 0.1] = NO_CELL
-    even = np.zeros((NO_CELL + 1, 3), np.float32)
+    links[rng.random(links.shape) < 0.1] = NO_PATCH
+    even = np.zeros((NO_PATCH + 1, 3), np.float32)
     even[:30] = rng.random((30, 3))
     lobed = np.array([2, 7, 8, 29])
     frame = np.linalg.qr(rng.normal(size=(30, 3, 2)))[0].transpose(0, 2, 1).astype(np.float32)
-    some = sent_by(even, lobed, frame[lobed], rng.normal(size=(4, 3, NUM_SENT)).astype(np.float32))
-    rows, squares = np.array([1, 4, 30, 49]), leaving_squares(points, links, pattern, frame)
-    for sent in (evenly(even), some):
-        found = alike_ray_vectors(links, squares, rows, weighed_functions(pattern, 0, DEGREE), sent)
-        exact = ray_vectors(points, [GatherRays(links, pattern, sent)], DEGREE)[rows]
+    some = radiance_from_patch(even, lobed, frame[lobed], rng.normal(size=(4, 3, NUM_OUTGOING)).astype(np.float32))
+    rows, squares = np.array([1, 4, 30, 49]), outgoing_bins(points, links, pattern, frame)
+    for sent in (isotropic(even), some):
+        found = shared_direction_coefficients(links, squares, rows, weighted_basis(pattern, 0, DEGREE), sent)
+        exact = ray_incident_coefficients(points, [GatherRays(links, pattern, sent)], DEGREE)[rows]
         assert relative_rmse(found, exact) < 1e-5
 
 
 def test_glossy_rays_do_not_go_alike():
     with pytest.raises(ValueError, match="elsewhere"):
-        weighed_functions(make_pattern(64, 8, 11), 0, DEGREE)
+        weighted_basis(make_pattern(64, 8, 11), 0, DEGREE)

@@ -7,23 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import twins
-from tiny_scenes import shining
+from tiny_scenes import make_emissive_triangles
 
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
-from relume.light.local import make_local, parts_of, rectangle, strata_of
-from relume.light.strata import NOT_FLAT, halvings, make_strata
+from relume.light.local import make_emitter_parts, make_light_strata, prepare_local_lights, rectangle
+from relume.light.strata import NOT_FLAT_RADIUS, make_strata, split_axes
 from relume.light.triangles import NO_LIGHTS
 from relume.look import LightGeometry
-from relume.methods.local_lights import FINER_OF_FEW, SAMPLES
-from relume.points import Points
+from relume.methods.local_lights import MESH_SAMPLE_FACTOR, SAMPLES
+from relume.points import SurfacePoints
 from relume.project.contraction import contract
 from relume.project.projector import Projector
-from relume.project.receivers import LocalRays, Receivers
+from relume.project.receivers import LocalRays, ShadingPoints
 from relume.project.shading.shader import Shader
 from relume.trace.embree import EmbreeScene
-from relume.trace.local_shadows import trace_local
+from relume.trace.local_shadows import trace_light_visibility
 
 PANEL = LightGeometry("rectangle", (0.1, 1.4, -0.8), (0.1, -1.0, 0.3), rotation=20.0, size=(0.9, 0.5))
 MESH = LightGeometry("mesh", material="Lamp")
@@ -38,16 +38,16 @@ def floor_under(lamp, *, is_seen=True):
     position = np.stack([x, 0 * x, z], axis=1)
     normal, tangent = (np.tile(np.array(axis, np.float32), (len(x), 1)) for axis in ([0, 1, 0], [1, 0, 0]))
     wo = twins.unit(np.array([0, 1.5, 3.0]) - position).astype(np.float32)
-    strata = strata_of(lamp, 64)
+    strata = make_light_strata(lamp, 64)
     seen = np.full((len(x), len(strata.uv) // 8), 255 if is_seen else 0, np.uint8)
-    points = Points(position.astype(np.float32), normal, tangent, np.arange(len(x), dtype=np.uint32))
+    points = SurfacePoints(position.astype(np.float32), normal, tangent, np.arange(len(x), dtype=np.uint32))
     rays = LocalRays(lamp, strata, np.ones(3, np.float32), seen)
-    return Receivers(points, wo, np.empty((len(x), 0), np.uint8), (rays,))
+    return ShadingPoints(points, wo, np.empty((len(x), 0), np.uint8), (rays,))
 
 
 def curves_of(model, params):
     document = complete_term(("test",), {"model": model, "params": params}, None)
-    return TERMS[model].settled(document), {c.name: curve_bands(document, c) for c in TERMS[model].curves}
+    return TERMS[model].normalized(document), {c.name: curve_bands(document, c) for c in TERMS[model].curves}
 
 
 def by_quadrature(term, bands, receivers, fine):
@@ -66,7 +66,7 @@ def by_quadrature(term, bands, receivers, fine):
         value = weight[:, None] * term.quotients(*wi.T, *(np.full(len(wi), c) for c in o)).T
         for curve in term.curves:
             if not curve.outgoing:
-                value = value * bands[curve.name][:, twins.band_of(curve, wi, o)].T
+                value = value * bands[curve.name][:, twins.find_bands(curve, wi, o)].T
         out.append(value.sum(axis=0))
     return np.array(out)
 
@@ -80,25 +80,25 @@ def error(found, expected):
 def test_lamps_have_no_grain_in_narrow_lobes(model):
     """Samples without extent err by 37 % in the first of these."""
     term, bands = curves_of(model, ROOM[model])
-    receivers = floor_under(make_local(PANEL))
+    receivers = floor_under(prepare_local_lights(PANEL))
     expected = by_quadrature(term, bands, receivers, FINE[model])
     found = Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
     assert error(found, expected) < 0.01
-    for active in (c.name for c in term.curves if not c.outgoing):
+    for active in (c.name for c in term.curves if not c.depends_on_view):
         transport = Projector(term, contract(term, bands, active), NO_LIGHTS, receivers).project(0, SIDE**2)
         assert error(np.einsum("njc,cj->nc", transport.astype(float), bands[active]), expected) < 0.01
 
 
 def test_a_lamp_that_nobody_sees_gives_nothing():
     term, bands = curves_of("ggx", {})
-    hidden = floor_under(make_local(PANEL), is_seen=False)
+    hidden = floor_under(prepare_local_lights(PANEL), is_seen=False)
     assert not Shader(term, contract(term, bands, None), NO_LIGHTS, hidden).project(0, SIDE**2).any()
 
 
 def test_beside_other_light_a_lamp_is_found_less_finely():
     """To a thousandth of all; the other light is in none of it."""
     term, bands = curves_of("ggx", ROOM["ggx"])
-    contraction, receivers = contract(term, bands, None), floor_under(make_local(PANEL))
+    contraction, receivers = contract(term, bands, None), floor_under(prepare_local_lights(PANEL))
     beside = np.full((SIDE**2, 3), 2.0, np.float32)
     alone = Shader(term, contraction, NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
     found = Shader(term, contraction, NO_LIGHTS, receivers, beside).project(0, SIDE**2)[:, 0]
@@ -122,10 +122,10 @@ def panel_in(columns, rows, begin=0.0, end=1.0):
 def test_a_mesh_shines_as_the_panel_that_it_is(columns, rows, roughness, most):
     """Parts of several pieces overlap and leave gaps, of which a narrower lobe would see something."""
     term, bands = curves_of("ggx", {"roughness": roughness})
-    mesh = make_local(MESH, shining(panel_in(columns, rows), False))
+    mesh = prepare_local_lights(MESH, make_emissive_triangles(panel_in(columns, rows), False))
     expected, found = (
         Shader(term, contract(term, bands, None), NO_LIGHTS, floor_under(lamp)).project(0, SIDE**2)[:, 0]
-        for lamp in (make_local(PANEL), mesh)
+        for lamp in (prepare_local_lights(PANEL), mesh)
     )
     assert error(found, expected) < most
 
@@ -136,9 +136,12 @@ def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
     wall = np.concatenate([panel_in(1, 1, -2.5, 0), panel_in(1, 1, 1, 3.3)]).reshape(-1, 3)
     wall += 1e-3 * np.array(PANEL.direction)
     blocks = EmbreeScene.build(wall.astype(np.float32), np.arange(12, dtype=np.uint32).reshape(4, 3))
-    open_air, behind = (make_local(MESH, shining(panel_in(1, 1, *ends), False)) for ends in ((0, 1), (-2.3, 3.1)))
-    of_panel, strata = floor_under(open_air), strata_of(behind, FINER_OF_FEW * SAMPLES)
-    seen = trace_local(blocks, 1e-5, behind, strata, of_panel.points)
+    open_air, behind = (
+        prepare_local_lights(MESH, make_emissive_triangles(panel_in(1, 1, *ends), False))
+        for ends in ((0, 1), (-2.3, 3.1))
+    )
+    of_panel, strata = floor_under(open_air), make_light_strata(behind, MESH_SAMPLE_FACTOR * SAMPLES)
+    seen = trace_light_visibility(blocks, 1e-5, behind, strata, of_panel.points)
     of_lamp = replace(of_panel, rays=(LocalRays(behind, strata, np.ones(3, np.float32), seen),))
     expected, found = (
         Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
@@ -150,7 +153,7 @@ def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
 @pytest.mark.parametrize(("num_pieces", "num"), [(1, 64), (2, 256), (50, 256), (1000, 256), (3, 4), (1, 1)])
 def test_every_cell_row_and_column_has_its_samples(num_pieces, num):
     """However samples are shifted within their cells, each N-th of u and, unshifted, of v has one."""
-    strata = make_strata(halvings(num_pieces, num), 1)
+    strata = make_strata(split_axes(num_pieces, num), 1)
     uv = strata.corner + strata.size * strata.uv
     for axis in range(2):
         np.testing.assert_array_equal(np.sort((uv[:, axis] * num).astype(int)), np.arange(num))
@@ -163,7 +166,7 @@ def test_what_does_not_lie_flat_is_asked_sample_by_sample():
     sides = [corners, corners[:, [1, 2, 0]], corners[:, [2, 0, 1]]]
     faces = [f for side in sides for f in (side, side[::-1] + np.cross(*np.diff(side, axis=0)[:2]))]
     triangles = np.array([t for f in faces for t in (f[[0, 1, 2]], f[[0, 2, 3]])])
-    lamp = make_local(MESH, shining(triangles, True))
-    parts = parts_of(lamp, strata_of(lamp, 64))
-    assert np.all(parts.radius[:5] == NOT_FLAT)
+    lamp = prepare_local_lights(MESH, make_emissive_triangles(triangles, True))
+    parts = make_emitter_parts(lamp, make_light_strata(lamp, 64))
+    assert np.all(parts.radius[:5] == NOT_FLAT_RADIUS)
     assert 0.3 < np.mean(parts.radius[85:] < 1) < 1

@@ -9,8 +9,8 @@ from tiny_scenes import studio
 
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.term import Angle
-from relume.light.triangles import subdivide
-from relume.project.light_culling import list_lights, nearest_into
+from relume.light.triangles import tessellate_environment
+from relume.project.light_culling import angle_lower_bounds, list_lights
 from relume.project.listed_lights import with_half_angle
 
 RNG = np.random.default_rng(9)
@@ -32,7 +32,7 @@ def test_no_direction_within_reach_has_a_smaller_angle(angle, wo_z):
     radius = RNG.choice([0.003, 0.03, 0.2, 0.9], size=2000)
     nearest = np.empty(2000, np.float32)
     x, y, z = np.ascontiguousarray(wi.T, np.float32)
-    nearest_into(int(angle), radius.astype(np.float32), x, y, z, *np.float32(wo), nearest)
+    angle_lower_bounds(int(angle), radius.astype(np.float32), x, y, z, *np.float32(wo), nearest)
     exact = angles_numpy(angle, around(wi, radius, 60), wo)
     assert (nearest[:, None] <= exact + 1e-3).all()
 
@@ -44,20 +44,20 @@ def test_bound_is_close_for_small_lights(angle):
     wo, radius = np.array([0.6, 0, 0.8]), np.full(500, 0.01)
     nearest = np.empty(500, np.float32)
     x, y, z = np.ascontiguousarray(wi.T, np.float32)
-    nearest_into(int(angle), radius.astype(np.float32), x, y, z, *np.float32(wo), nearest)
+    angle_lower_bounds(int(angle), radius.astype(np.float32), x, y, z, *np.float32(wo), nearest)
     assert (angles_numpy(angle, wi, wo) - nearest < 0.06).all()
 
 
 def test_every_corner_of_a_light_lies_within_its_radius():
-    lights = subdivide(studio(), 300)
+    lights = tessellate_environment(studio(), 300)
     cosine = np.einsum("ckm,mc->mk", lights.nodes.astype(float), lights.direction.astype(float))
     assert (np.arccos(np.clip(cosine, -1, 1)) <= lights.radius[:, None] + 1e-3).all()
 
 
 @pytest.mark.parametrize("support", [np.inf, 0.5, 0.1])
 def test_list_holds_the_seen_lights_in_order(support):
-    lights = subdivide(studio(), 150)
-    receivers = twins.only_above(twins.make_receivers(9, lights.num_lights, seed=7), lights)
+    lights = tessellate_environment(studio(), 150)
+    receivers = twins.only_above(twins.make_random_receivers(9, lights.num_lights, seed=7), lights)
     capacity = 9 * lights.num_lights
     first, light = np.empty(10, np.int64), np.empty(capacity + 1, np.int32)
     wi, wo = np.empty((2, 3, capacity), np.float32)

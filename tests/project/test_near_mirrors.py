@@ -8,7 +8,7 @@ import twins
 
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.trace.tangents import any_tangent
@@ -16,18 +16,18 @@ from relume.trace.tangents import any_tangent
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(np.ones((256, 512, 3), np.float32), 500)
+    return tessellate_environment(np.ones((256, 512, 3), np.float32), 500)
 
 
 def shown(document, lights, normal, wo):
     """All curves, those of the outgoing angle too. (n, 3)"""
     term = TERMS[document["model"]]
-    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.outgoing}
+    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
     visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)
-    receivers = twins.seen_from(wo, normal, any_tangent(normal), visible)
+    receivers = twins.make_receivers_at_origin(wo, normal, any_tangent(normal), visible)
     image = Projector(term, contract(term, bands, None), lights, receivers).project(0, len(normal))[:, 0]
     theta_o = np.arccos(np.sum(normal * wo, axis=1).astype(np.float64))
-    outgoing = [curve_values(document, curve, theta_o).T for curve in term.curves if curve.outgoing]
+    outgoing = [curve_values(document, curve, theta_o).T for curve in term.curves if curve.depends_on_view]
     return image * np.prod(outgoing, axis=0) if outgoing else image
 
 

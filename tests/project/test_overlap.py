@@ -6,7 +6,7 @@ import numba as nb
 import numpy as np
 import pytest
 
-from relume.project.eight_bands import deposit_eight, mean_of_eight, overlap_of
+from relume.project.eight_bands import deposit, mean_over_bands, overlap
 from relume.vector_code import NUM
 
 FINE = 250
@@ -17,7 +17,7 @@ NUM_BANDS = 256
 def deposit_all(overlap, weight, out):
     low, middle, high, rise, fall = overlap
     for band in range(0, NUM_BANDS, NUM):
-        deposit_eight(out, band, low, middle, high, rise, fall, weight[0], weight[1], weight[2])
+        deposit(out, band, low, middle, high, rise, fall, weight[0], weight[1], weight[2])
 
 
 @nb.njit
@@ -25,7 +25,7 @@ def mean_of_all(overlap, bands, falls, channel):
     low, middle, high, rise, fall = overlap
     mean, top = np.float32(0), np.int64(low) - 1
     for band in range(top + 1, np.int64(high) + 1, NUM):
-        mean += mean_of_eight(falls, channel, band, low, middle, high, rise, fall)
+        mean += mean_over_bands(falls, channel, band, low, middle, high, rise, fall)
         top = band + NUM - 1
     return mean + bands[channel, top]
 
@@ -33,7 +33,7 @@ def mean_of_all(overlap, bands, falls, channel):
 def shares_of(corners, weight=(1, 1, 1)):
     """The triangle shared out to all bands, three weights at once. (3, J)"""
     out = np.zeros((3, NUM_BANDS + NUM), np.float32)
-    deposit_all(overlap_of(*np.float32(corners)), np.float32(weight), out)
+    deposit_all(overlap(*np.float32(corners)), np.float32(weight), out)
     assert not out[:, NUM_BANDS:].any()
     return out[:, :NUM_BANDS].astype(float)
 
@@ -109,11 +109,11 @@ def test_weights_of_three_channels_and_means_are_the_shares():
         bands = np.pad(rng.uniform(0, 1, (3, NUM_BANDS)), ((0, 0), (0, NUM)), mode="edge").astype(np.float32)
         falls = -np.diff(bands, axis=1, prepend=bands[:, :1])
         for channel in range(3):
-            mean = mean_of_all(overlap_of(*np.float32(corners)), bands, falls, channel)
+            mean = mean_of_all(overlap(*np.float32(corners)), bands, falls, channel)
             assert mean == pytest.approx(float(bands[channel, :NUM_BANDS] @ shares), rel=2e-6)
 
 
 def test_middle_is_the_middle_whatever_the_size_of_the_angles():
     for corners in np.random.default_rng(3).uniform(0, 256, (200, 3)):
-        low, middle, high, *_ = overlap_of(*np.float32(corners))
+        low, middle, high, *_ = overlap(*np.float32(corners))
         assert [low, middle, high] == sorted(np.float32(corners))

@@ -21,7 +21,7 @@ import twins
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.environments.equirect import texel_directions
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 
@@ -44,7 +44,7 @@ def ball(size=16):
     normal = np.stack([x, -y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)[inside]
     tangent = twins.unit(np.cross([0.0, 1.0, 0.0], normal))
     wo = np.tile([0.0, 0.0, 1.0], (len(normal), 1))
-    return twins.seen_from(wo, normal, tangent, np.zeros((0, 0), np.uint8))
+    return twins.make_receivers_at_origin(wo, normal, tangent, np.zeros((0, 0), np.uint8))
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +54,11 @@ def truth():
 
 def errors(truth, num_lights):
     """Error of triangles and of points, relative to each pixel."""
-    lights = subdivide(sky_with_sun(256), num_lights)
+    lights = tessellate_environment(sky_with_sun(256), num_lights)
     receivers = twins.only_above(ball(), lights)
     projector = Projector(TERM, contract(TERM, BANDS, None), lights, receivers)
     triangles = projector.project(0, len(receivers.normal))[:, 0]
-    points = twins.project_points(TERM, BANDS, lights, receivers)
+    points = twins.project_point_lights(TERM, BANDS, lights, receivers)
     return [float(np.sqrt(np.mean((image / truth - 1) ** 2))) for image in (triangles, points)]
 
 

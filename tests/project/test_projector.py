@@ -14,25 +14,25 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Angle
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 
 NUM_POINTS = 40
 # every curve that enters the transport, and every pair of a term's
-CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.outgoing]
+CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
 # what an angle may be off and still count as linear, in bands: docs/method.md, "Overlap of triangle and band"
 TOLERANCE_BANDS, TOLERANCE_SHARE = 0.12, 0.015
 
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(studio(), 200)
+    return tessellate_environment(studio(), 200)
 
 
 @pytest.fixture(scope="module")
 def receivers(lights):
-    return twins.only_above(twins.make_receivers(NUM_POINTS, lights.num_lights, seed=1), lights)
+    return twins.only_above(twins.make_random_receivers(NUM_POINTS, lights.num_lights, seed=1), lights)
 
 
 def default_bands(model, **params):
@@ -82,7 +82,7 @@ def test_any_curve_may_be_the_free_one(model, curve, bands_of, lights, receivers
 @pytest.mark.parametrize(("model", "curve"), CURVES)
 def test_transport_is_linear_in_each_dormant_curve(model, curve, lights, receivers):
     one, two = coloured_bands(model, 1), coloured_bands(model, 2)
-    for dormant in {c.name for c in TERMS[model].curves if not c.outgoing} - {curve}:
+    for dormant in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
         parts = [project(model, {**one, dormant: of[dormant]}, curve, lights, receivers) for of in (one, two)]
         both = {**one, dormant: 2 * one[dormant] + 3 * two[dormant]}
         # thousands of leaves about a pole, each rounded to float32
@@ -102,12 +102,12 @@ def test_shares_of_every_triangle_sum_to_one(curve, lights):
     model, name = curve
     term = TERMS[model]
     ones = {c.name: np.ones((3, c.num_bands)) for c in term.curves}
-    base, chosen = twins.make_receivers(8, lights.num_lights, seed=3), np.arange(0, lights.num_lights, 7)
+    base, chosen = twins.make_random_receivers(8, lights.num_lights, seed=3), np.arange(0, lights.num_lights, 7)
     point, light = (index.ravel() for index in np.meshgrid(np.arange(8), chosen, indexing="ij"))  # each pair alone
     only = np.arange(lights.num_lights) == light[:, None]
     visible = np.packbits(only, axis=1, bitorder="little")
     frame = base.wo[point], base.normal[point], base.tangent[point]
-    pairs = twins.only_above(twins.seen_from(*frame, visible), lights)
+    pairs = twins.only_above(twins.make_receivers_at_origin(*frame, visible), lights)
     pairs = replace(pairs, visible=pairs.visible & visible)
     sums = project(model, ones, name, lights, pairs).sum(axis=1)
     wi, wo = (np.einsum("nij,nj->ni", twins.frames(pairs), d) for d in (lights.direction[light], pairs.wo))
@@ -118,7 +118,7 @@ def test_shares_of_every_triangle_sum_to_one(curve, lights):
 
 def test_flat_curves_are_left_out_and_multiply(lights, receivers):
     for model in ANALYTIC:
-        names = [c.name for c in TERMS[model].curves if not c.outgoing]
+        names = [c.name for c in TERMS[model].curves if not c.depends_on_view]
         flat = {c.name: np.full((3, c.num_bands), 0.5) * [[1], [2], [3]] for c in TERMS[model].curves}
         ones = {c.name: np.ones((3, c.num_bands)) for c in TERMS[model].curves}
         expected = image(model, ones, None, lights, receivers) * np.float64([0.5, 1.0, 1.5]) ** len(names)
@@ -131,7 +131,7 @@ def test_a_curve_that_becomes_flat_changes_nothing_suddenly(lights, receivers):
     """Flat to the last bit and flat but for 1e-9 are the same curve; so are their images, whichever curve is free."""
     for model in ("cook_torrance", "ggx", "ashikhmin_shirley"):
         bands = default_bands(model)
-        names = [c.name for c in TERMS[model].curves if not c.outgoing]
+        names = [c.name for c in TERMS[model].curves if not c.depends_on_view]
         for name in names:
             flat = {**bands, name: np.full_like(bands[name], 0.7)}
             nearly = {**flat, name: flat[name] * (1 + 1e-9 * np.arange(flat[name].shape[1]))}
@@ -145,7 +145,7 @@ def test_a_curve_that_becomes_flat_changes_nothing_suddenly(lights, receivers):
 @pytest.mark.parametrize(("model", "curve"), CURVES)
 def test_leaving_out_lights_that_a_dormant_curve_never_sees_loses_nothing(model, curve, lights, receivers):
     """A curve that ends early against the same one kept alive far out by a tail too small to see."""
-    for dormant in {c.name for c in TERMS[model].curves if not c.outgoing} - {curve}:
+    for dormant in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
         bands = coloured_bands(model)
         ends = bands[dormant].shape[1] // 6
         bands[dormant][:, ends:] = 0
@@ -159,7 +159,7 @@ def test_leaving_out_lights_that_a_dormant_curve_never_sees_loses_nothing(model,
 
 @pytest.mark.parametrize(("start", "stop"), [(0, 0), (0, 1), (3, 17), (0, 48), (1, 49), (47, 130), (100, 131)])
 def test_a_range_gives_the_rows_of_the_whole(start, stop, lights):
-    receivers = twins.only_above(twins.make_receivers(131, lights.num_lights, seed=5), lights)
+    receivers = twins.only_above(twins.make_random_receivers(131, lights.num_lights, seed=5), lights)
     bands = default_bands("cook_torrance")
     whole = project("cook_torrance", bands, "theta_h", lights, receivers)
     term = TERMS["cook_torrance"]
@@ -187,7 +187,7 @@ def test_hidden_lights_give_nothing_and_seen_ones_add_up(lights, receivers):
 
 @pytest.mark.parametrize("model", ANALYTIC)
 def test_against_the_twin_with_exact_angles(model, lights, receivers):
-    receivers = receivers.some(np.arange(0, NUM_POINTS, 2))
+    receivers = receivers.subset(np.arange(0, NUM_POINTS, 2))
     for bands in (default_bands(model), coloured_bands(model)):
         found = image(model, bands, None, lights, receivers)
         exact = twins.project(TERMS[model], bands, None, lights, receivers, depth=4)[:, 0]
@@ -197,7 +197,7 @@ def test_against_the_twin_with_exact_angles(model, lights, receivers):
 
 @pytest.fixture(scope="module")
 def many_lights():
-    return subdivide(studio(), 1400)
+    return tessellate_environment(studio(), 1400)
 
 
 # one curve of each angle: with ones for bands, models that share an angle differ by their quotients only
@@ -213,7 +213,7 @@ def test_bands_hold_what_exact_angles_put_there_within_the_tolerance(angle, mode
     edge plus it. The angles of Ashikhmin and Shirley, and tilts, have a crease through their pole: twice as much there.
     """
     lights = many_lights
-    receivers = twins.only_above(twins.make_receivers(5, lights.num_lights, seed=2), lights)
+    receivers = twins.only_above(twins.make_random_receivers(5, lights.num_lights, seed=2), lights)
     term, num_bands = TERMS[model], TERMS[model].curve(name).num_bands
     ones = {c.name: np.ones((3, c.num_bands)) for c in term.curves}
     found = project(model, ones, name, lights, receivers)[..., 0]
@@ -221,7 +221,7 @@ def test_bands_hold_what_exact_angles_put_there_within_the_tolerance(angle, mode
     tolerance = (TOLERANCE_BANDS + TOLERANCE_SHARE * edges) * (2 if angle in CREASED else 1)
     divided = twins.pieces(lights, 4)
     for row in range(len(found)):
-        power, shares, wi, wo = twins.samples_of(term, lights, receivers, row, divided)
+        power, shares, wi, wo = twins.shade_pieces(term, lights, receivers, row, divided)
         gamma = angles_numpy(angle, wi, np.broadcast_to(wo, wi.shape), term.curve(name).axes).ravel() * (
             num_bands / (np.pi / 2)
         )
@@ -257,15 +257,15 @@ SMOOTH = [
 def of_texels():
     """An environment, and the triangles that stand for it."""
     radiance = studio(48)
-    return radiance, subdivide(radiance, 1000)
+    return radiance, tessellate_environment(radiance, 1000)
 
 
 @pytest.mark.parametrize(("document", "bound"), SMOOTH, ids=lambda v: v["model"] if isinstance(v, dict) else None)
 def test_triangles_stand_for_all_texels(document, bound, of_texels):
     """Against the reflection integral over every texel, by brute force."""
     radiance, lights = of_texels
-    receivers = twins.only_above(twins.make_receivers(60, lights.num_lights, seed=4, horizon=0.3), lights)
-    term = TERMS[document["model"]].settled(document)
+    receivers = twins.only_above(twins.make_random_receivers(60, lights.num_lights, seed=4, horizon=0.3), lights)
+    term = TERMS[document["model"]].normalized(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
     found = Projector(term, contract(term, bands, None), lights, receivers).project(0, 60)[:, 0]
     exact = twins.integrate_texels(document, radiance, receivers)
@@ -278,7 +278,7 @@ def test_extreme_directions_stay_finite(lights):
     wo = np.float32([[1, 0, 0], [0, 1, 0], -lights.direction[0], [np.sqrt(1 - 1e-12), 1e-6, 0]])
     tangent = np.tile(np.float32([1, 0, 0]), (4, 1))
     visible = np.full((4, (lights.num_lights + 7) // 8), 255, np.uint8)
-    receivers = twins.only_above(twins.seen_from(wo, normal, tangent, visible), lights)
+    receivers = twins.only_above(twins.make_receivers_at_origin(wo, normal, tangent, visible), lights)
     for model, name in CURVES:
         transport = project(model, default_bands(model), name, lights, receivers)
         assert np.isfinite(transport).all()

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import twins
 
-from relume.basis.zernike import FALL, SENT_DEGREE, in_basis, ladder
-from relume.brdf.albedo import PAIRS, reflectances_of, shares
+from relume.basis.zernike import OUTGOING_DEGREE, WINDOW_DECAY, project, recurrence
+from relume.brdf.albedo import PAIRS, pack_reflectance, reflectance_matrix
 from relume.brdf.evaluate import eval_brdf
-from relume.methods.cells.reflecting import Arrived, Reflecting
-from relume.project.sent import NUM_SENT, evenly, falls_of, grid_means, sent_by
-from relume.trace.cell_tree import NO_CELL
+from relume.methods.cells.reflecting import IncidentLight, ReflectanceOperator
+from relume.project.sent import NUM_OUTGOING, bin_means, decay_of, isotropic, radiance_from_patch
+from relume.trace.cell_tree import NO_PATCH
 
 NUM_PAIRS = 200_000
 PLAIN = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}
@@ -36,7 +36,7 @@ def sides():
     """
     u = (np.arange(1, NUM_PAIRS + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5)) % 1
     wi, wo = by_cosine(u[:, 0], u[:, 1]), by_cosine(u[:, 2], u[:, 3])
-    return wi, wo, *(np.ascontiguousarray(in_basis(w)[:, :NUM_SENT].T) for w in (wi, wo))
+    return wi, wo, *(np.ascontiguousarray(project(w)[:, :NUM_OUTGOING].T) for w in (wi, wo))
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_what_a_term_sends_on_is_its_double_integral(model, params, sides):
     document = {**PLAIN, "model": model, "params": params}
     wi, wo, h_i, h_o = sides
     value = np.ascontiguousarray(np.pi**2 * eval_brdf(document, wi, wo)[:, 0])
-    found, rungs = shares(document), ladder(SENT_DEGREE)
+    found, rungs = reflectance_matrix(document), recurrence(OUTGOING_DEGREE)
     for pair, (j, k) in enumerate(PAIRS):
         drawn = value * h_i[rungs.cosine[k]] * h_o[rungs.cosine[j]]
         if rungs.order[j]:  # the same of cosine and sine parts; where a term is not isotropic, their mean
@@ -62,36 +62,36 @@ def test_what_a_term_sends_on_is_its_double_integral(model, params, sides):
 def test_a_table_holds_what_its_functions_send():
     """Of the directions of a cosine's rays, the sum is known without the table."""
     rng = np.random.default_rng(5)
-    vectors = rng.normal(size=(3, 3, NUM_SENT)).astype(np.float32) / np.arange(1, NUM_SENT + 1)
-    even = np.zeros((NO_CELL + 1, 3), np.float32)
+    vectors = rng.normal(size=(3, 3, NUM_OUTGOING)).astype(np.float32) / np.arange(1, NUM_OUTGOING + 1)
+    even = np.zeros((NO_PATCH + 1, 3), np.float32)
     even[:5] = 1 + rng.random((5, 3))
     frame = np.tile(np.eye(3, dtype=np.float32)[:2], (3, 1, 1))
-    sent = sent_by(even, np.array([0, 2, 3]), frame, vectors.astype(np.float32))
+    sent = radiance_from_patch(even, np.array([0, 2, 3]), frame, vectors.astype(np.float32))
     wo = over_hemisphere(4_000, 3)
     for row, cell in enumerate((0, 2, 3)):
-        exact = even[cell] + in_basis(wo)[:, :NUM_SENT] @ vectors[row].T
-        found = np.array([twins.sent_towards(sent, cell, w) for w in wo])
+        exact = even[cell] + project(wo)[:, :NUM_OUTGOING] @ vectors[row].T
+        found = np.array([twins.evaluate_outgoing(sent, cell, w) for w in wo])
         assert np.linalg.norm(found - exact) < 0.12 * np.linalg.norm(exact - even[cell])
         assert np.abs(found.mean(axis=0) - exact.mean(axis=0)).max() < 0.01
-    np.testing.assert_array_equal(twins.sent_towards(sent, 1, wo[0]), even[1])
+    np.testing.assert_array_equal(twins.evaluate_outgoing(sent, 1, wo[0]), even[1])
 
 
 def sent_of_one_direction(roughness):
     """What metal sends of light from one direction, 50 of them, and how fast that falls."""
     metal = {**PLAIN, "model": "ggx", "color": [1, 1, 1], "params": {"roughness": roughness, "f0": 0.9}}
     plain = np.ones((2, 50, 3), np.float32)
-    made = Reflecting.of((reflectances_of([metal]),), np.zeros(50, np.uint16), plain)
-    vectors = np.repeat(in_basis(over_hemisphere(50, 6))[:, None, :NUM_SENT], 3, axis=1).astype(np.float32)
-    of_cells, leaving = made.sent(Arrived(plain[0], vectors))
-    even = np.zeros((NO_CELL + 1, 3), np.float32)
+    made = ReflectanceOperator.from_materials((pack_reflectance([metal]),), np.zeros(50, np.uint16), plain)
+    vectors = np.repeat(project(over_hemisphere(50, 6))[:, None, :NUM_OUTGOING], 3, axis=1).astype(np.float32)
+    of_cells, leaving = made.apply(IncidentLight(plain[0], vectors))
+    even = np.zeros((NO_PATCH + 1, 3), np.float32)
     even[:50] = of_cells
-    frame, falls = np.tile(np.eye(3, dtype=np.float32)[:2], (50, 1, 1)), falls_of(made.widening)
-    return sent_by(even, np.arange(50), frame, leaving, falls), falls
+    frame, falls = np.tile(np.eye(3, dtype=np.float32)[:2], (50, 1, 1)), decay_of(made.roughening)
+    return radiance_from_patch(even, np.arange(50), frame, leaving, falls), falls
 
 
 def test_narrow_lobes_see_fewer_rings_about_what_metals_send_and_no_sharper_ones():
     def lowest(sent, table):
-        light = sent.even[:50, None, 0] + sent.scale[:, :1] * table[..., 0]
+        light = sent.isotropic[:50, None, 0] + sent.scale[:, :1] * table[..., 0]
         return light.min(axis=1) / light.max(axis=1)
 
     known = {roughness: sent_of_one_direction(roughness) for roughness in (0.01, 0.1, 0.3, 0.6)}
@@ -100,13 +100,13 @@ def test_narrow_lobes_see_fewer_rings_about_what_metals_send_and_no_sharper_ones
     sharp, rough = known[0.01][0], known[0.3][0]
     assert np.median(lowest(sharp, sharp.table)) < np.median(lowest(rough, rough.table)) - 0.1
     assert np.median(lowest(sharp, sharp.smooth)) > np.median(lowest(rough, rough.smooth)) - 0.02
-    np.testing.assert_allclose(known[0.3][1], FALL, rtol=0.04)  # from there on all is as the highlight has it
-    np.testing.assert_allclose(known[0.6][1], FALL, rtol=1e-6)
+    np.testing.assert_allclose(known[0.3][1], WINDOW_DECAY, rtol=0.04)  # from there on all is as the highlight has it
+    np.testing.assert_allclose(known[0.6][1], WINDOW_DECAY, rtol=1e-6)
 
 
 def test_even_light_is_sent_evenly():
-    radiance = np.zeros((NO_CELL + 1, 3), np.float32)
+    radiance = np.zeros((NO_PATCH + 1, 3), np.float32)
     radiance[:4] = 3
-    assert evenly(radiance).table.shape[0] == 0
-    assert twins.sent_towards(evenly(radiance), 2, np.array([0.0, 0, 1])) == pytest.approx(3)
-    assert grid_means()[0] == pytest.approx(1 / np.sqrt(np.pi), rel=1e-5)
+    assert isotropic(radiance).table.shape[0] == 0
+    assert twins.evaluate_outgoing(isotropic(radiance), 2, np.array([0.0, 0, 1])) == pytest.approx(3)
+    assert bin_means()[0] == pytest.approx(1 / np.sqrt(np.pi), rel=1e-5)

@@ -13,7 +13,7 @@ from tiny_scenes import studio
 from relume.brdf.curves import curve_bands
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
-from relume.light.triangles import subdivide
+from relume.light.triangles import tessellate_environment
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.shading import shader
@@ -30,17 +30,17 @@ DIVIDED = [pytest.param(*case, marks=[pytest.mark.slow] * (case[0] not in OFTEN)
 
 @pytest.fixture(scope="module")
 def lights():
-    return subdivide(studio(), 1000)
+    return tessellate_environment(studio(), 1000)
 
 
 @pytest.fixture(scope="module")
 def receivers(lights):
-    return twins.only_above(twins.make_receivers(NUM_POINTS, lights.num_lights, seed=4), lights)
+    return twins.only_above(twins.make_random_receivers(NUM_POINTS, lights.num_lights, seed=4), lights)
 
 
 def curves_of(model, params):
     document = complete_term(("test",), {"model": model, "params": params}, None)
-    return TERMS[model].settled(document), {c.name: curve_bands(document, c) for c in TERMS[model].curves}
+    return TERMS[model].normalized(document), {c.name: curve_bands(document, c) for c in TERMS[model].curves}
 
 
 def shaded(term, bands, lights, receivers):
@@ -69,7 +69,7 @@ def test_pictures_are_those_of_finely_divided_light(model, params, lights, recei
 def test_pictures_are_those_of_operators(model, params, lights, receivers):
     """What is shown before a curve is touched and after differs by about a thousandth."""
     term, bands = curves_of(model, params)
-    for active in (c.name for c in term.curves if not c.outgoing):
+    for active in (c.name for c in term.curves if not c.depends_on_view):
         transport = Projector(term, contract(term, bands, active), lights, receivers).project(0, NUM_POINTS)
         of_operator = np.einsum("njc,cj->nc", transport.astype(float), bands[active])
         assert error(shaded(term, bands, lights, receivers), of_operator) < 2e-3
@@ -99,7 +99,7 @@ def test_no_light_is_black_and_twice_the_light_twice_as_bright(lights, receivers
     term, bands = curves_of("ggx", {})
     unseen = replace(receivers, visible=np.zeros_like(receivers.visible))
     assert not shaded(term, bands, lights, unseen).any()
-    assert not shaded(term, bands, lights.none(), receivers).any()
+    assert not shaded(term, bands, lights.empty(), receivers).any()
     assert not shaded(term, {**bands, "theta_h": np.zeros((3, 256))}, lights, receivers).any()
     twice = shaded(term, bands, replace(lights, irradiance=2 * lights.irradiance), receivers)
     np.testing.assert_allclose(twice, 2 * shaded(term, bands, lights, receivers), rtol=1e-5)
@@ -134,16 +134,16 @@ def test_groups_of_lights_bring_what_their_lights_bring(model, params, lights, r
 def test_lobes_narrower_than_lights_are_apart_lose_no_light(model, params):
     """In groups whose cosines lean they took light away, a hundred times what arrives; beside groups and lights whose
     means are nothing in float32, they were not looked for there."""
-    few, (term, bands) = subdivide(studio(), 200), curves_of(model, params)
-    receivers = everything_seen(twins.make_receivers(100, few.num_lights, seed=4), few)
+    few, (term, bands) = tessellate_environment(studio(), 200), curves_of(model, params)
+    receivers = everything_seen(twins.make_random_receivers(100, few.num_lights, seed=4), few)
     found, alone = (shaded(term, bands, lights, receivers) for lights in (few, replace(few, codes=None)))
     assert found.min() >= 0
     assert error(found, alone) < 1e-3
 
 
 def test_a_narrow_lobe_is_found_within_wide_lights():
-    few, (term, bands) = subdivide(studio(), 200), curves_of("cook_torrance", {"sigma": 0.01})
-    receivers = everything_seen(twins.make_receivers(4, few.num_lights, seed=4), few)
+    few, (term, bands) = tessellate_environment(studio(), 200), curves_of("cook_torrance", {"sigma": 0.01})
+    receivers = everything_seen(twins.make_random_receivers(4, few.num_lights, seed=4), few)
     expected = twins.project(term, bands, None, few, receivers, depth=6)[:, 0]
     assert error(shaded(term, bands, replace(few, codes=None), receivers), expected) < 4e-3
 

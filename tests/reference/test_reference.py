@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from analytic_terms import ANALYTIC
 from sessions import relative_rmse
-from tiny_scenes import looking, quad, scene_of, sphere, still_life, studio
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, still_life, studio
 
 from relume.bake import Recipe
 from relume.brdf.evaluate import eval_brdf
@@ -14,16 +14,23 @@ from relume.environments.equirect import texel_directions, texel_solid_angles, u
 from relume.environments.model import Environment
 from relume.errors import CancelledError, PlanError
 from relume.look import default_look, validate
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
-from relume.picture.transfer import Transfer
-from relume.reference import Points, Truth, reference_image, reference_radiance, reference_truth, texels_of
+from relume.picture.transfer import FixedViewTransfer
+from relume.reference import (
+    ReferenceImage,
+    ReferencePoints,
+    environment_texels,
+    reference_image,
+    reference_radiance,
+    render_reference,
+)
 from relume.render.image import render_image
 from relume.scene.archive import make_scene
 from relume.scene.model import Light, Material, Scene
-from relume.store import bake_here
-from relume.trace.geometry import merge
+from relume.store import bake_in_process
+from relume.trace.geometry import build_scene_buffers
 
 WHITE = {"model": "lambert", "color": [1.0, 1.0, 1.0], "params": {}, "curves": {}, "texture": None}
 
@@ -34,8 +41,10 @@ def image_of(scene, size, spp, *, reflects=False, **changes):
 
 
 def test_white_ball_in_a_white_furnace_vanishes() -> None:
-    ball = sphere("ball", [0, 0, 0], 1.0, 0, rings=24)
-    scene = scene_of(ball, camera=looking("front", [0, 0, 4], [0, 0, 0], 0.6), environment=np.ones((64, 128, 3), "f"))
+    ball = sphere("ball", [0, 0, 0], 1.0, 0, num_rings=24)
+    scene = make_tiny_scene(
+        ball, camera=make_camera("front", [0, 0, 4], [0, 0, 0], 0.6), environment=np.ones((64, 128, 3), "f")
+    )
     # a facet hides what lies between its own plane and the smooth normal's horizon
     np.testing.assert_allclose(image_of(scene, (32, 32), 0), 1.0, rtol=0.01)
 
@@ -47,8 +56,10 @@ def test_floor_under_one_texel_has_the_closed_form() -> None:
     wi = texel_directions(16, 32)[4, 16].astype(float)
     wall = quad("wall", [[0.5, 0, 1], [0.5, 0, -1], [0.5, 1, -1], [0.5, 1, 1]], 0)
     floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
-    scene = scene_of(floor, wall, camera=looking("front", [0, 4, 0.01], [0, 0, 0], 0.1), environment=radiance)
-    points = Points(
+    scene = make_tiny_scene(
+        floor, wall, camera=make_camera("front", [0, 4, 0.01], [0, 0, 0], 0.1), environment=radiance
+    )
+    points = ReferencePoints(
         position=np.array([[0.4, 1e-4, 0], [1.0, 1e-4, 0]], np.float32),
         normal=np.array([[0, 1, 0]] * 2, np.float32),
         tangent=np.array([[1, 0, 0]] * 2, np.float32),
@@ -56,7 +67,7 @@ def test_floor_under_one_texel_has_the_closed_form() -> None:
         textures={},
         roughness=np.ones(2, np.float32),
     )
-    found = reference_radiance(merge(scene), texels_of(scene.environment), points, [[WHITE]])[0]
+    found = reference_radiance(build_scene_buffers(scene), environment_texels(scene.environment), points, [[WHITE]])[0]
     expected = radiance[4, 16] * texel_solid_angles(16, 32)[4] / np.pi * wi[1]
     assert wi[:2].min() > 0.5
     np.testing.assert_allclose(found, [np.zeros(3), expected], rtol=1e-6)
@@ -73,19 +84,21 @@ HALF_ANGLE = [name for name, term in ANALYTIC.items() if "theta_h" in {curve.nam
 )
 def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) -> None:
     rng = np.random.default_rng(3)
-    scene = scene_of(
+    scene = make_tiny_scene(
         quad("far", [[90, 0, 1], [91, 0, 1], [91, 0, 0], [90, 0, 0]], 0),
-        camera=looking("front", [0, 1, 0], [0, 0, 0.1], 0.1),
+        camera=make_camera("front", [0, 1, 0], [0, 0, 0.1], 0.1),
         environment=rng.random((24, 48, 3), np.float32),
     )
     document = {"model": model, "color": [0.9, 0.5, 0.2], "params": {}, "curves": curves, "texture": "diffuse"}
     wo = np.array([0.4, 0.8, 0.2]) / np.linalg.norm([0.4, 0.8, 0.2])
-    points = Points(
+    points = ReferencePoints(
         np.array([[0, 0.1, 0]], np.float32), np.array([[0, 1, 0]], np.float32), np.array([[0, 0, 1]], np.float32),
         wo[None].astype(np.float32), {"diffuse": np.array([[1.0, 0.5, 0.25]], np.float32)},
         np.ones(1, np.float32),
     )  # fmt: skip
-    found = reference_radiance(merge(scene), texels_of(scene.environment), points, [[document]])[0, 0]
+    found = reference_radiance(build_scene_buffers(scene), environment_texels(scene.environment), points, [[document]])[
+        0, 0
+    ]
     frame = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], float)  # rows: tangent, n × t, normal
     u, v = np.meshgrid((np.arange(48) + 0.5) / 48, (np.arange(24) + 0.5) / 24)
     wi = uv_to_direction(u, v) @ frame.T
@@ -101,8 +114,8 @@ def corner_of(albedo):
         quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 2, -1], [-1, 2, -1]], 0),
     ]
     material = Material("Plaster", ({"model": "lambert", "color": [albedo] * 3},))
-    camera = looking("front", [0, 0.7, 2.4], [0, 0.5, -0.5], 0.5)
-    return scene_of(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=(material,))
+    camera = make_camera("front", [0, 0.7, 2.4], [0, 0.5, -0.5], 0.5)
+    return make_tiny_scene(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=(material,))
 
 
 @pytest.mark.slow
@@ -127,22 +140,22 @@ def test_light_paths_of_a_grey_corner_add_up() -> None:
 def test_what_a_method_leaves_out_is_what_the_two_truths_differ_by() -> None:
     scene, size = corner_of(0.5), (16, 16)
 
-    def truth_of(reflects: bool, **transport: object) -> Truth:
+    def truth_of(reflects: bool, **transport: object) -> ReferenceImage:
         look = validate({"transport": transport}, default_look(scene.materials))
-        return reference_truth(scene, "front", look, size, 64, reflects=reflects)
+        return render_reference(scene, "front", look, size, 64, reflects=reflects)
 
     shown = {show: image_of(scene, size, 64, reflects=True, transport={"show": show}) for show in ("all", "direct")}
     direct = truth_of(False)
-    np.testing.assert_allclose(direct.whole, shown["all"], rtol=1e-5)  # nothing is left of 24 bounces
-    np.testing.assert_allclose(direct.followed, shown["direct"], rtol=1e-6)
-    assert "reflect onto each other" in direct.left_out[0]
+    np.testing.assert_allclose(direct.all_paths_image, shown["all"], rtol=1e-5)  # nothing is left of 24 bounces
+    np.testing.assert_allclose(direct.method_image, shown["direct"], rtol=1e-6)
+    assert "reflect onto each other" in direct.omitted_paths[0]
     few = truth_of(True, bounces=1)
-    np.testing.assert_allclose(few.whole, shown["all"], rtol=1e-5)
-    assert shown["direct"].mean() < few.followed.mean() < few.whole.mean()
-    assert few.left_out == ("Light that more than 1 surfaces have reflected.",)
+    np.testing.assert_allclose(few.all_paths_image, shown["all"], rtol=1e-5)
+    assert shown["direct"].mean() < few.method_image.mean() < few.all_paths_image.mean()
+    assert few.omitted_paths == ("Light that more than 1 surfaces have reflected.",)
     asked = truth_of(False, show="direct")  # of what is shown nothing is left out
-    np.testing.assert_array_equal(asked.whole, asked.followed)
-    assert asked.left_out == asked.untraced == ()
+    np.testing.assert_array_equal(asked.all_paths_image, asked.method_image)
+    assert asked.omitted_paths == asked.unsupported_paths == ()
 
 
 def test_direct_light_seen_in_a_mirror_is_no_light_between_surfaces(tmp_path: Path) -> None:
@@ -156,11 +169,11 @@ def test_direct_light_seen_in_a_mirror_is_no_light_between_surfaces(tmp_path: Pa
         quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
         quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1),
     ]
-    camera = looking("front", [0, 0.6, 1.2], [0, 0.35, -1], 0.3)
-    scene = scene_of(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=materials)
+    camera = make_camera("front", [0, 0.6, 1.2], [0, 0.35, -1], 0.3)
+    scene = make_tiny_scene(*parts, camera=camera, environment=np.ones((64, 128, 3), "f"), materials=materials)
     look, size = validate({}, default_look(scene.materials)), (24, 18)
-    store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, 500), tmp_path / "store.zarr")
-    frame = render_image(open_transfer(store, Memory(1 << 30)), "front", look)
+    store = bake_in_process(DirectMethod(), scene, Recipe("direct", ("front",), size, 500), tmp_path / "store.zarr")
+    frame = render_image(open_transfer(store, Cache(1 << 30)), "front", look)
     followed = reference_image(scene, "front", look, size, 1024)
     in_mirror = followed[12:].mean(axis=(0, 1))
     assert in_mirror[0] == pytest.approx(8 * in_mirror[2], rel=0.01)
@@ -171,13 +184,13 @@ def test_direct_light_seen_in_a_mirror_is_no_light_between_surfaces(tmp_path: Pa
 def test_drawn_texels_estimate_all_of_them() -> None:
     """The mean over packets with draws of their own lies within four standard errors, and the error falls."""
     scene = still_life()
-    geometry, texels = merge(scene), texels_of(scene.environment)
+    geometry, texels = build_scene_buffers(scene), environment_texels(scene.environment)
     count = 16 * 64  # one point again and again: packets differ by their draw alone
     repeat = lambda row: np.repeat(np.array([row], np.float32), count, axis=0)  # noqa: E731
     frame = repeat([0, 1, 0]), repeat([1, 0, 0]), repeat([0, 0.6, 0.8])
-    points = Points(repeat([0.6, 1e-3, 0.4]), *frame, {}, repeat([1.0])[:, 0])
+    points = ReferencePoints(repeat([0.6, 1e-3, 0.4]), *frame, {}, repeat([1.0])[:, 0])
     terms = [WHITE, {**WHITE, "model": "cook_torrance", "params": {"sigma": 0.3}}]
-    truth = reference_radiance(geometry, texels, points.rows(slice(0, 1)), [terms])[0, 0]
+    truth = reference_radiance(geometry, texels, points.samples_of(slice(0, 1)), [terms])[0, 0]
     spread = []
     for spp in (32, 256):
         means = reference_radiance(geometry, texels, points, [terms], spp)[0, ::16]
@@ -200,10 +213,10 @@ def test_as_many_samples_as_texels_are_all_of_them() -> None:
 
 def test_rendered_frame_agrees(tmp_path: Path) -> None:
     scene, size = still_life(), (48, 36)
-    store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), size, 4000), tmp_path / "store.zarr")
+    store = bake_in_process(DirectMethod(), scene, Recipe("direct", ("front",), size, 4000), tmp_path / "store.zarr")
     default = default_look(scene.materials)
     partial = {"environment": {"scale": 0.5}, "materials": {"Ball": {"terms": [WHITE]}}}
-    frame = render_image(open_transfer(store, Memory(1 << 30)), "front", validate(partial, default))
+    frame = render_image(open_transfer(store, Cache(1 << 30)), "front", validate(partial, default))
     truth = image_of(scene, size, 0, **partial)
     assert relative_rmse(frame, truth) < 0.005
     assert frame.mean() == pytest.approx(truth.mean(), rel=0.002)
@@ -212,10 +225,12 @@ def test_rendered_frame_agrees(tmp_path: Path) -> None:
 def test_rotation_is_that_of_a_map_turned_by_hand() -> None:
     """Turning by one column is shifting the map by one: u falls where the map turns counter-clockwise from above."""
     radiance = studio(16)
-    camera = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
-    ball = sphere("ball", [0, 0.5, 0], 0.5, 0, rings=10)
-    turned = image_of(scene_of(ball, camera=camera, environment=radiance), (32, 24), 0, environment={"rotation": 90.0})
-    shifted = scene_of(ball, camera=camera, environment=np.roll(radiance, -8, axis=1))
+    camera = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
+    ball = sphere("ball", [0, 0.5, 0], 0.5, 0, num_rings=10)
+    turned = image_of(
+        make_tiny_scene(ball, camera=camera, environment=radiance), (32, 24), 0, environment={"rotation": 90.0}
+    )
+    shifted = make_tiny_scene(ball, camera=camera, environment=np.roll(radiance, -8, axis=1))
     np.testing.assert_allclose(turned, image_of(shifted, (32, 24), 0), rtol=2e-3, atol=1e-4)
 
 
@@ -227,7 +242,7 @@ def test_it_can_be_cancelled_and_tells_how_far_it_is() -> None:
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)
     with pytest.raises(CancelledError):
-        reference_image(scene, "front", look, (24, 18), 10, cancelled=lambda: True)
+        reference_image(scene, "front", look, (24, 18), 10, is_canceled=lambda: True)
 
 
 def test_what_a_bake_refuses_is_refused() -> None:
@@ -242,7 +257,7 @@ def test_what_a_bake_refuses_is_refused() -> None:
 def test_black_texels_are_left_out() -> None:
     radiance = np.zeros((8, 16, 3), np.float32)
     radiance[2, 3] = [0, 0, 1]
-    assert texels_of(Environment("one", radiance)).num_texels == 1
+    assert environment_texels(Environment("one", radiance)).num_texels == 1
 
 
 LIGHTS: dict[str, dict[str, object]] = {
@@ -258,18 +273,18 @@ LIGHTS: dict[str, dict[str, object]] = {
 
 
 @pytest.fixture(scope="module")
-def lit_bake(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Transfer]:
+def lit_bake(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, FixedViewTransfer]:
     """The still life, its wall a lamp."""
     parts = still_life()
     wall = Light("mesh", LIGHTS["mesh"])
     scene = make_scene("lit", parts.meshes, parts.materials, parts.cameras, parts.environment, lights=[wall])
     folder = tmp_path_factory.mktemp("lit")
-    store = bake_here(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 500), folder / "store.zarr")
-    return scene, open_transfer(store, Memory(1 << 30))
+    store = bake_in_process(DirectMethod(), scene, Recipe("direct", ("front",), (48, 36), 500), folder / "store.zarr")
+    return scene, open_transfer(store, Cache(1 << 30))
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, Transfer], kind: str) -> None:
+def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, FixedViewTransfer], kind: str) -> None:
     scene, transfer = lit_bake
     lights = {"mesh": {"on": kind == "mesh"}, **({} if kind == "mesh" else {kind: LIGHTS[kind]})}
     look = validate({"environment": {"scale": 0.0}, "lights": lights}, transfer.default_look)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, quad, scene_of, sphere
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
 from relume.color import luminance
 from relume.environments.equirect import texel_directions
 from relume.look import default_look, validate
 from relume.reference import reference_image
-from relume.reference.truth import CHANCE, Comparison, Estimate, compare, error_map
+from relume.reference.truth import FALSE_DISCOVERY_RATE, Comparison, Estimate, compare, error_map
 from relume.scene.model import Material
 
 SHAPE = (60, 80, 3)
@@ -21,7 +21,7 @@ def truth() -> np.ndarray:
 
 
 def added(passes) -> Estimate:
-    found = Estimate.nothing(*passes[0].shape[:2])
+    found = Estimate.empty(*passes[0].shape[:2])
     for picture in passes:
         found = found.add(picture)
     return found
@@ -73,7 +73,9 @@ def test_of_what_is_called_different_few_are_so_by_chance() -> None:
     frame[:, 32:] *= 1.1  # blocks end there too
     differs = compare(frame, estimate(16, 0.1))[1]
     assert differs[:, 32:].mean() > 0.95
-    assert differs[:, :32].sum() < 4 * CHANCE * differs.sum()  # of each size of blocks, and a block is many pixels
+    assert (
+        differs[:, :32].sum() < 4 * FALSE_DISCOVERY_RATE * differs.sum()
+    )  # of each size of blocks, and a block is many pixels
 
 
 def test_truth_without_noise_calls_rounding_no_difference() -> None:
@@ -96,9 +98,9 @@ def test_black_truth_is_compared_without_dividing_by_it() -> None:
 
 
 def test_large_pictures_have_fewer_batches() -> None:
-    assert len(Estimate.nothing(480, 640).sums) == 16
-    assert Estimate.nothing(2048, 2048).sums.nbytes <= 256 << 20
-    assert len(Estimate.nothing(3000, 4000).sums) == 4
+    assert len(Estimate.empty(480, 640).sums) == 16
+    assert Estimate.empty(2048, 2048).sums.nbytes <= 256 << 20
+    assert len(Estimate.empty(3000, 4000).sums) == 4
 
 
 def test_map_is_grey_where_noise_explains_and_coloured_where_not() -> None:
@@ -134,11 +136,11 @@ def metals(roughness: float):
     ]
     meshes = [
         quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0),
-        sphere("ball", [-0.5, 0.5, 0], 0.5, 1, rings=24),
-        sphere("small", [0.6, 0.4, 0.4], 0.4, 2, rings=24),
+        sphere("ball", [-0.5, 0.5, 0], 0.5, 1, num_rings=24),
+        sphere("small", [0.6, 0.4, 0.4], 0.4, 2, num_rings=24),
     ]
-    camera = looking("front", [0.2, 1.2, 3], [0, 0.4, 0], 0.7)
-    return scene_of(*meshes, camera=camera, environment=sun_and_sky(), materials=materials)
+    camera = make_camera("front", [0.2, 1.2, 3], [0, 0.4, 0], 0.7)
+    return make_tiny_scene(*meshes, camera=camera, environment=sun_and_sky(), materials=materials)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from tiny_scenes import quad
 
 from relume.color import srgb_decode
 from relume.environments.model import Environment
-from relume.render.finder import Finder
+from relume.render.finder import Viewport
 from relume.scene.archive import make_scene
 from relume.scene.built_in import BUILT_IN, built_in
 from relume.scene.model import Camera, Material, Texture
@@ -22,7 +22,7 @@ def facing(distance: float) -> Camera:
 
 
 @pytest.fixture(scope="module")
-def walls() -> Finder:
+def walls() -> Viewport:
     """A red wall on the left and a mirror with a greenish picture's colours on the right, both in the plane z = 0."""
     left = quad("left", [[-1, -1, 0], [0, -1, 0], [0, 1, 0], [-1, 1, 0]], 0)
     right = quad("right", [[0, -1, 0], [1, -1, 0], [1, 1, 0], [0, 1, 0]], 1)
@@ -32,10 +32,10 @@ def walls() -> Finder:
         "Printed", ({"model": "lambert", "color": [1, 1, 1], "texture": "diffuse"},), {"diffuse": Texture(green)}
     )
     sky = Environment("sky", np.ones((8, 16, 3), np.float32))
-    return Finder.of(make_scene("Walls", [left, right], [red, printed], [facing(3)], sky))
+    return Viewport.from_scene(make_scene("Walls", [left, right], [red, printed], [facing(3)], sky))
 
 
-def test_surfaces_have_their_colours_and_their_places(walls: Finder) -> None:
+def test_surfaces_have_their_colours_and_their_places(walls: Viewport) -> None:
     image = walls.image(facing(3), SIZE)
     assert image.shape == (48, 64, 3)
     assert image.dtype == np.uint8
@@ -43,13 +43,13 @@ def test_surfaces_have_their_colours_and_their_places(walls: Finder) -> None:
     assert left[0] > 2 * left[1]
     assert right[1] > 1.5 * right[0]
     assert outside.max() < 60
-    place = walls.place_at(facing(3), SIZE, 32 + 8, 24 - 4)
+    place = walls.point_at(facing(3), SIZE, 32 + 8, 24 - 4)
     step = 2 * 3 * np.tan(0.4) / 48  # metres a pixel, on the plane
     np.testing.assert_allclose(place, [8 * step, 4 * step, 0], atol=1e-5)
-    assert walls.place_at(facing(3), SIZE, 1, 1) is None
+    assert walls.point_at(facing(3), SIZE, 1, 1) is None
 
 
-def test_a_surface_is_darker_where_it_turns_away(walls: Finder) -> None:
+def test_a_surface_is_darker_where_it_turns_away(walls: Viewport) -> None:
     aside, turn = facing(0), np.radians(70)
     aside.to_world[:3, 0] = [np.cos(turn), 0, -np.sin(turn)]
     aside.to_world[:3, 2] = [np.sin(turn), 0, np.cos(turn)]
@@ -61,13 +61,13 @@ def test_a_surface_is_darker_where_it_turns_away(walls: Finder) -> None:
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_the_framing_camera_sees_the_scene_and_its_corners_hold_it(name: str) -> None:
     scene = built_in(name)
-    finder = Finder.of(scene)
+    finder = Viewport.from_scene(scene)
     image = finder.image(finder.framing, SIZE)
     assert len(np.unique(image.reshape(-1, 3), axis=0)) > 20
     positions = np.concatenate([mesh.positions[mesh.faces.ravel()] for mesh in scene.meshes])
     assert (finder.lowest <= positions.min(axis=0) + 1e-6).all()
     assert (finder.highest >= positions.max(axis=0) - 1e-6).all()
-    place = finder.place_at(finder.framing, SIZE, 32, 24)
+    place = finder.point_at(finder.framing, SIZE, 32, 24)
     assert place is not None
     assert (place >= finder.lowest - 1e-3).all()
     assert (place <= finder.highest + 1e-3).all()

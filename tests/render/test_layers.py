@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import OpenImageIO
 import pytest
-from oracle import copied
-from sessions import look_of
+from oracle import open_copy
+from sessions import make_look
 
-from relume.exr.layers import layers_for
+from relume.exr.layers import make_layers
 from relume.exr.picture import export_exr
 from relume.render.image import render_image
 
@@ -46,11 +46,11 @@ def exported(transfer, folder, background, layering):
         document["environment"].update(scale=0.7, rotation=30.0)
         document["background"].update(kind=background, color=[0.2, 0.3, 0.1])
 
-    look = look_of(transfer, change)
-    layers = layers_for(layering, look, reflects=True)
+    look = make_look(transfer, change)
+    layers = make_layers(layering, look, has_indirect=True)
     told: list[float] = []
     path = folder / "a.exr"
-    with copied(transfer) as other:  # one for all layers, as in a server
+    with open_copy(transfer) as other:  # one for all layers, as in a server
         export_exr(
             path, lambda of, progress: render_image(other, "front", of, progress=progress), look, layers, {},
             progress=told.append,

@@ -12,9 +12,9 @@ import pytest
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
-from relume.remarks import simplified
+from relume.remarks import approximated
 from relume.scene.archive import load_cameras, load_scene, make_scene, save_scene
-from relume.scene.model import Camera, Coding, Glass, Light, Material, Mesh, Opacity, Scene, Texture
+from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture, TextureEncoding
 
 
 def test_another_scene_of_the_same_id_is_not_written_over_the_first(tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def small_scene(**changes: object) -> Scene:
         "materials": [material],
         "cameras": [Camera("front", np.eye(4), 0.5)],
         "environment": Environment("sky", rng.random((2, 4, 3), np.float32)),
-        "warnings": [simplified("one thing")],
+        "warnings": [approximated("one thing")],
         "lights": [Light("Key", {"kind": "spot", "position": [0.1, 2.0, -3.5]})],
     }
     return make_scene(**(parts | changes))  # type: ignore[arg-type]
@@ -254,22 +254,25 @@ def test_glass_that_nothing_is_made_of_is_refused(fields: dict[str, object]) -> 
 
 def test_maps_of_roughness_are_kept(tmp_path: Path) -> None:
     pixels = np.arange(12, dtype=np.uint8).reshape(3, 4, 1)
-    texture = Texture(pixels, ("clamp", "mirror"), Coding("share", (2.0, 2.0, 2.0)))
+    texture = Texture(pixels, ("clamp", "mirror"), TextureEncoding("share", (2.0, 2.0, 2.0)))
     material = dataclasses.replace(small_scene().materials[0], textures={"roughness": texture})
     save_scene(small_scene(materials=[material]), tmp_path)
     kept = load_scene(tmp_path).materials[0].textures["roughness"]
     np.testing.assert_array_equal(kept.pixels, pixels)
-    assert (kept.wrap, kept.coding) == (texture.wrap, texture.coding)
+    assert (kept.wrap, kept.encoding) == (texture.wrap, texture.encoding)
 
 
 @pytest.mark.parametrize(
     ("channel", "texture"),
     [
         ("roughness", Texture(np.zeros((2, 2, 3), np.float32))),
-        ("roughness", Texture(np.zeros((2, 2, 3), np.uint8), coding=Coding("srgb"))),
-        ("roughness", Texture(np.zeros((2, 2, 1), np.uint8), coding=Coding("share", (float("nan"),) * 3))),
-        ("diffuse", Texture(np.zeros((2, 2, 1), np.uint8), coding=Coding("share"))),
-        ("emission", Texture(np.zeros((2, 2, 3), np.uint8), coding=Coding("srgb", (1.0, float("inf"), 1.0)))),
+        ("roughness", Texture(np.zeros((2, 2, 3), np.uint8), encoding=TextureEncoding("srgb"))),
+        ("roughness", Texture(np.zeros((2, 2, 1), np.uint8), encoding=TextureEncoding("share", (float("nan"),) * 3))),
+        ("diffuse", Texture(np.zeros((2, 2, 1), np.uint8), encoding=TextureEncoding("share"))),
+        (
+            "emission",
+            Texture(np.zeros((2, 2, 3), np.uint8), encoding=TextureEncoding("srgb", (1.0, float("inf"), 1.0))),
+        ),
     ],
 )
 def test_textures_that_their_channel_cannot_use_are_refused(channel: str, texture: Texture) -> None:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from texture_values import values_of
-from tiny_scenes import looking, quad, scene_of
+from texture_values import get_texture_values
+from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.errors import SceneError
 from relume.scene.archive import load_scene, save_scene
-from relume.scene.coding import ROWS_AT_ONCE, decode, made_of, mean_of
-from relume.scene.model import Coding, Material, Scene, Texture
+from relume.scene.coding import ROWS_PER_BATCH, decode, encode_rows, mean_value
+from relume.scene.model import Material, Scene, Texture, TextureEncoding
 from relume.trace.texture import MipMap
 
 
@@ -22,17 +22,17 @@ def random_bytes(height: int = 9, width: int = 7, seed: int = 1) -> np.ndarray:
 
 
 def test_display_values_are_linear_times_a_scale() -> None:
-    found = decode(np.array([[[0, 188, 255]]], np.uint8), Coding("srgb", (1.0, 2.0, 0.5)))
+    found = decode(np.array([[[0, 188, 255]]], np.uint8), TextureEncoding("srgb", (1.0, 2.0, 0.5)))
     np.testing.assert_allclose(found, [[[0, 2 * 0.5029, 0.5]]], atol=1e-4)
 
 
 def test_normals_are_scaled_turned_and_of_length_one() -> None:
     pixels = np.array([[[255, 127, 255], [128, 128, 255], [127, 128, 127]]], np.uint8)
-    x, up, none = decode(pixels, Coding("normal", (0.5, 0.5, 1.0)))[0]
+    x, up, none = decode(pixels, TextureEncoding("normal", (0.5, 0.5, 1.0)))[0]
     np.testing.assert_allclose(x, np.array([0.5, 0, 1]) / np.hypot(0.5, 1), atol=5e-3)
     np.testing.assert_allclose(up, [0, 0, 1], atol=5e-3)
     assert np.linalg.norm(none) == pytest.approx(1)
-    turned = decode(pixels, Coding("normal", (0.5, 0.5, 1.0), np.pi / 2))[0, 0]
+    turned = decode(pixels, TextureEncoding("normal", (0.5, 0.5, 1.0), np.pi / 2))[0, 0]
     np.testing.assert_allclose(turned[:2], [x[1], -x[0]], atol=1e-6)
 
 
@@ -42,21 +42,21 @@ def test_pixels_without_a_coding_are_values() -> None:
 
 
 def test_means_and_made_textures_go_over_all_rows() -> None:
-    height = 2 * ROWS_AT_ONCE + 3
+    height = 2 * ROWS_PER_BATCH + 3
     values = np.random.default_rng(3).random((height, 5, 3), np.float32) * np.float32([1, 4, 0.25])
     most = values.max(axis=(0, 1)).astype(np.float64)
-    made = made_of(lambda rows: values[rows], (height, 5), most, ("clamp", "repeat"))
+    made = encode_rows(lambda rows: values[rows], (height, 5), most, ("clamp", "repeat"))
     assert made.pixels.dtype == np.uint8
     assert made.wrap == ("clamp", "repeat")
-    display = np.round(255 * (values_of(made) / most) ** (1 / 2.2))
+    display = np.round(255 * (get_texture_values(made) / most) ** (1 / 2.2))
     np.testing.assert_allclose(display, 255 * (values / most) ** (1 / 2.2), atol=4)
-    np.testing.assert_allclose(mean_of(made), values.mean(axis=(0, 1)), rtol=2e-3)
+    np.testing.assert_allclose(mean_value(made), values.mean(axis=(0, 1)), rtol=2e-3)
 
 
-@pytest.mark.parametrize("size", [(9, 7), (ROWS_AT_ONCE + 3, 6), (1, 8), (1, 1)])
+@pytest.mark.parametrize("size", [(9, 7), (ROWS_PER_BATCH + 3, 6), (1, 8), (1, 1)])
 def test_pyramids_of_bytes_are_those_of_their_values(size: tuple[int, int]) -> None:
-    coded = Texture(random_bytes(*size), coding=Coding("srgb", (1.0, 0.5, 2.0)))
-    plain = Texture(values_of(coded))
+    coded = Texture(random_bytes(*size), encoding=TextureEncoding("srgb", (1.0, 0.5, 2.0)))
+    plain = Texture(get_texture_values(coded))
     of_bytes, of_values = MipMap(coded), MipMap(plain)
     assert [level.shape for level in of_bytes.levels] == [level.shape for level in of_values.levels]
     uv = np.random.default_rng(4).uniform(-2, 2, (500, 2)).astype(np.float32)
@@ -68,22 +68,22 @@ def test_pyramids_of_bytes_are_those_of_their_values(size: tuple[int, int]) -> N
 def scene_with(texture: Texture) -> Scene:
     material = Material("M", ({"model": "lambert", "color": [1, 1, 1], "texture": "diffuse"},), {"diffuse": texture})
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    return scene_of(floor, camera=looking("front", (0, 2, 2), (0, 0, 0), 0.8), materials=[material])
+    return make_tiny_scene(floor, camera=make_camera("front", (0, 2, 2), (0, 0, 0), 0.8), materials=[material])
 
 
 def test_bytes_and_codings_are_kept_in_archives(tmp_path: Path) -> None:
-    coded = Texture(random_bytes(), ("mirror", "clamp"), Coding("srgb", (0.5, 1.0, 2.0)))
+    coded = Texture(random_bytes(), ("mirror", "clamp"), TextureEncoding("srgb", (0.5, 1.0, 2.0)))
     scene = scene_with(coded)
     save_scene(scene, tmp_path)
     kept = load_scene(tmp_path).materials[0].textures["diffuse"]
     np.testing.assert_array_equal(kept.pixels, coded.pixels)
-    assert (kept.wrap, kept.coding) == (coded.wrap, coded.coding)
-    other = scene_with(dataclasses.replace(coded, coding=Coding("srgb")))
+    assert (kept.wrap, kept.encoding) == (coded.wrap, coded.encoding)
+    other = scene_with(dataclasses.replace(coded, encoding=TextureEncoding("srgb")))
     assert other.id != scene.id
 
 
 @pytest.mark.parametrize(
-    "texture", [Texture(random_bytes()), Texture(np.ones((2, 2, 3), np.float32), coding=Coding("srgb"))]
+    "texture", [Texture(random_bytes()), Texture(np.ones((2, 2, 3), np.float32), encoding=TextureEncoding("srgb"))]
 )
 def test_pixels_that_do_not_fit_their_coding_are_refused(tmp_path: Path, texture: Texture) -> None:
     save_scene(scene_with(texture), tmp_path)

@@ -4,46 +4,50 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from texture_values import values_of
-from tiny_scenes import looking, quad, scene_of
+from texture_values import get_texture_values
+from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.scene.emission import has_images, lit_surfaces, shares_of_faces, shine_of_faces
-from relume.scene.model import Coding, Material, Texture
+from relume.scene.emission import average_over_faces, has_emission_images, normalize_emission, relative_emission
+from relume.scene.model import Material, Texture, TextureEncoding
 
 FLOOR = quad("floor", [[0, 0, 1], [2, 0, 1], [2, 0, 0], [0, 0, 0]], 0)
 
 
 def image(pixels):
-    return Texture(np.array(pixels, np.uint8), coding=Coding("srgb"))
+    return Texture(np.array(pixels, np.uint8), encoding=TextureEncoding("srgb"))
 
 
 def test_mean_is_over_surfaces_and_the_image_over_it() -> None:
     red_left = image([[[255, 0, 0], [0, 0, 0]]])
-    material, emission = lit_surfaces(Material("m", (), {"emission": red_left}), np.array([4.0, 4, 4]), [FLOOR])
+    material, emission = normalize_emission(Material("m", (), {"emission": red_left}), np.array([4.0, 4, 4]), [FLOOR])
     assert emission.tolist() == [2.0, 0, 0]
-    np.testing.assert_allclose(values_of(material.textures["emission"])[0, 0, 0], 2)
+    np.testing.assert_allclose(get_texture_values(material.textures["emission"])[0, 0, 0], 2)
 
 
 @pytest.mark.parametrize("pixels", [[[[255, 128, 0]]], [[[200, 200, 200], [201, 200, 199]]]])
 def test_an_image_of_one_colour_is_none(pixels) -> None:
-    material, emission = lit_surfaces(Material("m", (), {"emission": image(pixels)}), np.array([2.0, 2, 2]), [FLOOR])
+    material, emission = normalize_emission(
+        Material("m", (), {"emission": image(pixels)}), np.array([2.0, 2, 2]), [FLOOR]
+    )
     assert not material.textures
     assert emission[0] > 1
 
 
 def test_triangles_shine_as_their_part_of_the_image_does() -> None:
     below = image([[[0, 0, 0]] * 4] * 2 + [[[255, 255, 255]] * 4] * 2)
-    shares = shine_of_faces(below, FLOOR)  # of the first triangle three quarters lie below, of the other one
+    shares = average_over_faces(below, FLOOR)  # of the first triangle three quarters lie below, of the other one
     np.testing.assert_allclose(shares, [[0.75] * 3, [0.25] * 3], atol=0.13)
     assert shares.mean() == pytest.approx(0.5)
 
 
 def test_faces_of_a_scene_come_in_its_order_and_others_shine_evenly() -> None:
     wall = quad("wall", [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 1)
-    lit = Material("lit", (), {"emission": Texture(np.full((1, 2, 3), 128, np.uint8), coding=Coding("srgb"))})
+    lit = Material(
+        "lit", (), {"emission": Texture(np.full((1, 2, 3), 128, np.uint8), encoding=TextureEncoding("srgb"))}
+    )
     plain = Material("plain", ())
-    scene = scene_of(wall, FLOOR, camera=looking("v", (0, 1, 2), (0, 0, 0), 0.7), materials=[lit, plain])
-    assert has_images(scene)
-    shares = shares_of_faces(scene)
+    scene = make_tiny_scene(wall, FLOOR, camera=make_camera("v", (0, 1, 2), (0, 0, 0), 0.7), materials=[lit, plain])
+    assert has_emission_images(scene)
+    shares = relative_emission(scene)
     assert shares.tolist()[:2] == [1, 1]
     assert shares[2] == pytest.approx(0.2158, abs=1e-3)

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_builder import LEFT, QUAD, QUAD_NORMALS, QUAD_UVS, Glb, self_contained
-from texture_values import values_of
+from glb_builder import DIELECTRIC_TRANSMISSION, QUAD, QUAD_NORMALS, QUAD_UVS, Glb, self_contained
+from texture_values import get_texture_values
 
 from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
-from relume.scene.coding import mean_of
+from relume.scene.coding import mean_value
 from relume.scene.gltf import import_gltf
 from relume.scene.model import Material, Mesh, Scene
 
@@ -147,7 +147,7 @@ def test_a_dielectric_becomes_lambert_and_ggx() -> None:
     pbr = {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0, "roughnessFactor": 0.3}
     lambert, ggx = material_of({"name": "Clay", "pbrMetallicRoughness": pbr}).terms
     assert (lambert["model"], lambert["texture"]) == ("lambert", None)
-    np.testing.assert_allclose(lambert["color"], np.array([0.5, 0.25, 0.125]) * LEFT, atol=1e-6)
+    np.testing.assert_allclose(lambert["color"], np.array([0.5, 0.25, 0.125]) * DIELECTRIC_TRANSMISSION, atol=1e-6)
     assert ggx["params"] == {"roughness": 0.3, "f0": [0.04, 0.04, 0.04]}
 
 
@@ -174,10 +174,10 @@ def test_base_colour_textures_are_linearised_into_the_diffuse_channel() -> None:
     pbr = {"baseColorTexture": {"index": index}, "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0}
     material = material_of({"pbrMetallicRoughness": pbr}, glb)
     expected = [[[0, 0.2158605, 1], [1, 0, 10 / 255 / 12.92]]]
-    np.testing.assert_allclose(values_of(material.textures["diffuse"]), expected, atol=1e-6)
+    np.testing.assert_allclose(get_texture_values(material.textures["diffuse"]), expected, atol=1e-6)
     assert material.textures["diffuse"].wrap == ("clamp", "mirror")
     assert [term["texture"] for term in material.terms] == ["diffuse", None]
-    np.testing.assert_allclose(material.terms[0]["color"], np.array([0.5, 1, 1]) * LEFT, atol=1e-6)
+    np.testing.assert_allclose(material.terms[0]["color"], np.array([0.5, 1, 1]) * DIELECTRIC_TRANSMISSION, atol=1e-6)
 
 
 def test_metallic_textures_share_out_base_colour() -> None:
@@ -186,9 +186,9 @@ def test_metallic_textures_share_out_base_colour() -> None:
     packed = glb.texture([[[0, 51, 0], [0, 51, 255]]])
     pbr = {"baseColorTexture": {"index": base}, "metallicRoughnessTexture": {"index": packed}}
     material = material_of({"pbrMetallicRoughness": pbr}, glb)
-    np.testing.assert_allclose(values_of(material.textures["diffuse"])[0, :, 0], [1, 0])
+    np.testing.assert_allclose(get_texture_values(material.textures["diffuse"])[0, :, 0], [1, 0])
     ggx = material.terms[1]
-    f0 = np.array(ggx["params"]["f0"]) * values_of(material.textures["specular"])[0]
+    f0 = np.array(ggx["params"]["f0"]) * get_texture_values(material.textures["specular"])[0]
     np.testing.assert_allclose(f0, [[0.04] * 3, [1.0] * 3], rtol=0.02)  # a byte of display values
     assert ggx["params"]["roughness"] == pytest.approx(0.2)
     assert ggx["texture"] == "specular"
@@ -202,7 +202,7 @@ def test_a_varying_roughness_texture_scales_the_width_and_a_plain_one_is_its_mea
     assert scene.materials[0].terms[1]["params"]["roughness"] == pytest.approx(0.4)
     assert scene.materials[0].terms[1]["roughness_map"] is True
     assert scene.materials[0].textures["roughness"].pixels.tolist() == [[[0], [255]]]
-    assert mean_of(scene.materials[0].textures["roughness"]).tolist() == pytest.approx([1.0])
+    assert mean_value(scene.materials[0].textures["roughness"]).tolist() == pytest.approx([1.0])
     assert not scene.warnings
 
     glb = Glb()
@@ -227,7 +227,9 @@ def test_normal_maps_are_scaled_and_get_tangents() -> None:
     scene = imported(glb.quad({"normalTexture": {"index": index, "scale": 0.5}}))
     normal_map = scene.materials[0].normal_map
     assert normal_map is not None
-    np.testing.assert_allclose(values_of(normal_map)[0, 0], np.array([0.5, 0, 1]) / np.hypot(0.5, 1), atol=5e-3)
+    np.testing.assert_allclose(
+        get_texture_values(normal_map)[0, 0], np.array([0.5, 0, 1]) / np.hypot(0.5, 1), atol=5e-3
+    )
     # u runs along +X and v down: the tangent is +X, and cross(n, t)·w points up, against v.
     np.testing.assert_allclose(scene.meshes[0].tangents, [[1, 0, 0, 1]] * 4, atol=1e-6)
 

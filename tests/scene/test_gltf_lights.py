@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from glb_builder import Glb
-from texture_values import values_of
+from texture_values import get_texture_values
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
@@ -71,7 +71,7 @@ def test_materials_shine_with_their_factor_their_strength_and_their_texture_s_me
     panel = default_look(scene.materials, scene.lights)["lights"]["Panel"]
     assert (panel["kind"], panel["material"]) == ("mesh", "Panel")
     np.testing.assert_allclose(panel["emission"], [4, 2, 0])
-    np.testing.assert_allclose(values_of(scene.materials[0].textures["emission"]), [[[2, 2, 2], [0, 0, 0]]])
+    np.testing.assert_allclose(get_texture_values(scene.materials[0].textures["emission"]), [[[2, 2, 2], [0, 0, 0]]])
     assert not scene.warnings
 
 

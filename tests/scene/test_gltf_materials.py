@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_builder import LEFT, Glb
-from texture_values import values_of
+from glb_builder import DIELECTRIC_TRANSMISSION, Glb
+from texture_values import get_texture_values
 
 from relume.brdf.document import complete_term
 from relume.brdf.fresnel import schlick
 from relume.brdf.registry import TERMS
 from relume.environments.model import Environment
 from relume.scene.gltf import import_gltf
-from relume.scene.gltf.sheen import below_sheen, sheen_albedo
-from relume.scene.gltf.terms import dielectric_share
+from relume.scene.gltf.sheen import sheen_albedo, sheen_attenuation
+from relume.scene.gltf.terms import dielectric_reflectance
 from relume.scene.model import Glass, Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -51,9 +51,9 @@ def test_what_scatters_light_gets_what_is_not_reflected_before(f0: float, f90: f
     cosine, sine = np.sqrt(square), np.sqrt(1 - square)
     towards = cosine[0] * cosine[1] + sine[0] * sine[1] * np.cos(turn)
     reflected = f0 + (f90 - f0) * (1 - np.sqrt((1 + towards) / 2)) ** 5
-    assert dielectric_share(f0, f90) == pytest.approx(reflected.mean(), abs=1e-4)
+    assert dielectric_reflectance(f0, f90) == pytest.approx(reflected.mean(), abs=1e-4)
     if (f0, f90) == (0.04, 1.0):
-        assert dielectric_share(f0, f90) == pytest.approx(1 - LEFT, abs=1e-6)
+        assert dielectric_reflectance(f0, f90) == pytest.approx(1 - DIELECTRIC_TRANSMISSION, abs=1e-6)
 
 
 def test_specular_gives_both_ends_of_the_fresnel_curve() -> None:
@@ -77,7 +77,7 @@ def test_specular_textures_share_out_the_reflectance() -> None:
     weight = glb.texture([[[255, 255, 255, 0], [255, 255, 255, 255]]])
     scene = imported({"specular": {"specularTexture": {"index": weight}}}, glb)
     ggx, texture = scene.materials[0].terms[1], scene.materials[0].textures["specular"]
-    head_on = np.array(ggx["color"]) * np.array(ggx["params"]["f0"]) * values_of(texture)[0]
+    head_on = np.array(ggx["color"]) * np.array(ggx["params"]["f0"]) * get_texture_values(texture)[0]
     np.testing.assert_allclose(head_on, [[0] * 3, [0.04] * 3], atol=1e-6)
 
 
@@ -134,7 +134,7 @@ def test_a_turned_normal_map_means_the_same_directions() -> None:
 
     def in_world(scene: Scene) -> np.ndarray:
         assert scene.materials[0].normal_map is not None
-        x, y, z = values_of(scene.materials[0].normal_map)[0, 0]
+        x, y, z = get_texture_values(scene.materials[0].normal_map)[0, 0]
         tangent, normal = scene.meshes[0].tangents[0, :3], scene.meshes[0].normals[0]
         return x * tangent + y * np.cross(normal, tangent) * scene.meshes[0].tangents[0, 3] + z * normal
 
@@ -165,12 +165,12 @@ def test_what_lies_below_a_sheen_is_dimmed_as_the_specification_says(theta_o: fl
     theta = (np.arange(300) + 0.5) * np.pi / 600
     kept = 1 - sheen_albedo(theta, 0.8)
     expected, arriving = np.minimum(kept, np.interp(theta_o, theta, kept)), np.sin(theta) * np.cos(theta)
-    light, view = below_sheen(1.0, 0.8, by_light=True)
+    light, view = sheen_attenuation(1.0, 0.8, by_light=True)
     shown = light(theta) * view(np.array(theta_o))
     assert shown @ arriving == pytest.approx(expected @ arriving, rel=1e-3)
     error = np.sqrt((shown - expected) ** 2 @ arriving / (expected**2 @ arriving))
     assert error < 0.12  # by the viewer's angle alone it is 0.18 where that is large, and 0.15 where it is small
-    by_view = below_sheen(1.0, 0.8, by_light=False)[1](np.array(theta_o))
+    by_view = sheen_attenuation(1.0, 0.8, by_light=False)[1](np.array(theta_o))
     assert by_view * arriving.sum() == pytest.approx(expected @ arriving, rel=1e-3)
 
 
@@ -204,7 +204,9 @@ def test_transmission_is_a_pane_of_the_base_colour_and_leaves_less_to_be_scatter
     )
     made = scene.materials[0]
     assert made.glass == Glass((0.375, 0.1875, 0.09375))
-    np.testing.assert_allclose(made.terms[0]["color"], np.array([0.125, 0.0625, 0.03125]) * LEFT, atol=1e-6)
+    np.testing.assert_allclose(
+        made.terms[0]["color"], np.array([0.125, 0.0625, 0.03125]) * DIELECTRIC_TRANSMISSION, atol=1e-6
+    )
     assert scene.warnings == ()
     assert imported({"transmission": {}}).materials[0].glass is None
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_builder import LEFT, Glb
-from texture_values import values_of
+from glb_builder import DIELECTRIC_TRANSMISSION, Glb
+from texture_values import get_texture_values
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
@@ -44,7 +44,13 @@ def test_each_variant_is_a_look_of_the_materials_it_changes() -> None:
     assert [material.name for material in scene.materials] == ["Red"]
     assert scene.variants["day"] == {"materials": {}}
     terms = scene.variants["night"]["materials"]["Red"]["terms"]
-    assert terms[0] == {"model": "lambert", "color": [0, 0, LEFT], "texture": None, "params": {}, "curves": {}}
+    assert terms[0] == {
+        "model": "lambert",
+        "color": [0, 0, DIELECTRIC_TRANSMISSION],
+        "texture": None,
+        "params": {},
+        "curves": {},
+    }
     assert scene.warnings == ()
 
 
@@ -65,8 +71,8 @@ def test_a_texture_is_kept_where_it_is_the_same_up_to_a_colour() -> None:
     lambert, ggx = scene.variants["night"]["materials"]["Red"]["terms"]
     assert lambert["color"] == [0, 0, 0]
     assert ggx["texture"] == "diffuse"
-    shown = np.array(ggx["color"]) * ggx["params"]["f0"] * values_of(scene.materials[0].textures["diffuse"])
-    expected = np.array([0.5, 0.4, 0.0]) * values_of(scene.materials[0].textures["diffuse"])
+    shown = np.array(ggx["color"]) * ggx["params"]["f0"] * get_texture_values(scene.materials[0].textures["diffuse"])
+    expected = np.array([0.5, 0.4, 0.0]) * get_texture_values(scene.materials[0].textures["diffuse"])
     np.testing.assert_allclose(shown, expected, atol=1e-4)  # f0 keeps clear of 0
     assert not any("mean colour" in warning for warning in scene.warnings)
 
@@ -78,7 +84,7 @@ def test_another_texture_becomes_its_mean_with_a_warning() -> None:
     grey = plain("Grey", 1, 0.5, 1, baseColorTexture={"index": second})
     scene = imported(dressed(glb, [red, grey], [[{"material": 1, "variants": [0]}]]))
     lambert = scene.variants["day"]["materials"]["Red"]["terms"][0]
-    np.testing.assert_allclose(lambert["color"], np.array([0.5, 0.25, 0.5]) * LEFT, atol=1e-6)
+    np.testing.assert_allclose(lambert["color"], np.array([0.5, 0.25, 0.5]) * DIELECTRIC_TRANSMISSION, atol=1e-6)
     assert lambert["texture"] is None
     assert any("mean colour" in warning for warning in scene.warnings)
 

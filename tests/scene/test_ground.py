@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, quad, scene_of, sphere, still_life
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, still_life
 
 from relume.errors import SceneError
 from relume.scene.archive import load_scene, save_scene
 from relume.scene.ground import with_ground
 
-CAMERA = looking("front", (0, 2, 5), (0, 1, 0), 0.6)
+CAMERA = make_camera("front", (0, 2, 5), (0, 1, 0), 0.6)
 
 
 def test_it_lies_below_everything_and_far_around():
-    scene = scene_of(sphere("ball", (3.0, 1.0, -2.0), 0.5, 0), camera=CAMERA)
+    scene = make_tiny_scene(sphere("ball", (3.0, 1.0, -2.0), 0.5, 0), camera=CAMERA)
     ground = with_ground(scene)
     disc = ground.meshes[-1]
     low = min(mesh.positions[:, 1].min() for mesh in scene.meshes)
@@ -32,7 +32,7 @@ def test_flat_scenes_get_one_too():
     level = quad("level", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     upright = quad("upright", [[0, 0, 0], [0, 0, 0.001], [0, 2, 0.001], [0, 2, 0]], 0)
     for mesh in (level, upright):
-        disc = with_ground(scene_of(mesh, camera=CAMERA)).meshes[-1].positions
+        disc = with_ground(make_tiny_scene(mesh, camera=CAMERA)).meshes[-1].positions
         assert disc[:, 1].max() < 0
         assert np.ptp(disc[:, 0]) > 10
 
@@ -43,6 +43,6 @@ def test_its_name_is_free_and_there_is_one_alone(tmp_path):
     assert [m.name for m in ground.materials] == [*(m.name for m in scene.materials), "Ground"]
     assert ground.name == "With a ground"
     save_scene(ground, tmp_path)
-    assert load_scene(tmp_path).materials[-1].catcher
+    assert load_scene(tmp_path).materials[-1].shadow_catcher
     with pytest.raises(SceneError, match="already"):
         with_ground(ground)

@@ -11,7 +11,7 @@ from glb_builder import QUAD, Glb
 from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene.gltf import import_gltf, importer
-from relume.scene.gltf.flattened import cofactors, dimensions
+from relume.scene.gltf.flattened import cofactors, count_dimensions
 from relume.scene.model import Scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -55,7 +55,7 @@ def test_attributes_that_are_not_known_are_not_read() -> None:
 def test_many_meshes_of_one_material_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
     moves = np.column_stack([np.arange(50), np.zeros((50, 2))])
     apart = imported(instanced(TRANSLATION=moves))
-    monkeypatch.setattr(importer, "_MANY", 10)
+    monkeypatch.setattr(importer, "_MAX_SEPARATE_MESHES", 10)
     (mesh,) = imported(instanced(TRANSLATION=moves)).meshes
     assert mesh.name == "tree"
     for name in ("positions", "normals", "tangents", "uvs"):
@@ -87,12 +87,12 @@ def test_a_matrix_of_any_rank_sends_normals_across_what_it_makes_of_planes() -> 
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     for scales in ([1.0, 2.0, 3.0], [1.0, 2.0, 0.0], [1e-6, 2e-6, 3e-6]):
         linear = turn * scales
-        assert dimensions(linear) == np.count_nonzero(scales)
+        assert count_dimensions(linear) == np.count_nonzero(scales)
         normal, edges = cofactors(linear) @ [0.2, 0.3, 0.9], linear @ [[0.9, 0], [0, 0.3], [-0.2, -0.1]]
         assert np.linalg.norm(normal) > 0
         np.testing.assert_allclose(normal / np.linalg.norm(normal) @ (edges / np.linalg.norm(edges)), 0, atol=1e-9)
     for scales in ([1.0, 1e-12, 0.0], [0.0, 0.0, 0.0], [1e-20, 1e-20, 1e-20]):
-        assert dimensions(turn * scales) < 2
+        assert count_dimensions(turn * scales) < 2
 
 
 def test_nodes_that_go_round_are_shown_once_and_said() -> None:
@@ -122,6 +122,6 @@ def test_instances_that_do_not_fit_are_refused(monkeypatch: pytest.MonkeyPatch) 
         imported(instanced(TRANSLATION=[[0, 0, 0]], SCALE=[[1, 1, 1], [1, 1, 1]]))
     with pytest.raises(SceneError, match="give vectors of 3"):
         imported(instanced(TRANSLATION=[[0, 0], [1, 1]]))
-    monkeypatch.setattr(importer, "MAX_PLACED", 3)
+    monkeypatch.setattr(importer, "MAX_INSTANCES", 3)
     with pytest.raises(SceneError, match="3 more are allowed"):
         imported(instanced(TRANSLATION=np.zeros((4, 3))))

@@ -12,7 +12,7 @@ import pytest
 
 from relume.environments.model import Environment
 from relume.scene.importer import import_scene
-from relume.scene.model import Coding, Material, Scene
+from relume.scene.model import Material, Scene, TextureEncoding
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"
@@ -236,7 +236,7 @@ def test_a_normal_map_is_as_strong_as_the_file_says(tmp_path: Path, option: str,
     (tmp_path / "tiles.png").write_bytes(image("normals"))
     material = material_of(tmp_path, f"newmtl M\nKd 1 1 1\nmap_Bump {option} tiles.png\n")
     assert material.normal_map is not None
-    assert material.normal_map.coding == Coding("normal", (strength, strength, 1.0))
+    assert material.normal_map.encoding == TextureEncoding("normal", (strength, strength, 1.0))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 import pytest
-from texture_values import values_of
+from texture_values import get_texture_values
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
@@ -111,7 +111,7 @@ def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
     path = tmp_path / "thing.obj"
     path.write_text(SQUARE + COORDINATES + "mtllib m.mtl\nusemtl a\nf 1/1 2/2 3/3\n")
     scene = import_scene(path, "thing", LIGHT)
-    np.testing.assert_allclose(values_of(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0])
+    np.testing.assert_allclose(get_texture_values(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0])
     assert scene.materials[0].terms[0] == {"model": "lambert", "color": [1.0, 1.0, 1.0], "texture": "diffuse"}
     assert scene.lights == (Light("a", {"kind": "mesh", "material": "a", "emission": [1.0, 1.0, 1.0]}),)
     opacity = scene.materials[0].opacity
@@ -131,7 +131,7 @@ def test_a_map_of_roughness_scales_the_width_and_its_mean_is_what_terms_say(tmp_
     assert half.terms[1]["params"]["roughness"] == pytest.approx(0.2)
     assert whole.terms[1]["params"]["roughness"] == pytest.approx(0.4)
     assert half.terms[1]["roughness_map"] is True
-    np.testing.assert_allclose(values_of(half.textures["roughness"]), [[[0.5], [1.5]]], rtol=1e-6)
+    np.testing.assert_allclose(get_texture_values(half.textures["roughness"]), [[[0.5], [1.5]]], rtol=1e-6)
 
 
 def shining(tmp_path: Path, library: str, faces: str) -> Scene:
@@ -181,7 +181,7 @@ def test_an_archive_holds_the_scene_with_its_files() -> None:
         archive.writestr("model/m.mtl", "newmtl a\nmap_Kd ../maps/Wood.png\n")
         archive.writestr("maps/wood.png", png(0, 255, 0))
     scene = import_scene(packed.getvalue(), "test", LIGHT)
-    np.testing.assert_allclose(values_of(scene.materials[0].textures["diffuse"])[0, 0], [0, 1, 0])
+    np.testing.assert_allclose(get_texture_values(scene.materials[0].textures["diffuse"])[0, 0], [0, 1, 0])
     assert scene.warnings == ()
 
 

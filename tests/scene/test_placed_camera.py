@@ -8,7 +8,7 @@ import pytest
 
 from relume.errors import ParameterError
 from relume.scene.built_in import built_in
-from relume.scene.placed_camera import FARTHEST, placed_camera, read_placed, with_cameras
+from relume.scene.placed_camera import MAX_DISTANCE_M, make_custom_camera, read_custom_camera, with_cameras
 
 EYE = [1, 0, 0, 3, 0, 1, 0, 2, 0, 0, 1, 9, 0, 0, 0, 1]
 
@@ -26,7 +26,7 @@ def changed(index: int, value: float) -> list[float]:
 
 
 def test_camera_of_a_scene_has_its_place_and_angle() -> None:
-    camera = placed_camera("Hero", EYE, 40).camera
+    camera = make_custom_camera("Hero", EYE, 40).camera
     assert camera.name == "Hero"
     assert camera.to_world[:3, 3].tolist() == [3, 2, 9]
     assert camera.yfov == pytest.approx(math.radians(40))
@@ -34,11 +34,11 @@ def test_camera_of_a_scene_has_its_place_and_angle() -> None:
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 7.5])
 def test_scale_is_taken_out_and_what_is_left_stays_the_same_text(scale: float) -> None:
-    placed = placed_camera("Hero", turned(33.3, scale), 40)
+    placed = make_custom_camera("Hero", turned(33.3, scale), 40)
     np.testing.assert_allclose(placed.camera.to_world, np.array(turned(33.3)).reshape(4, 4), atol=1e-12)
     text = json.dumps(placed.document())
-    assert read_placed(json.loads(text)) == placed
-    assert json.dumps(read_placed(json.loads(text)).document()) == text
+    assert read_custom_camera(json.loads(text)) == placed
+    assert json.dumps(read_custom_camera(json.loads(text)).document()) == text
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_scale_is_taken_out_and_what_is_left_stays_the_same_text(scale: float) -
         (changed(3, math.inf), "16 finite numbers"),
         (changed(15, 2.0), "the last four"),
         (changed(12, 0.1), "the last four"),
-        (changed(3, 2 * FARTHEST), "from the origin"),
+        (changed(3, 2 * MAX_DISTANCE_M), "from the origin"),
         (changed(5, 0.0), "none of them zero"),
         (changed(5, 1e308), "none of them zero"),
         (changed(1, 0.5), "right angles"),
@@ -58,19 +58,19 @@ def test_scale_is_taken_out_and_what_is_left_stays_the_same_text(scale: float) -
 )
 def test_what_is_no_camera_is_refused(to_world: list[float], said: str) -> None:
     with pytest.raises(ParameterError, match=said):
-        placed_camera("Hero", to_world, 40)
+        make_custom_camera("Hero", to_world, 40)
 
 
 @pytest.mark.parametrize("yfov", [0.0, -40.0, 180.0, math.nan, math.inf])
 def test_angle_that_shows_nothing_is_refused(yfov: float) -> None:
     with pytest.raises(ParameterError, match="degrees"):
-        placed_camera("Hero", EYE, yfov)
+        make_custom_camera("Hero", EYE, yfov)
 
 
 @pytest.mark.parametrize("name", ["", " Hero", "a/b", "a\\b", "..", "x" * 81, "line\nbreak"])
 def test_name_that_is_no_part_of_an_address_is_refused(name: str) -> None:
     with pytest.raises(ParameterError, match="printable characters"):
-        placed_camera(name, EYE, 40)
+        make_custom_camera(name, EYE, 40)
 
 
 @pytest.mark.parametrize(
@@ -88,13 +88,13 @@ def test_name_that_is_no_part_of_an_address_is_refused(name: str) -> None:
 )
 def test_document_that_is_no_camera_is_refused(document: object) -> None:
     with pytest.raises(ParameterError):
-        read_placed(document)
+        read_custom_camera(document)
 
 
 def test_a_scene_with_more_cameras_is_the_same_scene() -> None:
     scene = built_in("cornell_box")
     own = scene.cameras[0].name
-    more = with_cameras(scene, [placed_camera("Hero", EYE, 40).camera, placed_camera(own, EYE, 50).camera])
+    more = with_cameras(scene, [make_custom_camera("Hero", EYE, 40).camera, make_custom_camera(own, EYE, 50).camera])
     assert more.id == scene.id
     assert {camera.name for camera in more.cameras} == {*(camera.name for camera in scene.cameras), "Hero"}
     assert next(camera for camera in more.cameras if camera.name == own).yfov == pytest.approx(math.radians(50))

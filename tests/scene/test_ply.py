@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from glb_builder import LEFT
-from ply_builder import POINTS, binary, text
+from glb_builder import DIELECTRIC_TRANSMISSION
+from ply_builder import POSITIONS, binary, text
 
 from relume.environments.model import Environment
 from relume.scene.importer import import_scene
@@ -26,7 +26,7 @@ def test_all_formats_say_the_same(data: bytes, mixed: bool) -> None:
     if mixed:  # a triangle after the quad: rows of different lengths
         data = {b"asc": text(True), b"bin": binary("<", True)}[data.split()[2][:3]]
     (mesh,) = imported(data).meshes
-    expected = POINTS[[0, 1, 2, 0, 2, 3, *([0, 1, 3] if mixed else [])]]
+    expected = POSITIONS[[0, 1, 2, 0, 2, 3, *([0, 1, 3] if mixed else [])]]
     np.testing.assert_array_equal(mesh.positions, expected.astype(np.float32))
     np.testing.assert_allclose(mesh.normals, [[0, 0, 1]] * len(expected), atol=1e-6)
 
@@ -42,7 +42,9 @@ def test_normals_coordinates_and_colours_are_understood() -> None:
     mesh = scene.meshes[0]
     np.testing.assert_allclose(mesh.normals, [[0, 0.6, 0.8]] * 3, atol=1e-6)
     np.testing.assert_array_equal(mesh.uvs, [[0, 1], [1, 1], [0, 0]])
-    np.testing.assert_allclose(scene.materials[0].terms[0]["color"], np.array([1, 0, 0.2158605]) * LEFT, atol=1e-6)
+    np.testing.assert_allclose(
+        scene.materials[0].terms[0]["color"], np.array([1, 0, 0.2158605]) * DIELECTRIC_TRANSMISSION, atol=1e-6
+    )
     assert scene.warnings == ()
 
 

@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from tiny_scenes import looking, quad, scene_of
+from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.scene.projected import are_projected
+from relume.scene.projected import find_triplanar
 
 CORNERS = [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]]
-CAMERA = looking("front", [0, 2, 2], [0, 0, 0], 0.8)
+CAMERA = make_camera("front", [0, 2, 2], [0, 0, 0], 0.8)
 
 
 def mesh(name, material, is_mapped):
@@ -18,7 +18,7 @@ def mesh(name, material, is_mapped):
 
 def test_most_triangles_decide():
     def found(*meshes):
-        return are_projected(scene_of(*meshes, camera=CAMERA))
+        return find_triplanar(make_tiny_scene(*meshes, camera=CAMERA))
 
     assert found(mesh("bare", 0, False), mesh("mapped", 1, True)) == [True, False]
     mixed = [mesh("bare", 1, False), mesh("mapped", 1, True), mesh("again", 1, True)]

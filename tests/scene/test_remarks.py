@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from relume.environments.model import Environment
-from relume.remarks import remark_of, simplified, unused, wrong
+from relume.remarks import approximated, ignored, unsupported, warning_of
 from relume.scene.archive import load_scene, save_scene
-from relume.scene.finish import MAX_WARNINGS, finished_scene
+from relume.scene.finish import MAX_WARNINGS, finalize
 from relume.scene.importer import import_scene
 from relume.scene.model import Scene
 
@@ -50,13 +50,13 @@ def test_scenes_of_before_there_were_effects_still_open(tmp_path: Path) -> None:
 
 def test_what_is_left_out_of_a_long_list_weighs_least() -> None:
     scene = imported()
-    found = [unused("a little thing")] * MAX_WARNINGS + [simplified("a mean")] * 3 + [wrong("a hole")]
-    listed = finished_scene("test", scene.meshes, scene.materials, scene.cameras, LIGHT, found).warnings
+    found = [ignored("a little thing")] * MAX_WARNINGS + [approximated("a mean")] * 3 + [unsupported("a hole")]
+    listed = finalize("test", scene.meshes, scene.materials, scene.cameras, LIGHT, found).warnings
     assert listed[:4] == ("a hole", "a mean", "a mean", "a mean")
     assert (listed[-1], listed[-1].effect, len(listed)) == ("and 4 more of the kind", "unused", MAX_WARNINGS + 1)
 
 
 def test_a_remark_survives_documents_and_processes() -> None:
-    remark = simplified("a mean")
-    for copy in (remark_of(json.loads(json.dumps(remark.document()))), pickle.loads(pickle.dumps(remark))):
+    remark = approximated("a mean")
+    for copy in (warning_of(json.loads(json.dumps(remark.document()))), pickle.loads(pickle.dumps(remark))):
         assert (copy, copy.effect) == (remark, remark.effect)

@@ -9,7 +9,7 @@ from relume.eye.view_samples import BACKGROUND, sample_view
 from relume.scene.cornell import cornell_box, lamplit_cornell_box
 from relume.scene.interior import interior
 from relume.scene.tableau import tableau
-from relume.trace.geometry import merge
+from relume.trace.geometry import build_scene_buffers
 
 SCENES = {"cornell": cornell_box, "lamplit": lamplit_cornell_box, "interior": interior, "tableau": tableau}
 
@@ -26,7 +26,7 @@ def test_nothing_is_seen_from_behind(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_all_materials_are_in_the_picture(name):
     scene = SCENES[name]()
-    samples = sample_view(scene, merge(scene), "front", (64, 64))
+    samples = sample_view(scene, build_scene_buffers(scene), "front", (64, 64))
     assert set(range(len(scene.materials))) <= set(samples.material.tolist()) - {BACKGROUND}
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from texture_values import values_of
+from texture_values import get_texture_values
 
 from relume.environments.model import Environment
 from relume.errors import SceneError
 from relume.scene import companions
-from relume.scene.companions import Sent
+from relume.scene.companions import UploadedFiles
 from relume.scene.importer import import_scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -28,7 +28,7 @@ def kept(folder: Path, **files: bytes) -> dict[str, Path]:
 
 def test_names_are_looked_up_from_the_scenes_folder_not_from_the_disk(tmp_path: Path) -> None:
     (path,) = kept(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n").values()
-    sent = Sent({"room\\looks\\Red.MTL": path}, "room/meshes/triangle.obj")
+    sent = UploadedFiles({"room\\looks\\Red.MTL": path}, "room/meshes/triangle.obj")
     scene = import_scene(TRIANGLE, "test", LIGHT, sent)
     assert scene.materials[0].terms[0]["color"] == [1, 0, 0]
     assert scene.warnings == ()
@@ -36,7 +36,7 @@ def test_names_are_looked_up_from_the_scenes_folder_not_from_the_disk(tmp_path: 
 
 def test_a_file_that_was_not_sent_is_missing_even_where_the_disk_has_it(tmp_path: Path) -> None:
     kept(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n")
-    sent = Sent({}, "meshes/triangle.obj")
+    sent = UploadedFiles({}, "meshes/triangle.obj")
     missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, sent)
     assert any("is not beside the scene" in warning for warning in missing.warnings)
     with pytest.raises(SceneError, match="outside the folder"):
@@ -50,13 +50,13 @@ def test_images_lie_where_the_material_file_says_or_else_where_the_scene_would(t
     Image.new("RGB", (2, 2), (255, 0, 0)).save(picture, "PNG")
     files = kept(tmp_path, scene=b"", looks=f"newmtl Red\nKd 1 1 1\nmap_Kd {image}\n".encode(), png=picture.getvalue())
     lies = {"../images/red.png": "room/images/red.png", "looks/red.png": "room/looks/red.png"}[image]
-    sent = Sent({"room/looks/red.mtl": files["looks"], lies: files["png"]}, "room/triangle.obj")
+    sent = UploadedFiles({"room/looks/red.mtl": files["looks"], lies: files["png"]}, "room/triangle.obj")
     scene = import_scene(TRIANGLE.replace(b"../looks", b"looks"), "test", LIGHT, sent)
-    np.testing.assert_allclose(values_of(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0], atol=1e-3)
+    np.testing.assert_allclose(get_texture_values(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0], atol=1e-3)
 
 
 def test_together_they_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(companions, "MAX_BYTES", 5)
     files = kept(tmp_path, a=b"1234", b=b"12")
     with pytest.raises(SceneError, match="scale them down"):
-        Sent(files, "scene.obj")
+        UploadedFiles(files, "scene.obj")

@@ -7,11 +7,11 @@ import pytest
 from glb_builder import Glb
 
 from relume.environments.model import Environment
-from relume.scene.companions import Alone
+from relume.scene.companions import NoFiles
 from relume.scene.gltf import import_gltf
 from relume.scene.mesh_files import import_obj, import_ply
-from relume.scene.model import Coding, Scene, Texture
-from relume.scene.vertex_colors import WRAP, colors_as_image
+from relume.scene.model import Scene, Texture, TextureEncoding
+from relume.scene.vertex_colors import WRAP, draw_color_image
 from relume.trace.texture import MipMap
 
 LIGHT = Environment("grey", np.ones((2, 4, 3), np.float32))
@@ -22,8 +22,8 @@ def test_look_ups_between_corners_are_what_is_between_their_colours() -> None:
     calm = 0.5 + 0.15 * rng.random((50, 3, 4))
     gaudy = rng.random((50, 3, 4))
     for corners, most in ((calm, 0.006), (gaudy, 0.1)):
-        image, places, white = colors_as_image(corners.astype(np.float32))
-        pyramid = MipMap(Texture(np.ascontiguousarray(image[..., :3]), WRAP, Coding("srgb")))
+        image, places, white = draw_color_image(corners.astype(np.float32))
+        pyramid = MipMap(Texture(np.ascontiguousarray(image[..., :3]), WRAP, TextureEncoding("srgb")))
         share = rng.dirichlet([1, 1, 1], (50, 40))
         uv = np.einsum("nkc,ncd->nkd", share, places).reshape(-1, 2).astype(np.float32)
         found = pyramid.sample(uv, np.zeros(len(uv), np.float32))
@@ -90,7 +90,7 @@ def test_a_ply_file_shows_them() -> None:
 @pytest.mark.parametrize("objects", [1, 2])
 def test_an_obj_file_of_one_object_shows_them_and_others_say_that_they_do_not(objects: int) -> None:
     lines = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n" + "".join(f"o {k}\nf 1 2 3\n" for k in range(objects))
-    scene = import_obj(lines.encode(), "x", LIGHT, Alone())
+    scene = import_obj(lines.encode(), "x", LIGHT, NoFiles())
     if objects == 2:
         assert "vertex colours" in str(scene.warnings[0])
         return

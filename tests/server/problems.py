@@ -3,7 +3,7 @@
 from typing import Any
 
 
-def problem_of(response: Any) -> dict[str, Any]:
+def parse_problem(response: Any) -> dict[str, Any]:
     assert response.headers["content-type"] == "application/problem+json"
     problem: dict[str, Any] = response.json()
     assert problem["status"] == response.status_code

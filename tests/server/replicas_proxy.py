@@ -18,7 +18,7 @@ _NGINX = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
 
 
 @contextmanager
-def proxied(folder: Path, ports: Sequence[int]) -> Iterator[int]:
+def proxy_to_ports(folder: Path, ports: Sequence[int]) -> Iterator[int]:
     """Port of nginx before servers at ports of this machine; skips the test where there is no nginx.
 
     Args:
@@ -31,22 +31,22 @@ def proxied(folder: Path, ports: Sequence[int]) -> Iterator[int]:
 
 
 @contextmanager
-def proxied_by_one_name(folder: Path, addresses: Sequence[str], server_port: int) -> Iterator[int]:
-    """As `proxied`, before servers at addresses that the name `server` means together, as in compose."""
+def proxy_to_shared_name(folder: Path, addresses: Sequence[str], server_port: int) -> Iterator[int]:
+    """As `proxy_to_ports`, before servers at addresses that the name `server` means together, as in compose."""
     (folder / "hosts").write_text("".join(f"{address} server\n" for address in addresses))
-    alone = ["unshare", "--map-root-user", "--mount"]  # the name means them to this nginx, and to nobody else
-    if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False).returncode != 0:
+    private_mounts = ["unshare", "--map-root-user", "--mount"]  # the name means them to this nginx, and to nobody else
+    if shutil.which("unshare") is None or subprocess.run([*private_mounts, "true"], check=False).returncode != 0:
         pytest.skip("unshare may not give a process mounts of its own here")
-    as_named = 'mount --bind "$0" /etc/hosts && exec "$@"'
-    before = [*alone, "sh", "-c", as_named, str(folder / "hosts")]
+    mount_script = 'mount --bind "$0" /etc/hosts && exec "$@"'
+    command_prefix = [*private_mounts, "sh", "-c", mount_script, str(folder / "hosts")]
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    with _running(folder, port, [f"server:{server_port}"], before):
+    with _running(folder, port, [f"server:{server_port}"], command_prefix):
         yield port
 
 
 @contextmanager
-def _running(folder: Path, port: int, servers: Sequence[str], before: Sequence[str] = ()) -> Iterator[None]:
+def _running(folder: Path, port: int, servers: Sequence[str], command_prefix: Sequence[str] = ()) -> Iterator[None]:
     """nginx at that port until the end, started by what stands before its command."""
     if _NGINX is None:
         pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
@@ -55,8 +55,10 @@ def _running(folder: Path, port: int, servers: Sequence[str], before: Sequence[s
     (line,) = re.findall(r"server server:8420[^;]*;", text)
     lines = "".join(line.replace("server:8420", each) for each in servers)
     (folder / "nginx.conf").write_text(text.replace(line, lines))
-    own = "daemon off;" + (" user root;" if before else "")  # root there is who runs this, and can be nobody else
-    command = [*before, _NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", own]
+    directives = "daemon off;" + (
+        " user root;" if command_prefix else ""
+    )  # root there is who runs this, and can be nobody else
+    command = [*command_prefix, _NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", directives]
     process = subprocess.Popen(command)
     try:
         _wait_for(port, process)

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastapi import FastAPI
-from server_fakes import SIZE, BatchesHere, Control, tiny_scene
+from server_fakes import SIZE, Control, InThreadBatches, tiny_scene
 from server_fixtures import open_fake_bakes
 from websockets import Subprotocol
 from websockets.sync.client import ClientConnection, connect
 
 from relume.bake import Recipe
-from server.app import create_app, stoppable
-from server.running.process import Process
+from server.app import create_app, create_server
+from server.running.process import ServerProcess
 from server.settings import Settings
 from worker.scenes import register_scene
 
@@ -27,7 +27,7 @@ class Running:
     """A server, the thread that it runs in, and its port."""
 
     app: FastAPI
-    process: Process
+    process: ServerProcess
     thread: threading.Thread
     port: int
 
@@ -52,8 +52,10 @@ def open_socket(url: str, **opening: Any) -> Iterator[ClientConnection]:
 @contextmanager
 def running_server(settings: Settings, control: Control) -> Iterator[Running]:
     settings.allowed_hosts = ["127.0.0.1"]
-    app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
-    process = stoppable(app, settings)
+    app = create_app(
+        settings, open_library=control.open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
+    )
+    process = create_server(app, settings)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         thread = threading.Thread(target=process.run, kwargs={"sockets": [listening]})
         thread.start()

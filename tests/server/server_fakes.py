@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
 from relume.environments.model import Environment
 from relume.errors import CancelledError, EditNotSupportedError, MemoryBudgetError
 from relume.look import default_look
-from relume.memory import Holder
-from relume.picture.transfer import Axis, Eyes
-from relume.reference import Truth
-from relume.render.finder import Finder
+from relume.memory import CacheOwner
+from relume.picture.transfer import CameraMode, EditAxis
+from relume.reference import ReferenceImage
+from relume.render.finder import Viewport
 from relume.scene.archive import load_scene, make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.store import open_store
-from server.apart.step import IsWanted, Step, Tell
+from server.apart.step import IsNeeded, ProgressCallback, Step
 from server.apart.steps import do_step
-from server.apart.workshop import Workshop
-from server.files.importing import ImportRequest, _written
+from server.apart.workshop import BatchContext
+from server.files.importing import ImportRequest, _write_scene
 from server.library.ports import Library
 from server.settings import Settings
 
@@ -49,9 +49,9 @@ def tiny_scene(name: str = "triangle") -> Scene:
     )
 
 
-def made(request: ImportRequest) -> str:
+def write_tiny_scene(request: ImportRequest) -> str:
     """What the process of an import does, without one: it makes the tiny scene, whatever the file is."""
-    return _written(request, tiny_scene())
+    return _write_scene(request, tiny_scene())
 
 
 @dataclass(frozen=True)
@@ -77,10 +77,10 @@ class FakeMethod:
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
         return [Task(0, 0, "", 0, 4)]
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
         if self.gate is not None:
             self.gate.wait(30)
-        return Written({"values": np.arange(4, dtype=np.float32)}, 10, 0.0)
+        return TaskOutput({"values": np.arange(4, dtype=np.float32)}, 10, 0.0)
 
 
 @dataclass(frozen=True)
@@ -106,45 +106,45 @@ class FakeTransfer:
     default_look: dict[str, Any] = field(default_factory=lambda: default_look(tiny_scene().materials))
     material_names: list[str] = field(default_factory=lambda: ["Paper"])
 
-    eyes: Eyes = Eyes.BAKED
+    camera_mode: CameraMode = CameraMode.FIXED
 
     @property
-    def axes(self) -> frozenset[Axis]:
-        return frozenset([Axis.CURVE, *([Axis.BOUNCES] if self.method == "gather" else [])])
+    def axes(self) -> frozenset[EditAxis]:
+        return frozenset([EditAxis.CURVE, *([EditAxis.BOUNCES] if self.method == "gather" else [])])
 
-    def radiance_of(self, name: str | None) -> np.ndarray:
+    def environment_radiance(self, name: str | None) -> np.ndarray:
         return np.ones((4, 8, 3), np.float32)
 
 
 @dataclass(frozen=True)
 class FakeJob:
-    """One curve; made when `control.may_freeze` says so."""
+    """One curve; made when `control.freeze_gate` says so."""
 
     control: "Control"
     key: str
     state: str = "freezing"
-    refines: bool = False
-    goes_on: bool = False
+    is_refinement: bool = False
+    is_resumable: bool = False
 
     @property
-    def what(self) -> str:
+    def label(self) -> str:
         return f"Paper, {self.key.rsplit('/', 1)[-1]}"
 
-    def make(self, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> str:
-        self.control.freezing.set()
+    def run(self, progress: Callable[[float], None], is_canceled: Callable[[], bool]) -> str:
+        self.control.freeze_started.set()
         progress(0.5)
-        while not self.control.may_freeze.wait(0.01):
-            if cancelled():
+        while not self.control.freeze_gate.wait(0.01):
+            if is_canceled():
                 self.control.num_cancelled += 1
                 raise CancelledError("stopped")
         return self.key
 
 
-def advance_of(tiles: list[Any], exact: bool) -> SimpleNamespace:
+def make_advance(tiles: list[Any], exact: bool) -> SimpleNamespace:
     """What a step of a whole picture says."""
     fidelity = "exact" if exact else "approximate"
-    shown = {"exact": exact, "fidelity": fidelity, "complete": True, "was_off": None}
-    return SimpleNamespace(tiles=tiles, changed=bool(tiles), **shown)
+    fields = {"exact": exact, "fidelity": fidelity, "complete": True, "was_off": None}
+    return SimpleNamespace(tiles=tiles, changed=bool(tiles), **fields)
 
 
 @dataclass
@@ -155,58 +155,65 @@ class FakePicture:
     view: FakeView
     control: "Control"
     look: Any = None
-    spent: int = 0
-    frozen: set[str] = field(default_factory=lambda: {THETA_H})
-    wanted: str = THETA_H
+    num_coefficients_used: int = 0
+    frozen_curves: set[str] = field(default_factory=lambda: {THETA_H})
+    active_pointer: str = THETA_H
     ior: float = 1.5
 
     def __post_init__(self) -> None:
         self.pixels = np.zeros((self.view.height, self.view.width, 3), np.float32)
 
-    def set_look(self, look: Any, *, hand: str | None, solo: frozenset[str] | None) -> None:
+    def set_look(self, look: Any, *, active_pointer: str | None, solo: frozenset[str] | None) -> None:
         if look.environment.rotation != 0.0:
             raise EditNotSupportedError("direct", "the environment's rotation")
-        if self.look is None or colour_and_sigma(look) != colour_and_sigma(self.look):
-            self.spent = 0
+        if self.look is None or sum_color_and_sigma(look) != sum_color_and_sigma(self.look):
+            self.num_coefficients_used = 0
         self.look = look
         self.control.num_looks += 1
-        self.control.hands.append(hand)
+        self.control.controls.append(active_pointer)
         self.control.solos.append(solo)
 
     def look_at(self, region: tuple[int, int, int, int] | None) -> None:
         self.control.regions.append(region)
 
     def check(self, look: Any) -> None:
-        if self.view.name in self.control.short_of_memory and ior_of(look) != self.ior:
+        if self.view.name in self.control.views_over_budget and get_ior(look) != self.ior:
             raise MemoryBudgetError("the curve", 2, 1, "close it")
 
-    def touch(self, pointer: str) -> None:
-        if self.view.name in self.control.short_of_memory:
+    def prepare(self, pointer: str) -> None:
+        if self.view.name in self.control.views_over_budget:
             raise MemoryBudgetError("the curve", 2, 1, "close it")
-        self.wanted = pointer
+        self.active_pointer = pointer
 
     def next_job(self) -> FakeJob | None:
-        lacking = [THETA_D] if self._lacks_theta_d() else []
-        needed = [curve for curve in (*lacking, self.wanted) if curve not in self.frozen]
-        return FakeJob(self.control, needed[0], refines=self.control.refines) if needed else None
+        missing_curves = [THETA_D] if self._needs_theta_d() else []
+        pending_curves = [curve for curve in (*missing_curves, self.active_pointer) if curve not in self.frozen_curves]
+        return (
+            FakeJob(self.control, pending_curves[0], is_refinement=self.control.is_refinement)
+            if pending_curves
+            else None
+        )
 
-    def install(self, need: FakeJob, made: str) -> None:
-        self.frozen.add(made)
+    def install(self, job: FakeJob, result: str) -> None:
+        self.frozen_curves.add(result)
 
-    def _lacks_theta_d(self) -> bool:
-        return self.look is not None and ior_of(self.look) != self.ior
+    def _needs_theta_d(self) -> bool:
+        return self.look is not None and get_ior(self.look) != self.ior
 
     def advance(self, max_coefficients: int | None) -> Any:
-        if self._lacks_theta_d() and THETA_D in self.frozen:
-            self.ior, self.spent = ior_of(self.look), 0
-        exact = not self._lacks_theta_d()
-        if self.spent >= NUM_COEFFICIENTS:
-            return advance_of([], exact)
+        if self._needs_theta_d() and THETA_D in self.frozen_curves:
+            self.ior, self.num_coefficients_used = get_ior(self.look), 0
+        exact = not self._needs_theta_d()
+        if self.num_coefficients_used >= NUM_COEFFICIENTS:
+            return make_advance([], exact)
         budget = NUM_COEFFICIENTS if max_coefficients is None else min(max_coefficients, self.control.max_step)
-        self.spent = min(NUM_COEFFICIENTS, self.spent + budget)
-        target = colour_and_sigma(self.look) + (self.ior - 1.5)
-        self.pixels += (target - self.pixels) * np.float32(self.spent / NUM_COEFFICIENTS)
-        return advance_of(self.all_tiles()[: self.control.tiles_a_step], exact and self.spent == NUM_COEFFICIENTS)
+        self.num_coefficients_used = min(NUM_COEFFICIENTS, self.num_coefficients_used + budget)
+        target = sum_color_and_sigma(self.look) + (self.ior - 1.5)
+        self.pixels += (target - self.pixels) * np.float32(self.num_coefficients_used / NUM_COEFFICIENTS)
+        return make_advance(
+            self.all_tiles()[: self.control.num_tiles_per_step],
+            exact and self.num_coefficients_used == NUM_COEFFICIENTS,
+        )
 
     def all_tiles(self) -> list[tuple[int, int, int, int]]:
         width, height = self.view.width, self.view.height
@@ -228,17 +235,17 @@ class FakePicture:
     def image(self) -> np.ndarray:
         return self.pixels
 
-    def probe(self, x: int, y: int) -> dict[str, Any]:
+    def inspect(self, x: int, y: int) -> dict[str, Any]:
         return {
             "material": "Paper",
             "position": np.array([1.0, 2.0, 3.0]),
             "normal": np.array([0.0, 1.0, 0.0]),
             "radiance": [float(c) for c in self.pixels[y, x]],
             "bands": np.ones((3, 4)),
-            "curve": self.wanted,
+            "curve": self.active_pointer,
         }
 
-    def brush(self, pointer: str, from_deg: float, to_deg: float) -> np.ndarray:
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> np.ndarray:
         return np.full((self.view.height, self.view.width), (to_deg - from_deg) / 90.0, np.float32)
 
 
@@ -253,34 +260,34 @@ class Control:
     """What tests set and see."""
 
     max_step: int = NUM_COEFFICIENTS
-    refines: bool = False
+    is_refinement: bool = False
     num_looks: int = 0
-    tiles_a_step: int = 1
+    num_tiles_per_step: int = 1
     regions: list[tuple[int, int, int, int] | None] = field(default_factory=list)
-    hands: list[str | None] = field(default_factory=list)
+    controls: list[str | None] = field(default_factory=list)
     solos: list[frozenset[str] | None] = field(default_factory=list)
     num_cancelled: int = 0
     num_opened: int = 0
-    freezing: threading.Event = field(default_factory=threading.Event)
-    may_freeze: threading.Event = field(default_factory=threading.Event)
-    may_trace: threading.Event = field(default_factory=threading.Event)
-    short_of_memory: set[str] = field(default_factory=set)
-    stores_kept: list[set[Path]] = field(default_factory=list)
+    freeze_started: threading.Event = field(default_factory=threading.Event)
+    freeze_gate: threading.Event = field(default_factory=threading.Event)
+    trace_gate: threading.Event = field(default_factory=threading.Event)
+    views_over_budget: set[str] = field(default_factory=set)
+    stores_in_use: list[set[Path]] = field(default_factory=list)
     render_gate: threading.Event = field(default_factory=_open_gate)
-    passes_asked: list[int] = field(default_factory=list)
-    reflections_asked: list[bool] = field(default_factory=list)
-    frames_from: list[tuple[Camera, tuple[int, int]] | None] = field(default_factory=list)
-    passes_from: list[tuple[Camera, tuple[int, int]]] = field(default_factory=list)
+    requested_passes: list[int] = field(default_factory=list)
+    requested_reflections: list[bool] = field(default_factory=list)
+    frame_cameras: list[tuple[Camera, tuple[int, int]] | None] = field(default_factory=list)
+    pass_cameras: list[tuple[Camera, tuple[int, int]]] = field(default_factory=list)
 
     def open_library(self, cache_bytes: int, floor_bytes: int) -> Library:
-        paint = self._open, self._open, self._picture, self._render, self._render_small, self._reference
+        openers_and_renderers = self._open, self._open, self._picture, self._render, self._render_small, self._reference
         return Library(
-            *paint,
-            lambda folder: Finder.of(load_scene(folder)),
+            *openers_and_renderers,
+            lambda folder: Viewport.from_scene(load_scene(folder)),
             lambda transfer: ({}, {}),
-            lambda: {Holder("frozen", "0123"): 100},
+            lambda: {CacheOwner("frozen", "0123"): 100},
             lambda: 123,
-            lambda stores: self.stores_kept.append(set(stores)),
+            lambda stores: self.stores_in_use.append(set(stores)),
         )
 
     def _open(self, path: Path) -> FakeTransfer:
@@ -299,19 +306,21 @@ class Control:
         look: Any,
         *,
         progress: Callable[[float], object] = lambda share: None,
-        cancelled: Callable[[], bool] = lambda: False,
+        is_canceled: Callable[[], bool] = lambda: False,
         for_display: bool = False,
-        eye: tuple[Camera, tuple[int, int]] | None = None,
+        camera_and_size: tuple[Camera, tuple[int, int]] | None = None,
         exact: bool = True,
     ) -> np.ndarray:
         """It waits half way while `render_gate` is clear."""
-        self.frames_from.append(eye)
+        self.frame_cameras.append(camera_and_size)
         progress(0.5)
         while not self.render_gate.wait(0.01):
-            if cancelled():
+            if is_canceled():
                 raise CancelledError("stopped")
         progress(1.0)
-        width, height = (transfer.views[view].width, transfer.views[view].height) if eye is None else eye[1]
+        width, height = (
+            (transfer.views[view].width, transfer.views[view].height) if camera_and_size is None else camera_and_size[1]
+        )
         shape = height, width, 3
         return np.full(shape, exact_pixel(look), np.float32)
 
@@ -327,56 +336,56 @@ class Control:
         size: tuple[int, int],
         spp: int,
         progress: Callable[[float], object],
-        cancelled: Callable[[], bool],
+        is_canceled: Callable[[], bool],
         pass_index: int,
         *,
         reflects: bool,
         is_whole: bool,
-    ) -> Truth:
+    ) -> ReferenceImage:
         """Noise of a fiftieth around a truth that the frame misses by a tenth, and by a third by all paths."""
         if not scene.is_dir():
             raise FileNotFoundError(scene)
-        self.passes_asked.append(pass_index)
-        self.passes_from.append((camera, size))
-        self.reflections_asked.append(reflects)
-        while not self.may_trace.wait(0.01):
-            if cancelled():
+        self.requested_passes.append(pass_index)
+        self.pass_cameras.append((camera, size))
+        self.requested_reflections.append(reflects)
+        while not self.trace_gate.wait(0.01):
+            if is_canceled():
                 raise CancelledError("stopped")
         progress(1.0)
         noise = np.random.default_rng(pass_index).standard_normal((size[1], size[0], 3))
-        followed = (exact_pixel(look) / 1.1 * (1 + noise / 50)).astype(np.float32)
-        whole = followed * np.float32(1.1 * 0.75)
-        return Truth(whole if is_whole else None, followed, ("What surfaces reflect.",), ())
+        supported = (exact_pixel(look) / 1.1 * (1 + noise / 50)).astype(np.float32)
+        all_paths = supported * np.float32(1.1 * 0.75)
+        return ReferenceImage(all_paths if is_whole else None, supported, ("What surfaces reflect.",), ())
 
 
-class BatchesHere:
+class InThreadBatches:
     """Does steps in the thread that asks, with the library that the server has."""
 
     def __init__(self, settings: Settings, library: Library) -> None:
-        self._shop = Workshop(settings.data, library)
+        self._context = BatchContext(settings.data, library)
 
-    def run(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
-        return do_step(self._shop, step, tell, lambda: not is_wanted())
+    def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
+        return do_step(self._context, step, report, lambda: not is_needed())
 
     def resident_bytes(self) -> int:
         return 0
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         pass
 
     def close(self) -> None:
         pass
 
 
-def colour_and_sigma(look: Any) -> float:
+def sum_color_and_sigma(look: Any) -> float:
     terms = look.materials["Paper"].terms
     return float(terms[0]["color"][0]) + float(terms[1]["params"]["sigma"])
 
 
-def ior_of(look: Any) -> float:
+def get_ior(look: Any) -> float:
     return float(look.materials["Paper"].terms[1]["params"]["ior"])
 
 
 def exact_pixel(look: Any) -> float:
     """What `FakePicture` shows everywhere when it is exact."""
-    return colour_and_sigma(look) + ior_of(look) - 1.5
+    return sum_color_and_sigma(look) + get_ior(look) - 1.5

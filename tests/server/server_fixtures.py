@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
-from server_fakes import SIZE, BatchesHere, Control, FakeMethod, tiny_scene
+from server_fakes import SIZE, Control, FakeMethod, InThreadBatches, tiny_scene
 from session_client import Baked
 from sqlalchemy import Engine, event
 
@@ -62,35 +62,41 @@ def settings(tmp_path: Path, ack_seconds: float, empty_ledger: Path) -> Settings
 
 
 def open_fake_bakes(settings: Settings) -> BakeService:
-    return BakeService(settings.data, settings.database_url, methods={"direct": FakeMethod()}, shares=settings.turns)
+    return BakeService(
+        settings.data, settings.database_url, methods={"direct": FakeMethod()}, client_weights=settings.turns
+    )
 
 
 @contextmanager
 def no_database_on_the_loop() -> Iterator[None]:
     """Fails where the event loop of a server waits for its database, and all sessions with it."""
-    asked: list[str] = []
+    blocking_statements: list[str] = []
 
-    def look(connection: object, cursor: object, statement: str, *_: object) -> None:
+    def check_statement(connection: object, cursor: object, statement: str, *_: object) -> None:
         if asyncio._get_running_loop() is None or threading.current_thread() is threading.main_thread():
             return
         calls = traceback.extract_stack()[:-1]
         if not any("/tests/" in call.filename for call in calls):  # tests ask what they like
-            ours = [call for call in calls if "/site-packages/" not in call.filename]
-            asked.append(f"{statement.splitlines()[0]}\n" + "".join(traceback.format_list(ours[-6:])))
+            own_calls = [call for call in calls if "/site-packages/" not in call.filename]
+            blocking_statements.append(
+                f"{statement.splitlines()[0]}\n" + "".join(traceback.format_list(own_calls[-6:]))
+            )
 
-    event.listen(Engine, "before_cursor_execute", look)
+    event.listen(Engine, "before_cursor_execute", check_statement)
     try:
         yield
     finally:
-        event.remove(Engine, "before_cursor_execute", look)
-    assert not asked, "\n".join(asked)
+        event.remove(Engine, "before_cursor_execute", check_statement)
+    assert not blocking_statements, "\n".join(blocking_statements)
 
 
 @pytest.fixture
 def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
     monkeypatch.setattr("server.live.state.frame_window.SLOW_S", math.inf)  # a busy machine is no slow link
     monkeypatch.setattr("server.live.sending.coefficient_budget.MIN_COEFFICIENTS", 512)  # nor does it take more steps
-    app = create_app(settings, open_library=control.open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes)
+    app = create_app(
+        settings, open_library=control.open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
+    )
     with no_database_on_the_loop(), TestClient(app, raise_server_exceptions=False) as client:
         yield client
 

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 SIGMA = "/materials/Paper/terms/1/params/sigma"
 IOR = "/materials/Paper/terms/1/params/ior"
 THETA_H = "/materials/Paper/terms/1/curves/theta_h"
-NOTHING: Mapping[str, Any] = {}
+NO_FIELDS: Mapping[str, Any] = {}
 THETA_D = "/materials/Paper/terms/1/curves/theta_d"
 
 
@@ -34,11 +34,13 @@ class Session:
     def __init__(self, websocket: Any, acknowledges: bool) -> None:
         self.websocket, self.acknowledges = websocket, acknowledges
 
-    def send(self, **message: Any) -> None:
+    def send_message(self, **message: Any) -> None:
         self.websocket.send_text(json.dumps(message))
 
-    def edit(self, revision: int, path: str, value: Any, op: str = "replace", hand: str | None = None) -> None:
-        self.send(type="edit", revision=revision, patch=[{"op": op, "path": path, "value": value}], hand=hand)
+    def edit(self, revision: int, path: str, value: Any, op: str = "replace", control: str | None = None) -> None:
+        self.send_message(
+            type="edit", revision=revision, patch=[{"op": op, "path": path, "value": value}], hand=control
+        )
 
     def receive(self) -> dict[str, Any] | Frame:
         message = self.websocket.receive()
@@ -50,7 +52,7 @@ class Session:
         (length,) = struct.unpack_from("<I", data)
         frame = Frame(json.loads(data[4 : 4 + length]), data[4 + length :])
         if self.acknowledges:
-            self.send(type="ack", frame=frame.header["frame"])
+            self.send_message(type="ack", frame=frame.header["frame"])
         return frame
 
     def text(self, kind: str) -> dict[str, Any]:
@@ -59,9 +61,9 @@ class Session:
             if isinstance(message, dict) and message["type"] == kind:
                 return message
 
-    def ready(self, what: str) -> None:
+    def wait_until_ready(self, label: str) -> None:
         """Wait until this has been prepared; other jobs may end before it."""
-        while (status := self.text("status"))["state"] != "ready" or status["what"] != what:
+        while (status := self.text("status"))["state"] != "ready" or status["what"] != label:
             pass
 
     def frame(self) -> Frame:
@@ -77,19 +79,19 @@ class Session:
                 return frame
 
 
-TOGETHER = {"room": "together-on-one-look-here"}
+ROOM_FIELDS = {"room": "together-on-one-look-here"}
 """What opens a session in a room."""
 
 
 @contextmanager
 def open_session(
-    client: TestClient, bake: str, *, acknowledges: bool = True, opening: Mapping[str, Any] = NOTHING, **options: Any
+    client: TestClient, bake: str, *, acknowledges: bool = True, opening: Mapping[str, Any] = NO_FIELDS, **options: Any
 ) -> Iterator[Session]:
     """A session that has said `opening`, the fields of its first message."""
     options = {"subprotocols": ["relume.v1"], **options}
     with client.websocket_connect(session_path(bake, opening), **options) as websocket:
         session = Session(websocket, acknowledges)
-        session.send(type="open", **opening)
+        session.send_message(type="open", **opening)
         yield session
 
 

@@ -12,40 +12,40 @@ from typing import Any
 import numpy as np
 import pg8000
 import pytest
-from server_fakes import BatchesHere
+from server_fakes import InThreadBatches
 from sqlalchemy.exc import OperationalError
 from tiny_scenes import still_life
 
 from relume.bake import Recipe
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_bake
 from relume.picture.picture import Picture
 from server.apart import ahead as module
-from server.apart.ahead import Ahead
-from server.apart.step import IsWanted, Step, Tell
+from server.apart.ahead import Prewarmer
+from server.apart.step import IsNeeded, ProgressCallback, Step
 from server.apart.thumbnails import Thumbnails
 from server.library.opening import open_library
 from server.settings import Settings
-from worker.database.faults import Complaint, database_away
+from worker.database.faults import DatabaseError, database_outage
 from worker.paths import bake_path
 from worker.scenes import register_scene
 from worker.service import BakeService
-from worker.storage.locks import open_locked
+from worker.storage.locks import open_lock_file
 
 SIZE = (24, 16)
 AWAY = pg8000.InterfaceError("refused")
 
 
 class Steps:
-    """Does steps here and remembers them; `before` is called first."""
+    """Does steps here and remembers them; `baked_normal` is called first."""
 
     def __init__(self, data: Path) -> None:
-        self._here = BatchesHere(Settings(data=data), open_library(1 << 28, 0))
+        self._here = InThreadBatches(Settings(data=data), open_library(1 << 28, 0))
         self.asked: list[tuple[str, str]] = []
         self.is_done = threading.Event()
-        self.before: Callable[[IsWanted], None] = lambda is_wanted: None
+        self.before: Callable[[IsNeeded], None] = lambda is_wanted: None
 
-    def run(self, step: Step, tell: Tell, is_wanted: IsWanted) -> Mapping[str, Any]:
+    def run(self, step: Step, tell: ProgressCallback, is_wanted: IsNeeded) -> Mapping[str, Any]:
         self.before(is_wanted)
         self.asked.append((step.kind, step.values["bake"]))
         answer = self._here.run(step, tell, is_wanted)
@@ -56,7 +56,7 @@ class Steps:
 
 @pytest.fixture
 def bakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[BakeService]:
-    monkeypatch.setattr(module, "ROUND_S", 0.02)
+    monkeypatch.setattr(module, "POLL_INTERVAL_S", 0.02)
     with BakeService(tmp_path) as service:
         yield service
 
@@ -69,17 +69,17 @@ def bake(bakes: BakeService, num_lights: int = 40) -> str:
     return identity
 
 
-def looking(bakes: BakeService, steps: Steps, is_used: Callable[[str], bool] = lambda bake: False) -> Ahead:
+def looking(bakes: BakeService, steps: Steps, is_used: Callable[[str], bool] = lambda bake: False) -> Prewarmer:
     thumbnails = Thumbnails(bakes.data_dir / "thumbnails", steps.run)
-    return Ahead(bakes.data_dir, bakes.ledger, steps.run, thumbnails, is_used)
+    return Prewarmer(bakes.data_dir, bakes.ledger, steps.run, thumbnails, is_used)
 
 
 def settled(bakes: BakeService, identity: str) -> np.ndarray:
     """The exact picture of a bake that nothing is in memory of. (height, width, 3)"""
-    path, memory = bake_path(bakes.data_dir, identity), Memory(1 << 28)
+    path, memory = bake_path(bakes.data_dir, identity), Cache(1 << 28)
     picture = Picture(open_bake(path, memory), "front", memory)
     while not picture.advance(None).exact or picture.next_job() is not None:
-        picture.freeze(lambda share: None, lambda: False)
+        picture.run_next_job(lambda share: None, lambda: False)
     return picture.image()
 
 
@@ -96,7 +96,7 @@ def test_a_bake_opens_with_its_exact_picture(bakes: BakeService, monkeypatch: py
     assert len(list((bakes.data_dir / "thumbnails").iterdir())) == 2
 
     with monkeypatch.context() as patched:
-        patched.setattr("relume.operators.shade.shaded_rows", refuse)
+        patched.setattr("relume.operators.shade.shade_rows", refuse)
         kept_picture = settled(bakes, later)
     for file in bake_path(bakes.data_dir, later).glob("derived/*/*.npy"):
         file.unlink()
@@ -125,7 +125,7 @@ def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> N
     used: set[str] = set()
     identity, steps, asked = bake(bakes), Steps(bakes.data_dir), threading.Event()
 
-    def wait(is_wanted: IsWanted) -> None:
+    def wait(is_wanted: IsNeeded) -> None:
         assert is_wanted()
         used.add(identity)
         assert not is_wanted()
@@ -145,11 +145,11 @@ def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> N
 def test_who_has_not_the_turn_says_nothing_of_the_database(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(module, "ROUND_S", 0.02)
+    monkeypatch.setattr(module, "POLL_INTERVAL_S", 0.02)
     bakes = BakeService(tmp_path)  # not started: it would ask the database itself
     lock, rounds = bakes.data_dir / module._LOCK, threading.Semaphore(0)
     ahead = looking(bakes, Steps(bakes.data_dir))
-    turn = ahead._turn
+    turn = ahead._try_lock
 
     @contextmanager
     def counted() -> Iterator[bool]:
@@ -157,9 +157,11 @@ def test_who_has_not_the_turn_says_nothing_of_the_database(
         with turn() as is_ours:
             yield is_ours
 
-    ahead._turn = counted  # type: ignore[method-assign]
+    ahead._try_lock = counted  # type: ignore[method-assign]
     with caplog.at_level(logging.WARNING, "worker.database.faults"):
-        Complaint(logging.getLogger("loop"), "it cannot be read").meet(OperationalError("SELECT 1", {}, AWAY))
+        DatabaseError(logging.getLogger("loop"), "it cannot be read").report_failure(
+            OperationalError("SELECT 1", {}, AWAY)
+        )
         with closing_lock(lock):
             ahead.start()
             for _ in range(3):
@@ -167,7 +169,7 @@ def test_who_has_not_the_turn_says_nothing_of_the_database(
             ahead.close()
         said = [record.getMessage() for record in caplog.records]
         assert [line.split(" (")[0] for line in said] == ["the database does not answer"]
-        database_away.well()
+        database_outage.report_recovered()
         assert "that is over" in caplog.text
     bakes.close()
 
@@ -175,7 +177,7 @@ def test_who_has_not_the_turn_says_nothing_of_the_database(
 @contextmanager
 def closing_lock(path: Path) -> Iterator[None]:
     """Another server has it meanwhile."""
-    lock = open_locked(path, fcntl.LOCK_EX)
+    lock = open_lock_file(path, fcntl.LOCK_EX)
     try:
         yield
     finally:
@@ -186,7 +188,7 @@ def test_one_server_of_several_does_it(bakes: BakeService) -> None:
     identity, first, second = bake(bakes), Steps(bakes.data_dir), Steps(bakes.data_dir)
     is_held, may_go = threading.Event(), threading.Event()
 
-    def hold(is_wanted: IsWanted) -> None:
+    def hold(is_wanted: IsNeeded) -> None:
         is_held.set()
         assert may_go.wait(60)
 
@@ -208,8 +210,8 @@ def test_one_server_of_several_does_it(bakes: BakeService) -> None:
 def test_a_bake_that_is_deleted_under_it_leaves_nothing(bakes: BakeService, caplog: pytest.LogCaptureFixture) -> None:
     identity, steps, is_over = bake(bakes), Steps(bakes.data_dir), threading.Event()
 
-    def delete(is_wanted: IsWanted) -> None:
-        bakes.forget(identity)
+    def delete(is_wanted: IsNeeded) -> None:
+        bakes.delete(identity)
         is_over.set()
 
     steps.before = delete

@@ -12,20 +12,20 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from fastapi.testclient import TestClient
 from session_client import Baked
 
-from relume.memory import Memory
+from relume.memory import Cache
 from server.files import answers as answers_module
 from server.files.answers import Answers
-from server.library.once import Once
+from server.library.once import SingleFlight
 
 T = TypeVar("T")
 
 
 def run(work: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    return run_alone(work())
+    return run_in_thread(work())
 
 
 async def sent(response: Any) -> bytes:
@@ -101,8 +101,8 @@ class TestOnce:
             return 7
 
         async def scenario() -> int:
-            once = Once(1, "test")
-            first, second = (asyncio.create_task(once.make("it", work)) for _ in range(2))
+            once = SingleFlight(1, "test")
+            first, second = (asyncio.create_task(once.run("it", work)) for _ in range(2))
             while not made:
                 await asyncio.sleep(0)
             first.cancel()
@@ -115,8 +115,8 @@ class TestOnce:
 
     def test_a_failure_that_nobody_waits_for_is_no_warning(self, caplog: pytest.LogCaptureFixture) -> None:
         async def scenario() -> None:
-            once, begun = Once(1, "test"), threading.Event()
-            asking = asyncio.create_task(once.make("it", lambda: begun.wait() and 1 // 0))
+            once, begun = SingleFlight(1, "test"), threading.Event()
+            asking = asyncio.create_task(once.run("it", lambda: begun.wait() and 1 // 0))
             await asyncio.sleep(0)
             asking.cancel()
             begun.set()
@@ -148,7 +148,7 @@ class TestThumbnails:
             while not painted:
                 pass
             assert client.portal is not None
-            entered = client.portal.start_task_soon(_enter, services.live.keeper)
+            entered = client.portal.start_task_soon(_enter, services.live.room_lease)
             assert entered.result(60)
             assert not any(each.done() for each in asking)
             may_end.set()
@@ -170,18 +170,18 @@ class TestThumbnails:
         assert client.portal is not None
         client.portal.call(crowd)
         try:
-            assert client.portal.start_task_soon(_enter, services.live.keeper).result(60)
+            assert client.portal.start_task_soon(_enter, services.live.room_lease).result(60)
         finally:
             may_end.set()
 
 
 async def _enter(keeper: Any) -> bool:
-    async with keeper.having("a room"):
+    async with keeper.hold("a room"):
         return True
 
 
 def test_what_is_larger_than_the_memory_is_made_once_for_those_who_wait_for_it_together() -> None:
-    memory, made = Memory(10), list[int]()
+    memory, made = Cache(10), list[int]()
     begun, may_end = threading.Event(), threading.Event()
 
     def make() -> np.ndarray[Any, Any]:
@@ -191,14 +191,14 @@ def test_what_is_larger_than_the_memory_is_made_once_for_those_who_wait_for_it_t
         return np.zeros(100)
 
     with ThreadPoolExecutor(4) as threads:
-        asking = [threads.submit(memory.keep, ("scene", "finder"), make) for _ in range(4)]
+        asking = [threads.submit(memory.get_value, ("scene", "finder"), make) for _ in range(4)]
         begun.wait()
-        while len(threads._threads) < 4 or memory._room.making[("scene", "finder")] is None:
+        while len(threads._threads) < 4 or memory._state.computations[("scene", "finder")] is None:
             pass
         threading.Event().wait(0.2)  # all have come to the lock; where one is late it makes it again, as it may
         may_end.set()
         found = {id(each.result()) for each in asking}
     assert len(found) == 1
     assert made == [1]
-    memory.keep(("scene", "finder"), make)
+    memory.get_value(("scene", "finder"), make)
     assert made == [1, 1]  # it was not kept

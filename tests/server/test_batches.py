@@ -13,17 +13,17 @@ from sqlalchemy import select, update
 from relume.errors import CancelledError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
 from relume.resident import resident_bytes
 from server.apart import process as processes
-from server.apart.pool import Pool
+from server.apart.pool import ProcessPool
 from server.apart.step import Step
 from server.errors import BusyError, QuotaError
 from server.queues.work import Quota
-from server.queues.work_queue import WorkQueue
+from server.queues.work_queue import JobQueue
 from server.records.tables import RenderRow
 from server.wire.renders import RenderRequest
 from worker.database import open_database
 from worker.lease import new_owner
 from worker.ledger import Ledger
-from worker.turns import Turns, Waiting
+from worker.turns import FairShare, WaitingBake
 
 STAND_IN = """
 import json, os, sys, time
@@ -57,18 +57,18 @@ def always() -> bool:
 
 
 @pytest.fixture
-def pool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pool]:
+def pool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ProcessPool]:
     monkeypatch.setattr(processes, "COMMAND", ["-c", STAND_IN])
-    found = Pool(tmp_path, 1, 1 << 20, 1, 0, idle_s=0.0)
+    found = ProcessPool(tmp_path, 1, 1 << 20, 1, 0, idle_s=0.0)
     yield found
     found.close()
 
 
-def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: Pool) -> None:
+def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: ProcessPool) -> None:
     first, second = (pool.run(Step("work"), ignore, always)["pid"] for _ in range(2))
     assert [first] == [second] == pool.pids()
     assert pool.resident_bytes() > 0
-    pool.let_go()
+    pool.release()
     assert pool.pids() == []
     assert resident_bytes(first) == 0
     assert pool.run(Step("work"), ignore, always)["pid"] != first
@@ -84,13 +84,15 @@ def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: Poo
         ({"kind": "not-found"}, NotFoundError),
     ],
 )
-def test_what_a_step_meets_is_what_its_process_met(pool: Pool, values: dict[str, str], kind: type[Exception]) -> None:
+def test_what_a_step_meets_is_what_its_process_met(
+    pool: ProcessPool, values: dict[str, str], kind: type[Exception]
+) -> None:
     with pytest.raises(RelumeError, match="no") as met:
         pool.run(Step("fail", values=values), ignore, always)
     assert met.type is kind
 
 
-def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: Pool, tmp_path: Path) -> None:
+def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: ProcessPool, tmp_path: Path) -> None:
     values = {"mark": str(tmp_path / "once")}
     assert pool.run(Step("die once", values=values), ignore, always)["pid"] > 0
     mark = tmp_path / "twice"
@@ -100,13 +102,15 @@ def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: Pool, tmp_path:
     assert pool.run(Step("work"), ignore, always)["pid"] > 0
 
 
-def test_what_a_step_says_is_why_it_failed(pool: Pool) -> None:
+def test_what_a_step_says_is_why_it_failed(pool: ProcessPool) -> None:
     with pytest.raises(RelumeError, match=r"^no\.$"):
         pool.run(Step("fail"), ignore, always)
     assert len(pool.pids()) == 1
 
 
-def test_a_step_that_does_not_listen_is_ended_with_its_process(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_that_does_not_listen_is_ended_with_its_process(
+    pool: ProcessPool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(processes, "_STOP_S", 0.05)
     running, seen = threading.Event(), []
 
@@ -122,14 +126,16 @@ def test_a_step_that_does_not_listen_is_ended_with_its_process(pool: Pool, monke
     assert pool.run(Step("work"), ignore, always)["pid"] != pid
 
 
-def test_a_process_that_has_grown_is_exchanged(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_has_grown_is_exchanged(pool: ProcessPool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.apart.pool._PROGRAM_BYTES", 1 << 27)
     small = pool.run(Step("work"), ignore, always)["pid"]
     assert pool.run(Step("grow"), ignore, always)["pid"] == small
     assert pool.pids() == []
 
 
-def test_what_somebody_waits_for_is_done_before_what_came_earlier(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_somebody_waits_for_is_done_before_what_came_earlier(
+    pool: ProcessPool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(processes, "_STOP_S", 0.05)
     order: list[str] = []
     gate = threading.Event()
@@ -163,31 +169,35 @@ def wait_for(is_reached: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
-def following(turns: Turns, waiting: Sequence[Waiting]) -> Waiting:
-    chosen = turns.order(waiting)[0]
-    turns.take(chosen.client)
+def following(turns: FairShare, waiting: Sequence[WaitingBake]) -> WaitingBake:
+    chosen = turns.sort(waiting)[0]
+    turns.pick_next(chosen.client)
     return chosen
 
 
 def test_clients_have_their_turns_one_after_another_and_small_work_goes_first() -> None:
-    turns = Turns({})
-    waiting = [Waiting("a1", "ann", False, 1.0), Waiting("a2", "ann", False, 2.0), Waiting("b1", "bob", False, 3.0)]
+    turns = FairShare({})
+    waiting = [
+        WaitingBake("a1", "ann", False, 1.0),
+        WaitingBake("a2", "ann", False, 2.0),
+        WaitingBake("b1", "bob", False, 3.0),
+    ]
     assert [following(turns, waiting).id for _ in range(4)] == ["a1", "b1", "a1", "b1"]
-    waiting.append(Waiting("a3", "ann", True, 4.0))
+    waiting.append(WaitingBake("a3", "ann", True, 4.0))
     assert [following(turns, waiting).id for _ in range(2)] == ["a3", "a3"]
     del waiting[0], waiting[-1]
-    waiting.append(Waiting("c1", "cem", False, 5.0))
+    waiting.append(WaitingBake("c1", "cem", False, 5.0))
     assert [following(turns, waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
 
 
 def test_shares_say_how_many_turns_somebody_has() -> None:
-    turns = Turns({"ann": 3.0})
-    waiting = [Waiting("b", "bob", False, 1.0), Waiting("a", "ann", False, 2.0)]
+    turns = FairShare({"ann": 3.0})
+    waiting = [WaitingBake("b", "bob", False, 1.0), WaitingBake("a", "ann", False, 2.0)]
     assert "".join(following(turns, waiting).id for _ in range(12)).count("a") == 9
-    assert following(turns, [Waiting("b", "bob", False, 1.0), Waiting("c", "cem", False, 0.0)]).id == "c"
+    assert following(turns, [WaitingBake("b", "bob", False, 1.0), WaitingBake("c", "cem", False, 0.0)]).id == "c"
 
 
-class Counting(WorkQueue[RenderRequest]):
+class Counting(JobQueue[RenderRequest]):
     """Its steps only say what they are of."""
 
     row, noun, request_type = RenderRow, "render", RenderRequest
@@ -202,8 +212,8 @@ class Counting(WorkQueue[RenderRequest]):
         return False
 
     def step(self, work: Any, timer: Any) -> int:
-        self.note(work.id, work.done)
-        self.run_apart(work, str(work.request.name), {}, ignore)
+        self.record_progress(work.id, work.done)
+        self.run_in_process(work, str(work.request.name), {}, ignore)
         return int(work.done) + 1
 
 
@@ -216,7 +226,7 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
         return {}
 
     with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as ledger:
-        queue = Counting(ledger.sessions, tmp_path / "renders", run, Quota(of_all=3, of_each=2))
+        queue = Counting(ledger.sessions, tmp_path / "renders", run, Quota(max_total=3, max_per_client=2))
 
         def submit(name: str, client: str) -> str:
             asked = {"bake": "0" * 16, "view": "front", "format": "png", "looks": [{}] * 2, "name": name}
@@ -267,7 +277,7 @@ def test_two_servers_do_no_step_twice_and_go_on_with_what_one_left(tmp_path: Pat
 
 
 def test_a_process_that_ends_is_asked_no_more_though_it_is_not_gone_yet(
-    pool: Pool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    pool: ProcessPool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("subprocess.Popen.poll", lambda process: process.returncode)  # as long as nobody has waited
     assert pool.run(Step("die once", values={"mark": str(tmp_path / "once")}), ignore, always)["pid"] > 0

@@ -12,7 +12,7 @@ from btf_zips import zipped
 from fastapi.testclient import TestClient
 from server_fakes import Control
 
-from relume.btf.compress import Images
+from relume.btf.compress import ViewArrays
 from relume.btf.importing import import_btf
 from relume.errors import CancelledError
 from server.settings import Settings
@@ -97,7 +97,7 @@ def test_a_mesh_that_is_sent_is_rendered_with_its_period(
         return import_btf(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
 
     made: list[Any] = []
-    monkeypatch.setattr("server.apart.btfs.make_btf", render)
+    monkeypatch.setattr("server.apart.btfs.synthesize_btf", render)
     form = {"size": 16, "period": 2.5}
     answer = client.post(f"{WORKS}/geometry", files={"geometry": ("Roof.obj", SQUARE)}, data=form)
     assert answer.status_code == 202
@@ -150,17 +150,17 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
     has_begun, has_ended, found = threading.Event(), threading.Event(), []
 
     def slow(folder: Path, file: Path, name: str, bound: float, tell: Callable[[float], object],
-             cancelled: Callable[[], bool], making: Path, images: Images) -> Any:  # fmt: skip
+             is_canceled: Callable[[], bool], making: Path, images: ViewArrays) -> Any:  # fmt: skip
         found.append(making.exists())
         if not has_begun.is_set():
             making.mkdir()
             tell(0.5)
             has_begun.set()
-            while not cancelled():
+            while not is_canceled():
                 time.sleep(0.01)
             has_ended.set()
             raise CancelledError("stopped")
-        return import_btf(folder, file, name, bound, tell, cancelled, making, images)
+        return import_btf(folder, file, name, bound, tell, is_canceled, making, images)
 
     monkeypatch.setattr("server.apart.btfs.import_btf", slow)
     url = send(client, zipped(tmp_path / "a.zip"))
@@ -177,12 +177,12 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
 def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
     client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.apart.btfs.TURN_S", 0.0)
+    monkeypatch.setattr("server.apart.btfs.SLICE_S", 0.0)
     done: list[float] = []
 
     def render(shelf: Path, wanted: Any, name: str, tell: Callable[[float], object],
-               cancelled: Callable[[], bool], making: Path) -> Any:  # fmt: skip
-        while not cancelled():
+               is_canceled: Callable[[], bool], making: Path) -> Any:  # fmt: skip
+        while not is_canceled():
             tell(0.1 * len(done))
             done.append(0.1 * len(done))
             if len(done) == 7:
@@ -192,7 +192,7 @@ def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
         raise CancelledError("for now")
 
     images: list[str] = []
-    monkeypatch.setattr("server.apart.btfs.make_btf", render)
+    monkeypatch.setattr("server.apart.btfs.synthesize_btf", render)
     url = client.post(f"{WORKS}/synthetic", json={"geometry": "weave"}).headers["location"]
     assert wait_for(client, url, "ready", "failed")["state"] == "ready"
     assert len(done) == 7

@@ -52,7 +52,7 @@ def test_curve_over_the_budget_while_a_turned_light_is_prepared_does_not_end_the
 ) -> None:
     with open_session(short, bake) as session:
         session.exact(0)
-        session.send(type="touch", parameter="/environment/rotation")
+        session.send_message(type="touch", parameter="/environment/rotation")
         session.edit(1, f"{BALL}/curves", {"theta_h": DRAWN})
         answer(session, 1)
         session.edit(2, f"{BALL}/color", [0.2, 0.2, 0.2])
@@ -62,7 +62,7 @@ def test_curve_over_the_budget_while_a_turned_light_is_prepared_does_not_end_the
 def test_edit_that_needs_too_much_memory_is_taken_back_and_the_next_one_builds_on_the_look_before(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.short_of_memory = {"front"}
+    control.views_over_budget = {"front"}
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
@@ -70,15 +70,15 @@ def test_edit_that_needs_too_much_memory_is_taken_back_and_the_next_one_builds_o
         assert (problem["revision"], problem["problem"]["type"]) == (1, "urn:relume:problem:memory-budget")
         session.edit(2, SIGMA, 0.4)
         assert np.frombuffer(session.exact(2).payload, "<u4")[0] == 900
-    assert not control.freezing.is_set()
+    assert not control.freeze_started.is_set()
 
 
 def test_edit_that_one_of_two_views_has_no_memory_for_is_taken_back_in_both(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.short_of_memory = {"left"}
+    control.views_over_budget = {"left"}
     with open_session(client, baked.bake) as session:
-        session.send(type="views", names=["front", "left"])
+        session.send_message(type="views", names=["front", "left"])
         for _ in range(2):
             session.exact(0)
         session.edit(1, IOR, 2.0)
@@ -92,11 +92,11 @@ def test_edit_that_one_of_two_views_has_no_memory_for_is_taken_back_in_both(
 def test_edit_too_large_that_a_hand_prepares_for_is_taken_back_and_prepared_for_the_look_before(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.short_of_memory = {"front"}
+    control.views_over_budget = {"front"}
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
-        session.send(type="touch", parameter=SIGMA)
+        session.send_message(type="touch", parameter=SIGMA)
         refused = [session.text("problem")["revision"] for _ in range(2)]
         assert refused == [1, None]
         session.edit(2, SIGMA, 0.4)

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from fastapi.testclient import TestClient
 from PIL import Image
-from problems import problem_of
+from problems import parse_problem
 from server_fakes import SIZE
-from session_client import TOGETHER, Baked, open_session
+from session_client import ROOM_FIELDS, Baked, open_session
 
-from server.live.rooms.comment_news import CommentNews
+from server.live.rooms.comment_news import CommentSync
 from server.live.rooms.rooms import Rooms
 from server.records import comments
-from worker.database.faults import Absence, away_elsewhere
+from worker.database.faults import MissingDatabase, make_unavailable_error
 
 
 def image(size: tuple[int, int] = (640, 384), form: str = "JPEG") -> str:
@@ -68,9 +68,9 @@ def test_a_comment_is_kept_listed_settled_opened_and_deleted(
     assert not client.get(path).json()[0]["resolved"]
     assert client.delete(one).status_code == 204
     assert [each["text"] for each in client.get(path).json()] == ["And here"]
-    assert problem_of(client.delete(one))["status"] == 404
-    assert problem_of(client.patch(one, json={"resolved": True}))["status"] == 404
-    assert problem_of(client.get(made["picture"]))["status"] == 404
+    assert parse_problem(client.delete(one))["status"] == 404
+    assert parse_problem(client.patch(one, json={"resolved": True}))["status"] == 404
+    assert parse_problem(client.get(made["picture"]))["status"] == 404
 
 
 def test_comments_go_with_their_scene(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
@@ -79,7 +79,7 @@ def test_comments_go_with_their_scene(client: TestClient, baked: Baked, path: st
     assert len(store.list(baked.scene)) == 1
     client.delete(f"/api/scenes/{baked.scene}")
     assert store.list(baked.scene) == []
-    assert problem_of(client.get(path))["status"] == 404
+    assert parse_problem(client.get(path))["status"] == 404
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
@@ -102,7 +102,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 def test_what_is_wrong_is_said(client: TestClient, path: str, pin: dict[str, Any]) -> None:
     for wrong, word in WRONG:
         answer = client.post(path, json={**pin, **wrong})
-        assert problem_of(answer)["status"] in (404, 422), wrong
+        assert parse_problem(answer)["status"] in (404, 422), wrong
         assert word in answer.text
     assert client.get(path).json() == []
 
@@ -110,13 +110,13 @@ def test_what_is_wrong_is_said(client: TestClient, path: str, pin: dict[str, Any
 def test_a_scene_has_so_many_comments(
     client: TestClient, path: str, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(comments, "MAX_OF_SCENE", 1)
+    monkeypatch.setattr(comments, "MAX_PER_SCENE", 1)
     client.post(path, json=pin)
-    assert problem_of(client.post(path, json=pin))["status"] == 503
+    assert parse_problem(client.post(path, json=pin))["status"] == 503
 
 
 def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
-    with open_session(client, baked.bake, opening=TOGETHER) as ann:
+    with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         made = client.post(path, json=pin).json()
         assert ann.text("comments") == {"type": "comments"}
@@ -127,17 +127,17 @@ def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path
 def test_where_nothing_is_asked_nothing_is_said_of_the_database(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.rooms.comment_news.EVERY_S", 0.001)
-    away = Absence(logging.getLogger("away"), "the database")
-    monkeypatch.setattr("worker.database.faults.database_away", away)
-    away.meet(away_elsewhere("connection refused"))
+    monkeypatch.setattr("server.live.rooms.comment_news.POLL_INTERVAL_S", 0.001)
+    away = MissingDatabase(logging.getLogger("away"), "the database")
+    monkeypatch.setattr("worker.database.faults.database_outage", away)
+    away.report_failure(make_unavailable_error("connection refused"))
     caplog.clear()
 
     async def look_for_a_while() -> None:
         with pytest.raises(TimeoutError):
-            await asyncio.wait_for(CommentNews(Rooms(1, 1, 1.0), lambda _: {}, ThreadPoolExecutor(1)).run(), 0.1)
+            await asyncio.wait_for(CommentSync(Rooms(1, 1, 1.0), lambda _: {}, ThreadPoolExecutor(1)).run(), 0.1)
 
-    run_alone(look_for_a_while())
+    run_in_thread(look_for_a_while())
     assert caplog.records == []
 
 
@@ -145,15 +145,15 @@ def test_rooms_are_told_of_what_another_server_took(
     client: TestClient, baked: Baked, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     services = client.app.state.services  # type: ignore[attr-defined]
-    news = CommentNews(services.live.rooms, services.comments.marks, services.threads.news)
+    news = CommentSync(services.live.rooms, services.comments.marks, services.threads.queries)
 
     def look() -> None:
-        client.portal.call(news.look)  # type: ignore[union-attr]
+        client.portal.call(news.refresh)  # type: ignore[union-attr]
 
-    monkeypatch.setattr("server.live.rooms.comment_news.EVERY_S", 1e9)  # the server's own looks once at most
+    monkeypatch.setattr("server.live.rooms.comment_news.POLL_INTERVAL_S", 1e9)  # the server's own looks once at most
     told: list[str] = []
     monkeypatch.setattr(services.live.rooms, "commented", told.append)
-    with open_session(client, baked.bake, opening=TOGETHER) as ann:
+    with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         look()
         other = comments.CommentStore(services.comments._sessions)
@@ -161,9 +161,9 @@ def test_rooms_are_told_of_what_another_server_took(
         look()
         look()
         assert told == [baked.scene]
-        other.settle(baked.scene, made.id, "Bob")
+        other.resolve(baked.scene, made.id, "Bob")
         look()
-        other.settle(baked.scene, made.id, None)
+        other.resolve(baked.scene, made.id, None)
         look()
         other.delete(baked.scene, made.id)
         look()

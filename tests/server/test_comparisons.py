@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
-from server_fakes import SIZE, BatchesHere, Control, FakeTransfer
+from server_fakes import SIZE, Control, FakeTransfer, InThreadBatches
 from session_client import Baked
 
 from relume.errors import CancelledError
-from relume.picture.transfer import Eyes
+from relume.picture.transfer import CameraMode
 from server.apart.steps import STEPS
 from server.app import create_app
-from server.queues.comparisons import GUESSED_S_A_PIXEL
+from server.queues.comparisons import DEFAULT_PIXEL_S
 from server.settings import Settings
 
 WAIT_S = 60.0
@@ -44,7 +44,7 @@ def submit(client: TestClient, baked: Baked, passes: int, **more: Any) -> str:
 
 
 def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Control, baked: Baked) -> None:
-    control.may_trace.set()
+    control.trace_gate.set()
     url = submit(client, baked, 6)
     body = wait_until(client, url, is_done)
     assert (body["state"], body["passes"], body["progress"]) == ("ready", 6, 1.0)
@@ -73,7 +73,7 @@ def _brightness(client: TestClient, url: str) -> float:
 
 
 def test_the_paths_of_the_method_alone_may_be_asked_for(client: TestClient, control: Control, baked: Baked) -> None:
-    control.may_trace.set()
+    control.trace_gate.set()
     url = submit(client, baked, 4, paths="method")
     body = wait_until(client, url, is_done)
     assert body["paths"] == "method"
@@ -93,7 +93,7 @@ def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     is_upgraded: bool,
     asked: list[int],
 ) -> None:
-    control.may_trace.set()
+    control.trace_gate.set()
     url = submit(client, baked, 3)
     assert wait_until(client, url, is_done)["state"] == "ready"
     queue = client.app.state.services.comparisons
@@ -103,12 +103,12 @@ def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     # as a kill after three passes leaves it
     queue._update(identity, ("ready",), state="running", request=request)
     if is_upgraded:
-        monkeypatch.setattr("server.apart.passes.truth_code", lambda: "0123456789abcdef")
+        monkeypatch.setattr("server.apart.passes.comparison_code", lambda: "0123456789abcdef")
     later = Control()
-    later.may_trace.set()
-    with TestClient(create_app(settings, open_library=later.open_library, open_batches=BatchesHere)) as restarted:
+    later.trace_gate.set()
+    with TestClient(create_app(settings, open_library=later.open_library, open_batches=InThreadBatches)) as restarted:
         assert wait_until(restarted, url, is_done)["passes"] == 5
-    assert later.passes_asked == asked
+    assert later.requested_passes == asked
 
 
 def test_deleting_stops_the_work_and_forgets_its_files(client: TestClient, control: Control, baked: Baked) -> None:
@@ -117,14 +117,14 @@ def test_deleting_stops_the_work_and_forgets_its_files(client: TestClient, contr
     assert client.get(f"{url}/error.png").status_code == 409
     assert client.delete(url, params={"forget": True}).status_code == 204
     assert client.get(url).status_code == 404
-    control.may_trace.set()  # the next one is worked on
+    control.trace_gate.set()  # the next one is worked on
     assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"
     folder = client.app.state.services.settings.data / "truths"
     assert len(list(folder.iterdir())) == 1
 
 
 def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, control: Control, baked: Baked) -> None:
-    control.may_trace.set()
+    control.trace_gate.set()
     url = submit(client, baked, 1000)
     wait_until(client, url, lambda body: body["passes"] >= 3 and body["found"] is not None)
     assert client.delete(url).status_code == 204
@@ -140,23 +140,25 @@ def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, cont
     assert resumed.json()["state"] in ("queued", "running")  # the queue may be quicker than the answer
     on = wait_until(client, url, lambda body: body["passes"] > passes + 1)
     assert on["seconds_left"] > 0
-    whole = [index for index, (_, size) in zip(control.passes_asked, control.passes_from, strict=False) if size == SIZE]
+    whole = [
+        index for index, (_, size) in zip(control.requested_passes, control.pass_cameras, strict=False) if size == SIZE
+    ]
     assert len(whole) - len(set(whole)) <= 3  # no finished pass was made again
     assert client.delete(url, params={"forget": True}).status_code == 204
     assert client.post(f"{url}/resume").status_code == 404
 
 
 def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control: Control, baked: Baked) -> None:
-    control.may_trace.set()
+    control.trace_gate.set()
     request = {"bake": baked.bake, "view": "front", "passes": 10, "dry_run": True}
     planned = client.post("/api/truths", json=request)
     assert planned.status_code == 200
     assert planned.json()["passes"] == 10
     assert planned.json()["seconds"] > 0
-    assert len(control.passes_asked) == 1  # a small picture; the second time its pace is known
+    assert len(control.requested_passes) == 1  # a small picture; the second time its pace is known
     again = client.post("/api/truths", json=request | {"passes": 20}).json()
     assert again["seconds"] == pytest.approx(2 * planned.json()["seconds"])
-    assert len(control.passes_asked) == 1
+    assert len(control.requested_passes) == 1
     assert client.post("/api/truths", json=request | {"view": "nowhere"}).status_code == 422
 
 
@@ -186,9 +188,9 @@ def test_brute_force_has_the_light_paths_of_the_bake(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     monkeypatch.setattr(FakeTransfer, "__init__", _baked_by(method, FakeTransfer.__init__))
-    control.may_trace.set()
+    control.trace_gate.set()
     wait_until(client, submit(client, baked, 2), is_done)
-    assert control.reflections_asked == [method == "gather"] * 3  # a small first one, and two passes
+    assert control.requested_reflections == [method == "gather"] * 3  # a small first one, and two passes
 
 
 def _baked_by(method: str, init: Callable[..., None], **also: Any) -> Callable[..., None]:
@@ -198,15 +200,15 @@ def _baked_by(method: str, init: Callable[..., None], **also: Any) -> Callable[.
 def test_a_moving_view_is_compared_from_where_its_eye_is(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(FakeTransfer, "__init__", _baked_by("surface", FakeTransfer.__init__, eyes=Eyes.FREE))
-    control.may_trace.set()
+    monkeypatch.setattr(FakeTransfer, "__init__", _baked_by("surface", FakeTransfer.__init__, eyes=CameraMode.FREE))
+    control.trace_gate.set()
     to_world = np.array([[0, 0, 1, 4], [0, 1, 0, 2], [-1, 0, 0, 3], [0, 0, 0, 1]], float)
     camera = {"to_world": to_world.ravel().tolist(), "yfov": 40.0}
     url = submit(client, baked, 2, camera=camera, size=[40, 24])
     assert wait_until(client, url, is_done)["state"] == "ready"
     assert Image.open(io.BytesIO(client.get(f"{url}/error.png").content)).size == (40, 24)
-    (frame_from,) = [eye for eye in control.frames_from if eye is not None]
-    for seen_from, size in (frame_from, *control.passes_from):
+    (frame_from,) = [eye for eye in control.frame_cameras if eye is not None]
+    for seen_from, size in (frame_from, *control.pass_cameras):
         assert size == (40, 24)  # smaller ones are made of larger pictures first
         assert np.array_equal(seen_from.to_world, to_world)
         assert seen_from.yfov == pytest.approx(np.radians(40))
@@ -227,14 +229,14 @@ def test_an_estimate_waits_for_no_other_and_is_judged_by_other_views_until_it_is
     question = {"bake": baked.bake, "view": "front", "passes": 4, "dry_run": True}
     guessed = client.post("/api/truths", json=question)  # nothing may be traced
     assert (guessed.status_code, guessed.json()["is_measured"]) == (200, False)
-    assert guessed.json()["seconds"] == pytest.approx(4 * GUESSED_S_A_PIXEL * SIZE[0] * SIZE[1])
+    assert guessed.json()["seconds"] == pytest.approx(4 * DEFAULT_PIXEL_S * SIZE[0] * SIZE[1])
     assert client.post("/api/truths", json=question | {"paths": "method"}).json()["is_measured"] is False
-    control.may_trace.set()
+    control.trace_gate.set()
     client.app.state.services.comparisons._sample.result(WAIT_S)  # type: ignore[attr-defined]
     measured = client.post("/api/truths", json=question).json()
     assert measured["is_measured"] is True
     assert client.post("/api/truths", json=question).json() == measured
-    assert len(control.passes_asked) == 1
+    assert len(control.requested_passes) == 1
 
 
 def test_there_is_a_picture_and_progress_while_the_first_pass_is_made(
@@ -242,15 +244,15 @@ def test_there_is_a_picture_and_progress_while_the_first_pass_is_made(
 ) -> None:
     half_way = threading.Event()
 
-    def slow(shop: Any, tell: Callable[[float], None], cancelled: Callable[[], bool], **_: Any) -> None:
+    def slow(shop: Any, tell: Callable[[float], None], is_canceled: Callable[[], bool], **_: Any) -> None:
         tell(0.5)
         half_way.set()
-        while not cancelled():
+        while not is_canceled():
             time.sleep(0.01)
         raise CancelledError("stopped")
 
     monkeypatch.setitem(cast("dict[str, Any]", STEPS), "pass of a comparison", slow)
-    control.may_trace.set()
+    control.trace_gate.set()
     url = submit(client, baked, 2)
     assert half_way.wait(WAIT_S)
     body = client.get(url).json()
@@ -263,7 +265,7 @@ def test_there_is_a_picture_and_progress_while_the_first_pass_is_made(
 
 
 def test_brute_force_can_be_looked_at_after_one_pass(client: TestClient, control: Control, baked: Baked) -> None:
-    control.may_trace.set()
+    control.trace_gate.set()
     queue = client.app.state.services.comparisons  # type: ignore[attr-defined]
     step = queue.step
 

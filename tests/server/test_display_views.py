@@ -15,11 +15,11 @@ from test_comparisons import is_done, wait_until
 
 from relume.imageio.files import to_bytes
 from relume.imageio.ocio.config import Config
-from relume.imageio.ocio.current import using
+from relume.imageio.ocio.current import using_config
 from relume.imageio.ocio.lut import SIZE
 from relume.imageio.ocio.view import OcioView
-from relume.imageio.primaries import KNOWN
-from server.apart.process import Process
+from relume.imageio.primaries import INTEROP_SPACES
+from server.apart.process import BatchProcess
 from server.settings import Settings
 
 CONFIG = "ocio://cg-config-latest"
@@ -55,13 +55,13 @@ def test_its_views_are_listed_tabled_and_rendered(client: TestClient, baked: Bak
         (tmp_path / "a.exr").write_bytes(rendered(format="exr", color_space=name))
         found = OpenImageIO.ImageBuf(str(tmp_path / "a.exr"))
         pictures[name] = found.get_pixels(OpenImageIO.FLOAT)
-    assert found.spec().getattribute("chromaticities") == pytest.approx(KNOWN["lin_ap1_scene"])
+    assert found.spec().getattribute("chromaticities") == pytest.approx(INTEROP_SPACES["lin_ap1_scene"])
     light = np.ascontiguousarray(pictures[None]).reshape(-1, 3)
     converted = light.copy()
     config.convert(converted, "ACEScg")
     np.testing.assert_allclose(pictures["lin_ap1"].reshape(-1, 3), converted, rtol=1e-5)
     light *= 2
-    config.show(light, OcioView(**VIEW))
+    config.apply_view(light, OcioView(**VIEW))
     png = np.asarray(Image.open(io.BytesIO(rendered(format="png"))))
     np.testing.assert_array_equal(png, to_bytes(light.reshape(png.shape)))
 
@@ -93,6 +93,6 @@ def test_processes_that_render_are_told_the_config(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr("subprocess.Popen", start)
     for told in ((CONFIG, "ACEScg"), (CONFIG, None), (None,)):
-        with using(*told):
-            Process(tmp_path, 1, 2, 3)
+        with using_config(*told):
+            BatchProcess(tmp_path, 1, 2, 3)
     assert [command[-2:] for command in started] == [[CONFIG, "ACEScg"], ["3", CONFIG], ["2", "3"]]

@@ -86,7 +86,7 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
     picture = np.zeros((HEIGHT, WIDTH, 3))
     with open_session(real, bake["id"]) as session:
         session.edit(1, f"/materials/{name}/terms", terms)
-        session.send(type="touch", curve=f"/materials/{name}/terms/1/curves/theta_h")
+        session.send_message(type="touch", curve=f"/materials/{name}/terms/1/curves/theta_h")
         session.edit(2, f"/materials/{name}/terms/1/params/sigma", 0.2)
         while True:
             message = session.receive()
@@ -94,7 +94,7 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
                 put(picture, message)
                 if message.header["exact"] and message.header["revision"] == 2:
                     break
-        session.send(type="probe", x=WIDTH // 2, y=HEIGHT // 2)
+        session.send_message(type="probe", x=WIDTH // 2, y=HEIGHT // 2)
         probe = session.text("probe")
 
     terms[1]["params"] = {"sigma": 0.2}
@@ -129,9 +129,9 @@ def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_pat
     pictures = {name: np.zeros((48, 64, 3)) for name in ("front", "left")}
     last, frames = 6, []
     with open_session(real, bake) as session:
-        session.send(type="views", names=["front", "left"])
-        session.send(type="focus", view="left")
-        session.send(type="touch", curve="/materials/Ball/terms/1/curves/theta_h")
+        session.send_message(type="views", names=["front", "left"])
+        session.send_message(type="focus", view="left")
+        session.send_message(type="touch", curve="/materials/Ball/terms/1/curves/theta_h")
         for revision in range(1, last + 1):
             session.edit(revision, "/materials/Ball/terms/1/params/sigma", 0.1 + revision / 20)
         while {f.header["view"] for f in frames if f.header["exact"] and f.header["revision"] == last} != set(pictures):
@@ -163,11 +163,11 @@ def test_view_is_opened_whose_ground_only_catches_shadows_again(real: TestClient
     terms = [{"model": "lambert"}, {"model": "cook_torrance"}]
     with open_session(real, bake) as session:
         session.edit(1, ground, {"catcher": False, "terms": terms})
-        session.send(type="touch", curve=f"{ground}/terms/1/curves/theta_h")
+        session.send_message(type="touch", curve=f"{ground}/terms/1/curves/theta_h")
         session.exact(1)
         session.edit(2, f"{ground}/catcher", True)
         session.exact(2)
-        session.send(type="view", name="left")
+        session.send_message(type="view", name="left")
         assert session.exact(2).header["view"] == "left"
 
 
@@ -182,8 +182,8 @@ def test_drag_of_a_slider_shows_pictures_near_the_look_and_ends_exact(real: Test
     with open_session(real, bake) as session:
         session.edit(1, term, ggx)
         put(picture, session.exact(1))
-        session.send(type="touch", parameter=f"{term}/params/roughness")
-        session.ready("Ball, Roughness")
+        session.send_message(type="touch", parameter=f"{term}/params/roughness")
+        session.wait_until_ready("Ball, Roughness")
         session.edit(2, f"{term}/params/roughness", 0.3)
         while not frames or not frames[-1].header["exact"]:
             frame = session.frame()
@@ -206,10 +206,10 @@ def test_colour_bleeding_follows_a_dragged_colour_and_ends_exact(real: TestClien
         assert list(changes)[-1].state == "ready"
     color, picture = "/materials/Floor/terms/0/color", np.zeros((48, 64, 3))
     with open_session(real, bake) as session:
-        session.edit(1, color, [0.1, 0.1, 0.8], hand=color)  # rows are frozen for this one
+        session.edit(1, color, [0.1, 0.1, 0.8], control=color)  # rows are frozen for this one
         put(picture, session.exact(1))
         before = picture.copy()
-        session.edit(2, color, [0.8, 0.1, 0.1], hand=color)
+        session.edit(2, color, [0.8, 0.1, 0.1], control=color)
         while (first := session.frame()).header["fidelity"] != "followed":  # the last rows may still be missing
             put(picture, first)
         put(picture, first)

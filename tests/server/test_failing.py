@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import pytest
 from fastapi.testclient import TestClient
-from server_fakes import made
+from server_fakes import write_tiny_scene
 
 from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
 from server.apart.process import _answer
-from server.errors import problem_of
+from server.errors import make_problem
 from server.files import importing
-from server.files.importing import ImportRequest, answer_of
+from server.files.importing import ImportRequest, run_import
 from server.settings import Settings
-from worker.database.faults import away_elsewhere
+from worker.database.faults import make_unavailable_error
 
 
 class Usage(NamedTuple):
@@ -64,10 +64,10 @@ def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
 
 @pytest.mark.parametrize("error", [DiskFullError("a.webp"), OSError(errno.ENOSPC, "No space left on device")])
 def test_a_disk_that_a_step_finds_full_is_no_failure_of_its_process(error: Exception) -> None:
-    problem = problem_of(error)
+    problem = make_problem(error)
     with pytest.raises(DiskFullError, match=r"disk is full; free some space") as found:
         _answer({"problem": problem.detail, "kind": problem.type.rpartition(":")[2]})
-    assert problem_of(found.value) == problem.model_copy(update={"title": "Disk is full"})
+    assert make_problem(found.value) == problem.model_copy(update={"title": "Disk is full"})
 
 
 def test_probes_of_a_server_that_is_stopped_are_no_lines(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:
@@ -82,9 +82,9 @@ def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
     def full(_: object) -> str:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    request = ImportRequest.of(settings, "built_in", None, "cornell_box")
+    request = ImportRequest.create(settings, "built_in", None, "cornell_box")
     monkeypatch.setattr(importing, "_import", full)
-    assert answer_of(request).keys() == {"full"}
+    assert run_import(request).keys() == {"full"}
 
 
 @pytest.mark.parametrize(
@@ -104,17 +104,17 @@ def test_the_process_of_an_import_tells_faults_of_the_service_from_those_of_the_
         raise failure
 
     monkeypatch.setattr(importing, "_import", fail)
-    assert answer_of(ImportRequest.of(settings, "built_in", None, "cornell_box")).keys() == {key}
+    assert run_import(ImportRequest.create(settings, "built_in", None, "cornell_box")).keys() == {key}
 
 
 def test_an_import_whose_scene_cannot_be_listed_says_why_and_leaves_nothing_half_there(
     client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
-        raise away_elsewhere("refused")
+        raise make_unavailable_error("refused")
 
-    monkeypatch.setattr("server.files.intake.enter_scene", fail)
-    monkeypatch.setattr(client.app.state.services.intake.importers, "run", made)  # type: ignore[attr-defined]
+    monkeypatch.setattr("server.files.intake.insert_scene", fail)
+    monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)  # type: ignore[attr-defined]
     refused = client.post("/api/scenes", files={"scene": ("triangle.glb", b"which nobody reads")})
     assert refused.status_code == 503
     assert client.get("/api/scenes").json() == []

@@ -19,8 +19,8 @@ from websockets.sync.client import ClientConnection
 
 from relume.errors import ProtocolError
 from server.live import pace as pacing
-from server.live.pace import AT_ONCE, PATIENCE_S, PER_SECOND, SHARE, WORK_AT_ONCE_S, Pace
-from server.live.reception import Reception
+from server.live.pace import CPU_FRACTION, MAX_BUSY_S, MESSAGE_BURST, MESSAGES_PER_SECOND, WORK_BURST_S, Pace
+from server.live.reception import MessageReceiver
 from server.live.state.client_socket import ClientSocket
 from server.settings import Settings
 from server.wire.connection import PongMessage
@@ -42,13 +42,13 @@ class Clock:
 
 
 def after(clock: Clock, num: int, work_s: float = 0.0, rest_s: float = 0.0, are_due: Sequence[bool] = (False,)) -> None:
-    """Take so many messages, each of which takes `work_s` and comes `rest_s` after the one before was taken."""
+    """Take so many messages, each of `estimated_work`, each `convergence_s` after the one before was taken."""
     pace = Pace(clock, lambda: clock.worked_s, clock.sleep)
 
     async def take() -> None:
         for k in range(num):
             clock.now_s += rest_s
-            pace.begin()
+            pace.start_message()
             clock.now_s += work_s
             clock.worked_s += work_s
             await pace.pause(is_due=are_due[k % len(are_due)])
@@ -59,14 +59,14 @@ def after(clock: Clock, num: int, work_s: float = 0.0, rest_s: float = 0.0, are_
 
 def test_a_burst_is_taken_at_once_and_others_have_a_turn_after_each_message() -> None:
     clock = Clock()
-    after(clock, AT_ONCE)
-    assert clock.sleeps == [0.0] * AT_ONCE
+    after(clock, MESSAGE_BURST)
+    assert clock.sleeps == [0.0] * MESSAGE_BURST
 
 
 def test_more_than_that_waits() -> None:
     clock = Clock()
-    after(clock, AT_ONCE + 1000)
-    assert clock.now_s == pytest.approx(1000 / PER_SECOND, rel=0.01)
+    after(clock, MESSAGE_BURST + 1000)
+    assert clock.now_s == pytest.approx(1000 / MESSAGES_PER_SECOND, rel=0.01)
 
 
 def test_hands_that_move_at_each_frame_never_wait() -> None:
@@ -84,7 +84,7 @@ def test_what_acknowledges_a_frame_is_not_counted_and_allows_an_edit() -> None:
 def test_messages_that_take_long_have_a_share_of_the_loop() -> None:
     clock = Clock()
     after(clock, 1000, work_s=0.01)
-    assert clock.now_s == pytest.approx((1000 * 0.01 - WORK_AT_ONCE_S) / SHARE, rel=0.01)
+    assert clock.now_s == pytest.approx((1000 * 0.01 - WORK_BURST_S) / CPU_FRACTION, rel=0.01)
 
 
 def test_a_hand_that_moves_in_a_large_scene_never_waits() -> None:
@@ -98,7 +98,7 @@ def test_who_goes_on_sending_too_much_is_told_to_go() -> None:
     with pytest.raises(ProtocolError, match="more than 200 a second for 10 s") as ended:
         after(clock, 1_000_000)
     assert ended.value.close_code == 1008
-    assert PATIENCE_S <= clock.now_s < PATIENCE_S + 2
+    assert MAX_BUSY_S <= clock.now_s < MAX_BUSY_S + 2
 
 
 def test_messages_that_are_refused_count_as_well(
@@ -120,9 +120,9 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
 ) -> None:
     """Of what came to the server while it was at something else."""
     taken: list[str] = []
-    take, is_held = Reception._take, False
+    take, is_held = MessageReceiver._dispatch, False
 
-    def take_late(self: Reception, message: Any, received_s: float) -> None:
+    def take_late(self: MessageReceiver, message: Any, received_s: float) -> None:
         nonlocal is_held
         taken.append(message.type)
         if not is_held:
@@ -130,7 +130,7 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
             time.sleep(0.5)  # all that the test sends is there then
         take(self, message, received_s)
 
-    monkeypatch.setattr(Reception, "_take", take_late)
+    monkeypatch.setattr(MessageReceiver, "_dispatch", take_late)
     with running_server(settings, control) as running:
         url = running.baked_url()
         with open_socket(url) as flooding, open_socket(url) as other:
@@ -145,7 +145,7 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
 
 
 def test_a_flood_over_a_real_socket_ends(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pacing, "PATIENCE_S", 0.3)
+    monkeypatch.setattr(pacing, "MAX_BUSY_S", 0.3)
     gone = pytest.raises(ConnectionClosed)  # with 1008, unless what is not read any more resets the connection
     with running_server(settings, control) as running, open_socket(running.baked_url()) as session, gone:
         flood(session)

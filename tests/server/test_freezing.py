@@ -7,12 +7,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from server_fakes import Control, FakeJob
 
 from relume.errors import ProtocolError, StoreError
 from server.library.threads import Threads
-from server.live.sending.freezing import Freezer
+from server.live.sending.freezing import Precomputer
 from server.metrics import Metrics
 
 
@@ -29,7 +29,7 @@ class Told:
 class Broken(FakeJob):
     """Cannot be made."""
 
-    def make(self, progress: Any, cancelled: Any) -> str:
+    def run(self, progress: Any, is_canceled: Any) -> str:
         raise StoreError("damaged; bake again")
 
 
@@ -49,12 +49,12 @@ def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context["message"]))
         threads, news = Threads(), asyncio.Event()
         try:
-            await scenario(Freezer(told, threads, Metrics(), None, news), Control(), news)  # type: ignore[arg-type]
+            await scenario(Precomputer(told, threads, Metrics(), None, news), Control(), news)  # type: ignore[arg-type]
         finally:
             threads.close()
         gc.collect()
 
-    run_alone(main())
+    run_in_thread(main())
     return told.states, complaints
 
 
@@ -62,12 +62,12 @@ def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
 def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str) -> None:
     told = Told()
 
-    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d", state))  # type: ignore[arg-type]
-        assert await asyncio.to_thread(control.freezing.wait, 60)
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
         assert not freezer.is_done
-        control.may_freeze.set()
+        control.freeze_gate.set()
         await asyncio.wait_for(news.wait(), 60)
         assert freezer.is_done
         taken = await freezer.take()
@@ -75,7 +75,7 @@ def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str
         assert (taken[0], taken[2]) == (view, "/curves/theta_d")
         assert freezer.running is None
         assert set(told.states) == {state}
-        await freezer.say_ready(taken[0], taken[1])
+        await freezer.send_ready(taken[0], taken[1])
 
     states, complaints = run(scenario, told)
     assert states[-1] == "ready"
@@ -83,10 +83,10 @@ def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str
 
 
 def test_cancelled_freeze_gives_nothing() -> None:
-    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
-        assert await asyncio.to_thread(control.freezing.wait, 60)
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
         freezer.cancel()
         await asyncio.wait_for(news.wait(), 60)
         assert await freezer.take() is None
@@ -95,7 +95,7 @@ def test_cancelled_freeze_gives_nothing() -> None:
 
 
 def test_freeze_that_fails_says_why() -> None:
-    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, Broken(control, "/curves/theta_d"))  # type: ignore[arg-type]
         await asyncio.wait_for(news.wait(), 60)
@@ -106,7 +106,7 @@ def test_freeze_that_fails_says_why() -> None:
 
 
 def test_client_that_leaves_during_a_freeze_ends_it() -> None:
-    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
         await asyncio.wait_for(news.wait(), 60)
@@ -119,10 +119,10 @@ def test_client_that_leaves_during_a_freeze_ends_it() -> None:
 
 
 def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -> None:
-    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
-        assert await asyncio.to_thread(control.freezing.wait, 60)
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
         await freezer.end()
         assert control.num_cancelled == 1
 
@@ -131,12 +131,12 @@ def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -
 
 
 def test_end_that_is_cut_off_leaves_no_complaint() -> None:
-    async def scenario(freezer: Freezer, control: Control, news: asyncio.Event) -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
         running = freezer._running
         assert running is not None
-        assert await asyncio.to_thread(control.freezing.wait, 60)
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
         ending = asyncio.create_task(freezer.end())
         await asyncio.sleep(0)
         ending.cancel()

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from session_client import Baked
 from test_comparisons import is_done, wait_until
 
@@ -62,13 +62,13 @@ def test_a_batch_that_has_failed_goes_on_where_it_stopped(client: TestClient, fa
     assert wait_until(client, failed, is_done)["state"] == "ready"
     assert painting.painted == ["0000", "0001", "0002", "0003"]
     assert len(names_in(client.get(f"{failed}/archive.zip"))) == 4
-    assert problem_of(client.post(f"{failed}/resume"))["type"].endswith("not-ready")
+    assert parse_problem(client.post(f"{failed}/resume"))["type"].endswith("not-ready")
 
 
 def test_what_there_is_of_a_batch_can_be_had(client: TestClient, failed: str) -> None:
     refused = client.get(f"{failed}/archive.zip")
     assert refused.status_code == 409
-    assert "?partial=true" in problem_of(refused)["detail"]
+    assert "?partial=true" in parse_problem(refused)["detail"]
     answer = client.get(f"{failed}/archive.zip?partial=true")
     assert answer.headers["content-type"] == "application/zip"
     assert answer.headers["content-disposition"].endswith("a-partial.zip")

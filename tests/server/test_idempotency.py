@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from session_client import Baked
 from sqlalchemy import func, select, update
 
@@ -50,9 +50,9 @@ def test_another_call_with_the_key_is_refused(client: TestClient, render: dict[s
     assert client.post("/api/renders", json=render, headers=keyed("one")).status_code == 202
     other = client.post("/api/renders", json={**render, "format": "exr"}, headers=keyed("one"))
     assert other.status_code == 422
-    assert problem_of(other)["type"].endswith("key-reused")
+    assert parse_problem(other)["type"].endswith("key-reused")
     elsewhere = client.post("/api/truths", json=render, headers=keyed("one"))
-    assert problem_of(elsewhere)["type"].endswith("key-reused")
+    assert parse_problem(elsewhere)["type"].endswith("key-reused")
     assert client.get("/api/truths").json() == []
 
 
@@ -66,7 +66,7 @@ def test_what_was_refused_may_be_tried_again(client: TestClient, render: dict[st
 def test_keys_that_are_none_are_refused(client: TestClient, render: dict[str, Any], key: str) -> None:
     answer = client.post("/api/renders", json=render, headers={"Idempotency-Key": key.encode("latin-1")})
     assert answer.status_code == 422
-    assert problem_of(answer)["detail"].startswith("Idempotency-Key is ")
+    assert parse_problem(answer)["detail"].startswith("Idempotency-Key is ")
     assert client.get("/api/renders").json() == []
 
 
@@ -93,7 +93,7 @@ def test_calls_without_a_body_and_with_one_that_nobody_reads(client: TestClient,
         assert [answer.status_code for answer in answers] == [201, 201]
         assert answers[0].json()["id"] == answers[1].json()["id"]
         resumed = [client.post("/api/renders/0123456789abcdef/resume", content=body, headers=key) for _ in range(2)]
-        assert all(problem_of(answer)["type"].endswith("key-reused") for answer in resumed)
+        assert all(parse_problem(answer)["type"].endswith("key-reused") for answer in resumed)
 
 
 def test_a_call_that_is_not_answered_yet_is_not_made_twice(
@@ -116,7 +116,7 @@ def test_a_call_that_is_not_answered_yet_is_not_made_twice(
     assert is_at_it.wait(30)
     meanwhile = client.post("/api/renders", json=render, headers=keyed("one"))
     assert meanwhile.status_code == 409
-    assert (problem_of(meanwhile)["type"][-11:], meanwhile.headers["retry-after"]) == ("in-progress", "1")
+    assert (parse_problem(meanwhile)["type"][-11:], meanwhile.headers["retry-after"]) == ("in-progress", "1")
     may_go_on.set()
     first.join(30)
     assert answers[0].status_code == 202
@@ -134,26 +134,26 @@ ANSWER = Answer(201, "/api/scenes/0", "application/json", b"{}")
 
 
 def test_keys_are_each_clients_own_and_run_out(client: TestClient, store: IdempotencyStore) -> None:
-    assert store.begin("ann", "one", "a") is None
+    assert store.claim("ann", "one", "a") is None
     store.end("ann", "one", ANSWER)
-    assert store.begin("bob", "one", "b") is None
-    before = store.begin("ann", "one", "a")
+    assert store.claim("bob", "one", "b") is None
+    before = store.claim("ann", "one", "a")
     assert before is not None
     assert before.answer == ANSWER
     with client.app.state.services.bakes.ledger.sessions.begin() as session:
-        session.execute(update(IdempotencyRow).values(created=epoch_s() - idempotency.KEPT_S - 1))
-    assert store.begin("ann", "one", "a") is None
+        session.execute(update(IdempotencyRow).values(created=epoch_s() - idempotency.RETENTION_S - 1))
+    assert store.claim("ann", "one", "a") is None
 
 
 def test_a_call_whose_server_has_died_is_made_again(client: TestClient, store: IdempotencyStore) -> None:
-    assert store.begin("ann", "one", "a") is None
+    assert store.claim("ann", "one", "a") is None
     with client.app.state.services.bakes.ledger.sessions.begin() as session:
-        place, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).one().split("/")
+        place, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).load().split("/")
         session.execute(update(IdempotencyRow).values(owner=f"{place}/{2**22 + 1}/{nonce}/{number}"))
-    assert store.begin("ann", "one", "a") is None
+    assert store.claim("ann", "one", "a") is None
     with client.app.state.services.bakes.ledger.sessions.begin() as session:
         session.execute(update(IdempotencyRow).values(created=epoch_s() - idempotency.ABANDONED_S - 1))
-    assert store.begin("ann", "one", "a") is None
+    assert store.claim("ann", "one", "a") is None
 
 
 def test_of_too_many_answers_the_oldest_go_and_large_ones_become_the_way_to_what_was_made(
@@ -161,10 +161,10 @@ def test_of_too_many_answers_the_oldest_go_and_large_ones_become_the_way_to_what
 ) -> None:
     monkeypatch.setattr(idempotency, "MAX_EACH", 3)
     for key in "abcde":
-        assert store.begin("ann", key, key) is None
+        assert store.claim("ann", key, key) is None
         store.end("ann", key, ANSWER)
-    assert store.begin("ann", "e", "e") is not None
-    assert store.begin("ann", "a", "a") is None
+    assert store.claim("ann", "e", "e") is not None
+    assert store.claim("ann", "a", "a") is None
     monkeypatch.setattr(idempotency, "MAX_BODY_BYTES", 10)
     first, again = (
         client.post("/api/renders", json=render, headers=keyed("one"), follow_redirects=False) for _ in range(2)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from session_client import Baked
 
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -34,7 +34,7 @@ def test_a_ready_bake_is_deleted_only_where_that_is_said(client: TestClient, bak
     url = f"/api/bakes/{baked.bake}"
     refused = client.delete(url)
     assert refused.status_code == 409
-    assert problem_of(refused)["detail"].endswith("?forget=true deletes it")
+    assert parse_problem(refused)["detail"].endswith("?forget=true deletes it")
     assert client.get(url).json()["state"] == "ready"
     assert client.delete(f"{url}?forget=true").status_code == 204
     assert client.get(url).status_code == 404

@@ -17,10 +17,10 @@ import pytest
 
 from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
 from relume.resident import resident_bytes
-from server.errors import problem_of
+from server.errors import make_problem
 from server.files import importers
-from server.files.confining import missing
-from server.files.importers import Importers, OutgrownError
+from server.files.confining import missing_features
+from server.files.importers import Importers, ImportTooLargeError
 from server.files.importing import ImportRequest
 
 STAND_IN = """
@@ -143,7 +143,7 @@ def test_the_parent_ends_with_the_server(waiting: Importers) -> None:
 def test_who_imports_ends_with_who_asked(waiting: Importers) -> None:
     asker, theirs = socket.socketpair()
     with theirs, waiting._lock:
-        socket.send_fds(waiting._running(), [b"."], [theirs.fileno()])
+        socket.send_fds(waiting._ensure_running(), [b"."], [theirs.fileno()])
     with asker:
         asker.sendall(json.dumps(asdict(asked("hang"))).encode() + b"\n")
         asker.shutdown(socket.SHUT_WR)
@@ -164,7 +164,7 @@ def test_what_is_forked_from_has_one_thread(tmp_path: Path) -> None:
         ("problem", 60, SceneError, "^no"),
         ("full", 60, DiskFullError, "free some space"),
         ("material", 60, MaterialError, "^no"),
-        ("large", 60, OutgrownError, "larger than"),
+        ("large", 60, ImportTooLargeError, "larger than"),
         ("failure", 60, RelumeError, "^no"),
         ("damage", 60, SceneError, "damaged"),
         ("hang", 1, SceneError, "more than 1 s or"),
@@ -185,13 +185,13 @@ def test_a_defect_is_no_fault_of_the_file_and_leaves_one_line(
 ) -> None:
     with pytest.raises(RelumeError, match="not because of the file") as failure:
         waiting.run(asked("defect"))
-    assert problem_of(failure.value).status == 500
+    assert make_problem(failure.value).status == 500
     (line,) = [record.getMessage() for record in caplog.records if record.levelno == logging.ERROR]
     assert "ValueError: of nobody's file" in line
     assert "\n" not in line
 
 
-@pytest.mark.skipif(bool(missing()), reason=f"this machine has no {' and no '.join(missing())}")
+@pytest.mark.skipif(bool(missing_features()), reason=f"this machine has no {' and no '.join(missing_features())}")
 def test_who_imports_reaches_its_own_files_and_nothing_else(waiting: Importers, tmp_path: Path) -> None:
     for name in ("file", "other"):
         (tmp_path / name).write_text(name)
@@ -210,7 +210,7 @@ def test_who_imports_is_given_no_password(waiting: Importers, monkeypatch: pytes
 
 
 def test_a_file_that_unpacks_to_more_than_it_may_is_stopped_while_it_does(waiting: Importers, tmp_path: Path) -> None:
-    with pytest.raises(OutgrownError):
+    with pytest.raises(ImportTooLargeError):
         waiting.run(replace(asked("write"), into=str(tmp_path), max_file_bytes=1 << 18))
     assert (tmp_path / "texels.npy").stat().st_size <= 1 << 18
 
@@ -219,7 +219,7 @@ def test_a_machine_that_cannot_confine_says_so_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(importers, "_COMMAND", [sys.executable, "-c", STAND_IN])
-    monkeypatch.setattr(importers, "missing", lambda: ("Landlock",))
+    monkeypatch.setattr(importers, "missing_features", lambda: ("Landlock",))
     with closing(Importers()) as found:
         found.start()
         found.start()

@@ -20,8 +20,8 @@ from sse_starlette.sse import AppStatus
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
-from server.running.leave import Leave
-from server.running.process import Process
+from server.running.leave import DrainState
+from server.running.process import ServerProcess
 from server.settings import Settings
 
 
@@ -96,8 +96,8 @@ class Stubborn:
         self.ended, self.may_stop = threading.Event(), threading.Event()
         config = uvicorn.Config(self._app, port=0, interface="asgi3", lifespan="on", log_config=None)
         limits = {"drain_seconds": 5.0, "stop_seconds": 0.2}
-        leave, end = Leave(), lambda _: self.ended.set()
-        self.process = Process(config, leave=leave, num_sessions=lambda: 0, end=end, **limits)
+        leave, end = DrainState(), lambda _: self.ended.set()
+        self.process = ServerProcess(config, drain=leave, num_sessions=lambda: 0, end=end, **limits)
         self.thread = threading.Thread(target=self.process.run)
 
     def stop(self) -> None:
@@ -149,7 +149,7 @@ def test_it_is_told_once_that_the_server_answers() -> None:
         told.append(process.started)
         process.should_exit = True
 
-    process = Process(config, leave=Leave(), num_sessions=lambda: 0, tell_started=tell, **limits)
+    process = ServerProcess(config, drain=DrainState(), num_sessions=lambda: 0, on_started=tell, **limits)
     thread = threading.Thread(target=process.run)  # browser tests of the same process may have a loop in this one
     thread.start()
     thread.join(timeout=30)

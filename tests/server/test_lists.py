@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from server_fakes import SIZE, tiny_scene
 from session_client import Baked
 from test_comparisons import is_done, wait_until
@@ -105,7 +105,7 @@ def test_filters(client: TestClient, filled: Baked) -> None:
     assert len(ids(f"/api/shares?bake={filled.bake}")) == 3
     assert client.get(f"/api/scenes/{filled.scene}/comments?resolved=true").json() == []
     assert len(client.get(f"/api/scenes/{filled.scene}/comments?resolved=false").json()) == 3
-    assert problem_of(client.get("/api/renders?state=done"))["detail"].startswith("state is 'done'; give 'queued'")
+    assert parse_problem(client.get("/api/renders?state=done"))["detail"].startswith("state is 'done'; give 'queued'")
 
 
 def test_works_say_whose_they_are_and_when(client: TestClient, filled: Baked) -> None:
@@ -121,6 +121,6 @@ def test_works_say_whose_they_are_and_when(client: TestClient, filled: Baked) ->
 @pytest.mark.parametrize("url", ["/api/bakes?stat=ready", "/api/me?x=1", "/api/color?limit=3"])
 def test_what_a_call_does_not_take_is_refused_by_name(client: TestClient, url: str) -> None:
     answer = client.get(url)
-    problem = problem_of(answer)
+    problem = parse_problem(answer)
     assert answer.status_code == 422
     assert url.partition("?")[2].partition("=")[0] in problem["detail"]

@@ -7,23 +7,23 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 
 from relume.errors import ParameterError, ProtocolError, StoreError
 from server.library.transfers import MAX_IDLE, TransferPool
-from server.live.sending.bake_news import POLL_S, BakeNews
+from server.live.sending.bake_news import POLL_S, BakeUpdates
 from server.live.sending.coefficient_budget import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, CoefficientBudget
 from server.live.state.frame_window import FrameWindow
 from server.live.state.look_state import LookState
-from server.live.state.pointers import check_hand, check_held, find_curve
-from server.live.state.resume import MAX_KEPT, ResumeStore
-from server.live.state.shown_views import ShownViews
+from server.live.state.pointers import check_active_pointer, check_parameter, find_curve
+from server.live.state.resume import MAX_SAVED, ResumeStore
+from server.live.state.shown_views import VisibleViews
 from worker.status import BakeStatus
 
 DOCUMENT: dict[str, Any] = {
     "materials": {"a/b": {"terms": [{"model": "lambert"}, {"model": "cook_torrance"}, {"model": "ashikhmin_shirley"}]}}
 }
-ALONE = ShownViews(["front"], "front")
+ALONE = VisibleViews(["front"], "front")
 TERM = "/materials/a~1b/terms"
 
 
@@ -31,41 +31,41 @@ def test_window_opens_by_acknowledgement_and_an_ack_counts_for_all_before_it() -
     window = FrameWindow(ack_seconds=10)
     for _ in range(2):
         assert window.has_room("front", ALONE)
-        window.sent("front", 100, now_s=1.0)
+        window.on_sent("front", 100, now_s=1.0)
     assert not window.has_room("front", ALONE)
-    window.acknowledged(2, now_s=1.1)
-    window.sent("front", 100, now_s=1.2)
+    window.on_acknowledged(2, now_s=1.1)
+    window.on_sent("front", 100, now_s=1.2)
     assert window.has_room("front", ALONE)
     assert window.next_frame == 4
 
 
 def test_view_under_the_pointer_has_a_slot_of_its_own_and_the_others_share_one() -> None:
-    window, shown = FrameWindow(ack_seconds=10), ShownViews(["front", "left", "top"], "left")
+    window, shown = FrameWindow(ack_seconds=10), VisibleViews(["front", "left", "top"], "left")
     assert all(window.has_room(name, shown) for name in shown.names)
-    window.sent("top", 100, now_s=1.0)
+    window.on_sent("top", 100, now_s=1.0)
     assert [window.has_room(name, shown) for name in shown.names] == [False, True, False]
-    window.sent("left", 100, now_s=1.0)
+    window.on_sent("left", 100, now_s=1.0)
     assert not any(window.has_room(name, shown) for name in shown.names)
-    window.acknowledged(1, now_s=1.1)
+    window.on_acknowledged(1, now_s=1.1)
     assert [window.has_room(name, shown) for name in shown.names] == [True, False, True]
 
 
 def test_shown_views_keep_the_focus_where_they_can() -> None:
-    shown = ShownViews(["front"], "front")
+    shown = VisibleViews(["front"], "front")
     shown.show(["left", "front", "left"])
     assert (shown.names, shown.focus) == (("left", "front"), "front")
-    shown.work_in("left")
+    shown.set_focus("left")
     with pytest.raises(ParameterError, match="which are shown"):
-        shown.work_in("top")
+        shown.set_focus("top")
     shown.hide("left")
     assert (shown.names, shown.focus) == (("front",), "front")
 
 
 def test_window_refuses_what_was_never_sent_and_loses_patience() -> None:
     window = FrameWindow(ack_seconds=10)
-    window.sent("front", 100, now_s=1.0)
+    window.on_sent("front", 100, now_s=1.0)
     with pytest.raises(ProtocolError, match="never sent"):
-        window.acknowledged(2, now_s=1.0)
+        window.on_acknowledged(2, now_s=1.0)
     window.check(10.9)
     with pytest.raises(ProtocolError) as lost:
         window.check(11.1)
@@ -77,9 +77,9 @@ def stream(window: FrameWindow, num_frames: int, num_bytes: int, bytes_per_s: fl
     now_s = start_s
     for _ in range(num_frames):
         frame = window.next_frame
-        window.sent("front", num_bytes, now_s)
+        window.on_sent("front", num_bytes, now_s)
         now_s += 0.010 + num_bytes / bytes_per_s
-        window.acknowledged(frame, now_s)
+        window.on_acknowledged(frame, now_s)
     return now_s
 
 
@@ -126,7 +126,7 @@ def test_pace_is_bounded() -> None:
 
 def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
     store = ResumeStore(resume_seconds=600)
-    tokens = [store.open("bake", LookState({}, {"k": k}, k), ALONE) for k in range(MAX_KEPT + 5)]
+    tokens = [store.open("bake", LookState({}, {"k": k}, k), ALONE) for k in range(MAX_SAVED + 5)]
     assert len(set(tokens)) == len(tokens)
     for token in tokens:
         store.close(token, now_s=0.0)
@@ -160,25 +160,25 @@ def test_curve_pointers_are_resolved_or_refused() -> None:
 def test_what_a_hand_may_hold_is_of_this_look() -> None:
     document = {**DOCUMENT, "lights": {"Desk / lamp": {}}}
     for pointer in (f"{TERM}/2/params/nu", "/lights/Desk ~1 lamp", "/environment/scale"):
-        check_held(pointer, document)
+        check_parameter(pointer, document)
     for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/sigma", "/lights/Desk", "/environment/size"):
         with pytest.raises(ParameterError):
-            check_held(pointer, document)
+            check_parameter(pointer, document)
 
 
 def test_a_hand_may_be_on_a_curve_or_on_what_may_be_held() -> None:
     document = {**DOCUMENT, "lights": {"Lamp": {}}}
     for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/nu", "/lights/Lamp", "/environment/rotation"):
-        check_hand(pointer, document)
+        check_active_pointer(pointer, document)
     for pointer in (f"{TERM}/2/curves/theta_h", f"{TERM}/2/params/sigma", "/lights/Desk", "/display/exposure"):
         with pytest.raises(ParameterError):
-            check_hand(pointer, document)
+            check_active_pointer(pointer, document)
 
 
 def test_of_a_ground_that_only_catches_shadows_there_is_nothing_to_hold() -> None:
     for is_catcher in (False, True):
         document = {"materials": {"a/b": {**DOCUMENT["materials"]["a/b"], "catcher": is_catcher}}}
-        for find, pointer in ((find_curve, f"{TERM}/1/curves/theta_h"), (check_held, f"{TERM}/1/params/sigma")):
+        for find, pointer in ((find_curve, f"{TERM}/1/curves/theta_h"), (check_parameter, f"{TERM}/1/params/sigma")):
             if is_catcher:
                 with pytest.raises(ParameterError):
                     find(pointer, document)
@@ -199,19 +199,19 @@ def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failu
         with ThreadPoolExecutor(2) as executor:
             pool = TransferPool(open_transfer, executor, 60.0, lambda: 0.0)
             with pytest.raises(StoreError):
-                async with pool.using("broken", Path("broken")):
+                async with pool.acquire("broken", Path("broken")):
                     pass
-            async with pool.using("broken", Path("broken")) as found, pool.using("broken", Path("broken")) as again:
+            async with pool.acquire("broken", Path("broken")) as found, pool.acquire("broken", Path("broken")) as again:
                 assert found is again
                 for k in range(MAX_IDLE + 2):
-                    async with pool.using(f"b{k}", Path(f"b{k}")):
+                    async with pool.acquire(f"b{k}", Path(f"b{k}")):
                         pass
-                async with pool.using("b0", Path("b0")):
+                async with pool.acquire("b0", Path("b0")):
                     pass
-            async with pool.using("broken", Path("broken")):
+            async with pool.acquire("broken", Path("broken")):
                 pass
 
-    run_alone(run())
+    run_in_thread(run())
     assert opened == ["broken", "broken", "b0", "b1", "b2", "b3", "b0"]
 
 
@@ -223,9 +223,11 @@ def test_sessions_on_one_scene_look_into_the_ledger_together() -> None:
         return []
 
     async def scenario() -> None:
-        news = BakeNews(bakes, asking)
+        news = BakeUpdates(bakes, asking)
         socket: Any = SimpleNamespace()
-        telling = [asyncio.create_task(news.tell(socket, "b", scene)) for scene in ("one", "one", "other", "one")]
+        telling = [
+            asyncio.create_task(news.send_updates(socket, "b", scene)) for scene in ("one", "one", "other", "one")
+        ]
         await asyncio.sleep(0.1)
         telling[0].cancel()  # whoever asked first and goes takes nothing from others
         await asyncio.sleep(3.2 * POLL_S)
@@ -234,6 +236,6 @@ def test_sessions_on_one_scene_look_into_the_ledger_together() -> None:
             task.cancel()
 
     with ThreadPoolExecutor(1) as asking:
-        run_alone(scenario())
+        run_in_thread(scenario())
     assert set(asked) == {"one", "other"}
     assert 2 <= asked.count("one") <= 5

@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from fastapi.testclient import TestClient
 from running_server import running_server
 from server_fakes import Control
 from session_client import Baked, open_session
 from websockets.sync.client import connect
 
-from cli.serve import tell
+from cli.serve import announce
 from server.logs.context import BAKE, REQUEST, USER
 from server.logs.setting_up import Format, set_up
 from server.settings import Settings
@@ -51,7 +51,7 @@ def test_json_lines_say_what_they_are_about(capsys: pytest.CaptureFixture[str]) 
         except ValueError:
             log.exception("it “failed”\nfor %s", "Ann")
 
-    line = json.loads(logged(capsys, "json", lambda: run_alone(asyncio.to_thread(say))))
+    line = json.loads(logged(capsys, "json", lambda: run_in_thread(asyncio.to_thread(say))))
     assert line.pop("time").endswith("+00:00")
     assert "ValueError: why" in line.pop("trace")
     assert (line.pop("level"), line.pop("logger")) == ("error", "server.somewhere")
@@ -59,9 +59,9 @@ def test_json_lines_say_what_they_are_about(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_where_a_server_listens_is_a_line_of_the_log_where_machines_read_it(capsys: pytest.CaptureFixture[str]) -> None:
-    said = logged(capsys, "json", lambda: tell("relume listens on http://127.0.0.1:8420/", "json"))
+    said = logged(capsys, "json", lambda: announce("relume listens on http://127.0.0.1:8420/", "json"))
     assert json.loads(said)["message"] == "relume listens on http://127.0.0.1:8420/"
-    said = logged(capsys, "plain", lambda: tell("relume listens on http://127.0.0.1:8420/", "plain"))
+    said = logged(capsys, "plain", lambda: announce("relume listens on http://127.0.0.1:8420/", "plain"))
     assert said == "relume listens on http://127.0.0.1:8420/\n"
 
 
@@ -71,7 +71,7 @@ def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> 
         USER.set("Ann")
         log.warning("the user is")
 
-    said = logged(capsys, "plain", lambda: run_alone(asyncio.to_thread(say)))
+    said = logged(capsys, "plain", lambda: run_in_thread(asyncio.to_thread(say)))
     assert said == "WARNING server.somewhere: nothing is known\nWARNING server.somewhere: the user is [user=Ann]\n"
 
 

@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
-from relume.balls.library import library_ball, render
+from relume.balls.library import library_preview_png, render
 from relume.look.library import presets
 
 
@@ -25,7 +25,7 @@ def test_thumbnails_made_ahead_are_those_of_the_materials_as_they_are_rendered_n
     """Of the first material of each model and of the last: fits or lighting that change make all of them due again."""
     by_model = {preset.model: preset for preset in reversed(presets())}
     for preset in (*by_model.values(), presets()[-1]):
-        png = library_ball(preset.id)
+        png = library_preview_png(preset.id)
         assert png is not None
         ahead = np.asarray(Image.open(io.BytesIO(png)), int)
         difference = np.abs(ahead - render(preset).astype(int))

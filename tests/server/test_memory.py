@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 from session_client import open_session
 from tiny_scenes import still_life
 
 from relume.bake import Recipe
-from relume.resident import held_bytes
+from relume.resident import live_bytes
 from relume.scene.archive import make_scene
 from server.app import create_app
 from server.library.transfers import TransferPool
@@ -53,7 +53,7 @@ def real(tmp_path: Path, clock: Clock) -> Iterator[TestClient]:
 
 
 def go_round(client: TestClient) -> None:
-    client.portal.call(client.app.state.services.caretaker.go_round)
+    client.portal.call(client.app.state.services.cache_evictor.run_once)
 
 
 def bake_scenes(client: TestClient, num_scenes: int = NUM_SCENES) -> list[str]:
@@ -76,9 +76,11 @@ def look_at(client: TestClient, bake: str) -> bytes:
     """The exact picture of a bake, one of its curves frozen and moved."""
     with open_session(client, bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=CURVE)
-        session.ready("Ball, half angle θh")  # shading adds in another order: the last bits of a picture would tell
-        session.edit(1, SIGMA, 0.3, hand=SIGMA)
+        session.send_message(type="touch", curve=CURVE)
+        session.wait_until_ready(
+            "Ball, half angle θh"
+        )  # shading adds in another order: the last bits of a picture would tell
+        session.edit(1, SIGMA, 0.3, control=SIGMA)
         return session.exact(1).payload
 
 
@@ -145,19 +147,19 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
     shown, left = bake_scenes(real, 2)
     look_at(real, left)
     with open_session(real, shown) as session:
-        session.send(type="touch", curve=CURVE)
+        session.send_message(type="touch", curve=CURVE)
         session.edit(1, "/materials/Ball/terms/1/params/sigma", 0.3)
         session.exact(1)
-        (transfer,) = [one for one in real.app.state.services.transfers.opened if shown in one.key]
+        (transfer,) = [one for one in real.app.state.services.transfers.open_bakes if shown in one.key]
         clock.now += 100 * IDLE_S
         go_round(real)
-        assert real.app.state.services.transfers.opened == [transfer]
+        assert real.app.state.services.transfers.open_bakes == [transfer]
         assert gauges(real)["frozen_cache"] > FLOOR_BYTES
         session.edit(2, "/materials/Ball/terms/1/params/sigma", 0.25)
         session.exact(2)
     clock.now += IDLE_S - 1
     go_round(real)
-    assert real.app.state.services.transfers.opened == [transfer]
+    assert real.app.state.services.transfers.open_bakes == [transfer]
 
 
 @pytest.mark.slow
@@ -175,7 +177,7 @@ def test_comparisons_and_renders_go_on_while_their_bake_is_let_go(real: TestClie
             break
         time.sleep(0.02)
     assert states == ["ready", "ready"]
-    assert real.app.state.services.transfers.opened == []
+    assert real.app.state.services.transfers.open_bakes == []
 
 
 def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
@@ -188,7 +190,7 @@ def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
         return opened[-1]
 
     async def use(pool: TransferPool, may_leave: asyncio.Event) -> Any:
-        async with pool.using("one", Path("one")) as found:
+        async with pool.acquire("one", Path("one")) as found:
             await may_leave.wait()
             return found
 
@@ -198,29 +200,29 @@ def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
             first = asyncio.create_task(use(pool, may_leave))
             await asyncio.sleep(0)
             clock.now += 2 * IDLE_S
-            assert pool.let_go() == (0, {Path("one")})  # it is being opened
+            assert pool.release() == (0, {Path("one")})  # it is being opened
             may_open.set()
             second = asyncio.create_task(use(pool, may_leave))
             await asyncio.sleep(0)
             may_leave.set()
             assert await first is await second is opened[0]
             clock.now += IDLE_S - 1
-            assert pool.let_go() == (0, {Path("one")})
+            assert pool.release() == (0, {Path("one")})
             clock.now += 2
-            assert pool.let_go() == (1, set())
+            assert pool.release() == (1, set())
             assert await use(pool, may_leave) is opened[1]
 
-    run_alone(run())
+    run_in_thread(run())
     assert len(opened) == 2
 
 
 def test_what_is_reached_twice_is_counted_once() -> None:
     array = np.zeros(1000, np.float64)
     views = {"a": array, "b": [array[10:], array.reshape(10, 100)], "own": np.ones(5, np.uint8)}
-    assert held_bytes(views) == array.nbytes + 5
-    assert held_bytes(lambda: views) == array.nbytes + 5
+    assert live_bytes(views) == array.nbytes + 5
+    assert live_bytes(lambda: views) == array.nbytes + 5
 
 
 def test_a_file_mapped_into_memory_is_the_systems(tmp_path: Path) -> None:
     np.save(tmp_path / "map.npy", np.zeros(1000))
-    assert held_bytes(np.load(tmp_path / "map.npy", mmap_mode="r").view(np.ndarray)) == 0
+    assert live_bytes(np.load(tmp_path / "map.npy", mmap_mode="r").view(np.ndarray)) == 0

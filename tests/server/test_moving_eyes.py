@@ -126,12 +126,12 @@ def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -
     assert first.header["fidelity"] == "approximate"
     pictures = [shown(first)]
     for number, aside in ((5, 0.4), (6, -0.3)):
-        session.send(**eye(view, number, aside))
+        session.send_message(**eye(view, number, aside))
         pictures.append(shown(of_eye(session, number)))
     assert all(picture.max() > 0.01 for picture in pictures)
     for k in range(3):
         assert np.abs(pictures[k] - pictures[k - 1]).max() > 0.01
-    session.send(**eye(view, 7, 0.0))
+    session.send_message(**eye(view, 7, 0.0))
     np.testing.assert_array_equal(shown(of_eye(session, 7)), pictures[0])
 
 
@@ -148,7 +148,7 @@ def test_where_the_eye_rests_the_exact_picture_follows_and_edits_go_on_in_it_twi
     (view,), material = found["views"], found["materials"][0]
     for number, aside in ((5, 0.4), (6, -0.3)):
         placed = eye(view, number, aside)
-        session.send(**placed)
+        session.send_message(**placed)
         moving = of_eye(session, number)
         assert not moving.header["exact"]
         exact_of(session, number, number - 5)
@@ -166,11 +166,11 @@ def test_where_the_eye_rests_the_exact_picture_follows_and_edits_go_on_in_it_twi
 
 def test_an_older_eye_says_nothing_and_the_size_is_the_eyes(session: Session) -> None:
     (view,) = hello(session)["views"]
-    session.send(**eye(view, 9, 0.2, (40, 30)))
+    session.send_message(**eye(view, 9, 0.2, (40, 30)))
     frame = of_eye(session, 9)
     assert (frame.header["width"], frame.header["height"], frame.header["tiles"]) == (40, 30, [[0, 0, 40, 30]])
-    session.send(**eye(view, 8, 0.5))
-    session.send(**eye(view, 10, 0.2, (40, 30)))
+    session.send_message(**eye(view, 8, 0.5))
+    session.send_message(**eye(view, 10, 0.2, (40, 30)))
     np.testing.assert_array_equal(shown(of_eye(session, 10)), shown(frame))
 
 
@@ -181,14 +181,14 @@ def test_an_edit_a_light_and_an_eye_in_one_burst_are_all_shown(session: Session,
     terms = [{"model": "lambert", "color": [0.1, 0.5, 0.2]}]
     session.edit(1, f"/materials/{material}/terms", terms)
     session.edit(2, "/environment/scale", 2.0)
-    session.send(**eye(view, 3, 0.3))
+    session.send_message(**eye(view, 3, 0.3))
     frame = of_eye(session, 3)
     while frame.header["revision"] < 2:
         frame = session.frame()
     burst = shown(frame)
     with open_session(client, bake) as other:
         hello(other)
-        other.send(**eye(view, 1, 0.3))
+        other.send_message(**eye(view, 1, 0.3))
         other.edit(1, f"/materials/{material}/terms", terms)
         other.edit(2, "/environment/scale", 2.0)
         frame = other.frame()
@@ -227,10 +227,10 @@ def test_a_render_is_what_the_eye_sees_where_it_begins(
 def test_bad_eyes_are_refused_in_words_and_nothing_is_lost(session: Session, bad: dict[str, Any]) -> None:
     (view,) = hello(session)["views"]
     before = shown(session.exact(0))
-    session.send(**(eye(view, 1, 0.2) | bad))
+    session.send_message(**(eye(view, 1, 0.2) | bad))
     problem = session.text("problem")
     assert len(problem["problem"]["detail"]) > 10
-    session.send(**eye(view, 2, 0.0))
+    session.send_message(**eye(view, 2, 0.0))
     np.testing.assert_array_equal(shown(exact_of(session, 2, 0)), before)
 
 
@@ -240,7 +240,7 @@ def test_an_eye_inside_a_solid_and_one_that_sees_nothing_are_seen_through(sessio
     for number, place in ((1, [0, 0, 0]), (2, [0, 0, 1e5])):
         to_world = LEVEL.copy()
         to_world[:3, 3] = place
-        session.send(**(eye(view, number, 0.0) | {"to_world": to_world.ravel().tolist()}))
+        session.send_message(**(eye(view, number, 0.0) | {"to_world": to_world.ravel().tolist()}))
         assert np.isfinite(shown(of_eye(session, number))).all()
 
 
@@ -252,7 +252,7 @@ def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
     with open_session(client, fixed["id"]) as session:
         (view,) = hello(session)["views"]
         assert (view["eye"], view["bounds"]) == ("baked", None)
-        session.send(**eye(view, 1, 0.2))
+        session.send_message(**eye(view, 1, 0.2))
         assert "surface" in session.text("problem")["problem"]["detail"]
     answer = client.get(f"/api/bakes/{bake}/views/{view['name']}/materials.png")
     assert answer.status_code == 404
@@ -269,27 +269,29 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
         before = shown(session.exact(0))
         assert client.delete(f"/api/scenes/{scene}").status_code == 204
         for number, aside in ((1, 0.3), (2, 0.5)):
-            session.send(**eye(view, number, aside))
+            session.send_message(**eye(view, number, aside))
             picture = shown(of_eye(session, number))
             assert np.abs(picture - before).max() > 0.01
-            session.ready("the exact picture from here")  # given up: what it needs is gone
+            session.wait_until_ready("the exact picture from here")  # given up: what it needs is gone
             problem = session.text("problem")["problem"]
             assert problem["type"].endswith("not-made")
             assert "the moving picture stays" in problem["detail"]
-        session.send(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
+        session.send_message(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
         assert session.text("probe")["material"] is not None
 
 
 def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
     found = hello(session)
     (view,) = found["views"]
-    session.send(**eye(view, 4, 0.0))
+    session.send_message(**eye(view, 4, 0.0))
     of_eye(session, 4)
-    session.send(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
+    session.send_message(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
     answer = session.text("probe")
     assert answer["material"] == found["materials"][0]
     assert np.linalg.norm(answer["position"]) == pytest.approx(1.0, abs=0.02)
-    session.send(type="brush", curve=f"/materials/{answer['material']}/terms/0/curves/theta_h", **{"from": 0, "to": 9})
+    session.send_message(
+        type="brush", curve=f"/materials/{answer['material']}/terms/0/curves/theta_h", **{"from": 0, "to": 9}
+    )
     assert session.text("problem")["problem"]["detail"]
 
 
@@ -320,15 +322,15 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
     found = hello(session)
     (view,), material = found["views"], found["materials"][0]
     session.frame()
-    session.send(**eye(view, 1, 0.2), rest="stay")
+    session.send_message(**eye(view, 1, 0.2), rest="stay")
     of_eye(session, 1)
-    session.send(type="evaluate", by="browser")
+    session.send_message(type="evaluate", by="browser")
     tables = tables_of(session)
     first = arrays_in(tables)
     if tables.header["fidelity"] == "preview":
         until_fine(session, 0)
     assert {"even", "materials", "vectors/0", "sky"} <= set(first)
-    session.send(**eye(view, 2, 0.4), rest="stay")
+    session.send_message(**eye(view, 2, 0.4), rest="stay")
     assert arrays_in(tables_of(session)) == {}
     session.edit(1, f"/materials/{material}/terms/0/color", [0.1, 0.2, 0.9])
     recoloured = tables_of(session)
@@ -367,17 +369,17 @@ def test_there_are_no_other_arrays_and_none_of_fixed_views(
 
 def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Session) -> None:
     (view,) = hello(session)["views"]
-    session.send(**eye(view, 1, 0.2), rest="stay")
+    session.send_message(**eye(view, 1, 0.2), rest="stay")
     while (first := of_eye(session, 1)).header["fidelity"] == "preview":
         pass
     for _ in range(2):
-        session.send(type="evaluate", by="browser")
+        session.send_message(type="evaluate", by="browser")
         assert "vectors/0" in arrays_in(tables_of(session))
-        session.send(type="evaluate", by="server")
+        session.send_message(type="evaluate", by="server")
         while (frame := session.frame()).header["kind"] != "picture":
             pass
         np.testing.assert_array_equal(shown(frame), shown(first))
-    session.send(type="evaluate", by="nobody")
+    session.send_message(type="evaluate", by="nobody")
     assert "/by is 'nobody'" in str(session.text("problem"))
 
 
@@ -388,21 +390,21 @@ def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
     monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
     found = hello(session)
     (view,), color = found["views"], f"/materials/{found['materials'][0]}/terms/0/color"
-    session.send(**eye(view, 1, 0.05), rest="stay")
+    session.send_message(**eye(view, 1, 0.05), rest="stay")
     of_eye(session, 1)
     session.edit(1, "/transport/show", "direct")  # colours would bring other light to all points
-    session.send(type="evaluate", by="browser")
+    session.send_message(type="evaluate", by="browser")
     until_fine(session, 1)
     turn, kinds = "/environment/rotation", []
     edits = [(color, [0.1, 0.2, 0.9]), (turn, 20.0), (turn, 50.0), (color, [0.9, 0.8, 0.1])]
     for revision, (path, value) in enumerate(edits, start=2):
-        session.edit(revision, path, value, hand=path)
+        session.edit(revision, path, value, control=path)
         while (first := session.frame()).header["revision"] != revision:
             pass
         kinds.append(first.header["kind"])
         if kinds[-1] == "picture" or first.header["fidelity"] == "preview":
             until_fine(session, revision)
-        session.send(**eye(view, revision, 0.1 * revision), rest="stay")
+        session.send_message(**eye(view, revision, 0.1 * revision), rest="stay")
         assert arrays_in(tables_of(session)) == {}
     assert kinds == ["picture", "picture", "picture", "tables"]  # how small those of colours are it learns once
 
@@ -410,7 +412,7 @@ def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
 def test_tables_follow_a_picture_that_nothing_refines(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
     session.edit(1, "/transport/show", "direct")
-    session.send(type="evaluate", by="browser")
+    session.send_message(type="evaluate", by="browser")
     until_fine(session, 1)
     for revision in (2, 3):
         session.edit(revision, "/environment/scale", 0.5 / revision)

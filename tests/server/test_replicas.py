@@ -11,11 +11,11 @@ from threading import Thread
 from urllib.error import HTTPError
 
 import pytest
-from replicas_proxy import proxied, proxied_by_one_name
+from replicas_proxy import proxy_to_ports, proxy_to_shared_name
 from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
-from server.live.rooms.door import watch_of
+from server.live.rooms.door import derive_watch_key
 from server.wire.rooms import MIN_ROOM, ROOM_PREFIX
 
 NUM_SERVERS = 3
@@ -27,7 +27,7 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     folder = tmp_path_factory.mktemp("nginx")
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number)) for number in range(NUM_SERVERS)]
-        yield stack.enter_context(proxied(folder, ports))
+        yield stack.enter_context(proxy_to_ports(folder, ports))
 
 
 class _server:  # noqa: N801  (a context)
@@ -63,7 +63,7 @@ def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> No
     rooms = [secrets.token_hex(16) for _ in range(12)]
     servers = {}
     for k, room in enumerate(rooms):
-        queries = [f"?room_prefix={name[:ROOM_PREFIX]}" for name in (room, watch_of(room))]
+        queries = [f"?room_prefix={name[:ROOM_PREFIX]}" for name in (room, derive_watch_key(room))]
         found = {session(proxy, f"{k:015d}{j}", query) for j, query in enumerate(queries)}
         assert len(found) == 1, room
         servers[room] = found.pop()
@@ -76,7 +76,7 @@ def test_all_of_a_room_come_to_one_server_where_one_name_means_all_of_them(tmp_p
         port = stack.enter_context(_server(0, addresses[0]))
         for number, address in enumerate(addresses[1:], start=1):
             stack.enter_context(_server(number, address, port))
-        named = stack.enter_context(proxied_by_one_name(tmp_path, addresses, port))
+        named = stack.enter_context(proxy_to_shared_name(tmp_path, addresses, port))
         rooms = [secrets.token_hex(16) for _ in range(12)]
         queries = [f"?room_prefix={room[:ROOM_PREFIX]}" for room in rooms]
         found = [{session(named, f"{k:016x}", query) for _ in range(3)} for k, query in enumerate(queries)]
@@ -98,7 +98,7 @@ def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
 def test_whom_a_leaving_server_refuses_another_has_at_once(tmp_path: Path) -> None:
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
-        port = stack.enter_context(proxied(tmp_path, ports))
+        port = stack.enter_context(proxy_to_ports(tmp_path, ports))
         assert {session(port, "b", f"?room_prefix={secrets.token_hex(4)}") for _ in range(12)} == {"0"}
 
 
@@ -106,7 +106,7 @@ def test_a_room_is_found_on_the_server_that_has_it_and_the_others_are_none_the_w
     """They answer 404 whatever is asked: calls that are none of sessions still come to them."""
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=404 if number else None)) for number in range(NUM_SERVERS)]
-        port = stack.enter_context(proxied(tmp_path, ports))
+        port = stack.enter_context(proxy_to_ports(tmp_path, ports))
         assert {session(port, "b", f"?room_prefix={secrets.token_hex(4)}") for _ in range(12)} == {"0"}
         assert _answers(port) == {"0", "404"}
 
@@ -114,7 +114,7 @@ def test_a_room_is_found_on_the_server_that_has_it_and_the_others_are_none_the_w
 def test_a_call_that_is_refused_is_not_made_again_elsewhere(tmp_path: Path) -> None:
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
-        port = stack.enter_context(proxied(tmp_path, ports))
+        port = stack.enter_context(proxy_to_ports(tmp_path, ports))
         assert _answers(port) == {"0", "503"}
 
 
@@ -143,7 +143,7 @@ def _get(url: str) -> str:
 
 def test_what_opens_a_room_to_watch_says_its_place_and_no_more() -> None:
     room = "a" * MIN_ROOM
-    assert watch_of(room)[:ROOM_PREFIX] == room[:ROOM_PREFIX]
-    assert watch_of(room)[ROOM_PREFIX] != "a"
-    assert len(watch_of(room)) == 32
-    assert watch_of(room)[ROOM_PREFIX:] not in watch_of(room + "a")
+    assert derive_watch_key(room)[:ROOM_PREFIX] == room[:ROOM_PREFIX]
+    assert derive_watch_key(room)[ROOM_PREFIX] != "a"
+    assert len(derive_watch_key(room)) == 32
+    assert derive_watch_key(room)[ROOM_PREFIX:] not in derive_watch_key(room + "a")

@@ -14,7 +14,7 @@ import trimesh
 from fastapi.testclient import TestClient
 from glb_builder import Glb
 from PIL import Image
-from server_fakes import SIZE, BatchesHere, Control
+from server_fakes import SIZE, Control, InThreadBatches
 from session_client import Baked
 
 from relume.look import Look
@@ -282,7 +282,7 @@ def test_render_continues_after_a_restart(settings: Settings, client: TestClient
     services.renders.archive_path(status).unlink()
     untouched = services.renders.frame_path(status, 0).stat().st_mtime_ns
     control = Control()
-    with TestClient(create_app(settings, open_library=control.open_library, open_batches=BatchesHere)) as restarted:
+    with TestClient(create_app(settings, open_library=control.open_library, open_batches=InThreadBatches)) as restarted:
         assert wait_until_done(restarted, url)["state"] == "ready"
         assert restarted.get(f"{url}/frames/1").status_code == 200
     assert services.renders.frame_path(status, 0).stat().st_mtime_ns == untouched

@@ -8,25 +8,25 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from server_fakes import BatchesHere, Control
+from server_fakes import Control, InThreadBatches
 from server_fixtures import open_fake_bakes
-from session_client import SIGMA, TOGETHER, Baked, Session, open_session
+from session_client import ROOM_FIELDS, SIGMA, Baked, Session, open_session
 from sqlalchemy import select, update
 from starlette.testclient import WebSocketDenialResponse
 
 from server.app import create_app
-from server.live.rooms.door import watch_of
+from server.live.rooms.door import derive_watch_key
 from server.records.tables import RoomRow
 from server.settings import Settings
 
-WATCH = {"watch": watch_of(TOGETHER["room"])}
+WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
 RESTART = 1012
 LEASE_S = 600.0  # rounds are made by tests, however long those take
 
 
 @pytest.fixture(autouse=True)
 def _no_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.live.rooms.keeper.EVERY_S", LEASE_S)
+    monkeypatch.setattr("server.live.rooms.keeper.RENEW_INTERVAL_S", LEASE_S)
     monkeypatch.setattr("server.records.room_leases.ROOM_LEASE_S", LEASE_S)
 
 
@@ -40,7 +40,7 @@ def settings(settings: Settings) -> Settings:
 def other(settings: Settings, client: TestClient) -> Iterator[TestClient]:
     """A second server beside `client`."""
     app = create_app(
-        settings, open_library=Control().open_library, open_batches=BatchesHere, open_bakes=open_fake_bakes
+        settings, open_library=Control().open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
     )
     with TestClient(app) as opened:
         yield opened
@@ -53,7 +53,7 @@ def services(server: TestClient) -> Any:
 def look_around(server: TestClient) -> None:
     """A round of what keeps rooms, at once."""
     assert server.portal is not None
-    server.portal.call(services(server).live.keeper.look)
+    server.portal.call(services(server).live.room_lease.look)
 
 
 def refusal(server: TestClient, baked: Baked, opening: Mapping[str, str]) -> tuple[int, str]:
@@ -90,10 +90,10 @@ def emptied(*servers: TestClient) -> None:
 def test_a_room_of_one_server_is_nowhere_else_until_nobody_is_in_it(
     client: TestClient, other: TestClient, baked: Baked
 ) -> None:
-    with open_session(client, baked.bake, opening=TOGETHER) as ann:
+    with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         assert created(ann)
         look_around(client)
-        assert refusal(other, baked, TOGETHER) == refusal(other, baked, WATCH) == (404, "elsewhere")
+        assert refusal(other, baked, ROOM_FIELDS) == refusal(other, baked, WATCH) == (404, "elsewhere")
         apart = {"room": "apart" * 5}
         with open_session(other, baked.bake, opening=apart) as cleo, open_session(other, baked.bake) as dan:
             assert created(cleo)
@@ -101,26 +101,26 @@ def test_a_room_of_one_server_is_nowhere_else_until_nobody_is_in_it(
         with open_session(client, baked.bake, opening=WATCH) as bob:
             assert not created(bob)
     emptied(client, other)
-    with open_session(other, baked.bake, opening=TOGETHER) as bob:
+    with open_session(other, baked.bake, opening=ROOM_FIELDS) as bob:
         assert created(bob)
-        assert rooms(client) == [TOGETHER["room"][:8]]
+        assert rooms(client) == [ROOM_FIELDS["room"][:8]]
 
 
 def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
     client: TestClient, other: TestClient, baked: Baked
 ) -> None:
-    with open_session(client, baked.bake, opening=TOGETHER) as ann:
+    with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         assert created(ann)
         expire(client)
-        with open_session(other, baked.bake, opening=TOGETHER) as bob:
+        with open_session(other, baked.bake, opening=ROOM_FIELDS) as bob:
             assert created(bob)
             bob.edit(1, SIGMA, 0.31)
             bob.exact(1)
             for server in (other, client):
                 look_around(server)
             assert ann.text("leaving")["seconds"] == 0.2
-            assert refusal(client, baked, TOGETHER) == (404, "elsewhere")
-            with open_session(other, baked.bake, opening=TOGETHER) as again:
+            assert refusal(client, baked, ROOM_FIELDS) == (404, "elsewhere")
+            with open_session(other, baked.bake, opening=ROOM_FIELDS) as again:
                 hello = again.text("hello")
                 assert not hello["room"]["created"]
                 assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
@@ -132,14 +132,14 @@ def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
 def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
     client: TestClient, other: TestClient, baked: Baked
 ) -> None:
-    with open_session(client, baked.bake, opening=TOGETHER) as ann:
+    with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         assert client.portal is not None
         client.portal.call(services(client).leave.take)
         ann.text("leaving")
-        assert refusal(client, baked, TOGETHER) == (503, "leaving")
+        assert refusal(client, baked, ROOM_FIELDS) == (503, "leaving")
         emptied(other)
-        with open_session(other, baked.bake, opening=TOGETHER) as again:
+        with open_session(other, baked.bake, opening=ROOM_FIELDS) as again:
             assert created(again)
 
 
@@ -148,7 +148,7 @@ def test_a_session_is_opened_at_the_address_of_its_room(client: TestClient, bake
         path = f"/api/bakes/{baked.bake}/session{query}"
         with client.websocket_connect(path, ["relume.v1"]) as websocket:
             session = Session(websocket, acknowledges=False)
-            session.send(type="open", **TOGETHER)
+            session.send_message(type="open", **ROOM_FIELDS)
             with pytest.raises(ConnectionError) as ended:
                 session.receive()
         assert ended.value.args[0] == 1008

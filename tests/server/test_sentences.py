@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from session_client import Baked
 
 from relume.errors import bytes_text
@@ -17,7 +17,7 @@ OF_PYDANTIC = re.compile(r"Input should|Field required|should have at|literal\[|
 
 
 def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
-    problem = problem_of(client.post(url, **call))
+    problem = parse_problem(client.post(url, **call))
     assert problem["status"] == 422
     assert not OF_PYDANTIC.search(str(problem)), problem
     return problem
@@ -89,16 +89,16 @@ def test_what_is_refused_later_is_said_alike(client: TestClient, baked: Baked) -
     problem = refused(client, RENDERS, json={**body, "looks": [{"display": {"exposure": "x"}}]})
     assert problem["errors"][0]["pointer"] == "/looks/0/display/exposure"
     wrong_key = client.put("/api/looks/a", json={"materialz": {}})
-    assert problem_of(wrong_key)["detail"].startswith("/materialz is {}; give nothing of that name: a look has ")
+    assert parse_problem(wrong_key)["detail"].startswith("/materialz is {}; give nothing of that name: a look has ")
 
 
 def test_queries_and_methods(client: TestClient) -> None:
-    problem = problem_of(client.get("/api/bakes?limit=x&state=done"))
+    problem = parse_problem(client.get("/api/bakes?limit=x&state=done"))
     assert problem["errors"][0] == {"parameter": "limit", "detail": "limit is 'x'; give a whole number"}
     assert problem["errors"][1]["parameter"] == "state"
     method = client.patch("/api/renders")
     assert method.status_code == 405
-    assert problem_of(method)["detail"] == "PATCH is not taken at this address; use GET or POST"
+    assert parse_problem(method)["detail"] == "PATCH is not taken at this address; use GET or POST"
 
 
 def test_many_faults_are_counted(client: TestClient) -> None:

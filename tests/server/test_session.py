@@ -80,7 +80,7 @@ def test_edits_without_acknowledgement_are_merged_into_the_newest(
         session.edit(60, SIGMA, 5.0)  # refused: its answer says that all before it were received
         assert session.text("problem")["revision"] == 60
         num_looks = control.num_looks
-        session.send(type="ack", frame=second.header["frame"])
+        session.send_message(type="ack", frame=second.header["frame"])
         third = session.frame()
         assert [f.header["frame"] for f in (first, second, third)] == [1, 2, 3]
         assert third.header["revision"] == 59
@@ -90,7 +90,7 @@ def test_edits_without_acknowledgement_are_merged_into_the_newest(
 def test_a_frame_that_waits_for_others_shows_what_is_newest_when_its_turn_comes(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    turns = client.app.state.services.threads.turns  # type: ignore[attr-defined]
+    turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     with open_session(client, baked.bake) as session:
         session.exact(0)
@@ -107,14 +107,14 @@ def test_a_frame_that_waits_for_others_shows_what_is_newest_when_its_turn_comes(
 
 
 def test_a_ping_is_answered_while_frames_wait(client: TestClient, baked: Baked) -> None:
-    turns = client.app.state.services.threads.turns  # type: ignore[attr-defined]
+    turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     with open_session(client, baked.bake) as session:
         session.exact(0)
         while not turns.locked():
             client.portal.call(turns.acquire)
         session.edit(1, SIGMA, 0.3)
-        session.send(type="ping")
+        session.send_message(type="ping")
         assert session.receive() == {"type": "pong"}
         client.portal.call(turns.release)
         assert session.exact(1).header["revision"] == 1
@@ -174,13 +174,13 @@ def test_what_the_hand_is_on_travels_with_its_edit_to_the_picture(
     patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="edit", revision=1, patch=patch, hand=SIGMA)
+        session.send_message(type="edit", revision=1, patch=patch, hand=SIGMA)
         session.exact(1)
-        session.send(type="edit", revision=2, patch=patch, hand=THETA_H)
+        session.send_message(type="edit", revision=2, patch=patch, hand=THETA_H)
         session.exact(2)
         session.edit(3, SIGMA, 0.4)
         session.exact(3)
-    assert control.hands[-3:] == [SIGMA, THETA_H, None]
+    assert control.controls[-3:] == [SIGMA, THETA_H, None]
 
 
 @pytest.mark.parametrize("hand", ["/display/exposure", "/lights/Nobody", SIGMA.replace("Paper", "Nobody")])
@@ -188,7 +188,7 @@ def test_edit_by_a_hand_on_nothing_is_refused_whole(client: TestClient, baked: B
     patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="edit", revision=1, patch=patch, hand=hand)
+        session.send_message(type="edit", revision=1, patch=patch, hand=hand)
         problem = session.text("problem")
         assert (problem["revision"], problem["problem"]["type"]) == (1, "urn:relume:problem:parameter")
         session.edit(1, "/display/exposure", 1.0)
@@ -203,7 +203,7 @@ def test_solo_stays_until_an_edit_says_otherwise_and_is_no_part_of_the_look(
         hello = session.text("hello")
         assert hello["solo"] is None
         session.exact(0)
-        session.send(type="edit", revision=1, patch=[], solo=["environment", "Lamp"])
+        session.send_message(type="edit", revision=1, patch=[], solo=["environment", "Lamp"])
         assert session.exact(1).header["tiles"] == []
         session.edit(2, SIGMA, 0.4)
         session.exact(2)
@@ -215,7 +215,7 @@ def test_solo_stays_until_an_edit_says_otherwise_and_is_no_part_of_the_look(
         assert resumed["look"]["environment"] == hello["look"]["environment"]
         session.exact(2)
         assert control.solos[-1] == alone
-        session.send(type="edit", revision=3, patch=[], solo=None)
+        session.send_message(type="edit", revision=3, patch=[], solo=None)
         session.exact(3)
         assert control.solos[-1] is None
 
@@ -224,7 +224,7 @@ def test_solo_of_an_edit_that_is_taken_back_is_taken_back(client: TestClient, ba
     turn = [{"op": "replace", "path": "/environment/rotation", "value": 30.0}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="edit", revision=1, patch=turn, solo=["Lamp"])
+        session.send_message(type="edit", revision=1, patch=turn, solo=["Lamp"])
         assert session.text("problem")["revision"] == 1
         session.edit(2, SIGMA, 0.4)
         session.exact(2)
@@ -235,20 +235,20 @@ def test_solo_of_an_edit_that_is_taken_back_is_taken_back(client: TestClient, ba
 def test_edit_of_nothing_is_refused(client: TestClient, baked: Baked, fields: dict[str, object]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="edit", revision=1, patch=[], **fields)
+        session.send_message(type="edit", revision=1, patch=[], **fields)
         assert session.text("problem")["problem"]["type"] == "urn:relume:problem:form"
 
 
 def test_probe_and_brush_are_answered(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="probe", view="front", x=3, y=4)
+        session.send_message(type="probe", view="front", x=3, y=4)
         probe = session.text("probe")
         assert (probe["x"], probe["y"], probe["material"]) == (3, 4, "Paper")
         assert (probe["position"], probe["normal"]) == ([1.0, 2.0, 3.0], [0.0, 1.0, 0.0])
         assert probe["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
         assert np.shape(probe["bands"]) == (3, 4)
-        session.send(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
+        session.send_message(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
         frame = session.frame()
         assert frame.header["kind"] == "brush"
         assert frame.header["format"] == "r8"
@@ -260,7 +260,7 @@ def test_view_switches_and_sends_the_whole_picture(client: TestClient, baked: Ba
         session.exact(0)
         session.edit(1, SIGMA, 0.4)
         session.exact(1)
-        session.send(type="view", name="left", size=[512, 512])
+        session.send_message(type="view", name="left", size=[512, 512])
         frame = session.exact(1)
         assert frame.header["view"] == "left"
         assert len(frame.payload) == 4 * WIDTH * HEIGHT
@@ -269,7 +269,7 @@ def test_view_switches_and_sends_the_whole_picture(client: TestClient, baked: Ba
 def test_jpeg_stream_sends_whole_images(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="stream", format="jpeg", quality=70)
+        session.send_message(type="stream", format="jpeg", quality=70)
         session.edit(1, SIGMA, 0.4)
         frame = session.exact(1)
         assert frame.header["format"] == "jpeg"
@@ -291,8 +291,8 @@ def test_jpeg_is_no_larger_than_the_space_that_the_client_has(
     client: TestClient, baked: Baked, space: list[int] | None, sent: tuple[int, int]
 ) -> None:
     with open_session(client, baked.bake) as session:
-        session.send(type="stream", format="jpeg")
-        session.send(type="view", name="left", size=space)
+        session.send_message(type="stream", format="jpeg")
+        session.send_message(type="view", name="left", size=space)
         session.edit(1, SIGMA, 0.4)
         frame = session.exact(1)
         assert Image.open(io.BytesIO(frame.payload)).size == sent
@@ -302,16 +302,16 @@ def test_jpeg_is_no_larger_than_the_space_that_the_client_has(
 
 def test_space_is_of_one_view_until_views_are_shown_otherwise(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
-        session.send(type="stream", format="jpeg")
-        session.send(type="view", name="left", size=[80, 80])
-        session.send(type="views", names=["left"])
+        session.send_message(type="stream", format="jpeg")
+        session.send_message(type="view", name="left", size=[80, 80])
+        session.send_message(type="views", names=["left"])
         session.edit(1, SIGMA, 0.4)
         assert Image.open(io.BytesIO(session.exact(1).payload)).size == SIZE
 
 
 def test_space_says_nothing_of_hdr_frames(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
-        session.send(type="view", name="left", size=[8, 8])
+        session.send_message(type="view", name="left", size=[8, 8])
         session.edit(1, SIGMA, 0.4)
         while (frame := session.exact(1)).header["view"] != "left":
             pass

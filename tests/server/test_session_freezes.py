@@ -12,7 +12,7 @@ from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, open_sess
 def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=THETA_D)
+        session.send_message(type="touch", curve=THETA_D)
         curve = session.text("curve")
         assert curve["curve"] == THETA_D
         assert len(curve["bands"]) == 3
@@ -20,7 +20,7 @@ def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, bak
         status = session.text("status")
         assert status["state"] == "freezing"
         assert status["what"] == "Paper, theta_d"
-        control.may_freeze.set()
+        control.freeze_gate.set()
         while session.text("status")["state"] != "ready":
             pass
         session.edit(1, IOR, 2.0)
@@ -33,11 +33,11 @@ def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=THETA_H)
+        session.send_message(type="touch", curve=THETA_H)
         assert session.text("curve")["curve"] == THETA_H
-        session.send(type="touch", parameter=IOR)
+        session.send_message(type="touch", parameter=IOR)
         assert session.text("status")["what"] == "Paper, ior"
-        control.may_freeze.set()
+        control.freeze_gate.set()
         while session.text("status")["state"] != "ready":
             pass
         session.edit(1, SIGMA, 0.4)
@@ -47,11 +47,11 @@ def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
 def test_a_curve_that_is_opened_again_is_sent_again(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        control.may_freeze.set()
-        session.send(type="touch", curve=THETA_H)
+        control.freeze_gate.set()
+        session.send_message(type="touch", curve=THETA_H)
         first = session.text("curve")
-        session.send(type="touch", parameter=IOR)
-        session.send(type="touch", curve=THETA_H)
+        session.send_message(type="touch", parameter=IOR)
+        session.send_message(type="touch", curve=THETA_H)
         session.edit(1, "/environment/scale", 2.0)
         got = []
         while not isinstance(message := session.receive(), Frame) or message.header["revision"] < 1:
@@ -63,8 +63,8 @@ def test_a_curve_that_is_opened_again_is_sent_again(client: TestClient, baked: B
 def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        control.may_freeze.set()
-        session.send(type="touch", parameter="/environment/rotation")
+        control.freeze_gate.set()
+        session.send_message(type="touch", parameter="/environment/rotation")
         session.edit(1, SIGMA, 0.4)
         session.exact(1)
 
@@ -85,7 +85,7 @@ def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control:
 def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: dict[str, str]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", **touch)
+        session.send_message(type="touch", **touch)
         assert session.text("problem")["problem"]["detail"]
         session.edit(1, SIGMA, 0.4)
         session.exact(1)
@@ -94,38 +94,38 @@ def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: di
 def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.sending.frame_loop.SETTLE_S", 3600.0)
-    control.refines = True
+    monkeypatch.setattr("server.live.sending.frame_loop.BACKGROUND_DELAY_S", 3600.0)
+    control.is_refinement = True
     with open_session(client, baked.bake) as session:
         session.exact(0)
         for revision in (1, 3, 5):
             session.edit(revision, IOR, 2.0 + revision)
             session.edit(revision + 1, SIGMA, revision / 10)
             session.frame()
-        assert not control.freezing.is_set()
+        assert not control.freeze_started.is_set()
 
 
 def test_a_hand_whose_newest_edit_waits_for_room_does_not_rest(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.sending.frame_loop.SETTLE_S", 0.5)
-    control.refines = True
+    monkeypatch.setattr("server.live.sending.frame_loop.BACKGROUND_DELAY_S", 0.5)
+    control.is_refinement = True
     with open_session(client, baked.bake, acknowledges=False) as session:
         session.frame()
         session.edit(1, IOR, 2.0)
         session.edit(2, SIGMA, 0.3)
         second = session.frame()
         session.edit(3, SIGMA, 0.4)
-        assert not control.freezing.wait(0.8)
-        session.send(type="ack", frame=second.header["frame"])
+        assert not control.freeze_started.wait(0.8)
+        session.send_message(type="ack", frame=second.header["frame"])
         assert session.frame().header["revision"] == 3
-        assert control.freezing.wait(60)
-        control.may_freeze.set()
+        assert control.freeze_started.wait(60)
+        control.freeze_gate.set()
 
 
 def test_what_refines_a_picture_is_made_at_rest(client: TestClient, baked: Baked, control: Control) -> None:
-    control.refines = True
-    control.may_freeze.set()
+    control.is_refinement = True
+    control.freeze_gate.set()
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
@@ -137,9 +137,9 @@ def test_moving_on_to_another_curve_cancels_the_freeze_and_is_no_fault(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
-        session.send(type="touch", curve=THETA_H)
+        session.send_message(type="touch", curve=THETA_D)
+        assert control.freeze_started.wait(60)
+        session.send_message(type="touch", curve=THETA_H)
         while session.text("status")["state"] != "ready":
             pass
         assert control.num_cancelled == 1
@@ -151,13 +151,13 @@ def test_edits_that_need_no_freeze_are_painted_while_one_runs(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
+        session.send_message(type="touch", curve=THETA_D)
+        assert control.freeze_started.wait(60)
         for revision in range(1, 6):
             session.edit(revision, SIGMA, 0.2 + revision / 10)
             frame = session.exact(revision)
             assert np.frombuffer(frame.payload, "<u4")[0] == 700 + 100 * revision
-        assert not control.may_freeze.is_set()
+        assert not control.freeze_gate.is_set()
         assert control.num_cancelled == 0
 
 
@@ -172,7 +172,7 @@ def test_edit_that_needs_a_freeze_keeps_the_last_frame_and_others_go_on(
         frame = session.frame()  # the first since: revision 1 had nothing to show
         assert (frame.header["revision"], frame.header["exact"]) == (2, False)
         assert np.frombuffer(frame.payload, "<u4")[0] == 800
-        control.may_freeze.set()
+        control.freeze_gate.set()
         assert np.frombuffer(session.exact(2).payload, "<u4")[0] == 1300
 
 
@@ -182,13 +182,13 @@ def test_look_that_only_shows_otherwise_is_answered_while_a_freeze_is_awaited(
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
-        assert control.freezing.wait(60)
+        assert control.freeze_started.wait(60)
         session.edit(2, "/display/exposure", 1.0)
         frame = session.frame()
         assert (frame.header["revision"], frame.header["exact"], frame.header["tiles"]) == (2, False, [])
-        session.send(type="probe", x=3, y=4)
+        session.send_message(type="probe", x=3, y=4)
         assert session.text("probe")["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
-        control.may_freeze.set()
+        control.freeze_gate.set()
         session.exact(2)
 
 
@@ -198,7 +198,7 @@ def test_edit_that_goes_back_ends_the_freeze_it_does_not_need(
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
-        assert control.freezing.wait(60)
+        assert control.freeze_started.wait(60)
         session.edit(2, IOR, 1.5)
         session.exact(2)
         while session.text("status")["state"] != "ready":
@@ -211,11 +211,11 @@ def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
+        session.send_message(type="touch", curve=THETA_D)
+        assert control.freeze_started.wait(60)
         session.edit(1, IOR, 2.0)
         session.edit(2, IOR, 2.1)
-        control.may_freeze.set()
+        control.freeze_gate.set()
         session.exact(2)
         assert control.num_cancelled == 0
 
@@ -223,10 +223,10 @@ def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
 def test_another_view_does_not_wait_for_a_freeze(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        assert control.freezing.wait(60)
-        session.send(type="view", name="left")
+        session.send_message(type="touch", curve=THETA_D)
+        assert control.freeze_started.wait(60)
+        session.send_message(type="view", name="left")
         assert session.exact(0).header["view"] == "left"
         while control.num_cancelled == 0:
             time.sleep(0.01)
-        control.may_freeze.set()
+        control.freeze_gate.set()

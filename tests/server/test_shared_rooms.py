@@ -10,12 +10,12 @@ import jsonpatch
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
-from session_client import IOR, SIGMA, TOGETHER, Baked, Session, open_session
+from session_client import IOR, ROOM_FIELDS, SIGMA, Baked, Session, open_session
 
-from server.live.rooms.door import watch_of
+from server.live.rooms.door import derive_watch_key
 from server.settings import Settings
 
-WATCH = {"watch": watch_of(TOGETHER["room"])}
+WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
 LOST = 1001
 EXPOSURE = "/display/exposure"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
@@ -29,7 +29,7 @@ def settings(settings: Settings) -> Settings:
 
 def joined(client: TestClient, baked: Baked) -> AbstractContextManager[Session]:
     """A session in the room."""
-    return open_session(client, baked.bake, opening=TOGETHER)
+    return open_session(client, baked.bake, opening=ROOM_FIELDS)
 
 
 def told(session: Session, path: str) -> dict[str, Any]:
@@ -130,19 +130,19 @@ def test_each_has_their_own_exposure_and_who_comes_begins_with_the_last(client: 
 
 
 def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
-    with open_session(client, baked.bake, opening={**TOGETHER, "name": "Ann"}) as ann:
+    with open_session(client, baked.bake, opening={**ROOM_FIELDS, "name": "Ann"}) as ann:
         (first,) = ann.text("hello")["room"]["people"]
         assert (first["name"], first["role"], first["here"], first["material"]) == ("Ann", "admin", True, None)
         with joined(client, baked) as bob:
             room = bob.text("hello")["room"]
             assert (room["you"], [each["name"] for each in room["people"]]) == (2, ["Ann", "Guest 2"])
-            bob.send(type="presence", name="Bob", material="Paper")
+            bob.send_message(type="presence", name="Bob", material="Paper")
             found = people(ann, lambda them: them[-1]["name"] == "Bob")
             assert found[1]["material"] == "Paper"
             assert found[1]["color"] != found[0]["color"]
-            bob.send(type="presence", material="Nothing")
+            bob.send_message(type="presence", material="Nothing")
             assert "one of Paper" in bob.text("problem")["problem"]["detail"]
-            bob.send(type="presence", name="\u202e\n")
+            bob.send_message(type="presence", name="\u202e\n")
             assert "printable" in bob.text("problem")["problem"]["detail"]
             bob.websocket.close(LOST)
         # both may be told at once
@@ -151,7 +151,7 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
 
 
 def test_who_comes_is_told_while_frames_wait(client: TestClient, baked: Baked) -> None:
-    turns = client.app.state.services.threads.turns  # type: ignore[attr-defined]
+    turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     with joined(client, baked) as ann:
         ann.exact(0)
@@ -168,10 +168,10 @@ def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> No
         ann.text("hello")
         with joined(client, baked) as bob:
             seat = bob.text("hello")["room"]["seat"]
-            with open_session(client, baked.bake, opening={**TOGETHER, "seat": seat}) as finer:
+            with open_session(client, baked.bake, opening={**ROOM_FIELDS, "seat": seat}) as finer:
                 assert finer.text("hello")["room"]["you"] == 2
                 bob.websocket.close(1000)
-                finer.send(type="presence", name="Bob")
+                finer.send_message(type="presence", name="Bob")
                 found = people(ann, lambda them: them[-1]["name"] == "Bob")
                 assert [each["here"] for each in found] == [True, True]
                 finer.websocket.close(1000)
@@ -181,7 +181,7 @@ def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> No
 
 def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
-        session.send(type="presence", name="Ann")
+        session.send_message(type="presence", name="Ann")
         assert "with a room" in session.text("problem")["problem"]["detail"]
 
 
@@ -194,11 +194,11 @@ class TestComingBack:
     def test_a_place_is_kept_and_the_room_with_it(self, client: TestClient, baked: Baked) -> None:
         with joined(client, baked) as ann:
             seat = ann.text("hello")["room"]["seat"]
-            ann.send(type="presence", name="Ann")
+            ann.send_message(type="presence", name="Ann")
             ann.edit(1, SIGMA, 0.31)
             ann.exact(1)
             ann.websocket.close(LOST)
-        with open_session(client, baked.bake, opening={**TOGETHER, "seat": seat}) as again:
+        with open_session(client, baked.bake, opening={**ROOM_FIELDS, "seat": seat}) as again:
             hello = again.text("hello")
             assert (hello["room"]["you"], hello["room"]["created"], hello["revision"]) == (1, False, 0)
             assert [each["name"] for each in hello["room"]["people"]] == ["Ann"]
@@ -218,7 +218,7 @@ class TestComingBack:
             stack.close()
             ann.edit(1, EXTINCTION, 1.9)
             ann.exact(1)
-            opening = {**TOGETHER, "seat": hello["room"]["seat"], "resume": hello["resume"]}
+            opening = {**ROOM_FIELDS, "seat": hello["room"]["seat"], "resume": hello["resume"]}
             with open_session(client, baked.bake, opening=opening) as again:
                 back = again.text("hello")
                 params = back["look"]["materials"]["Paper"]["terms"][1]["params"]
@@ -229,7 +229,7 @@ class TestComingBack:
         with joined(client, baked) as ann, joined(client, baked) as bob:
             ann.text("hello")
             bob.text("hello")
-            code, reason = refused(client, baked, TOGETHER)
+            code, reason = refused(client, baked, ROOM_FIELDS)
             assert (code, reason) == (1013, "2 people are in this room; one of them has to leave first")
 
 
@@ -241,7 +241,7 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
         vera = stack.enter_context(open_session(client, baked.bake, opening=WATCH))
         hello = vera.text("hello")
         assert (hello["role"], hello["room"]["id"]) == ("view", None)
-        assert TOGETHER["room"] not in str(hello)
+        assert ROOM_FIELDS["room"] not in str(hello)
         vera.exact(0)
         vera.edit(1, SIGMA, 0.9)
         problem = vera.text("problem")["problem"]
@@ -253,7 +253,7 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
 
 def test_names_are_bounded(client: TestClient, baked: Baked) -> None:
     rooms = ("", "a" * 23, "a" * 65, "a b" * 10, "ä" * 24)
-    for opening in (*({"room": room} for room in rooms), {"watch": "ä" * 24}, {**TOGETHER, "name": "a" * 41}):
+    for opening in (*({"room": room} for room in rooms), {"watch": "ä" * 24}, {**ROOM_FIELDS, "name": "a" * 41}):
         assert refused(client, baked, opening)[0] == 1008
 
 
@@ -268,7 +268,7 @@ class Person:
     def edit(self, path: str, value: float) -> None:
         self.last += 1
         self._sent.append((self.last, [{"op": "replace", "path": path, "value": value}]))
-        self.session.edit(self.last, path, value, hand=path)
+        self.session.edit(self.last, path, value, control=path)
 
     def hear(self) -> None:
         """The next word on what the look has become, on top of one's own edits up to its revision."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from problems import problem_of
+from problems import parse_problem
 from server_fakes import tiny_scene
 from session_client import Baked
 
@@ -110,7 +110,7 @@ def test_ids_that_begin_alike_grow(client: TestClient, baked: Baked, monkeypatch
 def test_what_does_not_fit_is_refused(client: TestClient, baked: Baked, wrong: dict[str, Any], status: int) -> None:
     answer = client.post("/api/shares", json=body(baked, **wrong))
     assert answer.status_code == status
-    problem_of(answer)
+    parse_problem(answer)
 
 
 def test_links_are_bounded(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -121,7 +121,7 @@ def test_links_are_bounded(client: TestClient, baked: Baked, monkeypatch: pytest
             context.setattr(shares, limit, value)
             answer = client.post("/api/shares", json=another)
             assert answer.status_code == status
-            problem_of(answer)
+            parse_problem(answer)
     monkeypatch.setattr(shares, "MAX_SHARES", 1)
     assert client.delete(f"/api/shares/{kept}").status_code == 204
     assert client.get(f"/api/shares/{kept}").status_code == 404

@@ -13,7 +13,7 @@ from sqlalchemy import update
 
 from relume.errors import CancelledError, RelumeError
 from server.apart import steps
-from server.apart.btfs import FOUND, SENT
+from server.apart.btfs import RESULT_FILE, UPLOAD_FILE
 from server.apart.claim import claim
 from server.apart.step import Step
 from server.queues.btfs import BtfQueue
@@ -41,7 +41,7 @@ def notices(folder: Path) -> Mapping[str, Any]:
 
 
 def finishes(folder: Path) -> Mapping[str, Any]:
-    (folder / FOUND).write_text('{"material": "0123456789abcdef"}')
+    (folder / RESULT_FILE).write_text('{"material": "0123456789abcdef"}')
     return {"is_done": True}
 
 
@@ -79,7 +79,7 @@ def test_the_files_quota_and_state_of_a_work_that_was_taken_over_stay(
     caplog.set_level(logging.WARNING)
     first, second = Server(ledger, tmp_path, outcome), Server(ledger, tmp_path, finishes)
     request = BtfRequest(name="Felt", error=0.05)
-    work = first.queue.submit(request, prepare=lambda into: (into / SENT).write_bytes(b"sent"))
+    work = first.queue.submit(request, prepare=lambda into: (into / UPLOAD_FILE).write_bytes(b"sent"))
     folder = tmp_path / "btf-works" / work
     first.queue.start()
     assert first.has_begun.wait(WAIT_S)
@@ -90,20 +90,20 @@ def test_the_files_quota_and_state_of_a_work_that_was_taken_over_stay(
     assert second.has_begun.wait(WAIT_S)
     assert f"BTF {work} is taken over from" in caplog.text
 
-    first.queue._wanted = "", 0.0  # what was asked before it stood still is old
+    first.queue._needed_until = "", 0.0  # what was asked before it stood still is old
     assert not first.is_wanted()
     first.may_go_on.set()
     first.queue._closing.set()
     first.queue._thread.join(WAIT_S)
     assert f"BTF {work} was taken over by another process" in caplog.text
-    assert (folder / SENT).read_bytes() == b"sent"
+    assert (folder / UPLOAD_FILE).read_bytes() == b"sent"
     assert first.quotas == []
     found = second.queue.get(work)
     assert (found.state, found.problem) == ("running", None)
     assert second.is_wanted()
 
     second.may_go_on.set()
-    wait_until(lambda: second.queue.get(work).state == "ready" and not (folder / SENT).exists())
+    wait_until(lambda: second.queue.get(work).state == "ready" and not (folder / UPLOAD_FILE).exists())
     assert second.quotas == [f"kept {work}"]
     for server in (first, second):
         server.queue.close()
@@ -119,13 +119,13 @@ def wait_until(is_reached: Callable[[], bool]) -> None:
 
 
 def test_a_step_whose_files_another_server_has_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.apart.claim._ASK_AGAIN_S", 0.0)
+    monkeypatch.setattr("server.apart.claim._CHECK_INTERVAL_S", 0.0)
     seen: list[bool] = []
 
-    def work(shop: Any, tell: Any, cancelled: Callable[[], bool]) -> Mapping[str, Any]:
-        seen.append(cancelled())
+    def work(shop: Any, tell: Any, is_canceled: Callable[[], bool]) -> Mapping[str, Any]:
+        seen.append(is_canceled())
         claim(tmp_path, "the second")
-        seen.append(cancelled())
+        seen.append(is_canceled())
         return {}
 
     monkeypatch.setattr(steps, "STEPS", {"work": work})

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from server_fakes import Control
-from session_client import IOR, SIGMA, TOGETHER, Baked, Frame, Session, open_session
+from session_client import IOR, ROOM_FIELDS, SIGMA, Baked, Frame, Session, open_session
 
-from server.live.rooms.door import watch_of
+from server.live.rooms.door import derive_watch_key
 from server.settings import Settings
 
-WATCH = {"watch": watch_of(TOGETHER["room"])}
+WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
 EXPOSURE, ROTATION = "/display/exposure", "/environment/rotation"  # the bake cannot follow the rotation
 COLOR = "/materials/Paper/terms/0/color"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
@@ -30,7 +30,7 @@ def settings(settings: Settings) -> Settings:
 
 def joined(client: TestClient, baked: Baked) -> AbstractContextManager[Session]:
     """A session in the room."""
-    return open_session(client, baked.bake, opening=TOGETHER)
+    return open_session(client, baked.bake, opening=ROOM_FIELDS)
 
 
 class Client:
@@ -72,7 +72,7 @@ class Client:
 
     def asks(self) -> None:
         """Follow what has come until now."""
-        self.session.send(type="ping")
+        self.session.send_message(type="ping")
         self.hear("pong")
 
     @property
@@ -92,7 +92,7 @@ class Client:
 @contextmanager
 def waiting(client: TestClient) -> Iterator[None]:
     """No picture is painted meanwhile."""
-    turns = client.app.state.services.threads.turns  # type: ignore[attr-defined]
+    turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     while not turns.locked():
         client.portal.call(turns.acquire)
@@ -113,25 +113,25 @@ def params(look: dict[str, Any]) -> dict[str, float]:
 
 def in_a_view_that_cannot_follow(session: Session, control: Control) -> None:
     session.text("hello")
-    session.send(type="view", name="left")
+    session.send_message(type="view", name="left")
     while session.exact(0).header["view"] != "left":
         pass
-    control.short_of_memory.add("left")
+    control.views_over_budget.add("left")
 
 
 def is_told_once(session: Session) -> None:
     """Wait for the word that somebody's edit cannot be shown here."""
     assert session.text("problem")["revision"] is None
-    session.send(type="ping")
+    session.send_message(type="ping")
     while (message := session.receive()) != {"type": "pong"}:
         assert not isinstance(message, dict) or message["type"] != "problem"
 
 
-@pytest.mark.parametrize("opening", [TOGETHER, WATCH])
+@pytest.mark.parametrize("opening", [ROOM_FIELDS, WATCH])
 def test_an_edit_that_fails_for_the_edits_of_others_takes_none_of_them_back(
     client: TestClient, baked: Baked, control: Control, opening: dict[str, str]
 ) -> None:
-    control.may_freeze.set()
+    control.freeze_gate.set()
     with ExitStack() as stack:
         ann = Client(stack.enter_context(joined(client, baked)))  # the room is there before anybody may watch it
         vera = stack.enter_context(open_session(client, baked.bake, opening=opening))
@@ -152,7 +152,7 @@ def test_an_edit_that_fails_for_the_edits_of_others_takes_none_of_them_back(
 def test_an_editor_whose_bake_cannot_follow_another_goes_on_editing(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.may_freeze.set()
+    control.freeze_gate.set()
     with joined(client, baked) as first, joined(client, baked) as bob:
         ann = Client(first)
         in_a_view_that_cannot_follow(bob, control)

@@ -15,7 +15,7 @@ from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTrace
 from server_fakes import Control
 from session_client import SIGMA, THETA_D, Baked, open_session
 
-from server.collector import Collector
+from server.collector import TraceExporter
 from server.settings import Settings
 
 
@@ -64,11 +64,11 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
     with open_session(client, baked.bake, headers={"X-Request-ID": "r-1"}) as session:
         hello = session.text("hello")
         session.exact(0)
-        session.send(type="touch", curve=THETA_D)
-        control.may_freeze.set()
+        session.send_message(type="touch", curve=THETA_D)
+        control.freeze_gate.set()
         while (status := session.text("status"))["state"] != "ready":
             pass
-        session.edit(1, SIGMA, 0.3, hand=SIGMA)
+        session.edit(1, SIGMA, 0.3, control=SIGMA)
         frame = session.exact(1)
         session.edit(1, SIGMA, 0.4)
         session.text("problem")
@@ -99,7 +99,7 @@ def test_a_collector_that_is_away_is_said_once_and_that_it_is_back(
 ) -> None:
     exporter = OTLPSpanExporter(timeout=1)
     there, away = exporter._client._endpoint, "http://127.0.0.1:9/v1/traces"
-    collector = Collector(exporter)
+    collector = TraceExporter(exporter)
     for endpoint in (there, away, away, there):
         exporter._client._endpoint = endpoint
         collector.export(())

@@ -21,8 +21,8 @@ def exact_of_all(session: Session, revision: int, num_views: int = 2) -> list[Fr
 
 def show_both(session: Session, focus: str = "left") -> None:
     session.exact(0)
-    session.send(type="views", names=["front", "left"])
-    session.send(type="focus", view=focus)
+    session.send_message(type="views", names=["front", "left"])
+    session.send_message(type="focus", view=focus)
     exact_of_all(session, 0)
 
 
@@ -43,8 +43,8 @@ def test_client_that_does_not_acknowledge_gets_one_frame_of_the_focus_and_one_of
     client: TestClient, baked: Baked
 ) -> None:
     with open_session(client, baked.bake, acknowledges=False) as session:
-        session.send(type="ack", frame=session.frame().header["frame"])
-        session.send(type="views", names=["front", "left"])
+        session.send_message(type="ack", frame=session.frame().header["frame"])
+        session.send_message(type="views", names=["front", "left"])
         shown = [session.frame().header["view"] for _ in range(2)]
         assert sorted(shown) == ["front", "left"]
         session.edit(1, SIGMA, 0.5)
@@ -58,7 +58,7 @@ def test_freezes_go_in_the_same_order_and_name_their_view(client: TestClient, ba
         show_both(session)
         session.edit(1, IOR, 2.0)
         statuses = [session.text("status")]
-        control.may_freeze.set()
+        control.freeze_gate.set()
         while sum(status["state"] == "ready" for status in statuses) < 2:
             statuses.append(session.text("status"))
         ready = [status["view"] for status in statuses if status["state"] == "ready"]
@@ -70,7 +70,7 @@ def test_freezes_go_in_the_same_order_and_name_their_view(client: TestClient, ba
 def test_touch_reaches_all_views_and_a_brush_is_answered_by_each(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
-        session.send(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
+        session.send_message(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
         frames = [session.frame() for _ in range(2)]
         assert [frame.header["kind"] for frame in frames] == ["brush", "brush"]
         assert [frame.header["view"] for frame in frames] == ["left", "front"]
@@ -79,21 +79,21 @@ def test_touch_reaches_all_views_and_a_brush_is_answered_by_each(client: TestCli
 def test_probe_is_of_the_view_it_names_or_of_the_focused_one(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
-        session.send(type="probe", x=1, y=1)
+        session.send_message(type="probe", x=1, y=1)
         assert session.text("probe")["view"] == "left"
-        session.send(type="probe", view="front", x=1, y=1)
+        session.send_message(type="probe", view="front", x=1, y=1)
         assert session.text("probe")["view"] == "front"
 
 
 def test_view_that_has_no_room_for_the_open_curve_is_shown_without(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.short_of_memory = {"left"}
+    control.views_over_budget = {"left"}
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(type="touch", curve=THETA_H)
+        session.send_message(type="touch", curve=THETA_H)
         session.text("curve")
-        session.send(type="view", name="left")
+        session.send_message(type="view", name="left")
         assert session.text("problem")["revision"] is None
         session.edit(1, SIGMA, 0.3)
         assert session.exact(1).header["view"] == "left"
@@ -102,12 +102,12 @@ def test_view_that_has_no_room_for_the_open_curve_is_shown_without(
 def test_one_view_again_is_alone(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
-        session.send(type="view", name="front")
+        session.send_message(type="view", name="front")
         assert session.exact(0).header["view"] == "front"
         for revision in (1, 2, 3):
             session.edit(revision, SIGMA, 0.2 + revision / 10)
             assert session.exact(revision).header["view"] == "front"
-        session.send(type="focus", view="left")
+        session.send_message(type="focus", view="left")
         assert session.text("problem")["problem"]["parameter"] == "view"
 
 
@@ -127,12 +127,12 @@ def test_resume_brings_the_views_back(client: TestClient, baked: Baked) -> None:
 def test_look_that_cannot_be_followed_is_taken_back_in_all_views(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.may_freeze.set()
+    control.freeze_gate.set()
     with open_session(client, baked.bake) as session:
         show_both(session)
         session.edit(1, "/environment/rotation", 30.0)
         assert session.text("problem")["revision"] == 1
-        session.send(type="touch", curve=THETA_D)
+        session.send_message(type="touch", curve=THETA_D)
         session.edit(2, SIGMA, 0.4)
         for frame in exact_of_all(session, 2):
             assert np.frombuffer(frame.payload, "<u4")[0] == 900
@@ -153,7 +153,7 @@ def test_look_that_cannot_be_followed_is_taken_back_in_all_views(
 def test_views_that_cannot_be_shown_are_refused(client: TestClient, baked: Baked, message: dict[str, object]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send(**message)
+        session.send_message(**message)
         assert session.text("problem")["problem"]["status"] in (400, 422)
         session.edit(1, SIGMA, 0.3)
         assert session.exact(1).header["view"] == "front"
@@ -162,32 +162,32 @@ def test_views_that_cannot_be_shown_are_refused(client: TestClient, baked: Baked
 def test_what_is_on_the_screen_comes_first_and_the_rest_when_the_hand_rests(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.tiles_a_step = 100
+    control.num_tiles_per_step = 100
     with open_session(client, baked.bake) as session:
         header = session.exact(0).header
         width, height = header["width"], header["height"]
-        session.send(type="region", view="front", rect=[0, 0, 3, 2])
+        session.send_message(type="region", view="front", rect=[0, 0, 3, 2])
         session.edit(1, SIGMA, 0.5)
         first, rest = session.frame().header, session.exact(1).header
         assert (first["revision"], first["tiles"][0][:2], first["exact"]) == (1, [0, 0], False)
         assert control.regions == [(0, 0, 3, 2)]
         whole = {(x, y) for x, y, _, _ in [*first["tiles"], *rest["tiles"]]}
         assert len(first["tiles"]) == 1 < len(whole) == len(rest["tiles"]) + 1
-        session.send(type="region", view="front", rect=None)
+        session.send_message(type="region", view="front", rect=None)
         session.edit(2, SIGMA, 0.6)
         assert len(session.exact(2).header["tiles"]) == len(whole)
         for rect in ([width, 0, 1, 1], [0, height, 9, 9]):
-            session.send(type="region", view="front", rect=rect)
+            session.send_message(type="region", view="front", rect=rect)
             assert "some of the picture's" in session.text("problem")["problem"]["detail"]
 
 
 def test_what_is_out_of_sight_does_not_come_while_the_picture_is_on_its_way(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
-    control.tiles_a_step = 100
+    control.num_tiles_per_step = 100
     with open_session(client, baked.bake) as session:
         num_tiles = len(session.exact(0).header["tiles"])
-        session.send(type="region", view="front", rect=[0, 0, 3, 2])
+        session.send_message(type="region", view="front", rect=[0, 0, 3, 2])
         session.edit(1, IOR, 2.0)
         assert session.text("status")["state"] == "freezing"
         session.edit(2, SIGMA, 0.5)
@@ -195,7 +195,7 @@ def test_what_is_out_of_sight_does_not_come_while_the_picture_is_on_its_way(
         while frames[-1]["revision"] < 2:
             frames.append(session.frame().header)
         time.sleep(0.3)
-        control.may_freeze.set()
+        control.freeze_gate.set()
         rest = session.frame().header
         assert (frames[-1]["exact"], len(frames[-1]["tiles"])) == (False, 1)
         assert (rest["exact"], len(rest["tiles"])) == (True, num_tiles)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from relume.bake import ArraySpec
-from relume.errors import ChunkDamagedError, SchemaVersionError, StoreError, StoreGoneError, StoreNotFoundError
+from relume.errors import ChunkDamagedError, SchemaVersionError, StoreDeletedError, StoreError, StoreNotFoundError
 from relume.store import StoreWriter, create_store, open_store, publish, schema
 from relume.store.publish import verify_manifest
 
@@ -139,7 +139,7 @@ def test_a_store_deleted_under_a_reader_is_gone_not_damaged(tmp_path: Path) -> N
     opened.read(SPEC.path, 0, 32)
     shutil.rmtree(store)
     for reader in (opened, fresh):
-        with pytest.raises(StoreGoneError, match="deleted while it was shown"):
+        with pytest.raises(StoreDeletedError, match="deleted while it was shown"):
             reader.read(SPEC.path)
 
 

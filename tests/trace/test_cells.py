@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_scenes import corner, looking, points_at, scene_of, sphere
+from tiny_scenes import corner, make_camera, make_surface_points, make_tiny_scene, sphere
 
-from relume.light.gather_rays import local_ray, make_pattern, small_shifts_of
+from relume.light.gather_rays import lattice_offsets, local_ray, make_pattern
 from relume.scene.cornell import cornell_box
-from relume.scene.model import Coding, Material, Texture
-from relume.trace.cell_tree import NO_CELL, grow_tree, locate
-from relume.trace.cells import POINTS_A_CELL, choose_cells
-from relume.trace.geometry import merge
-from relume.trace.links import trace_links
+from relume.scene.model import Material, Texture, TextureEncoding
+from relume.trace.cell_tree import NO_PATCH, grow_tree, locate
+from relume.trace.cells import POINTS_PER_PATCH, choose_patches
+from relume.trace.geometry import build_scene_buffers
+from relume.trace.links import trace_gather_rays
 from relume.trace.packet import LANES
 from relume.trace.photons import lobe_directions
-from relume.trace.primary import trace_from
+from relume.trace.primary import trace_rays
 
 NUM_CELLS = 1200
 
@@ -25,13 +25,13 @@ NUM_CELLS = 1200
 @pytest.fixture(scope="module")
 def box():
     scene = cornell_box()
-    geometry = merge(scene)
-    return scene, geometry, choose_cells(scene, geometry, ("front",), (400, 400), NUM_CELLS)
+    geometry = build_scene_buffers(scene)
+    return scene, geometry, choose_patches(scene, geometry, ("front",), (400, 400), NUM_CELLS)
 
 
 def points_of(cells, count, first=0):
-    some = cells.gather_samples.rows(slice(None, None, POINTS_A_CELL * cells.num_cells // count)).rows(slice(count))
-    return points_at(some.position, some.normal, first)
+    some = cells.sample_points.rows(slice(None, None, POINTS_PER_PATCH * cells.num_patches // count)).rows(slice(count))
+    return make_surface_points(some.position, some.normal, first)
 
 
 def random_keys(num, num_sides, seed):
@@ -96,7 +96,7 @@ def test_cells_are_small_where_light_is_uneven(why):
 def test_a_side_without_points_has_no_cell():
     keys, side = random_keys(100, 2, seed=1)
     tree, _ = grow_tree(keys, np.ones(len(keys), np.float32), side, 4, 10)
-    assert cell_of(tree, 3, keys[0]) == NO_CELL
+    assert cell_of(tree, 3, keys[0]) == NO_PATCH
 
 
 def test_coinciding_points_end_in_one_cell():
@@ -109,7 +109,7 @@ def test_coinciding_points_end_in_one_cell():
 def test_no_points_make_no_cells():
     tree, members = grow_tree(np.empty((0, 6), np.float32), np.empty(0, np.float32), np.empty(0, np.int32), 2, 10)
     assert members == []
-    assert cell_of(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_CELL
+    assert cell_of(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_PATCH
 
 
 def test_points_lie_where_light_can_arrive(box):
@@ -144,7 +144,7 @@ def test_cells_are_small_where_a_polished_floor_mirrors_them(box):
     """More of the points lie on the blocks' feet, which the floor before them mirrors, than where it is matt."""
     plain, _, cells = box
     polished = cornell_box(is_floor_glossy=True)
-    mirrored = choose_cells(polished, merge(polished), ("front",), (400, 400), NUM_CELLS)
+    mirrored = choose_patches(polished, build_scene_buffers(polished), ("front",), (400, 400), NUM_CELLS)
     blocks = [k for k, material in enumerate(plain.materials) if material.name.endswith("block")]
 
     def share(of):
@@ -169,7 +169,7 @@ def test_lobes_have_the_cosine_of_their_exponent():
 
 def test_cells_are_the_same_every_time(box):
     scene, geometry, cells = box
-    again = choose_cells(scene, geometry, ("front",), (400, 400), NUM_CELLS)
+    again = choose_patches(scene, geometry, ("front",), (400, 400), NUM_CELLS)
     np.testing.assert_array_equal(again.position, cells.position)
     np.testing.assert_array_equal(again.tree.value, cells.tree.value)
 
@@ -185,14 +185,14 @@ def test_links_are_those_of_first_hits(box):
     """Every ray's first hit, traced by itself and located by hand."""
     _, geometry, cells = box
     points, pattern = points_of(cells, 40, first=100), make_pattern(24, 9, 3)
-    links = trace_links(geometry, cells.tree, points, points.normal, pattern)
+    links = trace_gather_rays(geometry, cells.tree, points, points.normal, pattern)
     normals = geometry.face_normals
     origins, directions, expected_of = [], [], []
     for p in range(40):
         n, t = points.normal[p].astype(float), points.tangent[p].astype(float)
         frame = np.stack([t, np.cross(n, t), n])
         wo = frame @ points.normal[p]
-        shift = small_shifts_of(pattern, 100 + p)
+        shift = lattice_offsets(pattern, 100 + p)
         for ray in range(33):
             wi = np.array(local_ray(pattern, ray, shift, *wo.astype(np.float32)))
             if wi[2] > 0:
@@ -200,52 +200,54 @@ def test_links_are_those_of_first_hits(box):
                 directions.append(wi @ frame)
                 expected_of.append((p, ray))
     directions = np.asarray(directions, np.float32)
-    hits = trace_from(geometry.embree, np.array(origins), directions)
+    hits = trace_rays(geometry.embree, np.array(origins), directions)
     assert links.num_rays == len(origins)
     wrong = 0
     for origin, direction, face, distance, (p, ray) in zip(
         origins, directions, hits.face, hits.distance, expected_of, strict=True
     ):
-        expected = NO_CELL
+        expected = NO_PATCH
         if face >= 0:
             behind = normals[face] @ direction > 0
             normal = -normals[face] if behind else normals[face]
             side = 2 * geometry.face_mesh[face] + int(behind)
             expected = cell_of(cells.tree, side, (*(origin + distance * direction), *normal))
-        wrong += int(expected != links.cell[p, ray])
+        wrong += int(expected != links.patch[p, ray])
     assert wrong <= 0.005 * len(origins)  # rounding at the edge of a cell
 
 
 def test_order_and_division_of_points_do_not_matter(box):
     _, geometry, cells = box
     points, pattern = points_of(cells, 30), make_pattern(16, 0, 3)
-    whole = trace_links(geometry, cells.tree, points, points.normal, pattern).cell
+    whole = trace_gather_rays(geometry, cells.tree, points, points.normal, pattern).patch
     part = points.rows(slice(11, 23))
-    np.testing.assert_array_equal(trace_links(geometry, cells.tree, part, part.normal, pattern).cell, whole[11:23])
+    np.testing.assert_array_equal(
+        trace_gather_rays(geometry, cells.tree, part, part.normal, pattern).patch, whole[11:23]
+    )
 
 
 def test_from_a_closed_room_no_ray_escapes():
     """A ball seen from inside, its cells' rays and a viewer's: what leaks out would be missing light."""
-    ball = sphere("room", (0, 0, 0), 2.0, 0, rings=24, inside=True)
-    room = scene_of(ball, camera=looking("front", (0, 0, 1), (0, 0, 0), 1.0))
-    geometry = merge(room)
-    cells = choose_cells(room, geometry, ("front",), (64, 64), 500)
+    ball = sphere("room", (0, 0, 0), 2.0, 0, num_rings=24, inside=True)
+    room = make_tiny_scene(ball, camera=make_camera("front", (0, 0, 1), (0, 0, 0), 1.0))
+    geometry = build_scene_buffers(room)
+    cells = choose_patches(room, geometry, ("front",), (64, 64), 500)
     points = points_of(cells, 400)
-    links = trace_links(geometry, cells.tree, points, points.normal, make_pattern(64, 0, 1))
-    assert np.mean(links.cell == NO_CELL) < 1e-4
+    links = trace_gather_rays(geometry, cells.tree, points, points.normal, make_pattern(64, 0, 1))
+    assert np.mean(links.patch == NO_PATCH) < 1e-4
 
 
 def test_cells_know_how_textures_lie_on_them():
     """On a floor along whose width u grows, as far as that is across their normals; and these without bumps."""
     slope = np.full((2, 2, 3), (200, 128, 230), np.uint8)
-    bumps = Texture(slope, coding=Coding("normal"))
+    bumps = Texture(slope, encoding=TextureEncoding("normal"))
     lambert = ({"model": "lambert"},)
     scene = corner([Material("Floor", lambert, {}, bumps), Material("Wall", lambert)])
     tangents = np.broadcast_to(np.float32([1, 0, 0, 1]), scene.meshes[0].tangents.shape)
     scene = replace(scene, meshes=(replace(scene.meshes[0], tangents=tangents), *scene.meshes[1:]))
-    cells = choose_cells(scene, merge(scene), ("front",), (40, 30), 100)
-    points, place = cells.gather_samples, cells.uv.reshape(-1, 5)
-    of_floor = np.repeat(cells.material == 0, POINTS_A_CELL) & (points.position[:, 1] < 1e-3)
+    cells = choose_patches(scene, build_scene_buffers(scene), ("front",), (40, 30), 100)
+    points, place = cells.sample_points, cells.uv.reshape(-1, 5)
+    of_floor = np.repeat(cells.material == 0, POINTS_PER_PATCH) & (points.position[:, 1] < 1e-3)
     chosen = np.flatnonzero(of_floor)
     assert len(chosen) > 20
     normal, tangent, turn = points.normal[chosen], points.tangent[chosen], place[chosen, 3:4]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, quad, scene_of, still_life, studio
+from tiny_scenes import make_camera, make_tiny_scene, quad, still_life, studio
 
 from relume.color import luminance
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.neighbours import neighbours_of
-from relume.light.triangles import TriangleLights, subdivide
+from relume.light.neighbours import find_neighbors
+from relume.light.triangles import TriangleLights, tessellate_environment
 from relume.scene.demo import demo_scene
-from relume.trace.coherent import targets_of, trace_coherent
-from relume.trace.geometry import merge
+from relume.trace.coherent import make_light_targets, trace_visibility_masks
+from relume.trace.geometry import build_scene_buffers
 from relume.trace.visibility import trace_visibility
 
 UNKNOWN, LIT, HIDDEN, BELOW = range(4)
@@ -27,7 +27,7 @@ def bits_of(visible, num_lights):
 
 
 def samples_of(scene, size, view=None):
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, view or scene.cameras[0].name, size)
     solid = samples.material != BACKGROUND
     return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
@@ -36,18 +36,20 @@ def samples_of(scene, size, view=None):
 def both(scene, size, num_lights):
     """Bits of the full trace and predicted ones, the light that each lets through, and the counts."""
     geometry, position, normal = samples_of(scene, size)
-    lights = subdivide(scene.environment.radiance, num_lights)
+    lights = tessellate_environment(scene.environment.radiance, num_lights)
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
-    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
+    found = trace_visibility_masks(
+        geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
+    )
     count = lights.num_lights
-    assert found.rays.full == full.num_rays
+    assert found.rays.num_full == full.num_rays
     cosine = np.maximum(normal @ lights.direction.T, 0)
     return bits_of(full.visible, count), bits_of(found.visible, count), cosine * lights.irradiance[:, 1], found.rays
 
 
 def in_pixels(scene, size, values):
     """A value of each surface sample as the picture shows it: by its share of its pixel. (pixels,)"""
-    samples = sample_view(scene, merge(scene), scene.cameras[0].name, size)
+    samples = sample_view(scene, build_scene_buffers(scene), scene.cameras[0].name, size)
     solid = samples.material != BACKGROUND
     return np.bincount(samples.pixel[solid], samples.weight[solid] * values, minlength=size[0] * size[1])
 
@@ -66,8 +68,8 @@ def fence():
     ]
     floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     wall = quad("wall", [[-2, 0, -0.5], [2, 0, -0.5], [2, 1.5, -0.5], [-2, 1.5, -0.5]], 0)
-    camera = looking("c", [0, 1.6, 2.4], [0, 0.3, 0], 0.7)
-    return scene_of(*wires, floor, wall, camera=camera, environment=studio(64))
+    camera = make_camera("c", [0, 1.6, 2.4], [0, 0.3, 0], 0.7)
+    return make_tiny_scene(*wires, floor, wall, camera=camera, environment=studio(64))
 
 
 def lids():
@@ -77,7 +79,9 @@ def lids():
         quad(f"lid{k}", [[x, 0.01, z + 0.02], [x + 0.02, 0.01, z + 0.02], [x + 0.02, 0.01, z], [x, 0.01, z]], 0)
         for k, (x, z) in enumerate(np.random.default_rng(2).uniform(-0.4, 0.4, (30, 2)))
     ]
-    return scene_of(floor, *tiles, camera=looking("c", [0, 0.6, 1.2], [0, 0, 0], 0.7), environment=studio(64))
+    return make_tiny_scene(
+        floor, *tiles, camera=make_camera("c", [0, 0.6, 1.2], [0, 0, 0], 0.7), environment=studio(64)
+    )
 
 
 def first_of(lights, count):
@@ -96,20 +100,20 @@ def first_of(lights, count):
 def test_predicted_bits_are_those_of_a_full_trace(scene, num_lights, saving, bound):
     made, size = scene(), (96, 72)
     full, predicted, weight, rays = both(made, size, num_lights)
-    wrong = (full != predicted).sum() / rays.full
+    wrong = (full != predicted).sum() / rays.num_full
     assert wrong <= WRONG_SHARE
     assert change(made, size, full, predicted, weight) <= bound
-    assert rays.full > saving * rays.traced
-    assert rays.checked > 0
+    assert rays.num_full > saving * rays.num_traced
+    assert rays.num_checked > 0
     # the estimate is that of what the check saw before it mended it: right to three deviations of the count
-    assert wrong <= rays.wrong_share + 3 * np.sqrt(rays.wrong + 9) / max(1, rays.checked)
+    assert wrong <= rays.error_rate + 3 * np.sqrt(rays.num_wrong + 9) / max(1, rays.num_checked)
     assert 0.1 < full[weight > 0].mean() < 0.999
 
 
 def twin(seen, facing, position, lights):
     """The same bits and number of rays, sample by sample, from the answers of a full trace."""
-    neighbours, power = neighbours_of(lights.direction), luminance(lights.irradiance)
-    beside, strong = np.split(neighbours.beside, neighbours.first[1:-1]), power > 5e-3 * power.sum()
+    neighbours, power = find_neighbors(lights.direction), luminance(lights.irradiance)
+    beside, strong = np.split(neighbours.neighbors, neighbours.first[1:-1]), power > 5e-3 * power.sum()
     bits, rays = np.zeros_like(seen), 0
     for start in range(0, len(seen), 64):
         rows = np.arange(start, min(start + 64, len(seen)))
@@ -161,13 +165,15 @@ def flood(seen, facing, known, rows, samples, before, doubt, beside):
 
 def test_kernel_does_what_its_twin_does():
     geometry, position, normal = samples_of(still_life(), (26, 20))
-    lights = subdivide(studio(), 300)
+    lights = tessellate_environment(studio(), 300)
     seen = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
-    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
-    assert found.rays.wrong == 0  # the twin does not mend
+    found = trace_visibility_masks(
+        geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
+    )
+    assert found.rays.num_wrong == 0  # the twin does not mend
     bits, rays = twin(seen, normal @ lights.direction.T > 0, position, lights)
     np.testing.assert_array_equal(bits_of(found.visible, lights.num_lights), bits)
-    assert found.rays.traced == rays
+    assert found.rays.num_traced == rays
 
 
 @pytest.mark.parametrize("num_samples", [1, 2, 15, 17, 63, 65, 130])
@@ -175,11 +181,13 @@ def test_kernel_does_what_its_twin_does():
 def test_any_number_of_samples_and_lights(num_samples, num_lights):
     geometry, position, normal = samples_of(still_life(), (48, 36))
     position, normal = position[:num_samples], normal[:num_samples]
-    lights = first_of(subdivide(studio(), 50), num_lights)
-    found = trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
+    lights = first_of(tessellate_environment(studio(), 50), num_lights)
+    found = trace_visibility_masks(
+        geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
+    )
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
     assert found.visible.shape == full.visible.shape
-    assert found.rays.traced <= found.rays.full == full.num_rays
+    assert found.rays.num_traced <= found.rays.num_full == full.num_rays
     if num_samples <= 2:  # both are traced
         np.testing.assert_array_equal(found.visible, full.visible)
     assert not np.unpackbits(found.visible, axis=1, bitorder="little")[:, num_lights:].any()
@@ -187,21 +195,25 @@ def test_any_number_of_samples_and_lights(num_samples, num_lights):
 
 def test_nothing_to_trace_is_no_error():
     geometry, position, normal = samples_of(still_life(), (24, 18))
-    lights = subdivide(studio(), 50)
-    found = trace_coherent(geometry.embree, position[:0], normal[:0], targets_of(lights.direction, lights.irradiance))
+    lights = tessellate_environment(studio(), 50)
+    found = trace_visibility_masks(
+        geometry.embree, position[:0], normal[:0], make_light_targets(lights.direction, lights.irradiance)
+    )
     assert found.visible.shape == (0, 7)
-    assert found.rays.traced == found.rays.full == 0
-    assert found.rays.wrong_share == 0
+    assert found.rays.num_traced == found.rays.num_full == 0
+    assert found.rays.error_rate == 0
 
 
 def test_threads_change_neither_bits_nor_counts(monkeypatch):
     geometry, position, normal = samples_of(still_life(), (96, 72))
-    lights = subdivide(studio(), 100)
+    lights = tessellate_environment(studio(), 100)
     results = []
     for threads in ("1", "3"):
         monkeypatch.setenv("RELUME_THREADS", threads)
         results.append(
-            trace_coherent(geometry.embree, position, normal, targets_of(lights.direction, lights.irradiance))
+            trace_visibility_masks(
+                geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
+            )
         )
     np.testing.assert_array_equal(results[0].visible, results[1].visible)
     assert results[0].rays == results[1].rays

@@ -9,11 +9,11 @@ from relume.errors import PlanError
 from relume.light.gather_rays import (
     MAX_RAYS,
     _step,
-    density_about_mirror,
+    glossy_pdf,
+    lattice_offsets,
     local_ray,
     make_pattern,
-    small_shifts_of,
-    weight_of,
+    ray_weight,
 )
 
 WO = np.array([np.sin(0.7), 0.0, np.cos(0.7)], np.float32)
@@ -21,10 +21,10 @@ WO = np.array([np.sin(0.7), 0.0, np.cos(0.7)], np.float32)
 
 def rays_of(pattern, point):
     """Directions above the horizon and their weights. (n, 3), (n,)"""
-    shift = small_shifts_of(pattern, point)
+    shift = lattice_offsets(pattern, point)
     wi = np.array([local_ray(pattern, ray, shift, *WO) for ray in range(pattern.num_rays)])
     wi = wi[wi[:, 2] > 0]
-    return wi, np.array([weight_of(pattern, *direction, *WO) for direction in wi])
+    return wi, np.array([ray_weight(pattern, *direction, *WO) for direction in wi])
 
 
 def half_cosines(wi):
@@ -80,7 +80,7 @@ def test_glossy_rays_reduce_the_noise_of_a_highlight():
 def test_density_about_the_mirror_direction_is_one_over_the_half_vectors():
     """∫ p(h) dh = 1 over the hemisphere of h, with p(h) = 4 cos θd · p(ωi)."""
     cosine = np.linspace(0, 1, 2_000_001)
-    density = 4 * np.array(density_about_mirror.py_func(cosine, 1.0), float)
+    density = 4 * np.array(glossy_pdf.py_func(cosine, 1.0), float)
     assert 2 * np.pi * np.trapezoid(density, cosine) == pytest.approx(1, rel=1e-3)
 
 
@@ -97,7 +97,7 @@ def test_the_same_ray_of_all_points_goes_nearly_the_same_way():
     """But for the few at the rim and in the middle of the disc, where shifts lead over its edge."""
     pattern, angles = make_pattern(377, 233, 3), []
     for ray in range(0, pattern.num_rays, 7):
-        directions = np.array([local_ray(pattern, ray, small_shifts_of(pattern, point), *WO) for point in range(60)])
+        directions = np.array([local_ray(pattern, ray, lattice_offsets(pattern, point), *WO) for point in range(60)])
         mean = directions.mean(axis=0)
         angles.append(np.degrees(np.arccos(np.clip(directions @ mean / np.linalg.norm(mean), -1, 1)).max()))
     assert np.quantile(angles, 0.8) < 15
@@ -114,8 +114,8 @@ def test_sides_of_a_lattice_are_vectors_between_its_points(count):
 
 def test_shifts_depend_on_seed_and_point():
     pattern = make_pattern(8, 0, 3)
-    assert small_shifts_of(make_pattern(8, 0, 4), 5) != small_shifts_of(pattern, 5)
-    far = small_shifts_of(pattern, 16_777_216 + 1), small_shifts_of(pattern, 16_777_216)
+    assert lattice_offsets(make_pattern(8, 0, 4), 5) != lattice_offsets(pattern, 5)
+    far = lattice_offsets(pattern, 16_777_216 + 1), lattice_offsets(pattern, 16_777_216)
     assert far[0] != far[1]  # points beyond the whole numbers of float32 are still told apart
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import points_at, quad, shining, still_life
+from tiny_scenes import make_emissive_triangles, make_surface_points, quad, still_life
 
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.gather_rays import shift_of
-from relume.light.local import light_sample, make_local, strata_of
+from relume.light.gather_rays import cranley_patterson_offset
+from relume.light.local import light_sample, make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
-from relume.trace.geometry import merge
-from relume.trace.local_shadows import MANY, arriving, trace_local
+from relume.trace.geometry import build_scene_buffers
+from relume.trace.local_shadows import MIN_GROUPED_SAMPLES, compute_irradiance, trace_light_visibility
 
 UP = np.array([0, 1, 0], np.float32)
 
@@ -35,7 +35,7 @@ def crosses(triangles, start, end):
 @pytest.fixture(scope="module")
 def surfaces():
     scene = still_life()
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "front", (64, 48))
     solid = np.flatnonzero(samples.material != BACKGROUND)[::37]
     return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
@@ -52,16 +52,17 @@ def surfaces():
 )
 def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
     geometry, position, normal = surfaces
-    made = make_local(light)
-    strata = strata_of(made, 16)
-    points = points_at(position, normal, first=100)
-    seen = trace_local(geometry.embree, geometry.epsilon, made, strata, points)
+    made = prepare_local_lights(light)
+    strata = make_light_strata(made, 16)
+    points = make_surface_points(position, normal, first=100)
+    seen = trace_light_visibility(geometry.embree, geometry.epsilon, made, strata, points)
     bits = np.unpackbits(seen, axis=1, bitorder="little")[:, : len(strata.uv)].astype(bool)
     triangles = geometry.positions[geometry.faces].astype(float)
     wrong = 0
     for k in range(len(strata.uv)):
         found = [
-            light_sample(made, strata, k, *shift_of(strata, n), *p) for n, p in zip(points.seed, position, strict=True)
+            light_sample(made, strata, k, *cranley_patterson_offset(strata, n), *p)
+            for n, p in zip(points.seed, position, strict=True)
         ]
         direction, distance = np.array([f[:3] for f in found]), np.array([f[3] for f in found])
         end = position + direction * np.minimum(distance, 100)[:, None]
@@ -75,32 +76,41 @@ def test_very_many_samples_are_asked_in_fours_where_neighbours_agree():
     """A floor in rows under a panel of which a card hides a third: bits are those of segments all the same."""
     panel, card = ([[x, y, -0.5], [1, y, -0.5], [1, y, 0.5], [x, y, 0.5]] for x, y in ((-1, 1.5), (0.37, 1.3)))
     corners = np.array(panel, np.float32)[[[0, 1, 2], [0, 2, 3]]]
-    made = make_local(LightGeometry("mesh", material="Lamp"), shining(corners, False))
-    strata = strata_of(made, MANY // 4)
+    made = prepare_local_lights(LightGeometry("mesh", material="Lamp"), make_emissive_triangles(corners, False))
+    strata = make_light_strata(made, MIN_GROUPED_SAMPLES // 4)
     x, z = np.meshgrid(np.linspace(-0.4, 0.4, 16), np.linspace(-0.2, 0.2, 2))
     position = np.stack([x, 0 * x, z], axis=2).reshape(-1, 3).astype(np.float32)
-    points = points_at(position, np.tile(UP, (32, 1)))
+    points = make_surface_points(position, np.tile(UP, (32, 1)))
     hides = quad("card", card, 0)
-    bits = np.unpackbits(trace_local(embree_of(hides), 1e-5, made, strata, points), axis=1, bitorder="little")
+    bits = np.unpackbits(
+        trace_light_visibility(embree_of(hides), 1e-5, made, strata, points), axis=1, bitorder="little"
+    )
     place = np.array(
         [
-            [light_sample(made, strata, k, *shift_of(strata, n), *p)[:4] for k in range(MANY)]
+            [
+                light_sample(made, strata, k, *cranley_patterson_offset(strata, n), *p)[:4]
+                for k in range(MIN_GROUPED_SAMPLES)
+            ]
             for n, p in zip(points.seed, position, strict=True)
         ]
     )
     end = position[:, None] + place[..., :3] * place[..., 3:]
-    start = np.repeat(position.astype(float), MANY, axis=0)
-    free = ~crosses(hides.positions[hides.faces].astype(float), start, end.reshape(-1, 3)).reshape(32, MANY)
+    start = np.repeat(position.astype(float), MIN_GROUPED_SAMPLES, axis=0)
+    free = ~crosses(hides.positions[hides.faces].astype(float), start, end.reshape(-1, 3)).reshape(
+        32, MIN_GROUPED_SAMPLES
+    )
     assert 0.5 < free.mean() < 0.9
     assert (bits != free).mean() < 2e-3
-    np.testing.assert_allclose(bits.mean(axis=1), free.mean(axis=1), atol=6 / MANY)  # single cells along the edge
+    np.testing.assert_allclose(
+        bits.mean(axis=1), free.mean(axis=1), atol=6 / MIN_GROUPED_SAMPLES
+    )  # single cells along the edge
 
 
 def irradiance(geometry, light, position, normal, triangles=None, num_samples=64):
-    made = make_local(light, triangles)
-    strata = strata_of(made, num_samples)
-    points = points_at(position, normal)
-    return arriving(made, strata, points, trace_local(geometry, 1e-5, made, strata, points))
+    made = prepare_local_lights(light, triangles)
+    strata = make_light_strata(made, num_samples)
+    points = make_surface_points(position, normal)
+    return compute_irradiance(made, strata, points, trace_light_visibility(geometry, 1e-5, made, strata, points))
 
 
 def embree_of(*meshes):
@@ -118,10 +128,10 @@ def test_surface_that_shines_does_not_shadow_itself():
     """The ceiling is the lamp: as bright as a rectangle where nothing is."""
     corners = CEILING.positions[CEILING.faces]
     lamp = LightGeometry("mesh", material="Lamp")
-    found = irradiance(embree_of(CEILING), lamp, FLOOR, NORMALS, shining(corners, False))
+    found = irradiance(embree_of(CEILING), lamp, FLOOR, NORMALS, make_emissive_triangles(corners, False))
     assert np.all(found > 0.3)
     open_air = embree_of(quad("far", [[90, 0, 0], [91, 0, 0], [91, 1, 0], [90, 1, 0]], 0))
-    free = irradiance(open_air, lamp, FLOOR, NORMALS, shining(corners, False))
+    free = irradiance(open_air, lamp, FLOOR, NORMALS, make_emissive_triangles(corners, False))
     np.testing.assert_array_equal(found, free)
 
 

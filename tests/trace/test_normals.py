@@ -3,19 +3,19 @@
 import numpy as np
 
 from relume.scene.built_in import built_in
-from relume.trace.geometry import merge
+from relume.trace.geometry import build_scene_buffers
 from relume.trace.normals import normals_at
-from relume.trace.primary import Hits, camera_directions, trace_from
+from relume.trace.primary import Hits, camera_directions, trace_rays
 from relume.trace.surface import surface_at
 
 
 def test_normals_are_those_of_the_surface():
     """Teapot and pearls, seen from within the scene: smooth, seen from behind, on edges of triangles, and nothing."""
     scene = built_in("still_life")
-    geometry, camera, size = merge(scene), scene.cameras[0], (48, 36)
+    geometry, camera, size = build_scene_buffers(scene), scene.cameras[0], (48, 36)
     y, x = np.divmod(np.arange(size[0] * size[1]), size[0])
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    seen = trace_from(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+    seen = trace_rays(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
     rng = np.random.default_rng(1)
     uv, face = seen.uv.copy(), np.where(rng.random(len(x)) < 0.1, np.int32(-1), seen.face)
     uv[::3, 0] = 0  # on an edge

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import points_at, still_life
+from tiny_scenes import make_surface_points, still_life
 
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.local import make_local, strata_of
+from relume.light.local import make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
 from relume.trace.embree import EmbreeScene
-from relume.trace.geometry import merge
-from relume.trace.local_shadows import arriving, trace_local
-from relume.trace.preview_light import BLOCK, preview_light
+from relume.trace.geometry import build_scene_buffers
+from relume.trace.local_shadows import compute_irradiance, trace_light_visibility
+from relume.trace.preview_light import BLOCK, trace_moving_light
 
 FAR = EmbreeScene.build(np.array([[90, 0, 0], [91, 0, 0], [91, 1, 0]], np.float32), np.array([[0, 1, 2]], np.uint32))
 CORNERS = np.array([0, 5, 10, 15])
@@ -22,7 +22,7 @@ PROBES = np.isin(np.arange(BLOCK) % 16, CORNERS)
 @pytest.fixture(scope="module")
 def surfaces():
     scene = still_life()
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "front", (64, 48))
     solid = np.flatnonzero(samples.material != BACKGROUND)
     solid = solid[: len(solid) // BLOCK * BLOCK - 5]  # the last block is not full
@@ -52,17 +52,20 @@ def predicted(seen, asked):
 )
 def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces, light):
     geometry, position, normal = surfaces
-    made = make_local(light)
-    strata = strata_of(made, 4)
-    along = (made, strata, points_at(position, normal))
-    rough = preview_light(geometry.embree, geometry.epsilon, *along)
+    made = prepare_local_lights(light)
+    strata = make_light_strata(made, 4)
+    along = (made, strata, make_surface_points(position, normal))
+    rough = trace_moving_light(geometry.embree, geometry.epsilon, *along)
     seen, asked = (
-        np.unpackbits(trace_local(scene, geometry.epsilon, *along), axis=1, bitorder="little")[:, : len(strata.uv)] > 0
+        np.unpackbits(trace_light_visibility(scene, geometry.epsilon, *along), axis=1, bitorder="little")[
+            :, : len(strata.uv)
+        ]
+        > 0
         for scene in (geometry.embree, FAR)
     )
     expected = np.packbits(predicted(seen, asked), axis=1, bitorder="little")
     np.testing.assert_array_equal(rough.visible, expected)
-    np.testing.assert_allclose(rough.arriving, arriving(*along, expected), rtol=2e-6)
+    np.testing.assert_allclose(rough.irradiance, compute_irradiance(*along, expected), rtol=2e-6)
     wrong = np.unpackbits(rough.visible ^ np.packbits(seen, axis=1, bitorder="little"))
     assert wrong.sum() < 0.02 * seen.size
     assert 0.05 < seen.mean() < 0.95
@@ -70,9 +73,9 @@ def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces,
 
 def test_points_that_no_light_reaches_stay_dark(surfaces):
     geometry, position, normal = surfaces
-    made = make_local(LightGeometry("point", (0.9, 1.4, 0.6)))
-    strata = strata_of(made, 4)
-    points = points_at(position, normal)._replace(normal=0 * normal)
-    rough = preview_light(geometry.embree, geometry.epsilon, made, strata, points)
-    assert not rough.arriving.any()
+    made = prepare_local_lights(LightGeometry("point", (0.9, 1.4, 0.6)))
+    strata = make_light_strata(made, 4)
+    points = make_surface_points(position, normal)._replace(normal=0 * normal)
+    rough = trace_moving_light(geometry.embree, geometry.epsilon, made, strata, points)
+    assert not rough.irradiance.any()
     assert not rough.visible.any()

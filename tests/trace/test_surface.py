@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from tiny_scenes import looking, mesh, quad, scene_of
+from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 
-from relume.trace.geometry import merge
+from relume.trace.geometry import build_scene_buffers
 from relume.trace.primary import Hits
 from relume.trace.surface import surface_at
 
@@ -14,7 +14,9 @@ INWARD = np.array([[-1.0, 0.0, 0.0]], np.float32)  # along the ray that hits the
 def on_wall(uv, corners=((0, 0, 0), (0, 0, 2), (0, 2, 2), (0, 2, 0))):
     """The point of a wall in x = 0 that a ray hits at barycentric coordinates of its first triangle."""
     floor = quad("floor", [[0, 0, 0], [2, 0, 0], [2, 0, 2], [0, 0, 2]], 0)
-    geometry = merge(scene_of(quad("wall", corners, 0), floor, camera=looking("c", [1, 1, 1], [0, 1, 1], 1.0)))
+    geometry = build_scene_buffers(
+        make_tiny_scene(quad("wall", corners, 0), floor, camera=make_camera("c", [1, 1, 1], [0, 1, 1], 1.0))
+    )
     hits = Hits(np.zeros(1, np.int32), np.array([uv], np.float32), np.ones(1, np.float32))
     return surface_at(geometry, hits, INWARD).points.position[0].astype(float), geometry.epsilon
 
@@ -35,10 +37,10 @@ def test_other_points_stay():
 def test_point_of_a_sliver_stays_in_it():
     """A triangle narrower than the distance to keep has a tenth of its height instead."""
     thin = 1e-6
-    geometry = merge(
-        scene_of(
+    geometry = build_scene_buffers(
+        make_tiny_scene(
             mesh("sliver", [[0, 0, 0], [0, 0, 2], [0, thin, 1]], [[0, 1, 2]], 0),
-            camera=looking("c", [1, 1, 1], [0, 1, 1], 1.0),
+            camera=make_camera("c", [1, 1, 1], [0, 1, 1], 1.0),
         )
     )
     hits = Hits(np.zeros(1, np.int32), np.array([[0.5, 0.0]], np.float32), np.ones(1, np.float32))

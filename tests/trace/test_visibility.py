@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
-from tiny_scenes import looking, quad, scene_of, sphere, still_life, studio
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, still_life, studio
 
 from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.triangles import subdivide
-from relume.trace.geometry import merge
-from relume.trace.primary import camera_directions, trace_from
+from relume.light.triangles import tessellate_environment
+from relume.trace.geometry import build_scene_buffers
+from relume.trace.primary import camera_directions, trace_rays
 from relume.trace.visibility import trace_visibility
 
 GRAZING_SHARE = 2e-5  # of the rays; those that pass within rounding of an edge may go either way
@@ -44,7 +44,7 @@ def unit(v):
 @pytest.fixture(scope="module")
 def surfaces():
     scene = still_life()
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "front", (64, 48))
     solid = samples.material != BACKGROUND
     return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
@@ -65,7 +65,7 @@ def test_bits_are_embreexs_own_whatever_the_packets_width(surfaces, num_points, 
 
 def test_whole_view_against_embreex(surfaces):
     geometry, position, normal = surfaces
-    directions = subdivide(studio(), 300).direction
+    directions = tessellate_environment(studio(), 300).direction
     traced = trace_visibility(geometry.embree, position, normal, directions)
     expected, above = visible_by_embreex(geometry, position, normal, directions)
     different = bits_of(traced.visible, len(directions)) != expected
@@ -108,7 +108,7 @@ def test_shadow_of_a_square_hole_is_the_analytic_one():
             [(-9, 9, 0.5, 9), (-9, 9, -9, -0.5), (0.5, 9, -0.5, 0.5), (-9, -0.5, -0.5, 0.5)]
         )
     ]
-    geometry = merge(scene_of(*lid, camera=looking("c", [0, 5, 5], [0, 0, 0], 0.8)))
+    geometry = build_scene_buffers(make_tiny_scene(*lid, camera=make_camera("c", [0, 5, 5], [0, 0, 0], 0.8)))
     rng = np.random.default_rng(8)
     points = np.column_stack([rng.uniform(-1, 1, 500), np.zeros(500), rng.uniform(-1, 1, 500)]).astype(np.float32)
     normals = np.tile(np.float32([0, 1, 0]), (500, 1))
@@ -124,14 +124,16 @@ def test_shadow_of_a_square_hole_is_the_analytic_one():
 
 def test_shadow_of_a_ball_in_an_open_box_is_the_analytic_one():
     """A ball over a floor between four low walls; rays near the ball's outline, where it has corners, are left out."""
-    ball = sphere("ball", [0, 1, 0], 0.5, 0, rings=24)
+    ball = sphere("ball", [0, 1, 0], 0.5, 0, num_rings=24)
     floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     corners = [(-2, 2), (2, 2), (2, -2), (-2, -2)]
     walls = [
         quad(f"wall{k}", [[x0, 0, z0], [x0, 0.6, z0], [x1, 0.6, z1], [x1, 0, z1]], 0)
         for k, ((x0, z0), (x1, z1)) in enumerate(zip(corners, corners[1:] + corners[:1], strict=True))
     ]
-    geometry = merge(scene_of(ball, floor, *walls, camera=looking("c", [0, 5, 5], [0, 0, 0], 0.8)))
+    geometry = build_scene_buffers(
+        make_tiny_scene(ball, floor, *walls, camera=make_camera("c", [0, 5, 5], [0, 0, 0], 0.8))
+    )
     rng = np.random.default_rng(9)
     points = np.column_stack([rng.uniform(-1.9, 1.9, 700), np.full(700, 1e-3), rng.uniform(-1.9, 1.9, 700)])
     points = points.astype(np.float32)
@@ -154,10 +156,10 @@ def test_convex_things_see_all_of_the_open_sky(far_away):
     """No surface shadows itself: neither a plane, nor a ball on whose triangles shading normals are bent."""
     at = np.float64([far_away, 0, 0])
     plane = quad("plane", np.add([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], at), 0)
-    directions = subdivide(studio(), 300).direction
-    camera = looking("c", np.add(at, [0, 1.5, 2.5]), at, 0.6)
-    scene = scene_of(plane, camera=camera)
-    geometry = merge(scene)
+    directions = tessellate_environment(studio(), 300).direction
+    camera = make_camera("c", np.add(at, [0, 1.5, 2.5]), at, 0.6)
+    scene = make_tiny_scene(plane, camera=camera)
+    geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "c", (64, 48))
     solid = samples.material != BACKGROUND
     assert solid.sum() > 500
@@ -167,8 +169,8 @@ def test_convex_things_see_all_of_the_open_sky(far_away):
     bits = bits_of(visible, len(directions))
     np.testing.assert_array_equal(bits, np.broadcast_to(directions[:, 1] > 0, bits.shape))
 
-    scene = scene_of(sphere("ball", at, 1.0, 0, rings=16), camera=camera)
-    geometry = merge(scene)
+    scene = make_tiny_scene(sphere("ball", at, 1.0, 0, num_rings=16), camera=camera)
+    geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "c", (64, 48))
     solid = samples.material != BACKGROUND
     position, normal = samples.surface.points.position[solid], samples.surface.points.normal[solid]
@@ -181,12 +183,12 @@ def test_convex_things_see_all_of_the_open_sky(far_away):
 
 def test_first_hits_are_embreexs_own():
     scene = still_life()
-    geometry = merge(scene)
+    geometry = build_scene_buffers(scene)
     camera = scene.cameras[0]
     y, x = np.divmod(np.arange(50 * 37), 50)
     directions = camera_directions(camera, (50, 37), (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     origin = camera.to_world[:3, 3].astype(np.float32)
-    hits = trace_from(geometry.embree, origin, directions)
+    hits = trace_rays(geometry.embree, origin, directions)
     found = embreex_scene(geometry).run(np.tile(origin, (len(directions), 1)), directions, output=True)
     same = hits.face == found["primID"]
     assert (~same).mean() < 1e-3  # a ray through the edge of two triangles may be given to either

@@ -15,9 +15,9 @@ from server.settings import Settings
 COUNT = """
 import ctypes, sys, threading
 from pathlib import Path
-from relume.resident import share_arenas
+from relume.resident import limit_malloc_arenas
 if sys.argv[2] == "shared":
-    share_arenas()
+    limit_malloc_arenas()
 libc, all_run = ctypes.CDLL(None), threading.Barrier(13)
 libc.malloc.argtypes, libc.malloc.restype = [ctypes.c_size_t], ctypes.c_void_p
 libc.fopen.restype = ctypes.c_void_p
@@ -37,7 +37,7 @@ print(Path(sys.argv[1]).read_text().count("<heap nr="))
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallopt"), reason="only glibc has arenas")
 @pytest.mark.parametrize(("how", "asked", "most"), [("shared", None, 2), ("alone", None, None), ("shared", "5", 5)])
-def test_threads_share_arenas(tmp_path, how: str, asked: str | None, most: int | None) -> None:
+def test_threads_limit_malloc_arenas(tmp_path, how: str, asked: str | None, most: int | None) -> None:
     environment = {key: value for key, value in os.environ.items() if key != "MALLOC_ARENA_MAX"}
     if asked is not None:
         environment["MALLOC_ARENA_MAX"] = asked
@@ -49,12 +49,12 @@ def test_threads_share_arenas(tmp_path, how: str, asked: str | None, most: int |
 def test_a_server_has_its_threads_share_them(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     done: list[str] = []
     monkeypatch.setattr(app, "set_up", lambda *_: None)
-    monkeypatch.setattr(app, "share_arenas", lambda: done.append("arenas"))
+    monkeypatch.setattr(app, "limit_malloc_arenas", lambda: done.append("arenas"))
 
     class Stub:
         def run(self) -> None:
             done.append("run")
 
-    monkeypatch.setattr(app, "stoppable", lambda *_: Stub())
+    monkeypatch.setattr(app, "create_server", lambda *_: Stub())
     app.serve(Settings(data=tmp_path))
     assert done == ["arenas", "run"]

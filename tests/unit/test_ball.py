@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from relume.balls.ball import _lights, ball_image
+from relume.balls.ball import _lights, render_preview
 from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
-from relume.scene.model import Coding, Texture
+from relume.scene.model import Texture, TextureEncoding
 
 
 def term(model: str, **given: object) -> dict[str, object]:
@@ -15,7 +15,7 @@ def term(model: str, **given: object) -> dict[str, object]:
 
 def test_middle_of_a_diffuse_ball_is_the_light_of_its_half_space() -> None:
     size = 33
-    middle = ball_image([term("lambert")], size)[size // 2, size // 2]
+    middle = render_preview([term("lambert")], size)[size // 2, size // 2]
     cosine = np.maximum(_lights().direction[:, 2].astype(float), 0)
     expected = (cosine[:, None] * _lights().irradiance).sum(axis=0) / np.pi
     # the pixel is as wide as 3.6 degrees of the ball
@@ -23,8 +23,8 @@ def test_middle_of_a_diffuse_ball_is_the_light_of_its_half_space() -> None:
 
 
 def test_highlight_adds_to_the_body_and_corners_stay_empty() -> None:
-    body = ball_image([term("lambert")], 24)
-    both = ball_image([term("lambert"), term("cook_torrance", params={"sigma": 0.2})], 24)
+    body = render_preview([term("lambert")], 24)
+    both = render_preview([term("lambert"), term("cook_torrance", params={"sigma": 0.2})], 24)
     assert np.all(both >= body - 1e-6)
     assert both.max() > 1.05 * body.max()
     np.testing.assert_array_equal(both[0, 0], body[-1, -1])
@@ -32,7 +32,7 @@ def test_highlight_adds_to_the_body_and_corners_stay_empty() -> None:
 
 @pytest.mark.parametrize("model", sorted(name for name, found in TERMS.items() if not name.startswith("measured")))
 def test_every_term_makes_a_ball(model: str) -> None:
-    image = ball_image([term(model)], 8)
+    image = render_preview([term(model)], 8)
     assert np.isfinite(image).all()
     assert image.min() >= 0
     assert image[3:5, 3:5].max() > 0
@@ -42,12 +42,12 @@ def test_a_ball_shows_its_images_in_color_and_place() -> None:
     """Red above, blue below; a channel that the material has no image of leaves the color."""
     pixels = np.zeros((70, 30, 3), np.uint8)
     pixels[:35, :, 0] = pixels[35:, :, 2] = 255
-    images = {"diffuse": Texture(pixels, coding=Coding("srgb", (1.0, 1.0, 1.0)))}
-    plain = ball_image([term("lambert", texture=None)], 32)
-    dressed = ball_image([term("lambert", texture="diffuse")], 32, images)
+    images = {"diffuse": Texture(pixels, encoding=TextureEncoding("srgb", (1.0, 1.0, 1.0)))}
+    plain = render_preview([term("lambert", texture=None)], 32)
+    dressed = render_preview([term("lambert", texture="diffuse")], 32, images)
     ratio = dressed[2:30, 14:18] / plain[2:30, 14:18]
     reds, blues = (ratio[..., channel].mean(axis=1) > 0.5 for channel in (0, 2))
     assert reds.any()
     assert blues.any()
     assert not (reds & blues)[ratio.max(axis=(1, 2)) > 0.99].any()
-    np.testing.assert_array_equal(ball_image([term("lambert", texture="specular")], 32, images), plain)
+    np.testing.assert_array_equal(render_preview([term("lambert", texture="specular")], 32, images), plain)

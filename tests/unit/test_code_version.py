@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from relume import code_version
-from relume.code_version import code_hash, sources_of
+from relume.code_version import code_hash, collect_sources
 
 
 @pytest.fixture
@@ -37,21 +37,21 @@ def names(package, found):
 def test_sources_are_all_that_is_imported_directly_or_not(package):
     bake = {"trace/rays", "light/lamp", "scene/__init__", "scene/mesh", "scene/model", "errors"}
     shown = {"shown/frame", "shown/only_here"}
-    assert names(package, sources_of(["trace.rays"], package=package)) == bake | shown
-    assert names(package, sources_of(["trace"], package=package)) == bake | shown | {"trace/shadows"}
-    assert names(package, sources_of(["trace.rays"], but_for=["shown"], package=package)) == bake
+    assert names(package, collect_sources(["trace.rays"], package=package)) == bake | shown
+    assert names(package, collect_sources(["trace"], package=package)) == bake | shown | {"trace/shadows"}
+    assert names(package, collect_sources(["trace.rays"], exclude=["shown"], package=package)) == bake
 
 
 def test_a_module_that_has_moved_is_missed_aloud(package):
     with pytest.raises(ModuleNotFoundError, match="no sources"):
-        sources_of(["trace.photons"], package=package)
+        collect_sources(["trace.photons"], package=package)
     with pytest.raises(ModuleNotFoundError, match="no sources"):
-        sources_of(["trace.rays"], but_for=["trace.photons"], package=package)
+        collect_sources(["trace.rays"], exclude=["trace.photons"], package=package)
 
 
 def test_the_hash_follows_what_is_imported_and_nothing_else(package):
     def current():
-        return code_hash(sources_of(["trace.rays"], package=package), package)
+        return code_hash(collect_sources(["trace.rays"], package=package), package)
 
     first = current()
     (package / "light" / "unused.py").write_text("x = 1\n")
@@ -66,8 +66,8 @@ def test_the_hash_follows_what_is_imported_and_nothing_else(package):
 
 def test_images_depend_on_the_code_of_frames_and_bakes_do_not():
     package = code_version._PACKAGE
-    images = names(package, sources_of(code_version._IMAGES))
-    bakes = names(package, sources_of(code_version._BAKES, code_version._AFTER_BAKES))
+    images = names(package, collect_sources(code_version._IMAGES))
+    bakes = names(package, collect_sources(code_version._BAKES, code_version._AFTER_BAKES))
     of_both = {"brdf/terms/ggx", "light/tiles", "light/triangles", "scene/model", "trace/cells", "views/store_io"}
     of_images = {"project/project_kernel", "operators/shade", "trace/local_shadows", "light/blur", "views/view"}
     of_bakes = {"trace/coherent_kernel", "trace/photons", "eye/view_samples", "methods/gather", "store/writer"}

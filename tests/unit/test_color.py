@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relume.color import RGB9E5_LARGEST, luminance, rgb9e5_pack, rgb9e5_unpack, srgb_decode, srgb_encode
+from relume.color import RGB9E5_MAX, luminance, rgb9e5_pack, rgb9e5_unpack, srgb_decode, srgb_encode
 
 
 def test_luminance_of_white_is_one_and_keeps_the_type():
@@ -45,7 +45,7 @@ def test_shared_exponent_words(rgb, word):
 def test_shared_exponent_keeps_nine_bits_of_the_largest_channel():
     rng = np.random.default_rng(2)
     rgb = np.exp(rng.uniform(-9, 11, (2000, 1)) + rng.normal(size=(2000, 3))).astype(np.float32)
-    rgb = np.minimum(rgb, np.float32(RGB9E5_LARGEST))
+    rgb = np.minimum(rgb, np.float32(RGB9E5_MAX))
     packed = rgb9e5_pack(rgb)
     assert packed.dtype == np.uint32
     error = np.abs(rgb9e5_unpack(packed) - rgb)

@@ -10,12 +10,12 @@ import OpenImageIO
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_scenes import looking, still_life
+from tiny_scenes import make_camera, still_life
 
-from relume.exr.attributes import Origin, attributes_of, world_to_ndc
-from relume.exr.layers import layers_for, layers_of, light_groups_of
+from relume.exr.attributes import Provenance, build_attributes, world_to_ndc
+from relume.exr.layers import light_and_path_layers, light_group_layers, make_layers
 from relume.exr.picture import export_exr
-from relume.imageio.exr import channels_of, write_exr
+from relume.imageio.exr import image_channels, write_exr
 from relume.look import Look, default_look, validate
 from relume.scene.ground import with_ground
 from relume.trace.primary import camera_directions
@@ -40,18 +40,18 @@ def read(path):
 def test_halves_are_rounded_and_nothing_becomes_infinite(tmp_path):
     image = np.random.default_rng(4).uniform(0, 3, (200, 48, 3)).astype(np.float32)
     image[0, 0] = (1e6, 1e-6, 0)
-    write_exr(tmp_path / "a.exr", channels_of(image), {})
+    write_exr(tmp_path / "a.exr", image_channels(image), {})
     spec, found = read(tmp_path / "a.exr")
     assert str(spec.format) == "half"
     assert list(spec.channelnames) == ["R", "G", "B"]
     np.testing.assert_array_equal(found, np.minimum(image, 65504).astype(np.float16).astype(np.float32))
-    write_exr(tmp_path / "b.exr", channels_of(image), {}, "float")
+    write_exr(tmp_path / "b.exr", image_channels(image), {}, "float")
     np.testing.assert_array_equal(read(tmp_path / "b.exr")[1], image)
 
 
 def test_alpha_and_layers_are_channels_of_their_names(tmp_path):
     image = np.random.default_rng(4).uniform(0, 3, (32, 48, 4)).astype(np.float32)
-    write_exr(tmp_path / "a.exr", [*channels_of(image), *channels_of(image[..., :3], "light_Key")], {}, "float")
+    write_exr(tmp_path / "a.exr", [*image_channels(image), *image_channels(image[..., :3], "light_Key")], {}, "float")
     spec, found = read(tmp_path / "a.exr")
     order = [spec.channelnames.index(name) for name in ("R", "G", "B", "A", "light_Key.R", "light_Key.B")]
     np.testing.assert_array_equal(found[..., order], image[..., [0, 1, 2, 3, 0, 2]])
@@ -61,34 +61,38 @@ def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
     lights = {"Key": POINT, "Off": POINT | {"on": False}, "Black": POINT | {"scale": 0}}
     look = look_with(lights=lights)
     lit = ["light_environment", "light_Key"]
-    assert names_of(layers_of(look, reflects=False)) == lit
+    assert names_of(light_and_path_layers(look, has_indirect=False)) == lit
     paths = ["path_direct", "path_first_bounce", "path_further_bounces"]
-    assert names_of(layers_of(look, reflects=True)) == [*lit, *paths]
-    assert names_of(layers_of(look_with(), reflects=False)) == []
-    assert names_of(layers_of(look_with(), reflects=True)) == paths
-    assert names_of(layers_of(look_with(transport={"bounces": 1}), reflects=True)) == paths[:2]
-    assert names_of(layers_of(look_with(transport={"show": "first_bounce"}), reflects=True)) == []
-    assert names_of(layers_of(look_with(lights=lights, environment={"scale": 0.0}), reflects=False)) == []
+    assert names_of(light_and_path_layers(look, has_indirect=True)) == [*lit, *paths]
+    assert names_of(light_and_path_layers(look_with(), has_indirect=False)) == []
+    assert names_of(light_and_path_layers(look_with(), has_indirect=True)) == paths
+    assert names_of(light_and_path_layers(look_with(transport={"bounces": 1}), has_indirect=True)) == paths[:2]
+    assert names_of(light_and_path_layers(look_with(transport={"show": "first_bounce"}), has_indirect=True)) == []
+    assert (
+        names_of(light_and_path_layers(look_with(lights=lights, environment={"scale": 0.0}), has_indirect=False)) == []
+    )
 
 
 def test_light_groups_are_direct_and_reflected_light_of_each_light():
     look = look_with(lights={"Key": POINT, "Off": POINT | {"on": False}})
-    groups = light_groups_of(look, reflects=True)
+    groups = light_group_layers(look, has_indirect=True)
     both = ["light_environment_direct", "light_environment_reflected", "light_Key_direct", "light_Key_reflected"]
     assert names_of(groups) == both
     assert [layer.look.transport.paths for layer in groups[:2]] == [(True, 1, 0), (False, 1, 24)]
-    assert names_of(light_groups_of(look, reflects=False)) == both[::2]
-    assert names_of(light_groups_of(look_with(), reflects=False)) == both[:1]  # a compositor finds what it asks for
+    assert names_of(light_group_layers(look, has_indirect=False)) == both[::2]
+    assert (
+        names_of(light_group_layers(look_with(), has_indirect=False)) == both[:1]
+    )  # a compositor finds what it asks for
     shown = look_with(transport={"show": "first_bounce"})
-    (first,) = light_groups_of(shown, reflects=True)
+    (first,) = light_group_layers(shown, has_indirect=True)
     assert (first.name, first.look.transport.paths) == (both[1], (False, 1, 1))
     behind = look_with(background={"kind": "color"})
-    assert names_of(light_groups_of(behind, reflects=True)) == [*both[:2], "light_background"]
+    assert names_of(light_group_layers(behind, has_indirect=True)) == [*both[:2], "light_background"]
 
 
 def test_names_of_light_groups_keep_what_they_end_with():
     names = ["x" * 79, "x" * 80, "a b", "a_b"]
-    groups = names_of(light_groups_of(look_with(lights=dict.fromkeys(names, POINT)), reflects=True))[2:]
+    groups = names_of(light_group_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=True))[2:]
     assert all(name.endswith(("_direct", "_reflected")) for name in groups)
     assert len({name.casefold() for name in groups}) == 2 * len(names)
     assert max(map(len, groups)) == 29
@@ -97,25 +101,27 @@ def test_names_of_light_groups_keep_what_they_end_with():
 
 def test_a_background_of_one_colour_is_a_layer_of_its_own_and_catchers_leave_none():
     look = look_with(lights={"Key": POINT}, background={"kind": "color", "color": [0.2, 0.3, 0.4]})
-    *lit, behind = layers_of(look, reflects=False)
-    assert behind.of == "background"
+    *lit, behind = light_and_path_layers(look, has_indirect=False)
+    assert behind.source == "background"
     assert behind.look.background.color == (0.2, 0.3, 0.4)
     assert not any(any(light.gain) for light in behind.look.lights.values())
     assert not any(behind.look.environment.gain)
     assert all(layer.look.background.color == (0, 0, 0) for layer in lit)
-    assert layers_of(look_with(background={"kind": "color"}), reflects=False) == []
+    assert light_and_path_layers(look_with(background={"kind": "color"}), has_indirect=False) == []
     catching = look.model_dump()
     catching["materials"]["Floor"]["catcher"] = True
     for layering in (True, "light_groups", False):
-        assert layers_for(layering, Look.model_validate(catching), reflects=True) == []
-    assert names_of(layers_for(True, look, reflects=True)) == names_of(layers_of(look, reflects=True))
-    assert layers_for(False, look, reflects=True) == []
+        assert make_layers(layering, Look.model_validate(catching), has_indirect=True) == []
+    assert names_of(make_layers(True, look, has_indirect=True)) == names_of(
+        light_and_path_layers(look, has_indirect=True)
+    )
+    assert make_layers(False, look, has_indirect=True) == []
 
 
 def test_lights_with_names_alike_or_without_letters_have_layers_of_their_own():
     names = ["a.b/c", "a b c", "A-B-C", "灯", "🙂", "environment", "x" * 79, "x" * 80, "../..", "key\nR", "Lampe é"]
-    layers = layers_of(look_with(lights=dict.fromkeys(names, POINT)), reflects=False)
-    assert [layer.of for layer in layers] == ["environment", *names]
+    layers = light_and_path_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=False)
+    assert [layer.source for layer in layers] == ["environment", *names]
     assert names_of(layers)[:6] == [
         "light_environment", "light_a_b_c", "light_a_b_c_2", "light_A_B_C_3", "light_unnamed", "light_unnamed_2",
     ]  # fmt: skip
@@ -124,24 +130,24 @@ def test_lights_with_names_alike_or_without_letters_have_layers_of_their_own():
 
 @given(st.lists(st.text(min_size=1, max_size=80), min_size=2, max_size=12, unique=True))
 def test_layer_names_are_plain_short_and_different(names):
-    layers = names_of(layers_of(look_with(lights=dict.fromkeys(names, POINT)), reflects=True))
+    layers = names_of(light_and_path_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=True))
     assert all(re.fullmatch(r"(light|path)_[A-Za-z0-9_]{1,23}", name) for name in layers)
     assert len({name.casefold() for name in layers}) == len(names) + 4
 
 
 def test_the_picture_of_a_light_has_that_light_alone():
     look = look_with(lights={"Key": POINT, "Fill": POINT, "Off": POINT | {"on": False}})
-    for layer in layers_of(look, reflects=False):
+    for layer in light_and_path_layers(look, has_indirect=False):
         shining = [name for name, light in layer.look.lights.items() if any(light.gain)]
         shining += ["environment"] if any(layer.look.environment.gain) else []
-        assert shining == [layer.of]
+        assert shining == [layer.source]
 
 
 def test_attributes_say_where_the_picture_comes_from(tmp_path):
-    camera = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
+    camera = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
     look = look_with(environment={"map": "studio"}, lights={"灯": POINT})
-    layers = layers_of(look, reflects=False)
-    attributes = attributes_of(Origin("5" * 16, "still\0life 灯", "b" * 16), camera, SIZE, look, layers)
+    layers = light_and_path_layers(look, has_indirect=False)
+    attributes = build_attributes(Provenance("5" * 16, "still\0life 灯", "b" * 16), camera, SIZE, look, layers)
     image = np.ones((SIZE[1], SIZE[0], 3), np.float32)
     export_exr(tmp_path / "a.exr", lambda look, progress: image, look, layers, attributes)
     spec, _ = read(tmp_path / "a.exr")
@@ -162,15 +168,15 @@ def test_attributes_say_where_the_picture_comes_from(tmp_path):
 
 @pytest.mark.parametrize("catcher", [True, False])
 def test_a_ground_is_told_as_what_it_was_shown(catcher):
-    camera, scene = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8), with_ground(still_life())
+    camera, scene = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8), with_ground(still_life())
     default, ground = default_look(scene.materials), scene.materials[-1].name
     look = validate({"materials": {ground: {"catcher": catcher}}}, default)
-    attributes = attributes_of(Origin("5" * 16, "grounded", "b" * 16), camera, SIZE, look, [])
+    attributes = build_attributes(Provenance("5" * 16, "grounded", "b" * 16), camera, SIZE, look, [])
     assert validate(json.loads(attributes["relume:look"]), default) == look
 
 
 def test_points_in_the_world_are_found_in_the_picture():
-    camera = looking("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
+    camera = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
     x, y = np.array([0, 48, 0, 12], np.float32), np.array([0, 32, 32, 24], np.float32)
     world = camera.to_world[:3, 3] + 2.5 * camera_directions(camera, SIZE, x, y)
     projected = np.append(world, np.ones((4, 1)), axis=1) @ world_to_ndc(camera, SIZE)
@@ -179,7 +185,7 @@ def test_points_in_the_world_are_found_in_the_picture():
 
 def test_export_tells_how_far_it_is_and_leaves_nothing_where_it_fails(tmp_path):
     look = look_with(lights={"Key": POINT})
-    layers = layers_of(look, reflects=False)
+    layers = light_and_path_layers(look, has_indirect=False)
     told: list[float] = []
 
     def render(look, progress):

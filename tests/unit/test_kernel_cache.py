@@ -86,8 +86,8 @@ def test_another_checkout_finds_what_one_has_compiled_until_a_source_changes(tmp
 def test_compiled_kernels_lie_in_the_folder_of_their_module(user_cache):
     code = (
         "import numpy as np\n"
-        "from relume.imageio.ocio.sampling import show_by\n"
-        "show_by(np.zeros((65, 65, 65, 3), np.uint16), np.zeros((1, 3), np.float32))\n"
+        "from relume.imageio.ocio.sampling import apply_lut\n"
+        "apply_lut(np.zeros((65, 65, 65, 3), np.uint16), np.zeros((1, 3), np.float32))\n"
     )
     subprocess.run([sys.executable, "-c", code], env={**os.environ}, check=True)
     (folder,) = user_cache.rglob("imageio.ocio.sampling-*")

@@ -11,14 +11,14 @@ from tiny_scenes import still_life
 
 from relume.environments.reading import read_environment
 from relume.errors import ParameterError
-from relume.exr.attributes import Origin, attributes_of
+from relume.exr.attributes import Provenance, build_attributes
 from relume.exr.picture import export_exr
-from relume.exr.space import space_called
+from relume.exr.space import find_space
 from relume.imageio.ocio.config import Config
-from relume.imageio.ocio.current import current, using
-from relume.imageio.ocio.lut import sample
+from relume.imageio.ocio.current import get_config, using_config
+from relume.imageio.ocio.lut import sample_lut
 from relume.imageio.ocio.view import OcioView
-from relume.imageio.primaries import KNOWN, to_rec_709
+from relume.imageio.primaries import INTEROP_SPACES, to_rec_709
 from relume.imageio.tonemap import tone_map
 from relume.look import default_look, validate
 
@@ -60,7 +60,7 @@ def seen(light: np.ndarray, view: OcioView) -> np.ndarray:
 def test_a_view_is_the_tone_map_that_the_config_has():
     image = lights(40_000).reshape(200, 200, 3)  # more rows than go into one range
     image[0, 0], image[0, 1] = np.nan, -1
-    with using(STUDIO):
+    with using_config(STUDIO):
         shown = tone_map(image, 1.5, VIEW)
     black = np.where(np.isnan(image) | (image < 0), 0, image)
     np.testing.assert_allclose(shown, seen((black * 2**1.5).astype(np.float32), VIEW), atol=1e-5)
@@ -79,25 +79,25 @@ def test_a_view_is_the_tone_map_that_the_config_has():
 def test_a_table_is_the_view_but_for_less_than_a_screen_shows(view, mean, most):
     """In steps of 8 bits: on the mean, and of 999 in 1,000."""
     light = lights(30_000)
-    with using(STUDIO):
-        table, shown = current().table(view), tone_map(light[None], 0.0, view, quick=True)[0]
-    np.testing.assert_allclose(shown, sample(table, light), atol=2e-5)
-    off = 255 * np.abs(sample(table, light) - seen(light, view))
+    with using_config(STUDIO):
+        table, shown = get_config().table(view), tone_map(light[None], 0.0, view, use_table=True)[0]
+    np.testing.assert_allclose(shown, sample_lut(table, light), atol=2e-5)
+    off = 255 * np.abs(sample_lut(table, light) - seen(light, view))
     assert off.mean() < mean
     assert np.quantile(off, 0.999) < most
     assert off.max() < 15  # a saturated light on the edge of what a display has
     greys = np.repeat(np.geomspace(1e-4, 100, 500, dtype=np.float32)[:, None], 3, axis=1)
-    assert 255 * np.abs(sample(table, greys) - seen(greys, view)).max() < 0.2
+    assert 255 * np.abs(sample_lut(table, greys) - seen(greys, view)).max() < 0.2
 
 
 def test_exported_light_is_the_same_light_to_whoever_reads_the_chromaticities():
     """In each of a config's linear spaces."""
     light = lights(1000, (-10, 0))
-    with using(STUDIO):
-        spaces = [space_called(name) for name in current().spaces]
+    with using_config(STUDIO):
+        spaces = [find_space(name) for name in get_config().spaces]
     assert len(spaces) > 15
     for space in spaces:
-        found = space.converted(light[None])[0]
+        found = space.convert_image(light[None])[0]
         wanted = by_ocio(light, ocio.ColorSpaceTransform("lin_rec709_scene", space.name))
         np.testing.assert_allclose(found, wanted, atol=1e-6, err_msg=space.name)
         back = to_rec_709(space.chromaticities)
@@ -106,12 +106,12 @@ def test_exported_light_is_the_same_light_to_whoever_reads_the_chromaticities():
 
 
 def test_known_spaces_are_written_as_what_they_are():
-    with using(STUDIO):
-        found = {name: space_called(name) for name in ("lin_ap1", "ACES2065-1", "scene_linear", "Linear V-Gamut")}
-        assert space_called(None).interop == "lin_rec709_scene"
+    with using_config(STUDIO):
+        found = {name: find_space(name) for name in ("lin_ap1", "ACES2065-1", "scene_linear", "Linear V-Gamut")}
+        assert find_space(None).interop == "lin_rec709_scene"
     assert [space.name for space in found.values()] == ["ACEScg", "ACES2065-1", "ACEScg", "Linear V-Gamut"]
     assert [space.interop for space in found.values()] == ["lin_ap1_scene", "lin_ap0_scene", "lin_ap1_scene", None]
-    assert found["ACES2065-1"].chromaticities == KNOWN["lin_ap0_scene"]
+    assert found["ACES2065-1"].chromaticities == INTEROP_SPACES["lin_ap0_scene"]
 
 
 def test_a_picture_in_aces_is_read_as_the_light_that_it_was(tmp_path):
@@ -119,9 +119,9 @@ def test_a_picture_in_aces_is_read_as_the_light_that_it_was(tmp_path):
     light = np.concatenate([lights(32 * 16, (-6, 4)), np.full((32 * 16, 1), 0.25, np.float32)], 1).reshape(16, 32, 4)
     scene = still_life()
     look = validate({}, default_look(scene.materials))
-    with using(STUDIO):
-        space = space_called("ACES2065-1")
-        attributes = attributes_of(Origin("a", "b", "c"), scene.cameras[0], (32, 16), look, [], space)
+    with using_config(STUDIO):
+        space = find_space("ACES2065-1")
+        attributes = build_attributes(Provenance("a", "b", "c"), scene.cameras[0], (32, 16), look, [], space)
         export_exr(tmp_path / "a.exr", lambda *of: light, look, [], attributes, "float", space=space)
     found = read_environment(tmp_path / "a.exr", "a").radiance
     np.testing.assert_allclose(found, light[..., :3], rtol=1e-3, atol=1e-4)
@@ -129,8 +129,8 @@ def test_a_picture_in_aces_is_read_as_the_light_that_it_was(tmp_path):
 
 @pytest.mark.parametrize("name", ["ACEScct", "Raw", "sRGB - Display", "../../etc/passwd", ""])
 def test_no_picture_is_exported_in_what_is_not_linear_light(name):
-    with using(STUDIO), pytest.raises(ParameterError, match="linear colour space"):
-        space_called(name)
+    with using_config(STUDIO), pytest.raises(ParameterError, match="linear colour space"):
+        find_space(name)
 
 
 def test_configs_that_cannot_be_used_say_why_in_one_sentence(tmp_path):
@@ -153,8 +153,8 @@ def test_an_old_config_is_told_which_of_its_spaces_is_ours(tmp_path, caplog):
     for name in ("raw", "gone"):
         with pytest.raises(ParameterError, match="RELUME_OCIO_SPACE"):
             Config(str(path), name)
-    with using(str(path), "scene_linear"):
-        config = current()
+    with using_config(str(path), "scene_linear"):
+        config = get_config()
         assert (config.working, config.displays, config.spaces) == ("lin", {"Monitor": ("Film", "Broken")}, ("lin",))
         grey = np.full((1, 1, 3), 0.25, np.float32)
         np.testing.assert_allclose(tone_map(grey, 0.0, OcioView("Monitor", "Film")), 0.5, atol=1e-5)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import relume
-from relume.memory import PASSING_SHARE, Holder, Memory
+from relume.memory import TRANSIENT_BUDGET_DIVISOR, Cache, CacheOwner
 
 BUDGET = 8_000
-SHARE = BUDGET // PASSING_SHARE
+SHARE = BUDGET // TRANSIENT_BUDGET_DIVISOR
 
 
 @dataclass(frozen=True)
@@ -28,51 +28,51 @@ def put(memory, key, num_bytes):
 
 def is_there(memory, key):
     """Without making it last."""
-    return memory.passing.find(key, Block) is not None
+    return memory.transient.get_cached(key, Block) is not None
 
 
 def test_what_was_made_in_passing_goes_first():
-    memory = Memory(BUDGET)
+    memory = Cache(BUDGET)
     put(memory, "oldest", 4_000)
-    put(memory.passing, "passing", 3_000)
+    put(memory.transient, "passing", 3_000)
     put(memory, "new", 2_000)
     assert [is_there(memory, key) for key in ("oldest", "passing", "new")] == [True, False, True]
     assert memory.used_bytes == 6_000
 
 
 def test_what_is_made_in_passing_takes_no_more_than_its_share_of_what_lasts():
-    memory = Memory(BUDGET)
+    memory = Cache(BUDGET)
     for number in range(8):
         put(memory, number, 1_000)
     for number in range(50):
-        put(memory.passing, ("passing", number), SHARE // 2)
+        put(memory.transient, ("passing", number), SHARE // 2)
     assert [is_there(memory, number) for number in range(8)] == [False] + [True] * 7
     assert [number for number in range(50) if is_there(memory, ("passing", number))] == [48, 49]
     assert memory.used_bytes == BUDGET
-    made = put(memory.passing, "large", SHARE + 1)
+    made = put(memory.transient, "large", SHARE + 1)
     assert made.num_bytes == SHARE + 1
     assert not is_there(memory, "large")
     assert [is_there(memory, number) for number in range(8)] == [False] + [True] * 7
 
 
 def test_free_room_is_everybodys():
-    memory = Memory(BUDGET)
-    put(memory.passing, "large", 7_000)
+    memory = Cache(BUDGET)
+    put(memory.transient, "large", 7_000)
     assert is_there(memory, "large")
     assert memory.used_bytes == 7_000
 
 
 def test_what_was_made_in_passing_lasts_once_somebody_else_has_found_it():
-    memory = Memory(BUDGET)
-    put(memory.passing, "found", 1_000)
-    put(memory.passing, "not found", 1_000)
-    assert put(memory, "found", 1_000) is memory.find("found", Block)
+    memory = Cache(BUDGET)
+    put(memory.transient, "found", 1_000)
+    put(memory.transient, "not found", 1_000)
+    assert put(memory, "found", 1_000) is memory.get_cached("found", Block)
     put(memory, "much", 6_500)
     assert [is_there(memory, key) for key in ("found", "not found", "much")] == [True, False, True]
 
 
 def test_what_is_kept_is_made_once_and_counted_as_it_is():
-    memory, made, start = Memory(BUDGET), [], threading.Barrier(6)
+    memory, made, start = Cache(BUDGET), [], threading.Barrier(6)
     key = ("/data/bakes/0123456789abcdef.zarr", "lights", 1)
 
     def make():
@@ -81,7 +81,7 @@ def test_what_is_kept_is_made_once_and_counted_as_it_is():
 
     def want():
         start.wait()
-        memory.keep(key, make)
+        memory.get_value(key, make)
 
     threads = [threading.Thread(target=want) for _ in range(6)]
     for thread in threads:
@@ -92,44 +92,44 @@ def test_what_is_kept_is_made_once_and_counted_as_it_is():
     assert memory.used_bytes == 8 * 150
     put(memory, ("/data/bakes/fedcba9876543210.zarr/3", "front", 0), 500)
     put(memory, "of nobody", 30)
-    assert memory.held() == {
-        Holder("lights", "0123456789abcdef"): 8 * 150,
-        Holder("block", "fedcba9876543210"): 500,
-        Holder("block", ""): 30,
+    assert memory.bytes_by_owner() == {
+        CacheOwner("lights", "0123456789abcdef"): 8 * 150,
+        CacheOwner("block", "fedcba9876543210"): 500,
+        CacheOwner("block", ""): 30,
     }
 
 
 def test_what_is_larger_than_the_budget_is_handed_out_and_not_kept():
-    memory = Memory(BUDGET)
+    memory = Cache(BUDGET)
     put(memory, "other", 5_000)
-    assert memory.keep(("bake", "lights"), lambda: np.ones(BUDGET)).sum() == BUDGET
+    assert memory.get_value(("bake", "lights"), lambda: np.ones(BUDGET)).sum() == BUDGET
     assert is_there(memory, "other")
     assert memory.used_bytes == 5_000
 
 
 def test_making_one_thing_while_making_another_fails_leaves_no_trace():
-    memory = Memory(BUDGET)
+    memory = Cache(BUDGET)
 
     def fails():
-        memory.keep(("bake", "part"), lambda: np.zeros(10))
+        memory.get_value(("bake", "part"), lambda: np.zeros(10))
         raise ValueError("no")
 
     for _ in range(3):
         with pytest.raises(ValueError, match="no"):
-            memory.passing.get("whole", Block, 1_000, fails)
+            memory.transient.get("whole", Block, 1_000, fails)
     assert memory.used_bytes == 80
 
 
 def test_bakes_that_nobody_uses_keep_their_floor_and_what_was_made_in_passing_goes_first():
-    memory = Memory(BUDGET)
-    put(memory.passing, ("left", "passing"), 500)
+    memory = Cache(BUDGET)
+    put(memory.transient, ("left", "passing"), 500)
     put(memory, ("left", "old"), 500)
     put(memory, ("used", "old"), 500)
     put(memory, ("left", "new"), 500)
     for bake in ("left", "used"):
-        memory.keep((bake, "lights"), lambda: np.zeros(5))
-    memory.shrink(700, {"used"})
-    assert memory.held()[Holder("lights", "")] == 40  # those in use
+        memory.get_value((bake, "lights"), lambda: np.zeros(5))
+    memory.trim(700, {"used"})
+    assert memory.bytes_by_owner()[CacheOwner("lights", "")] == 40  # those in use
     keys = [("left", "passing"), ("left", "old"), ("used", "old"), ("left", "new")]
     assert [is_there(memory, key) for key in keys] == [False, False, True, True]
     assert memory.used_bytes == 1_040

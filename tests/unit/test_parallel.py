@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from relume.parallel import beside_frames, do_long_work, for_ranges, for_shares, make_frame
+from relume.parallel import for_ranges, low_priority, mark_background_thread, parallel_for_chunks, run_frame
 
 
 @pytest.fixture(autouse=True)
@@ -16,7 +16,7 @@ def two_threads(monkeypatch):
 
 
 def shares(kernel):
-    for_shares(kernel, 1000)
+    parallel_for_chunks(kernel, 1000)
 
 
 def ranges(kernel):
@@ -53,14 +53,14 @@ def of_frames():
 @pytest.mark.parametrize("run", [shares, ranges])
 def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(run):
     assert names_of(run) <= of_frames()
-    with beside_frames():
+    with low_priority():
         assert names_of(run) == {"kernels-beside"}
     assert names_of(run) <= of_frames()
-    with ThreadPoolExecutor(1, initializer=do_long_work) as long:
+    with ThreadPoolExecutor(1, initializer=mark_background_thread) as long:
         assert long.submit(names_of, run).result() == {"kernels-long"}
 
         def follows():
-            with beside_frames():
+            with low_priority():
                 return names_of(run)
 
         assert long.submit(follows).result() == {"kernels-beside"}
@@ -69,7 +69,7 @@ def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(run):
 
 @pytest.mark.parametrize("run", [shares, ranges])
 def test_frames_that_are_made_at_once_keep_to_their_own_threads(run):
-    assert len(make_frame(who_meet)) == 2
+    assert len(run_frame(who_meet)) == 2
     both = threading.Barrier(2)
 
     def crowded():
@@ -79,19 +79,19 @@ def test_frames_that_are_made_at_once_keep_to_their_own_threads(run):
         return found
 
     with ThreadPoolExecutor(2, "hand") as hands:
-        found = [hands.submit(make_frame, crowded) for _ in range(2)]
+        found = [hands.submit(run_frame, crowded) for _ in range(2)]
         assert [names.result() for names in found] == [{"hand"}, {"hand"}]
     with pytest.raises(ZeroDivisionError):
-        make_frame(lambda: 1 / 0)
-    assert len(make_frame(who_meet)) == 2
+        run_frame(lambda: 1 / 0)
+    assert len(run_frame(who_meet)) == 2
 
 
 def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was():
     def fails(start, stop):
         raise ZeroDivisionError
 
-    with pytest.raises(ZeroDivisionError), beside_frames():
-        for_shares(fails, 1000)
+    with pytest.raises(ZeroDivisionError), low_priority():
+        parallel_for_chunks(fails, 1000)
     assert names_of(shares) <= of_frames()
 
 
@@ -115,7 +115,9 @@ def test_a_failure_is_raised_when_all_ranges_have_ended():
 
 def test_kernels_within_kernels_wait_for_nobody():
     found = []
-    for_shares(lambda start, stop: for_shares(lambda a, b: found.append((start + a, start + b)), stop - start), 1000)
+    parallel_for_chunks(
+        lambda start, stop: parallel_for_chunks(lambda a, b: found.append((start + a, start + b)), stop - start), 1000
+    )
     assert sum(stop - start for start, stop in found) == 1000
 
 
@@ -127,7 +129,7 @@ def test_frames_go_first():
         return found
 
     of_frames = max(niceness())
-    with beside_frames():
+    with low_priority():
         assert min(niceness()) > of_frames or of_frames == 19  # there is nothing beyond
-    with ThreadPoolExecutor(1, initializer=do_long_work) as long:
+    with ThreadPoolExecutor(1, initializer=mark_background_thread) as long:
         assert min(long.submit(niceness).result()) > of_frames or of_frames == 19

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from relume.errors import DiskFullError, RelumeError
-from relume.replacing import UNFINISHED, remove_folder, replacing
+from relume.replacing import UNFINISHED, atomic_write, remove_folder
 from server.files.importing import remove_strays
 
 
 def write(path: Path, raised: BaseException | None = None) -> None:
-    with replacing(path) as unfinished:
+    with atomic_write(path) as unfinished:
         unfinished.write_bytes(b"new")
         if raised is not None:
             raise raised
@@ -21,7 +21,7 @@ def write(path: Path, raised: BaseException | None = None) -> None:
 def test_a_file_takes_its_name_when_the_block_has_ended(tmp_path: Path) -> None:
     path = tmp_path / "found.JSON"
     path.write_text("old")
-    with replacing(path) as unfinished:
+    with atomic_write(path) as unfinished:
         unfinished.write_text("new")
         assert (path.read_text(), unfinished.parent, unfinished.suffix) == ("old", tmp_path, ".json")
         assert list(tmp_path.glob(UNFINISHED)) == [unfinished]
@@ -32,7 +32,7 @@ def test_a_file_takes_its_name_when_the_block_has_ended(tmp_path: Path) -> None:
 def test_others_may_read_it_where_the_system_lets_them(tmp_path: Path) -> None:
     plain, ours = tmp_path / "plain", tmp_path / "ours"
     plain.touch()
-    with replacing(ours) as unfinished:
+    with atomic_write(ours) as unfinished:
         unfinished.touch()
     assert stat.S_IMODE(ours.stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
 

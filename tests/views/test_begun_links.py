@@ -5,15 +5,15 @@ import pytest
 
 from relume.errors import CancelledError
 from relume.views import worn_store
-from relume.views.worn_store import BegunLinks
+from relume.views.worn_store import PartialHits
 
 NUM, RAYS, STEP = 50, 3, 8
 
 
 @pytest.fixture
 def begun(monkeypatch):
-    monkeypatch.setattr(worn_store, "_STEP", STEP)
-    return BegunLinks.of(NUM, RAYS)
+    monkeypatch.setattr(worn_store, "_SAMPLES_PER_STEP", STEP)
+    return PartialHits.empty(NUM, RAYS)
 
 
 class Linked:
@@ -32,7 +32,7 @@ def test_all_are_traced_once(begun):
     for _ in range(2):
         begun.trace(linked, lambda: False)
     assert sorted(linked.rows) == list(range(NUM))
-    np.testing.assert_array_equal(begun.cell, np.arange(NUM)[:, None] + np.arange(RAYS))
+    np.testing.assert_array_equal(begun.patch, np.arange(NUM)[:, None] + np.arange(RAYS))
 
 
 @pytest.mark.parametrize("num_threads", ["1", "2"])
@@ -45,7 +45,7 @@ def test_given_up_they_go_on_from_there(begun, monkeypatch, num_threads):
     assert 2 * STEP <= len(traced) <= 3 * STEP  # two threads may each be at one when it is said
     begun.trace(linked, lambda: False)
     assert sorted(linked.rows) == list(range(NUM))
-    np.testing.assert_array_equal(begun.cell, np.arange(NUM)[:, None] + np.arange(RAYS))
+    np.testing.assert_array_equal(begun.patch, np.arange(NUM)[:, None] + np.arange(RAYS))
 
 
 def test_a_step_that_fails_is_traced_again(begun):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.views.squares import nearest, one_of_each_square
+from relume.views.squares import nearest_chosen, one_per_block
 
 STEP, NUM, SOFT = 4, 3, 0.5
 
@@ -24,8 +24,8 @@ def squared_distances(view, material, chosen):
 def test_samples_take_the_nearest_about_them(transfer):
     view = transfer.views["front"]
     for material in range(len(transfer.material_names)):
-        chosen = one_of_each_square(view, material, STEP)
-        near, weight = nearest(view, material, chosen, STEP, NUM, SOFT)
+        chosen = one_per_block(view, material, STEP)
+        near, weight = nearest_chosen(view, material, chosen, STEP, NUM, SOFT)
         squared = squared_distances(view, material, chosen)
         expected = 1 / (np.sort(squared, axis=1)[:, : near.shape[1]] + SOFT)
         expected /= expected.sum(axis=1, keepdims=True)

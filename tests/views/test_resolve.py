@@ -24,9 +24,9 @@ def make_view(width=100, height=70, seed=0):
     pixel, weight = pixel[shuffled], weight[shuffled]
     order = np.argsort(pixel, kind="stable").astype(np.int32)
     return View(
-        camera=Camera("v", np.eye(4), 0.8), index=0, width=width, height=height, store=None, memory=None, key="",
+        camera=Camera("v", np.eye(4), 0.8), index=0, width=width, height=height, store=None, cache=None, key="",
         bounds=np.int64([0, len(pixel)]), pixel=pixel, first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
-        order=order, gains=weight[order, None].astype(np.float32), eye=np.zeros((1, 3), np.float32),
+        order=order, throughput=weight[order, None].astype(np.float32), origin=np.zeros((1, 3), np.float32),
         mirrored=None, is_mirrored=np.zeros(len(pixel), np.bool_), textures={}, cos_theta_o=np.ones(len(pixel)),
         level=np.zeros(len(pixel), np.uint8), ratios=((),),
     )  # fmt: skip
@@ -44,7 +44,7 @@ def radiance(view):
 
 @pytest.mark.parametrize("gain", [0.0, 1.0, 2.5, (2.0, 0.0, 0.5)])
 def test_whole_picture_is_the_weighted_sum(view, radiance, gain):
-    pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain, view.gains).reshape(
+    pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain, view.throughput).reshape(
         view.height, view.width, 3
     )
     np.testing.assert_allclose(pixels, np.array(gain) * twins.resolve(view, radiance.T.astype(float)), rtol=2e-6)
@@ -55,8 +55,8 @@ def test_tiles_come_one_after_another_row_major_and_clipped(view, radiance, coun
     tiles = view.all_tiles[::-1][:count]
     whole = twins.resolve(view, radiance.T.astype(float))
     expected = np.concatenate([whole[y : y + h, x : x + w].reshape(-1, 3) for x, y, w, h in tiles])
-    np.testing.assert_allclose(resolve(view, radiance, tiles, 1.0, view.gains), expected, rtol=2e-6)
-    payload = np.frombuffer(encode(view, radiance, tiles, "f32", 1.0, view.gains), "<f4").reshape(-1, 3)
+    np.testing.assert_allclose(resolve(view, radiance, tiles, 1.0, view.throughput), expected, rtol=2e-6)
+    payload = np.frombuffer(encode(view, radiance, tiles, "f32", 1.0, view.throughput), "<f4").reshape(-1, 3)
     np.testing.assert_allclose(payload, expected, rtol=2e-6)
 
 
@@ -72,15 +72,15 @@ def test_tiles_cover_the_picture_once():
 
 
 def test_no_tiles_are_no_bytes(view, radiance):
-    assert resolve(view, radiance, [], 1.0, view.gains).shape == (0, 3)
-    assert encode(view, radiance, [], "f32", 1.0, view.gains) == b""
-    assert encode(view, radiance, [], "rgb9e5", 1.0, view.gains) == b""
+    assert resolve(view, radiance, [], 1.0, view.throughput).shape == (0, 3)
+    assert encode(view, radiance, [], "f32", 1.0, view.throughput) == b""
+    assert encode(view, radiance, [], "rgb9e5", 1.0, view.throughput) == b""
 
 
 def test_packed_payload_is_the_packed_picture(view, radiance):
     tiles = view.all_tiles
-    pixels = resolve(view, radiance, tiles, 1.0, view.gains)
-    words = np.frombuffer(encode(view, radiance, tiles, "rgb9e5", 1.0, view.gains), "<u4")
+    pixels = resolve(view, radiance, tiles, 1.0, view.throughput)
+    words = np.frombuffer(encode(view, radiance, tiles, "rgb9e5", 1.0, view.throughput), "<u4")
     np.testing.assert_array_equal(words, rgb9e5_pack(pixels))
     error = np.abs(rgb9e5_unpack(words) - pixels)
     assert (error <= pixels.max(axis=1, keepdims=True) * 2**-9).all()
@@ -89,7 +89,7 @@ def test_packed_payload_is_the_packed_picture(view, radiance):
 @pytest.mark.parametrize("form", ["jpeg", "", "F32", "../x"])
 def test_other_formats_are_refused(view, radiance, form):
     with pytest.raises(ParameterError, match="'rgb9e5' or 'f32'"):
-        encode(view, radiance, view.all_tiles, form, 1.0, view.gains)
+        encode(view, radiance, view.all_tiles, form, 1.0, view.throughput)
 
 
 def packed(rgb):
@@ -142,7 +142,9 @@ def test_hostile_radiance_in_one_sample_stays_in_its_pixel(view, radiance):
     hurt = radiance.copy()
     hurt[0, 17], hurt[1, 17], hurt[2, 17] = np.nan, np.inf, -1e30
     whole = [(0, 0, view.width, view.height)]
-    words, clean = (np.frombuffer(encode(view, r, whole, "rgb9e5", 1.0, view.gains), "<u4") for r in (hurt, radiance))
+    words, clean = (
+        np.frombuffer(encode(view, r, whole, "rgb9e5", 1.0, view.throughput), "<u4") for r in (hurt, radiance)
+    )
     others = np.arange(len(words)) != view.pixel[17]
     np.testing.assert_array_equal(words[others], clean[others])
     assert np.isfinite(rgb9e5_unpack(words)).all()

@@ -12,14 +12,14 @@ from scipy.sparse import csr_array
 
 from relume.brdf.registry import TERMS
 from relume.light.gather_rays import make_pattern
-from relume.light.triangles import subdivide
-from relume.points import ALIKE, Points
+from relume.light.triangles import tessellate_environment
+from relume.points import FIXED_ALPHA_SAMPLE, SurfacePoints
 from relume.project.contraction import contract
 from relume.project.projector import Projector
 from relume.project.receivers import GatherRays
-from relume.project.sent import evenly
-from relume.sharing import Sharing, Weights
-from relume.views.sharing import sharing
+from relume.project.sent import isotropic
+from relume.sharing import FilterWeights, NeighborFilter
+from relume.views.sharing import make_neighbor_filter
 
 WIDTH, HEIGHT = 9, 7
 
@@ -32,9 +32,9 @@ def grid(keep=None):
     return pixel, position, np.tile(np.array([0, 1, 0], np.float32), (len(pixel), 1))
 
 
-def shared_by(pixel, position, normal, chance=ALIKE, **options):
-    points = Points(position, normal, np.zeros_like(normal), pixel, chance)
-    return sharing(pixel, WIDTH, points, **options)
+def shared_by(pixel, position, normal, chance=FIXED_ALPHA_SAMPLE, **options):
+    points = SurfacePoints(position, normal, np.zeros_like(normal), pixel, chance)
+    return make_neighbor_filter(pixel, WIDTH, points, **options)
 
 
 def by_hand(pixel, is_same):
@@ -50,14 +50,14 @@ def by_hand(pixel, is_same):
 
 def test_pixels_around_share_by_a_tent_and_edges_of_the_picture_by_what_is_there():
     pixel, position, normal = grid()
-    found = shared_by(pixel, position, normal).even.matrix
+    found = shared_by(pixel, position, normal).diffuse.matrix
     np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
     np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_samples_of_one_pixel_count_as_one():
     pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
-    found = shared_by(pixel, position, normal).even.matrix
+    found = shared_by(pixel, position, normal).diffuse.matrix
     np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
 
 
@@ -67,7 +67,7 @@ def test_other_pieces_of_a_surface_take_no_part():
     x, y = pixel % WIDTH, pixel // WIDTH
     normal[x > 4] = [1, 0, 0]
     position[(x <= 4) & (y > 3), 1] += 0.5
-    found = shared_by(pixel, position, normal).even.matrix.toarray()
+    found = shared_by(pixel, position, normal).diffuse.matrix.toarray()
     piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
     flat = piece != 2  # on the wall, depth as the floor has it is a rise
     assert not found[piece[:, None] != piece[None, :]].any()
@@ -78,7 +78,7 @@ def test_other_pieces_of_a_surface_take_no_part():
 def test_samples_of_different_channels_share_nothing():
     pixel, position, normal = (np.concatenate([a, a]) for a in grid())
     chance = np.repeat(np.array([-3, -4], np.float32), len(pixel) // 2)
-    found = shared_by(pixel, position, normal, chance).even.matrix.toarray()
+    found = shared_by(pixel, position, normal, chance).diffuse.matrix.toarray()
     assert not found[chance[:, None] != chance].any()
     np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
 
@@ -92,7 +92,7 @@ def test_highlights_are_shared_by_what_is_turned_alike():
         angle = np.radians(degrees) * is_turned
         normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
         found = shared_by(pixel, position, normal)
-        return found.even.matrix.toarray(), found.highlights.matrix.toarray()
+        return found.diffuse.matrix.toarray(), found.highlights.matrix.toarray()
 
     all_alike = by_hand(pixel, lambda a, b: True)
     for found in (*both(2.0), both(5.0)[0]):
@@ -103,8 +103,8 @@ def test_highlights_are_shared_by_what_is_turned_alike():
 def test_tents_follow_each_other_and_highlights_have_one():
     pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
     found = shared_by(pixel, position, normal, tents=3)
-    assert (found.even.times, found.highlights.times) == (3, 1)
-    rings, among = found.even.rings(4, 11)
+    assert (found.diffuse.num_passes, found.highlights.num_passes) == (3, 1)
+    rings, among = found.diffuse.find_dependencies(4, 11)
     values = np.random.default_rng(9).random((len(pixel), 3))
     once = by_hand(pixel, lambda a, b: True)
     shared = values[among]
@@ -119,14 +119,14 @@ def test_tents_follow_each_other_and_highlights_have_one():
 def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active, times):
     """Free curves and contracted ones, in ranges of any length; light of the environment is not shared."""
     rng, num = np.random.default_rng(2), 70
-    lights = subdivide(rng.random((16, 32, 3), np.float32), 40)
-    points = twins.make_receivers(num, lights.num_lights, seed=3)
+    lights = tessellate_environment(rng.random((16, 32, 3), np.float32), 40)
+    points = twins.make_random_receivers(num, lights.num_lights, seed=3)
     links = rng.integers(0, 50, (num, 24)).astype(np.uint16)
     radiance = rng.random((1 << 16, 3), np.float32)
-    alone = GatherRays(links, make_pattern(16, 8, 5), evenly(radiance))
+    alone = GatherRays(links, make_pattern(16, 8, 5), isotropic(radiance))
     weights = csr_array(rng.random((num, num)) * (rng.random((num, num)) < 0.1) + np.eye(num)).astype(np.float32)
     term = TERMS[model]
-    curve = next(c for c in ANALYTIC[model].curves if not c.outgoing)
+    curve = next(c for c in ANALYTIC[model].curves if not c.depends_on_view)
     bands = {c.name: rng.random((3, c.num_bands)) for c in term.curves}
     contraction = contract(term, bands, curve.name if is_active else None)
 
@@ -136,9 +136,9 @@ def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active
 
     dark = project((), [(0, num)])
     separate = project((alone,), [(0, num)]) - dark
-    nobody = Weights(csr_array((num, num), dtype=np.float32), 1)
-    of_term = Weights(csr_array(weights / weights.sum(axis=1)[:, None]), times)
-    both = Sharing(of_term, nobody) if model == "lambert" else Sharing(nobody, of_term)
+    nobody = FilterWeights(csr_array((num, num), dtype=np.float32), 1)
+    of_term = FilterWeights(csr_array(weights / weights.sum(axis=1)[:, None]), times)
+    both = NeighborFilter(of_term, nobody) if model == "lambert" else NeighborFilter(nobody, of_term)
     shared = project((replace(alone, sharing=both),), [(0, 50), (50, num)]) - dark
     expected = np.einsum("pq,qjc->pjc", np.linalg.matrix_power(of_term.matrix.toarray(), times), separate)
     np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())

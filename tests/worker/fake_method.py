@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, Written
+from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
 from relume.environments.model import Environment
 from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene
@@ -86,20 +86,20 @@ class FakeMethod:
         ]
         return [Task(1, index, *piece) for index, piece in enumerate(pieces)]
 
-    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> Written:
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
         time.sleep(self.delay_s)
         self._misbehave(task)
-        i, rows = recipe.views.index(task.view), task.stop - task.start
+        i, rows = recipe.views.index(task.group), task.stop - task.start
         random = np.random.default_rng([int(scene.id, 16), task.stage, task.index])
         if self.log:
             with Path(self.log).open("a") as log:
                 log.write(f"{task.stage}.{task.index}\n")
         if task.stage == 0:
-            return Written({f"views/{i}/depth": random.random(rows, np.float32)}, 10, 0.0)
+            return TaskOutput({f"views/{i}/depth": random.random(rows, np.float32)}, 10, 0.0)
         depth = store.read(f"views/{i}/depth", task.start, task.stop)
         bits = random.integers(0, 256, (rows, recipe.num_lights), np.uint8)
         bits[depth > 0.7] = 0
-        return Written({f"views/{i}/visibility": bits}, self.num_rays // 18, self.delay_s)
+        return TaskOutput({f"views/{i}/visibility": bits}, self.num_rays // 18, self.delay_s)
 
     def _rows(self, recipe: Recipe) -> int:
         return recipe.size[0] * recipe.size[1] + TAIL

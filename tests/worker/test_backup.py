@@ -22,8 +22,8 @@ from relume.scene.archive import load_scene
 from relume.store import open_store
 from server.records.looks import LookStore
 from worker.backup.restore import restore
-from worker.backup.shelf import Shelf
-from worker.backup.take import back_up
+from worker.backup.shelf import BackupRepository
+from worker.backup.take import create_backup
 from worker.database import open_database
 from worker.ledger import Ledger
 from worker.paths import bake_path, scene_path
@@ -35,8 +35,8 @@ SCENE = tiny_scene()
 
 
 @pytest.fixture
-def shelf(tmp_path: Path) -> Shelf:
-    return Shelf(tmp_path / "backups")
+def shelf(tmp_path: Path) -> BackupRepository:
+    return BackupRepository(tmp_path / "backups")
 
 
 def open_service(data: Path, url: str) -> BakeService:
@@ -95,10 +95,10 @@ def data(tmp_path: Path, ledger_url: str) -> Path:
     return tmp_path / "data"
 
 
-def take(data: Path, url: str, shelf: Shelf, **options: Callable[[int], Callable[[int], None]]) -> str:
+def take(data: Path, url: str, shelf: BackupRepository, **options: Callable[[int], Callable[[int], None]]) -> str:
     engine = open_database(url)
     try:
-        snapshot = back_up(data, engine, shelf, **options)
+        snapshot = create_backup(data, engine, shelf, **options)
     finally:
         engine.dispose()
     assert snapshot.left_out == ()
@@ -107,7 +107,7 @@ def take(data: Path, url: str, shelf: Shelf, **options: Callable[[int], Callable
 
 @pytest.mark.parametrize("into", ["sqlite", "postgresql"])
 def test_all_comes_back_into_either_database(
-    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path, postgresql: Cluster, into: str
+    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path, postgresql: Cluster, into: str
 ) -> None:
     take(data, ledger_url, shelf)
     elsewhere = tmp_path / "elsewhere"
@@ -132,7 +132,7 @@ def read(path: Path) -> bytes:
     return path.read_bytes() if path.is_file() else b""
 
 
-def test_the_second_backup_copies_only_what_is_new(data: Path, ledger_url: str, shelf: Shelf) -> None:
+def test_the_second_backup_copies_only_what_is_new(data: Path, ledger_url: str, shelf: BackupRepository) -> None:
     first = take(data, ledger_url, shelf)
     before = {path: path.stat().st_mtime_ns for path in (shelf.folder / "files").rglob("*") if path.is_file()}
     with closing(open_service(data, ledger_url)) as service:
@@ -147,7 +147,7 @@ def test_the_second_backup_copies_only_what_is_new(data: Path, ledger_url: str, 
 
 
 def test_scenes_that_come_and_go_meanwhile_leave_it_whole(
-    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path
+    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
 ) -> None:
     ended = threading.Event()
     with closing(open_service(data, ledger_url)) as service:
@@ -163,7 +163,7 @@ def test_scenes_that_come_and_go_meanwhile_leave_it_whole(
         thread = threading.Thread(target=come_and_go)
         thread.start()
         try:
-            snapshot = back_up(data, service.ledger._engine, shelf)
+            snapshot = create_backup(data, service.ledger._engine, shelf)
         finally:
             ended.set()
             thread.join()
@@ -180,8 +180,8 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from worker.backup.restore import restore
-from worker.backup.shelf import Shelf
-from worker.backup.take import back_up
+from worker.backup.shelf import BackupRepository
+from worker.backup.take import create_backup
 from worker.database import open_database
 
 count = [0]
@@ -190,21 +190,23 @@ def tell(done):
     if count[0] == 12:
         os.kill(os.getpid(), signal.SIGKILL)
 
-what, data, url, shelf = sys.argv[1], Path(sys.argv[2]), sys.argv[3], Shelf(Path(sys.argv[4]))
+what, data, url, shelf = sys.argv[1], Path(sys.argv[2]), sys.argv[3], BackupRepository(Path(sys.argv[4]))
 if what == "backup":
-    back_up(data, open_database(url), shelf, lambda total: tell)
+    create_backup(data, open_database(url), shelf, lambda total: tell)
 else:
     restore(shelf, None, data, url, lambda total: tell)
 """
 
 
-def kill(what: str, data: Path, url: str, shelf: Shelf) -> None:
+def kill(what: str, data: Path, url: str, shelf: BackupRepository) -> None:
     """Run it in a process of its own that is killed in the middle of a file."""
     done = subprocess.run([sys.executable, "-c", KILLED, what, str(data), url, str(shelf.folder)], check=False)
     assert done.returncode == -signal.SIGKILL
 
 
-def test_a_backup_that_is_killed_is_none_and_the_next_goes_on(data: Path, ledger_url: str, shelf: Shelf) -> None:
+def test_a_backup_that_is_killed_is_none_and_the_next_goes_on(
+    data: Path, ledger_url: str, shelf: BackupRepository
+) -> None:
     kill("backup", data, ledger_url, shelf)
     assert shelf.names() == []
     with pytest.raises(BackupError, match="holds no backup"):
@@ -214,14 +216,14 @@ def test_a_backup_that_is_killed_is_none_and_the_next_goes_on(data: Path, ledger
     assert list((shelf.folder / "files").rglob(".unfinished-*"))
     take(data, ledger_url, shelf)
     snapshot = shelf.read()
-    assert list(shelf.damaged(snapshot, lambda done: None)) == []
+    assert list(shelf.find_damaged(snapshot, lambda done: None)) == []
     kept = copied & {one.sha256 for one in snapshot.files}
     assert len(kept) == len(copied) - 1  # all but the ledger's copy of before
     assert not [path for path in shelf.folder.rglob("*") if path.name.startswith(".")]
 
 
 def test_a_restore_that_is_killed_cannot_be_worked_on_and_goes_on(
-    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path
+    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
 ) -> None:
     first = take(data, ledger_url, shelf)
     take(data, ledger_url, shelf)
@@ -241,35 +243,37 @@ def test_a_restore_that_is_killed_cannot_be_worked_on_and_goes_on(
     assert not list(elsewhere.rglob(".unfinished-*"))
 
 
-def test_what_is_damaged_is_left_out_and_said(data: Path, ledger_url: str, shelf: Shelf) -> None:
+def test_what_is_damaged_is_left_out_and_said(data: Path, ledger_url: str, shelf: BackupRepository) -> None:
     (store,) = (data / "bakes").glob("*.zarr")
     shard = store / "views" / "0" / "visibility" / "c" / "3" / "0"
     shard.write_bytes(bytes(shard.stat().st_size))
     with closing(Ledger(engine := open_database(ledger_url))):
-        snapshot = back_up(data, engine, shelf)
+        snapshot = create_backup(data, engine, shelf)
     assert f"bakes/{store.name} is damaged: delete it, and bake or import it again" in snapshot.left_out
     assert not any("bakes/" in kept.path for kept in snapshot.files)
     assert any("scenes/" in kept.path for kept in snapshot.files)
 
 
-def test_a_damaged_backup_is_found_and_the_next_is_whole(data: Path, ledger_url: str, shelf: Shelf) -> None:
+def test_a_damaged_backup_is_found_and_the_next_is_whole(data: Path, ledger_url: str, shelf: BackupRepository) -> None:
     take(data, ledger_url, shelf)
     kept = next(kept for kept in shelf.read().files if kept.path.startswith("scenes/"))
-    shelf.path_of(kept.sha256).write_bytes(bytes(kept.num_bytes))
-    assert list(shelf.damaged(shelf.read(), lambda done: None)) == [kept]
-    shelf.set_aside(kept)
+    shelf.content_path(kept.sha256).write_bytes(bytes(kept.num_bytes))
+    assert list(shelf.find_damaged(shelf.read(), lambda done: None)) == [kept]
+    shelf.quarantine(kept)
     take(data, ledger_url, shelf)
-    assert list(shelf.damaged(shelf.read(), lambda done: None)) == []
+    assert list(shelf.find_damaged(shelf.read(), lambda done: None)) == []
 
 
-def test_a_damaged_bake_costs_no_other_of_a_backup(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+def test_a_damaged_bake_costs_no_other_of_a_backup(
+    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
+) -> None:
     take(data, ledger_url, shelf)
     kept = next(kept for kept in shelf.read().files if "/visibility/c/" in kept.path)
-    shelf.path_of(kept.sha256).write_bytes(bytes(kept.num_bytes))
+    shelf.content_path(kept.sha256).write_bytes(bytes(kept.num_bytes))
     elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
     _, damaged = restore(shelf, None, elsewhere, url)
-    assert damaged == [f"{kept.thing} is damaged in the backup: bake or import it again"]
-    assert not (elsewhere / kept.thing).exists()
+    assert damaged == [f"{kept.content_key} is damaged in the backup: bake or import it again"]
+    assert not (elsewhere / kept.content_key).exists()
     assert load_scene(scene_path(elsewhere, SCENE.id)).id == SCENE.id
     with closing(open_service(elsewhere, url)) as service:
         (status,) = service.bakes()
@@ -277,17 +281,17 @@ def test_a_damaged_bake_costs_no_other_of_a_backup(data: Path, ledger_url: str, 
         assert service.get(status.id).state == "queued"  # what is asked for again is made again
 
 
-def test_a_damaged_ledger_is_not_restored(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+def test_a_damaged_ledger_is_not_restored(data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path) -> None:
     take(data, ledger_url, shelf)
     ledger = shelf.read().ledger
-    shelf.path_of(ledger.sha256).write_bytes(bytes(ledger.num_bytes))
+    shelf.content_path(ledger.sha256).write_bytes(bytes(ledger.num_bytes))
     elsewhere = tmp_path / "elsewhere"
     with pytest.raises(BackupError, match=r"the ledger is damaged in the backup"):
         restore(shelf, None, elsewhere, f"sqlite:///{elsewhere / 'relume.db'}")
     assert (elsewhere / "restoring.json").exists()
 
 
-def test_nothing_is_overwritten(data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path) -> None:
+def test_nothing_is_overwritten(data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path) -> None:
     take(data, ledger_url, shelf)
     with pytest.raises(BackupError, match="is not empty"):
         restore(shelf, None, data, f"sqlite:///{tmp_path / 'new.db'}")
@@ -296,12 +300,12 @@ def test_nothing_is_overwritten(data: Path, ledger_url: str, shelf: Shelf, tmp_p
         restore(shelf, None, empty, ledger_url)
     assert list(empty.iterdir()) == []
     with pytest.raises(BackupError, match="something else than backups"):
-        take(data, ledger_url, Shelf(data))
+        take(data, ledger_url, BackupRepository(data))
 
 
 @pytest.mark.parametrize("ledger_url", ["sqlite"], indirect=True)
 def test_a_snapshot_that_names_places_outside_is_refused(
-    data: Path, ledger_url: str, shelf: Shelf, tmp_path: Path
+    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
 ) -> None:
     name = take(data, ledger_url, shelf)
     file = shelf.folder / "snapshots" / f"{name}.json"

@@ -15,9 +15,9 @@ from postgres import Cluster
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 
-from server.errors import problem_of
+from server.errors import make_problem
 from worker.database import open_database, postgresql
-from worker.database.faults import is_away, told
+from worker.database.faults import describe_error, is_unavailable
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 from worker.service import BakeService
@@ -45,9 +45,9 @@ def test_a_bake_outlives_a_database_that_is_away(
             own_cluster.stop()
             with pytest.raises(OperationalError) as failure:
                 service.bakes()
-            assert is_away(failure.value)
-            assert problem_of(failure.value).status == 503
-            assert "try again in a while" in str(problem_of(failure.value).detail)
+            assert is_unavailable(failure.value)
+            assert make_problem(failure.value).status == 503
+            assert "try again in a while" in str(make_problem(failure.value).detail)
             time.sleep(1.5)  # every loop has met it
             own_cluster.start()
             assert list(changes)[-1].state == "ready"
@@ -61,7 +61,7 @@ def test_failures_of_statements_are_no_absence(ledger_url: str) -> None:
     with closing(Ledger(engine := open_database(ledger_url))), engine.connect() as connection:
         with pytest.raises(DBAPIError) as failure:
             connection.execute(text("SELECT nothing FROM nowhere"))
-        assert not is_away(failure.value)
+        assert not is_unavailable(failure.value)
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_server_that_accepts_and_says_nothing_is_away() -> None:
     with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(OperationalError, match="timed out") as failure:
         open_database(f"postgresql://relume@127.0.0.1:{mute.getsockname()[1]}/relume")
-    assert is_away(failure.value)
+    assert is_unavailable(failure.value)
 
 
 @pytest.mark.usefixtures("impatient")
@@ -81,7 +81,7 @@ def test_a_server_that_falls_silent_is_away_and_asked_anew(own_cluster: Cluster)
     with closing(Ledger(engine := open_database(own_cluster.new_database()))):
         with pytest.raises(OperationalError) as failure, engine.connect() as connection:
             connection.execute(text("SELECT pg_sleep(2)"))
-        assert is_away(failure.value)
+        assert is_unavailable(failure.value)
         assert failure.value.connection_invalidated
         own_cluster.stop()
         own_cluster.start()  # connections that are kept were ended
@@ -93,8 +93,8 @@ def test_what_a_server_says_of_a_failure_is_told(own_cluster: Cluster) -> None:
     url = own_cluster.new_database()
     with pytest.raises(DBAPIError) as failure:
         open_database(f"{url}_of_nobody")
-    assert told(failure.value).endswith("does not exist")
-    assert not is_away(failure.value)
+    assert describe_error(failure.value).endswith("does not exist")
+    assert not is_unavailable(failure.value)
 
 
 def test_rows_of_what_is_not_there_are_refused(ledger_url: str) -> None:

@@ -12,7 +12,7 @@ from relume.scene.demo import demo_scene
 from relume.scene.demo.still_life import look_at
 from relume.scene.demo.surfaces import sphere
 from relume.scene.model import Material
-from worker.estimate import Finished, crowding, seconds_for
+from worker.estimate import CompletedBake, crowding, estimate_seconds
 from worker.executor import TINY_BAKE_BYTES, TINY_BAKE_RAYS, is_tiny
 from worker.presets import PRESETS
 
@@ -35,31 +35,31 @@ def test_a_preview_with_indirect_light_waits_behind_no_larger_bake():
 
 
 def test_nothing_is_said_before_anything_was_measured():
-    assert seconds_for(LARGE, [], 4) is None
-    assert seconds_for(LARGE, [Finished(LARGE, 0.0)], 4) is None
+    assert estimate_seconds(LARGE, [], 4) is None
+    assert estimate_seconds(LARGE, [CompletedBake(LARGE, 0.0)], 4) is None
 
 
 def test_the_same_bake_again_takes_as_long_whatever_share_of_its_plan_was_traced():
-    assert seconds_for(LARGE, [Finished(LARGE, 120.0)], 1) == pytest.approx(120.0)
-    assert seconds_for(LARGE, [Finished(LARGE, 120.0)], 4) == pytest.approx(30.0)
-    assert seconds_for(SMALL, [Finished(SMALL, 2.0)], 4) == pytest.approx(2.0)
+    assert estimate_seconds(LARGE, [CompletedBake(LARGE, 120.0)], 1) == pytest.approx(120.0)
+    assert estimate_seconds(LARGE, [CompletedBake(LARGE, 120.0)], 4) == pytest.approx(30.0)
+    assert estimate_seconds(SMALL, [CompletedBake(SMALL, 2.0)], 4) == pytest.approx(2.0)
 
 
 def test_a_bake_is_judged_by_its_like_and_by_others_where_there_is_none():
-    both = [Finished(LARGE, 40.0), Finished(SMALL, 3.0)]
-    assert seconds_for(LARGE, both, 2) == pytest.approx(20.0)
-    assert seconds_for(SMALL, both, 2) == pytest.approx(3.0)
-    assert seconds_for(SMALL, both[:1], 2) == pytest.approx(20.0 / 40)
+    both = [CompletedBake(LARGE, 40.0), CompletedBake(SMALL, 3.0)]
+    assert estimate_seconds(LARGE, both, 2) == pytest.approx(20.0)
+    assert estimate_seconds(SMALL, both, 2) == pytest.approx(3.0)
+    assert estimate_seconds(SMALL, both[:1], 2) == pytest.approx(20.0 / 40)
 
 
 def test_larger_bakes_count_for_more():
     double = Plan(1000, 2 * LARGE.num_rays, 1, 1)
-    assert seconds_for(LARGE, [Finished(LARGE, 30.0), Finished(double, 30.0)], 1) == pytest.approx(20.0)
+    assert estimate_seconds(LARGE, [CompletedBake(LARGE, 30.0), CompletedBake(double, 30.0)], 1) == pytest.approx(20.0)
 
 
 def test_a_busy_machine_takes_longer_and_does_not_make_later_bakes_look_slow():
-    assert seconds_for(LARGE, [Finished(LARGE, 120.0)], 2, crowded=4.0) == pytest.approx(240.0)
-    assert seconds_for(LARGE, [Finished(LARGE, 480.0, crowding=4.0)], 2) == pytest.approx(60.0)
+    assert estimate_seconds(LARGE, [CompletedBake(LARGE, 120.0)], 2, load_factor=4.0) == pytest.approx(240.0)
+    assert estimate_seconds(LARGE, [CompletedBake(LARGE, 480.0, crowding=4.0)], 2) == pytest.approx(60.0)
 
 
 def test_crowding_is_at_least_one_thread_a_core(monkeypatch):
@@ -70,7 +70,7 @@ def test_crowding_is_at_least_one_thread_a_core(monkeypatch):
 def test_triangles_take_their_time():
     few, many = (METHODS["surface"].plan(ball(n), Recipe("surface", ("front",), (64, 48), 60)) for n in (4, 64))
     assert few.num_rays == many.num_rays
-    assert seconds_for(many, [Finished(few, 60.0)], 1) > 60.0
+    assert estimate_seconds(many, [CompletedBake(few, 60.0)], 1) > 60.0
 
 
 def ball(fineness):
@@ -83,20 +83,23 @@ def ball(fineness):
 def test_bakes_of_other_methods_judge_by_what_a_ray_takes_in_each():
     recipe = Recipe("direct", ("front",), (640, 480), 500)
     direct, surface = (METHODS[name].plan(ball(4), replace(recipe, method=name)) for name in ("direct", "surface"))
-    found = seconds_for(surface, [Finished(direct, 5.0)], 1)
+    found = estimate_seconds(surface, [CompletedBake(direct, 5.0)], 1)
     assert found == pytest.approx(5.0 * surface.work_s / direct.work_s)
     assert found > 5 * 5.0 * surface.num_rays / direct.num_rays
 
 
 def test_what_small_bakes_took_for_themselves_is_no_rate_of_large_ones():
     small, large = replace(LARGE, work_s=25.0), replace(LARGE, work_s=10_000.0)
-    assert seconds_for(large, [Finished(small, 2500.0)], 1) == pytest.approx(2500.0 + 9975.0)
-    assert seconds_for(large, [Finished(small, 2500.0)], 2) == pytest.approx(1250.0 + 9975.0 / 2)
-    assert seconds_for(large, [Finished(small, 12.5)], 1) == pytest.approx(5000.0)
-    assert seconds_for(replace(LARGE, work_s=200.0), [Finished(small, 2500.0)], 1) == pytest.approx(20_000.0)
+    assert estimate_seconds(large, [CompletedBake(small, 2500.0)], 1) == pytest.approx(2500.0 + 9975.0)
+    assert estimate_seconds(large, [CompletedBake(small, 2500.0)], 2) == pytest.approx(1250.0 + 9975.0 / 2)
+    assert estimate_seconds(large, [CompletedBake(small, 12.5)], 1) == pytest.approx(5000.0)
+    assert estimate_seconds(replace(LARGE, work_s=200.0), [CompletedBake(small, 2500.0)], 1) == pytest.approx(20_000.0)
 
 
 def test_plans_that_tell_rays_alone_judge_where_there_are_no_others():
     told = replace(LARGE, work_s=10.0)
-    assert seconds_for(replace(told, work_s=50.0), [Finished(told, 20.0), Finished(LARGE, 900.0)], 1) == 100.0
-    assert seconds_for(told, [Finished(LARGE, 30.0)], 1) == pytest.approx(30.0)
+    assert (
+        estimate_seconds(replace(told, work_s=50.0), [CompletedBake(told, 20.0), CompletedBake(LARGE, 900.0)], 1)
+        == 100.0
+    )
+    assert estimate_seconds(told, [CompletedBake(LARGE, 30.0)], 1) == pytest.approx(30.0)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import pytest
-from alone import run_alone
+from alone import run_in_thread
 
 from relume.errors import PlanError
 from worker.dask_executor import DaskExecutor
@@ -43,7 +43,7 @@ class FakeClient:
         return FakeTask(fn(*args))
 
     def add_callback(self, follow: Callable[..., Coroutine[Any, Any, None]], *args: object) -> None:
-        run_alone(follow(*args))
+        run_in_thread(follow(*args))
 
     def close(self, timeout: float) -> None:
         raise TimeoutError
@@ -57,7 +57,7 @@ class FakeCluster:
         self.workers = {0: FakeNanny(self.log), 1: FakeNanny(self.log)}
 
     def sync(self, work: Callable[..., Coroutine[Any, Any, None]], *args: object, callback_timeout: float) -> None:
-        run_alone(work(*args))
+        run_in_thread(work(*args))
 
     def close(self, timeout: float) -> None:
         self.log.append("close")

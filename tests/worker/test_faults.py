@@ -10,7 +10,7 @@ from sqlalchemy.exc import OperationalError
 
 from relume.errors import DatabaseDamagedError, DiskFullError
 from worker.database import open_database
-from worker.database.faults import Complaint, database_away
+from worker.database.faults import DatabaseError, database_outage
 from worker.ledger import Ledger
 from worker.scenes import register_scene
 
@@ -52,24 +52,24 @@ def test_a_database_without_room_says_so_and_goes_on_when_there_is_some(tmp_path
 
 
 def test_a_loop_that_asks_no_database_says_nothing_of_it(caplog: pytest.LogCaptureFixture) -> None:
-    database_away.meet(OperationalError("SELECT 1", {}, Exception("away")))
+    database_outage.report_failure(OperationalError("SELECT 1", {}, Exception("away")))
     caplog.clear()
     with caplog.at_level(logging.WARNING):
-        Complaint(log := logging.getLogger("loop"), "it cannot be stored", asks_database=False).well()
+        DatabaseError(log := logging.getLogger("loop"), "it cannot be stored", asks_database=False).report_recovered()
         assert caplog.records == []
-        Complaint(log, "it cannot be read").well()
+        DatabaseError(log, "it cannot be read").report_recovered()
     assert [record.getMessage() for record in caplog.records] == ["the database does not answer: that is over"]
 
 
 def test_a_loop_says_each_fault_once_and_that_it_is_over(caplog: pytest.LogCaptureFixture) -> None:
-    complaint = Complaint(logging.getLogger("loop"), "it cannot be read")
+    complaint = DatabaseError(logging.getLogger("loop"), "it cannot be read")
     with caplog.at_level(logging.WARNING, "loop"):
         for _ in range(3):
-            complaint.meet(OperationalError("SELECT 1", {}, Exception("away")))
-        complaint.meet(DiskFullError("the database"))
+            complaint.report_failure(OperationalError("SELECT 1", {}, Exception("away")))
+        complaint.report_failure(DiskFullError("the database"))
         for _ in range(2):
-            complaint.well()
-        complaint.meet(ZeroDivisionError("nobody foresaw it"))
+            complaint.report_recovered()
+        complaint.report_failure(ZeroDivisionError("nobody foresaw it"))
     assert [record.getMessage().split(" (")[0] for record in caplog.records] == [
         "it cannot be read",
         "it cannot be read",

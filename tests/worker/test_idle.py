@@ -47,12 +47,12 @@ def test_nothing_is_forgotten_while_a_task_runs(monkeypatch: pytest.MonkeyPatch)
     timers, forgotten = Timers(), []
     monkeypatch.setattr(threading, "Timer", timers.Timer)
     idle_timer = IdleTimer(lambda: 60.0, lambda: forgotten.append(True))
-    with idle_timer.kept_awake():
-        with idle_timer.kept_awake():
+    with idle_timer.keep_awake():
+        with idle_timer.keep_awake():
             timers.elapse()
         timers.elapse()
     assert forgotten == []
-    with pytest.raises(ZeroDivisionError), idle_timer.kept_awake():
+    with pytest.raises(ZeroDivisionError), idle_timer.keep_awake():
         _ = 1 / 0
     assert len(timers.running) == 1
     timers.elapse()
@@ -62,19 +62,19 @@ def test_nothing_is_forgotten_while_a_task_runs(monkeypatch: pytest.MonkeyPatch)
 def test_scene_and_what_was_built_for_it_go_after_a_bake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELUME_IDLE_SECONDS", "1")
     forgotten = threading.Event()
-    monkeypatch.setattr(tasks, "give_back", forgotten.set)
+    monkeypatch.setattr(tasks, "trim_heap", forgotten.set)
     with BakeService(tmp_path, methods={"fake": FakeMethod()}) as service:
         scene = tiny_scene("one that goes")
         register_scene(service.data_dir, service.ledger, scene)
         with service.subscribe(service.submit(scene.id, RECIPE)) as changes:
             assert list(changes)[-1].state == "ready"
-        with tasks.idle_timer.kept_awake():
-            loaded = weakref.ref(tasks.scene_of(service.data_dir, scene.id))
-            assert tasks.kept_bytes() > 0
+        with tasks.idle_timer.keep_awake():
+            loaded = weakref.ref(tasks.load_registered_scene(service.data_dir, scene.id))
+            assert tasks.cached_bytes() > 0
             forgotten.clear()
         assert forgotten.wait(WAIT_S)
     assert loaded() is None
-    assert tasks.kept_bytes() == 0
+    assert tasks.cached_bytes() == 0
 
 
 def test_idle_seconds_are_those_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,7 +87,7 @@ def test_idle_seconds_are_those_of_the_environment(monkeypatch: pytest.MonkeyPat
 
 def test_pyramid_of_a_texture_goes_with_it() -> None:
     texture = Texture(np.zeros((4, 4, 3), np.float32))
-    pyramid = weakref.ref(MipMap.of(texture))
-    assert MipMap.of(texture) is pyramid()
+    pyramid = weakref.ref(MipMap.for_texture(texture))
+    assert MipMap.for_texture(texture) is pyramid()
     del texture
     assert pyramid() is None

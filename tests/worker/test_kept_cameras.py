@@ -13,11 +13,11 @@ from relume.bake import Recipe
 from relume.errors import NotFoundError, ParameterError, PlanError
 from relume.methods.registry import METHODS
 from relume.scene.model import Scene
-from relume.scene.placed_camera import PlacedCamera, placed_camera
-from relume.store import bake_here, open_store
+from relume.scene.placed_camera import CustomCamera, make_custom_camera
+from relume.store import bake_in_process, open_store
 from relume.store.publish import array_paths
 from worker import cameras
-from worker.cameras import chosen_views, delete_camera, keep_camera, kept_cameras, placed_names
+from worker.cameras import camera_names_by_scene, delete_camera, list_cameras, resolve_views, store_camera
 from worker.database import open_database
 from worker.database.models import SceneRow
 from worker.ledger import Ledger
@@ -32,10 +32,10 @@ def scene() -> Scene:
     return still_life()
 
 
-def alike(scene: Scene, name: str, yfov: float | None = None) -> PlacedCamera:
+def alike(scene: Scene, name: str, yfov: float | None = None) -> CustomCamera:
     """Where the scene's first camera is, under another name."""
     first = scene.cameras[0]
-    return placed_camera(name, first.to_world.ravel().tolist(), yfov or math.degrees(first.yfov))
+    return make_custom_camera(name, first.to_world.ravel().tolist(), yfov or math.degrees(first.yfov))
 
 
 @pytest.fixture
@@ -52,16 +52,16 @@ def record(ledger: Ledger, scene: Scene) -> SceneRecord:
 
 def test_cameras_are_kept_replaced_and_deleted_with_their_scene(tmp_path: Path, ledger: Ledger, scene: Scene) -> None:
     wide, narrow = alike(scene, "Hero", 60), alike(scene, "Hero", 20)
-    assert keep_camera(ledger, scene.id, wide)
-    assert not keep_camera(ledger, scene.id, narrow)
-    keep_camera(ledger, scene.id, alike(scene, "Behind"))
-    assert kept_cameras(ledger, scene.id) == [alike(scene, "Behind"), narrow]
-    assert placed_names(ledger) == {scene.id: ["Behind", "Hero"]}
+    assert store_camera(ledger, scene.id, wide)
+    assert not store_camera(ledger, scene.id, narrow)
+    store_camera(ledger, scene.id, alike(scene, "Behind"))
+    assert list_cameras(ledger, scene.id) == [alike(scene, "Behind"), narrow]
+    assert camera_names_by_scene(ledger) == {scene.id: ["Behind", "Hero"]}
     delete_camera(ledger, scene.id, "Behind")
     with pytest.raises(NotFoundError):
         delete_camera(ledger, scene.id, "Behind")
     delete_scene(tmp_path, ledger, scene.id)
-    assert placed_names(ledger) == {}
+    assert camera_names_by_scene(ledger) == {}
 
 
 def test_names_of_the_scene_itself_and_too_many_are_refused(
@@ -69,29 +69,29 @@ def test_names_of_the_scene_itself_and_too_many_are_refused(
 ) -> None:
     own = scene.cameras[0].name
     with pytest.raises(ParameterError, match="own cameras"):
-        keep_camera(ledger, scene.id, alike(scene, own))
+        store_camera(ledger, scene.id, alike(scene, own))
     with pytest.raises(ParameterError, match="own cameras"):
         delete_camera(ledger, scene.id, own)
     monkeypatch.setattr(cameras, "MAX_CAMERAS", 1)
-    keep_camera(ledger, scene.id, alike(scene, "Hero"))
-    keep_camera(ledger, scene.id, alike(scene, "Hero", 60))
+    store_camera(ledger, scene.id, alike(scene, "Hero"))
+    store_camera(ledger, scene.id, alike(scene, "Hero", 60))
     with pytest.raises(ParameterError, match="or delete one"):
-        keep_camera(ledger, scene.id, alike(scene, "Behind"))
+        store_camera(ledger, scene.id, alike(scene, "Behind"))
     with pytest.raises(NotFoundError):
-        keep_camera(ledger, "0" * 16, alike(scene, "Hero"))
+        store_camera(ledger, "0" * 16, alike(scene, "Hero"))
 
 
 def test_views_are_chosen_by_name_or_as_they_are(ledger: Ledger, scene: Scene, record: SceneRecord) -> None:
     own, hero, behind = scene.cameras[0].name, alike(scene, "Hero"), alike(scene, "Behind")
-    keep_camera(ledger, scene.id, hero)
-    assert chosen_views(ledger, record, []) == (record.views, ())
-    assert chosen_views(ledger, record, ["Hero", own, behind, own]) == (("Hero", own, "Behind"), (hero, behind))
+    store_camera(ledger, scene.id, hero)
+    assert resolve_views(ledger, record, []) == (record.views, ())
+    assert resolve_views(ledger, record, ["Hero", own, behind, own]) == (("Hero", own, "Behind"), (hero, behind))
     with pytest.raises(ParameterError, match="Hero"):
-        chosen_views(ledger, record, ["Nobody"])
+        resolve_views(ledger, record, ["Nobody"])
     with pytest.raises(ParameterError, match="a name of its own"):
-        chosen_views(ledger, record, ["Hero", alike(scene, "Hero", 60)])
+        resolve_views(ledger, record, ["Hero", alike(scene, "Hero", 60)])
     with pytest.raises(ParameterError, match="own cameras"):
-        chosen_views(ledger, record, [alike(scene, own)])
+        resolve_views(ledger, record, [alike(scene, own)])
 
 
 def test_a_recipe_with_cameras_is_the_same_after_it_was_written_down(scene: Scene) -> None:
@@ -103,7 +103,8 @@ def test_view_of_a_placed_camera_is_what_the_scenes_own_gives_there(scene: Scene
     own = Recipe("direct", (scene.cameras[0].name,), (32, 24), 50)
     placed = Recipe("direct", ("Hero",), (32, 24), 50, cameras=(alike(scene, "Hero"),))
     stores = [
-        open_store(bake_here(METHOD, scene, recipe, tmp_path / f"{recipe.views[0]}.zarr")) for recipe in (own, placed)
+        open_store(bake_in_process(METHOD, scene, recipe, tmp_path / f"{recipe.views[0]}.zarr"))
+        for recipe in (own, placed)
     ]
     paths = array_paths(tmp_path / "Hero.zarr")
     assert "views/0/visibility" in paths
@@ -129,4 +130,4 @@ def test_a_camera_of_a_scene_that_is_deleted_in_this_moment_is_none(
 
     monkeypatch.setattr(cameras, "_count", deleted_meanwhile)
     with pytest.raises(NotFoundError):
-        keep_camera(ledger, scene.id, alike(scene, "Hero"))
+        store_camera(ledger, scene.id, alike(scene, "Hero"))

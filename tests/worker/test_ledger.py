@@ -79,8 +79,8 @@ def test_only_one_of_many_claims_a_bake(ledger: Ledger) -> None:
         thread.join()
     assert len(won) == 1
     assert ledger.claimable() == []
-    assert ledger.beat(identity, won[0], progress=0.5)
-    assert not ledger.beat(identity, lease.new_owner(), progress=0.9)
+    assert ledger.heartbeat(identity, won[0], progress=0.5)
+    assert not ledger.heartbeat(identity, lease.new_owner(), progress=0.9)
     assert ledger.bake(identity).progress == 0.5
 
 
@@ -91,7 +91,7 @@ def test_lease_ends_when_it_is_not_renewed(ledger: Ledger, monkeypatch: pytest.M
     assert [work.id for work in ledger.claimable()] == [identity]
     assert ledger.claim(identity, second)
     monkeypatch.undo()
-    assert not ledger.beat(identity, first)
+    assert not ledger.heartbeat(identity, first)
     ledger.finish(identity, first, "failed", "too late")
     assert ledger.bake(identity).state == "running"
 
@@ -125,10 +125,10 @@ def test_who_has_lost_the_lease_of_a_bake_records_and_forgets_nothing(
     monkeypatch.setattr(lease, "LEASE_S", -1.0)
     assert ledger.claim(identity, second)
     assert "is taken over from" in caplog.text
-    assert not ledger.keep_lease(identity, first)
+    assert not ledger.renew_lease(identity, first)
     assert not ledger.finish_task(identity, first, Task(0, 2, "left", 8, 16), cost, 1)
-    assert not ledger.forget_tasks(identity, first)
-    assert not ledger.begin_anew(identity, first, "code", "run", None)
+    assert not ledger.delete_tasks(identity, first)
+    assert not ledger.restart(identity, first, "code", "run", None)
     assert not ledger.finish(identity, first, "failed", "a problem")
     assert ledger.finished_tasks(identity) == {(0, 1): cost}
     status = ledger.bake(identity)
@@ -141,7 +141,7 @@ def test_cancelled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) 
     ledger.claim(identity, owner)
     assert ledger.finish_task(identity, owner, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
     assert ledger.cancel(identity)
-    assert not ledger.beat(identity, owner)
+    assert not ledger.heartbeat(identity, owner)
     ledger.finish(identity, owner, "ready")
     assert ledger.bake(identity).state == "cancelled"
     assert ledger.submit(SCENE.id, RECIPE, PLAN) == identity
@@ -210,20 +210,20 @@ def test_a_room_is_of_one_server_until_that_gives_it_up_or_is_dead(ledger: Ledge
     assert first.take("a")
     assert not second.take("a")
     assert first.take("a")
-    assert first.keep({"a", "b"}) == set()
+    assert first.renew({"a", "b"}) == set()
     assert [second.take(each) for each in "abc"] == [False, False, True]
-    assert first.keep({"b"}) == set()
+    assert first.renew({"b"}) == set()
     assert [second.take(each) for each in "abc"] == [True, False, True]
     with ledger.sessions.begin() as session:
         session.execute(text("UPDATE rooms SET heartbeat = heartbeat - 700"))
     assert second.take("b")
-    assert first.keep({"b"}) == {"b"}
-    assert second.keep(()) == set()
-    assert first.keep({"b"}) == set()
+    assert first.renew({"b"}) == {"b"}
+    assert second.renew(()) == set()
+    assert first.renew({"b"}) == set()
     assert not second.take("b")
     with ledger.sessions.begin() as session:
         session.execute(text("UPDATE rooms SET heartbeat = heartbeat - 86400"))
-    second.keep(())
+    second.renew(())
     with ledger.sessions.begin() as session:
         assert session.scalar(text("SELECT count(*) FROM rooms")) == 0
 

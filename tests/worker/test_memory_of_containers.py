@@ -13,7 +13,7 @@ from worker import budget
 @pytest.fixture
 def groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(budget, "_GROUPS", tmp_path / "cgroup")
-    monkeypatch.setattr(budget, "_OWN_GROUPS", tmp_path / "own")
+    monkeypatch.setattr(budget, "_PROCESS_GROUPS", tmp_path / "own")
     monkeypatch.setattr("os.sysconf", lambda name: {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 64 * GIB // 4096}[name])
     return tmp_path
 

@@ -12,7 +12,7 @@ from cli.follow import detail
 from relume.bake import Plan, Task
 from worker.executor import TINY_BAKE_RAYS
 from worker.ledger import Ledger
-from worker.notes import Notebook, note_path, read_note
+from worker.notes import TaskNotes, note_path, read_note
 from worker.scenes import register_scene
 from worker.service import BakeService
 from worker.status import BakeStatus, TaskCost
@@ -24,14 +24,14 @@ LARGE = TINY_BAKE_RAYS + 1
 def entered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Every phase that is told to the ledger, in order, each once."""
     phases: list[str] = []
-    beat = Ledger.beat
+    beat = Ledger.heartbeat
 
     def noted(self: Ledger, identity: str, owner: str, **progress: Any) -> bool:
         if not phases or phases[-1] != progress["phase"]:
             phases.append(progress["phase"])
         return beat(self, identity, owner, **progress)
 
-    monkeypatch.setattr(Ledger, "beat", noted)
+    monkeypatch.setattr(Ledger, "heartbeat", noted)
     return phases
 
 
@@ -68,14 +68,14 @@ def test_how_many_wait_before_a_bake(tmp_path: Path) -> None:
 
 def test_kernels_that_are_compiled_are_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written: list[str] = []
-    write = Notebook._write
+    write = TaskNotes._write
 
-    def noted(self: Notebook, what: Any) -> None:
+    def noted(self: TaskNotes, what: Any) -> None:
         write(self, what)
         written.append(read_note(tmp_path / "one.zarr") or "")
 
-    monkeypatch.setattr(Notebook, "_write", noted)
-    notes = Notebook(tmp_path / "one.zarr")
+    monkeypatch.setattr(TaskNotes, "_write", noted)
+    notes = TaskNotes(tmp_path / "one.zarr")
     kernel = nb.njit(lambda x: x + 1)
     with notes.watching_compiler():
         notes.note("working")
@@ -85,7 +85,7 @@ def test_kernels_that_are_compiled_are_noted(tmp_path: Path, monkeypatch: pytest
 
 
 def test_note_that_cannot_be_kept_costs_the_words_alone(tmp_path: Path) -> None:
-    Notebook(tmp_path / "nowhere" / "one.zarr").note("working")
+    TaskNotes(tmp_path / "nowhere" / "one.zarr").note("working")
     assert read_note(tmp_path / "nowhere" / "one.zarr") is None
     note_path(tmp_path / "one.zarr").write_text("something else")
     assert read_note(tmp_path / "one.zarr") is None

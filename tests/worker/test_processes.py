@@ -23,7 +23,7 @@ from distributed.security import Security
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.errors import PlanError
-from relume.store import bake_here
+from relume.store import bake_in_process
 from worker.database import open_database
 from worker.executor import TINY_BAKE_RAYS, Executors
 from worker.ledger import Ledger
@@ -48,7 +48,9 @@ def tree_hash(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return tree_hash(bake_here(FakeMethod(), tiny_scene(), RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr"))
+    return tree_hash(
+        bake_in_process(FakeMethod(), tiny_scene(), RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr")
+    )
 
 
 def start(data_dir: Path, url: str, **method: Any) -> "subprocess.Popen[str]":

@@ -7,7 +7,7 @@ import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.bake import Task
-from worker.progress import Expected, Progress
+from worker.progress import ExpectedWork, Progress
 from worker.status import TaskCost
 
 PLAN = FakeMethod(num_rays=10_000).plan(tiny_scene(), RECIPE)
@@ -26,16 +26,16 @@ def run(seconds: float, done_before: int = 0) -> list[dict[str, float | None]]:
     clock = Clock()
     progress = Progress(PLAN, clock=clock)
     progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
-    progress.add(Task(0, 0, "front", 0, 0), TaskCost(1000, 0.1, 0.1), here=True)
+    progress.add(Task(0, 0, "front", 0, 0), TaskCost(1000, 0.1, 0.1), is_local=True)
     progress.begin_stage(TASKS, last=True)
     for task in TASKS[:done_before]:
-        progress.add(task, TaskCost(1000, 1, 1), here=False)
+        progress.add(task, TaskCost(1000, 1, 1), is_local=False)
     seen = []
     for task in TASKS[done_before:]:
         for _ in range(int(seconds)):
             seen.append(progress.fields())
             clock.now += 1
-        progress.add(task, TaskCost(1000, 1, 1), here=True)
+        progress.add(task, TaskCost(1000, 1, 1), is_local=True)
     return [*seen, progress.fields()]
 
 
@@ -68,15 +68,15 @@ def lefts_of(true_s: float, prior_s: float | None, parallel: int = 1, num_tasks:
     Two stages, a tenth and nine tenths of the work; a run of `parallel` processes, whose tasks differ by a tenth.
     """
     clock, random = Clock(), np.random.default_rng(1)
-    expected = Expected(prior_s, (0.1, 0.9), parallel)
-    progress = Progress(PLAN, expected=expected, clock=clock)
+    expected = ExpectedWork(prior_s, (0.1, 0.9), parallel)
+    progress = Progress(PLAN, expected_work=expected, clock=clock)
     clock.now += 60.0  # the processes start, and compile
     progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
     assert progress.fields()["seconds_left"] is None
     progress.begin_work()
     began, seen = clock.now, []
     clock.now += 0.1 * true_s
-    progress.add(Task(0, 0, "front", 0, 0), TaskCost(1000, 1, 0.1 * true_s * parallel), here=True)
+    progress.add(Task(0, 0, "front", 0, 0), TaskCost(1000, 1, 0.1 * true_s * parallel), is_local=True)
     tasks = [Task(1, i, "front", i * 10, i * 10 + 10) for i in range(num_tasks)]
     progress.begin_stage(tasks, last=True)
     mean_s = 0.9 * true_s * parallel / num_tasks
@@ -87,7 +87,7 @@ def lefts_of(true_s: float, prior_s: float | None, parallel: int = 1, num_tasks:
         ends.append((free[first], task, seconds))
     for done, (now, task, seconds) in enumerate(sorted(ends, key=lambda end: end[0]), start=1):
         clock.now = now
-        progress.add(task, TaskCost(1000, 1, seconds), here=True)
+        progress.add(task, TaskCost(1000, 1, seconds), is_local=True)
         left = progress.fields()["seconds_left"]
         seen.append((0.1 + 0.9 * done / num_tasks, left, max(free) - now))
     assert max(free) - began == pytest.approx(true_s, rel=0.1)
@@ -107,7 +107,7 @@ def test_a_tenth_of_the_work_tells_the_rest(slower: float, parallel: int, is_for
 def expected_alone(prior_s: float | None) -> tuple[Progress, Clock]:
     """A stage of ten tasks that has just begun."""
     clock = Clock()
-    progress = Progress(PLAN, expected=Expected(prior_s, (0.0, 1.0)), clock=clock)
+    progress = Progress(PLAN, expected_work=ExpectedWork(prior_s, (0.0, 1.0)), clock=clock)
     progress.begin_stage([], last=False)
     progress.begin_stage(TASKS, last=True)
     progress.begin_work()
@@ -124,7 +124,7 @@ def test_nothing_is_said_without_evidence() -> None:
 def test_what_others_took_is_said_of_a_bake_that_goes_on_until_it_cannot_be_true() -> None:
     progress, clock = expected_alone(20.0)
     assert progress.fields()["seconds_left"] is None  # in the first tenth others' bakes tell nothing
-    progress.add(TASKS[0], TaskCost(1000, 1, 1), here=False)
+    progress.add(TASKS[0], TaskCost(1000, 1, 1), is_local=False)
     assert progress.fields()["seconds_left"] == pytest.approx(18.0)
     clock.now += 1
     assert progress.fields()["seconds_left"] == pytest.approx(17.0)
@@ -134,40 +134,40 @@ def test_what_others_took_is_said_of_a_bake_that_goes_on_until_it_cannot_be_true
 
 def test_no_time_is_said_in_the_first_tenth_whatever_others_took() -> None:
     clock = Clock()
-    progress = Progress(PLAN, expected=Expected(3.0, (1.0,)), clock=clock)
+    progress = Progress(PLAN, expected_work=ExpectedWork(3.0, (1.0,)), clock=clock)
     tasks = [Task(0, i, "front", i, i + 1) for i in range(40)]
     progress.begin_stage(tasks, last=True)
     progress.begin_work()
     said = []
     for task in tasks:
         clock.now += 1
-        progress.add(task, TaskCost(1000, 1, 1), here=True)
+        progress.add(task, TaskCost(1000, 1, 1), is_local=True)
         said.append(progress.fields()["seconds_left"])
     assert said[:3] == [None] * 3
     assert said[3:] == [pytest.approx(left) for left in range(36, -1, -1)]
 
 
 def test_stages_count_by_the_time_they_took_before() -> None:
-    progress = Progress(PLAN, expected=Expected(10.0, (0.25, 0.75)), clock=Clock())
+    progress = Progress(PLAN, expected_work=ExpectedWork(10.0, (0.25, 0.75)), clock=Clock())
     tasks = [Task(0, i, "front", 0, 0) for i in range(4)]
     progress.begin_stage(tasks, last=False)
-    progress.add(tasks[0], TaskCost(1000, 1, 1), here=True)
+    progress.add(tasks[0], TaskCost(1000, 1, 1), is_local=True)
     assert progress.fields()["progress"] == pytest.approx(0.0625)
     for task in tasks[1:]:
-        progress.add(task, TaskCost(1000, 1, 1), here=True)
+        progress.add(task, TaskCost(1000, 1, 1), is_local=True)
     progress.begin_stage(TASKS, last=True)
     assert progress.fields()["progress"] == pytest.approx(0.25)
-    progress.add(TASKS[0], TaskCost(1000, 1, 1), here=True)
+    progress.add(TASKS[0], TaskCost(1000, 1, 1), is_local=True)
     assert progress.fields()["progress"] == pytest.approx(0.325)
 
 
 def test_a_stage_that_cannot_be_shared_counts_as_long_as_it_took() -> None:
     """One task of a fifth, then twenty of the rest by two processes: the first tells what the others will take."""
     clock = Clock()
-    progress = Progress(PLAN, expected=Expected(None, (0.2, 0.8), 2), clock=clock)
+    progress = Progress(PLAN, expected_work=ExpectedWork(None, (0.2, 0.8), 2), clock=clock)
     progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
     progress.begin_work()
     clock.now += 20
-    progress.add(Task(0, 0, "front", 0, 0), TaskCost(0, 0, 20), here=True)
+    progress.add(Task(0, 0, "front", 0, 0), TaskCost(0, 0, 20), is_local=True)
     progress.begin_stage([Task(1, i, "front", i * 10, i * 10 + 10) for i in range(20)], last=True)
     assert progress.fields()["seconds_left"] == pytest.approx(80)

@@ -20,12 +20,12 @@ from relume.errors import LedgerVersionError, ParameterError
 from server.access.tables import AuditRow, OwnedRow, TokenRow
 from server.records.looks import LookStore
 from server.records.shares import ShareStore
-from server.records.tables import BtfRow, CommentRow, ComparisonRow, LookRow, RenderRow, RoomRow, ShareRow, WorkRow
-from worker.cameras import kept_cameras
+from server.records.tables import BtfRow, CommentRow, ComparisonRow, JobRow, LookRow, RenderRow, RoomRow, ShareRow
+from worker.cameras import list_cameras
 from worker.database import open_database, upgrading
 from worker.database.models import Base
 from worker.database.opening import connect
-from worker.database.upgrading import draft, newest_revision, revision_of, upgrade
+from worker.database.upgrading import draft_revision, get_revision, latest_revision, upgrade
 from worker.ledger import Ledger
 from worker.scenes import list_scenes
 
@@ -50,7 +50,7 @@ def differences(engine: Engine) -> object:
 
 def revision(engine: Engine) -> str | None:
     with engine.connect() as connection:
-        return revision_of(connection)
+        return get_revision(connection)
 
 
 def rows(engine: Engine) -> dict[str, list[Any]]:
@@ -71,7 +71,7 @@ def pairs(now: dict[str, list[Any]], before: dict[str, list[Any]]) -> list[tuple
 def test_revisions_make_the_tables_of_the_code(ledger_url: str) -> None:
     with closing(Ledger(engine := open_database(ledger_url))):
         assert differences(engine) == []
-        assert revision(engine) == newest_revision()
+        assert revision(engine) == latest_revision()
 
 
 def test_a_ledger_from_before_revisions_becomes_a_new_one_with_its_rows(old: Path) -> None:
@@ -80,16 +80,16 @@ def test_a_ledger_from_before_revisions_becomes_a_new_one_with_its_rows(old: Pat
     found = rows(before)
     before.dispose()
     with closing(Ledger(engine := open_database(f"sqlite:///{old}"))) as ledger:
-        assert (revision(engine), differences(engine)) == (newest_revision(), [])
+        assert (revision(engine), differences(engine)) == (latest_revision(), [])
         assert all(found.values())
         now = rows(engine)
         assert [row[: len(old)] for row, old in pairs(now, found)] == [old for _, old in pairs(now, found)]
         (scene,), (bake,) = list_scenes(ledger), ledger.bakes()
         assert (bake.scene, bake.state, len(ledger.finished_tasks(bake.id))) == (scene.id, "ready", 20)
-        assert [camera.name for camera in kept_cameras(ledger, scene.id)] == ["kept"]
+        assert [camera.name for camera in list_cameras(ledger, scene.id)] == ["kept"]
         assert LookStore(ledger.sessions).get("red").document == '{"materials":{}}'
         assert ShareStore(ledger.sessions).get("0123456789").document == {"bake": "x"}
-        kinds: tuple[type[WorkRow], ...] = (RenderRow, BtfRow, ComparisonRow)
+        kinds: tuple[type[JobRow], ...] = (RenderRow, BtfRow, ComparisonRow)
         with ledger.sessions() as session:
             states = [session.scalars(select(kind)).one().state for kind in kinds]
         assert states == ["ready", "failed", "queued"]
@@ -111,7 +111,7 @@ def test_older_ones_get_the_columns_and_tables_that_they_lack(old: Path) -> None
 def test_many_processes_make_the_tables_once(ledger_url: str) -> None:
     with ThreadPoolExecutor(4) as threads:
         engines = list(threads.map(open_database, [ledger_url] * 4))
-    assert {revision(engine) for engine in engines} == {newest_revision()}
+    assert {revision(engine) for engine in engines} == {latest_revision()}
     for engine in engines:
         engine.dispose()
 
@@ -123,7 +123,7 @@ def test_a_ledger_of_a_newer_relume_is_refused_and_stays_as_it_is(ledger_url: st
     with pytest.raises(LedgerVersionError, match="upgraded by a newer relume"):
         open_database(ledger_url)
     with pytest.raises(LedgerVersionError, match="restore a backup"):
-        upgrade(engine, by_hand=True)
+        upgrade(engine, is_requested=True)
     assert revision(engine) == "9999"
     engine.dispose()
 
@@ -149,7 +149,7 @@ def another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleN
     monkeypatch.setattr(upgrading, "REVISIONS", folder)
 
     def write(step: str, is_additive: bool) -> None:
-        before, name = newest_revision(), f"{int(newest_revision()) + 1:04d}"
+        before, name = latest_revision(), f"{int(latest_revision()) + 1:04d}"
         source = REVISION.format(doc="Tests", name=name, before=before, is_additive=is_additive, step=step)
         (folder / "versions" / f"{name}_tests.py").write_text(source)
         upgrading._scripts.cache_clear()
@@ -169,8 +169,8 @@ def test_what_adds_is_made_at_start_and_what_does_not_waits_for_a_word(
         open_database(ledger_url)
     engine = connect(ledger_url)
     assert "note" in {column["name"] for column in inspect(engine).get_columns("looks")}
-    assert [what for _, what in upgrade(engine, by_hand=True)] == ["Tests"]
-    assert upgrade(engine, by_hand=True) == []
+    assert [what for _, what in upgrade(engine, is_requested=True)] == ["Tests"]
+    assert upgrade(engine, is_requested=True) == []
     engine.dispose()
     open_database(ledger_url).dispose()
 
@@ -182,7 +182,7 @@ def test_a_revision_that_fails_changes_nothing(ledger_url: str, another: SimpleN
         open_database(ledger_url)
     engine = connect(ledger_url)
     assert "note" not in {column["name"] for column in inspect(engine).get_columns("looks")}
-    assert revision(engine) == f"{int(newest_revision()) - 1:04d}"
+    assert revision(engine) == f"{int(latest_revision()) - 1:04d}"
     engine.dispose()
 
 
@@ -191,9 +191,9 @@ def test_a_draft_has_what_the_tables_of_the_code_have_and_the_ledger_lacks(old: 
         with engine.begin() as connection:
             connection.execute(text("DROP TABLE shares"))
         with engine.begin() as connection:
-            path = draft(connection, Base.metadata, "links of looks")
+            path = draft_revision(connection, Base.metadata, "links of looks")
     assert path.parent == another.folder / "versions"
-    assert path.name == f"{int(newest_revision()) + 1:04d}_links_of_looks.py"
+    assert path.name == f"{int(latest_revision()) + 1:04d}_links_of_looks.py"
     assert "op.create_table('shares'" in path.read_text()
 
 

@@ -15,7 +15,7 @@ from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.bake import Task
 from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
-from relume.store import bake_here, open_store
+from relume.store import bake_in_process, open_store
 from worker import lease, scenes
 from worker.database.models import BakeRow
 from worker.executor import Executors
@@ -51,7 +51,7 @@ def tree_hash(folder: Path) -> str:
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Hash of the store that an undisturbed bake gives."""
-    return tree_hash(bake_here(FakeMethod(), SCENE, RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr"))
+    return tree_hash(bake_in_process(FakeMethod(), SCENE, RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr"))
 
 
 def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str) -> None:
@@ -70,13 +70,13 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
 
 def test_how_long_a_bake_takes_is_known_once_one_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("ledger", "service"):
-        monkeypatch.setattr(f"worker.{module}.load_of_machine", lambda: 0.0)
+        monkeypatch.setattr(f"worker.{module}.machine_load", lambda: 0.0)
     with open_service(tmp_path) as service:
         plan = service.plan(SCENE.id, RECIPE)
-        assert service.seconds_for(plan) is None
+        assert service.estimate_seconds(plan) is None
         identity = follow(service, service.submit(SCENE.id, RECIPE)).id
         tasks = service.ledger.finished_tasks(identity).values()
-        assert service.seconds_for(plan) == pytest.approx(sum(cost.seconds for cost in tasks))
+        assert service.estimate_seconds(plan) == pytest.approx(sum(cost.seconds for cost in tasks))
         assert not list((tmp_path / "bakes" / "staging").iterdir())
 
 
@@ -110,11 +110,11 @@ def test_what_a_stopped_bake_has_is_kept_for_a_week(tmp_path: Path, monkeypatch:
     with open_service(tmp_path, delay_s=0.02) as service:
         identity = stop_half_way(service)
     service = open_service(tmp_path)
-    service._remove_strays()
+    service._delete_orphans()
     assert staging_path(tmp_path, identity).exists()
     assert service.ledger.finished_tasks(identity)
-    monkeypatch.setattr("worker.service.KEPT_S", -1.0)
-    service._remove_strays()
+    monkeypatch.setattr("worker.service.STOPPED_RETENTION_S", -1.0)
+    service._delete_orphans()
     assert not list((tmp_path / "bakes" / "staging").iterdir())
     assert service.ledger.finished_tasks(identity) == {}
     assert service.get(identity).progress == 0.0
@@ -125,7 +125,7 @@ def test_a_stopped_bake_is_forgotten_with_what_it_has(tmp_path: Path) -> None:
     with open_service(tmp_path, delay_s=0.02) as service:
         identity = stop_half_way(service)
     service = open_service(tmp_path)  # no task of it runs any more
-    service.forget(identity)
+    service.delete(identity)
     assert service.bakes() == []
     assert not list((tmp_path / "bakes" / "staging").iterdir())
     service.close()
@@ -274,11 +274,11 @@ def test_processes_that_a_bake_has_to_start_are_part_of_its_time(
     with open_service(tmp_path) as service:
         follow(service, service.submit(SCENE.id, RECIPE))
         plan = service.plan(SCENE.id, RECIPE)
-        warm_s = service.seconds_for(plan)
+        warm_s = service.estimate_seconds(plan)
         monkeypatch.setattr("worker.service.is_tiny", lambda plan: False)
-        cold_s = service.seconds_for(plan)
+        cold_s = service.estimate_seconds(plan)
         monkeypatch.setattr(Executors, "has_cluster", True)
-        assert service.seconds_for(plan) == warm_s
+        assert service.estimate_seconds(plan) == warm_s
     assert warm_s is not None
     assert cold_s == pytest.approx(warm_s + START_S)
 
@@ -468,7 +468,7 @@ def test_stores_that_nobody_will_finish_are_removed_at_the_start(
     begun: list[Path] = []
     with monkeypatch.context() as patch:
         patch.setattr(service.ledger, "bakes", bakes_and_then_another_process_begins_one)
-        service._remove_strays()
+        service._delete_orphans()
     service.close()
     assert not stray.exists()
     assert begun[0].exists()
@@ -478,8 +478,8 @@ def test_published_store_of_a_killed_service_is_taken_as_it_is(tmp_path: Path) -
     service = open_service(tmp_path)
     identity = service.submit(SCENE.id, RECIPE)
     service.ledger.claim(identity, "elsewhere/1/nonce/0")
-    bake_here(FakeMethod(), SCENE, RECIPE, service.store_path(identity))
-    service.ledger.keep_lease(identity, "elsewhere/1/nonce/0")
+    bake_in_process(FakeMethod(), SCENE, RECIPE, service.store_path(identity))
+    service.ledger.renew_lease(identity, "elsewhere/1/nonce/0")
     service.ledger._change(identity, None, heartbeat=time.time() - 2 * lease.LEASE_S)
     with service:
         assert follow(service, identity).state == "ready"

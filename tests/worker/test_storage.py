@@ -23,17 +23,17 @@ from zarr.storage import ObjectStore
 from relume.bake import Recipe
 from relume.errors import ParameterError, StorageError
 from relume.scene.archive import load_scene
-from relume.store import Reader, bake_here, open_store
-from server.errors import problem_of
-from worker.backup.shelf import Shelf
-from worker.backup.take import back_up
-from worker.bake import TAKEN_OVER
+from relume.store import Reader, bake_in_process, open_store
+from server.errors import make_problem
+from worker.backup.shelf import BackupRepository
+from worker.backup.take import create_backup
+from worker.bake import TAKEN_OVER_MESSAGE
 from worker.paths import scene_path
 from worker.scenes import delete_scene, register_scene
 from worker.service import BakeService
 from worker.status import BakeStatus
-from worker.storage import configured, fetched, open_kept
-from worker.storage.remote import Remote
+from worker.storage import fetch_if_missing, get_storage, open_cached
+from worker.storage.remote import ObjectStorage
 
 SCENE = tiny_scene()
 
@@ -49,7 +49,7 @@ def s3() -> Iterator[str]:
 
 
 @pytest.fixture(params=["s3", pytest.param("a shared folder", marks=pytest.mark.slow)])
-def storage(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Remote:
+def storage(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ObjectStorage:
     """The storage that `RELUME_STORAGE` names, empty."""
     url = f"file://{tmp_path / 'shared'}"
     if request.param == "s3":
@@ -60,7 +60,7 @@ def storage(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.
         boto3.client("s3", endpoint_url=keys["AWS_ENDPOINT_URL"], region_name="us-east-1").create_bucket(Bucket=bucket)
         url = f"s3://{bucket}/team"
     monkeypatch.setenv("RELUME_STORAGE", url)
-    found = configured()
+    found = get_storage()
     assert found is not None
     return found
 
@@ -84,7 +84,7 @@ def bake(service: BakeService, recipe: Recipe = RECIPE) -> Path:
 
 
 def test_one_machine_imports_another_bakes_and_the_first_opens_it(
-    tmp_path: Path, storage: Remote, ledger_of_all: str
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
 ) -> None:
     with (
         closing(machine(tmp_path, "server", ledger_of_all)) as server,
@@ -96,7 +96,7 @@ def test_one_machine_imports_another_bakes_and_the_first_opens_it(
         assert (path.exists(), here.exists()) == (True, False)
         assert server.submit(SCENE.id, RECIPE) == path.stem  # it is not baked again
         assert server.get(path.stem).state == "ready"
-        reader = open_kept(here, open_store)
+        reader = open_cached(here, open_store)
         assert reader.path == here
         assert tree_hash(here) == tree_hash(path)
         assert load_scene(scene_path(far.data_dir, SCENE.id)).id == SCENE.id
@@ -115,11 +115,11 @@ def half(tmp_path: Path, name: str, url: str) -> tuple[BakeStatus, int]:
 
 
 def is_as_expected(path: Path, tmp_path: Path) -> bool:
-    return tree_hash(path) == tree_hash(bake_here(FakeMethod(), SCENE, RECIPE, tmp_path / "expected.zarr"))
+    return tree_hash(path) == tree_hash(bake_in_process(FakeMethod(), SCENE, RECIPE, tmp_path / "expected.zarr"))
 
 
 def test_a_bake_that_another_machine_had_begun_goes_on_elsewhere(
-    tmp_path: Path, storage: Remote, ledger_of_all: str
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
 ) -> None:
     half(tmp_path, "first", ledger_of_all)
     log = tmp_path / "second.log"
@@ -135,17 +135,17 @@ def test_a_bake_that_another_machine_had_begun_goes_on_elsewhere(
 
 
 def test_where_the_storage_lacks_parts_the_bake_starts_again_and_says_so(
-    tmp_path: Path, storage: Remote, ledger_of_all: str
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
 ) -> None:
     status, _ = half(tmp_path, "first", ledger_of_all)
     storage.delete(f"parts/{status.id}")
-    assert half(tmp_path, "second", ledger_of_all)[0].problem == TAKEN_OVER
+    assert half(tmp_path, "second", ledger_of_all)[0].problem == TAKEN_OVER_MESSAGE
     with machine(tmp_path, "first", ledger_of_all) as service:  # what it has of its own is not what the ledger counts
         assert is_as_expected(bake(service), tmp_path)
 
 
 def test_what_is_stored_is_a_zarr_store_that_others_can_open(
-    tmp_path: Path, storage: Remote, ledger_of_all: str
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
 ) -> None:
     with machine(tmp_path, "one", ledger_of_all) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
@@ -156,7 +156,7 @@ def test_what_is_stored_is_a_zarr_store_that_others_can_open(
 
 
 def test_bakes_that_are_not_open_make_room(
-    tmp_path: Path, storage: Remote, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with machine(tmp_path, "one", ledger_of_all) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
@@ -164,19 +164,19 @@ def test_bakes_that_are_not_open_make_room(
         first = bake(service, recipes[0])
         size = sum(file.stat().st_size for file in first.rglob("*") if file.is_file())
         monkeypatch.setenv("RELUME_STORAGE_CACHE_BYTES", str(int(2.2 * size)))
-        opened: Reader | None = open_kept(first, open_store)
+        opened: Reader | None = open_cached(first, open_store)
         second, third = bake(service, recipes[1]), bake(service, recipes[2])
         assert [path.exists() for path in (first, second, third)] == [True, False, True]  # the first is open
         assert opened is not None
         assert opened.read("views/0/visibility").any()
         del opened
         gc.collect()
-        assert open_kept(second, open_store).shape("views/0/visibility")  # fetched again
+        assert open_cached(second, open_store).shape("views/0/visibility")  # fetched again
         assert [path.exists() for path in (first, second, third)] == [False, True, True]
 
 
 def test_what_was_baked_before_there_was_a_storage_is_stored_at_start(
-    tmp_path: Path, storage: Remote, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     url = os.environ["RELUME_STORAGE"]
     monkeypatch.delenv("RELUME_STORAGE")
@@ -192,7 +192,9 @@ def test_what_was_baked_before_there_was_a_storage_is_stored_at_start(
     assert storage.has(f"scenes/{SCENE.id}")
 
 
-def test_what_is_half_stored_or_damaged_is_not_opened(tmp_path: Path, storage: Remote, ledger_of_all: str) -> None:
+def test_what_is_half_stored_or_damaged_is_not_opened(
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
+) -> None:
     with machine(tmp_path, "one", ledger_of_all) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         path = bake(service)
@@ -208,7 +210,7 @@ def test_what_is_half_stored_or_damaged_is_not_opened(tmp_path: Path, storage: R
     changed.write_text(changed.read_text().replace("fake", "fork", 1))
     obstore.put(storage._store, f"{name}/zarr.json", changed)
     with pytest.raises(StorageError, match="is damaged in the object storage"):
-        fetched(path)
+        fetch_if_missing(path)
     assert not path.exists()
 
 
@@ -227,8 +229,8 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
         assert failed.state == "failed"
         assert failed.problem == "the object storage cannot be used now; try again in a while"
         with pytest.raises(StorageError) as failure:
-            fetched(service.store_path("0" * 16))
-        assert problem_of(failure.value).status == 503
+            fetch_if_missing(service.store_path("0" * 16))
+        assert make_problem(failure.value).status == 503
         monkeypatch.setenv("RELUME_STORAGE", f"file://{tmp_path / 'shared'}")
         path = bake(service)
     assert (tmp_path / "shared" / "whole" / "bakes" / f"{path.name}.json").exists()
@@ -238,7 +240,9 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
     assert "that is over" in caplog.text
 
 
-def test_a_scene_that_is_deleted_is_deleted_there_too(tmp_path: Path, storage: Remote, ledger_of_all: str) -> None:
+def test_a_scene_that_is_deleted_is_deleted_there_too(
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
+) -> None:
     with machine(tmp_path, "one", ledger_of_all) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         path = bake(service)
@@ -249,11 +253,13 @@ def test_a_scene_that_is_deleted_is_deleted_there_too(tmp_path: Path, storage: R
     assert not storage.fetch(f"bakes/{path.name}", tmp_path / "nothing")
 
 
-def test_a_backup_lacks_nothing_that_the_storage_has(tmp_path: Path, storage: Remote, ledger_of_all: str) -> None:
+def test_a_backup_lacks_nothing_that_the_storage_has(
+    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
+) -> None:
     with machine(tmp_path, "one", ledger_of_all) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         shutil.rmtree(bake(service))
-        snapshot = back_up(service.data_dir, service.ledger._engine, Shelf(tmp_path / "backups"))
+        snapshot = create_backup(service.data_dir, service.ledger._engine, BackupRepository(tmp_path / "backups"))
     assert snapshot.left_out == ()
 
 
@@ -263,11 +269,11 @@ def test_lists_that_name_places_outside_are_refused(tmp_path: Path, path: str) -
     document = {"files": [{"path": path, "bytes": 1, "sha256": "0" * 64}]}
     (tmp_path / "shared" / "whole" / "scenes" / "one.json").write_text(json.dumps(document))
     with pytest.raises(StorageError, match="outside of it"):
-        Remote(f"file://{tmp_path / 'shared'}").fetch("scenes/one", tmp_path / "here")
+        ObjectStorage(f"file://{tmp_path / 'shared'}").fetch("scenes/one", tmp_path / "here")
     assert not (tmp_path / "here").exists()
 
 
 @pytest.mark.parametrize("url", ["ftp://host/folder", "bucket", "s3://"])
 def test_other_storages_are_refused_in_words(url: str) -> None:
     with pytest.raises(ParameterError, match="RELUME_STORAGE"):
-        Remote(url)
+        ObjectStorage(url)

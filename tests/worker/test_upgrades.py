@@ -11,8 +11,8 @@ import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.errors import StoreError
-from relume.store import code_of, open_store
-from worker.bake import UPGRADED
+from relume.store import open_store, read_code
+from worker.bake import CODE_CHANGED_MESSAGE
 from worker.paths import staging_path
 from worker.scenes import register_scene
 from worker.service import BakeService
@@ -92,15 +92,15 @@ def test_a_bake_that_other_code_has_begun_starts_again_and_says_why(
     running(NEW)
     service = open_service(tmp_path, delay_s=0.02, log=str(log))
     if how == "cancelled":
-        service._remove_strays()
+        service._delete_orphans()
         assert not staging_path(tmp_path, identity).exists()
         service.ledger.requeue(identity, ("cancelled",))
     with service.subscribe(identity) as changes, service:
         seen = list(changes)
         assert [seen[-1].state, seen[-1].problem, seen[-1].code] == ["ready", None, NEW]
-        assert code_of(service.store_path(identity)) == NEW
+        assert read_code(service.store_path(identity)) == NEW
         assert open_store(service.store_path(identity)).attributes["code"] == NEW
-    assert how == "cancelled" or UPGRADED in {status.problem for status in seen}
+    assert how == "cancelled" or CODE_CHANGED_MESSAGE in {status.problem for status in seen}
     assert len(log.read_text().split()) == num_old + NUM_TASKS
 
 
@@ -113,5 +113,5 @@ def test_a_process_of_other_code_computes_nothing(tmp_path: Path) -> None:
 
 def test_a_store_from_before_codes_were_written_down_is_of_none(tmp_path: Path) -> None:
     (tmp_path / "zarr.json").write_text('{"attributes": {"schema_version": 7}}')
-    assert code_of(tmp_path) is None
-    assert code_of(tmp_path / "nothing") is None
+    assert read_code(tmp_path) is None
+    assert read_code(tmp_path / "nothing") is None

@@ -14,7 +14,7 @@ from relume.replacing import UNFINISHED
 from relume.store.publish import manifest_digests
 from relume.store.schema import MANIFEST_NAME
 
-LEFT_OUT = (
+EXCLUDED_PATTERNS = (
     "relume.db*",
     "restoring.json",
     "upload-*",
@@ -30,7 +30,7 @@ LEFT_OUT = (
 
 
 @dataclass(frozen=True)
-class Found:
+class FileEntry:
     """A file that belongs into a backup.
 
     Attributes:
@@ -45,38 +45,38 @@ class Found:
     sha256: str | None
 
 
-def contents(data_dir: Path) -> Iterator[Found]:
+def walk_files(data_dir: Path) -> Iterator[FileEntry]:
     """The files, sorted; of a published store those that its manifest names, which never change."""
     digests: dict[str, str] = {}
     for folder, folders, names in os.walk(data_dir):
-        here = Path(folder).relative_to(data_dir).as_posix()
-        folders[:] = sorted(name for name in folders if _belongs(_joined(here, name)))
-        if fnmatch(here, "bakes/*.zarr"):
-            digests = _digests(Path(folder), here)
+        relative_folder = Path(folder).relative_to(data_dir).as_posix()
+        folders[:] = sorted(name for name in folders if _is_included(_join(relative_folder, name)))
+        if fnmatch(relative_folder, "bakes/*.zarr"):
+            digests = _digests(Path(folder), relative_folder)
             if not digests:
                 folders.clear()  # it is being published, or deleted
                 continue
-        is_store = fnmatch(here, "bakes/*.zarr*")
-        for path in (_joined(here, name) for name in sorted(names)):
-            if not _belongs(path) or (is_store and path not in digests and not path.endswith(f"/{MANIFEST_NAME}")):
+        is_store = fnmatch(relative_folder, "bakes/*.zarr*")
+        for path in (_join(relative_folder, name) for name in sorted(names)):
+            if not _is_included(path) or (is_store and path not in digests and not path.endswith(f"/{MANIFEST_NAME}")):
                 continue
             try:
                 stat = (data_dir / path).stat()
             except FileNotFoundError:  # deleted since
                 continue
-            yield Found(path, stat.st_size, stat.st_mtime_ns, digests.get(path) if is_store else None)
+            yield FileEntry(path, stat.st_size, stat.st_mtime_ns, digests.get(path) if is_store else None)
 
 
-def _digests(store: Path, here: str) -> dict[str, str]:
+def _digests(store: Path, relative_folder: str) -> dict[str, str]:
     try:
-        return {f"{here}/{name}": digest for name, digest in manifest_digests(store).items()}
+        return {f"{relative_folder}/{name}": digest for name, digest in manifest_digests(store).items()}
     except StoreError:
         return {}
 
 
-def _belongs(path: str) -> bool:
-    return not any(fnmatch(path, pattern) for pattern in LEFT_OUT)
+def _is_included(path: str) -> bool:
+    return not any(fnmatch(path, pattern) for pattern in EXCLUDED_PATTERNS)
 
 
-def _joined(folder: str, name: str) -> str:
+def _join(folder: str, name: str) -> str:
     return name if folder == "." else f"{folder}/{name}"

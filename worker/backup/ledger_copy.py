@@ -10,7 +10,7 @@ from sqlalchemy import Connection, Engine, MetaData, Table, func, insert, select
 
 from worker.database import open_database
 
-ROWS_AT_ONCE = 1000
+ROWS_PER_BATCH = 1000
 
 
 def copy_ledger(source: Engine, path: Path) -> None:
@@ -22,8 +22,8 @@ def copy_ledger(source: Engine, path: Path) -> None:
     """
     target = open_database(f"sqlite:///{path}")
     try:
-        with _moment(source) as reading, target.begin() as writing:
-            _copy_rows(reading, writing)
+        with _snapshot_connection(source) as source_connection, target.begin() as target_connection:
+            _copy_rows(source_connection, target_connection)
         with target.connect() as connection:  # one file, nothing beside it
             connection.exec_driver_sql("PRAGMA journal_mode = DELETE")
     finally:
@@ -38,15 +38,15 @@ def fill_ledger(path: Path, target: Engine) -> None:
     """
     source = open_database(f"sqlite:///{path}")
     try:
-        with _moment(source) as reading, target.begin() as writing:
-            _copy_rows(reading, writing)
+        with _snapshot_connection(source) as source_connection, target.begin() as target_connection:
+            _copy_rows(source_connection, target_connection)
     finally:
         source.dispose()
 
 
 def is_empty(engine: Engine) -> bool:
     """Whether a ledger has no rows."""
-    with _moment(engine) as connection:
+    with _snapshot_connection(engine) as connection:
         return not any(connection.scalar(select(func.count()).select_from(table)) for table in _tables(connection))
 
 
@@ -57,16 +57,16 @@ def _tables(connection: Connection) -> list[Table]:
     return [table for table in metadata.sorted_tables if table.name != "alembic_version"]
 
 
-def _copy_rows(reading: Connection, writing: Connection) -> None:
-    sources = {table.name: table for table in _tables(reading)}
-    for table in _tables(writing):
+def _copy_rows(source: Connection, target: Connection) -> None:
+    sources = {table.name: table for table in _tables(source)}
+    for table in _tables(target):
         columns = [sources[table.name].c[column.name] for column in table.columns]
-        for rows in reading.execute(select(*columns)).mappings().partitions(ROWS_AT_ONCE):
-            writing.execute(insert(table), [dict(row) for row in rows])
+        for rows in source.execute(select(*columns)).mappings().partitions(ROWS_PER_BATCH):
+            target.execute(insert(table), [dict(row) for row in rows])
 
 
 @contextmanager
-def _moment(engine: Engine) -> Iterator[Connection]:
+def _snapshot_connection(engine: Engine) -> Iterator[Connection]:
     """A connection that sees all tables as they are at one moment, and writes nothing."""
     with engine.connect() as connection:
         if engine.dialect.name == "sqlite":

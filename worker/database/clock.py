@@ -18,10 +18,10 @@ class epoch_s(FunctionElement[float]):  # noqa: N801  used as a function
 
 
 @compiles(epoch_s, "sqlite")
-def _of_sqlite(element: epoch_s, compiler: Any, **_: object) -> str:
+def _compile_sqlite(element: epoch_s, compiler: Any, **_: object) -> str:
     return "((julianday('now') - 2440587.5) * 86400.0)"
 
 
 @compiles(epoch_s, "postgresql")
-def _of_postgresql(element: epoch_s, compiler: Any, **_: object) -> str:
+def _compile_postgresql(element: epoch_s, compiler: Any, **_: object) -> str:
     return "extract(epoch from clock_timestamp())::float8"

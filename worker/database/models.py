@@ -30,7 +30,7 @@ class SceneRow(Base):
 
 
 class CameraRow(Base):
-    """A camera that somebody placed in a scene; `document` is its JSON, see `relume.scene.placed_camera`."""
+    """A camera that somebody placed in a scene; `document` is its JSON, see `relume.scene.make_custom_camera`."""
 
     __tablename__ = "cameras"
 

@@ -8,7 +8,7 @@ from typing import ParamSpec, TypeVar
 
 from sqlalchemy.exc import DBAPIError
 
-from worker.database.faults import database_away, is_away
+from worker.database.faults import database_outage, is_unavailable
 
 RETRY_S = 1.0
 
@@ -16,7 +16,7 @@ Result = TypeVar("Result")
 Given = ParamSpec("Given")
 
 
-def patiently(
+def with_retry(
     gives_up: Callable[[], bool], call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs
 ) -> Result:
     """The result of a call on the ledger, asked again as long as the database is away.
@@ -29,10 +29,10 @@ def patiently(
         try:
             result = call(*args, **kwargs)
         except DBAPIError as error:
-            if not is_away(error) or gives_up():
+            if not is_unavailable(error) or gives_up():
                 raise
-            database_away.meet(error)
+            database_outage.report_failure(error)
             time.sleep(RETRY_S)
         else:
-            database_away.well()
+            database_outage.report_recovered()
             return result

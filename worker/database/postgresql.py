@@ -50,12 +50,18 @@ def connect_postgresql(_: object, __: object, ___: object, settings: dict[str, A
         _, __, ___: dialect, pool record and arguments of that event; not needed.
         settings: what the URL says: user, host, and port, database, password, sslmode where it has them.
     """
-    where = settings["host"], settings.get("port", PORT)
+    address = settings["host"], settings.get("port", PORT)
     password = settings.get("password", "")  # without one, pg8000 fails on servers that ask for it
-    more = {"password": password, "application_name": "relume", "ssl_context": _tls(settings.get("sslmode", "prefer"))}
+    extra_settings = {
+        "password": password,
+        "application_name": "relume",
+        "ssl_context": _tls(settings.get("sslmode", "prefer")),
+    }
     with _network():
-        sock = socket.create_connection(where, TIMEOUT_S)
-        return _Connection(sock, **{name: value for name, value in settings.items() if name != "sslmode"} | more)
+        sock = socket.create_connection(address, TIMEOUT_S)
+        return _Connection(
+            sock, **{name: value for name, value in settings.items() if name != "sslmode"} | extra_settings
+        )
 
 
 def _tls(mode: str) -> ssl.SSLContext | None:

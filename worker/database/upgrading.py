@@ -24,38 +24,38 @@ logging.getLogger("alembic").setLevel(logging.WARNING)  # what is made, whoever 
 REVISIONS = Path(__file__).with_name("revisions")
 _LOCK = 0x72656C756D65  # of PostgreSQL, by its number; "relume"
 
-Note = tuple[str, str]
+RevisionNote = tuple[str, str]
 """Name of a revision, and what it does."""
 
 
-def revision_of(connection: Connection) -> str | None:
+def get_revision(connection: Connection) -> str | None:
     """The revision that a database has; None where it is empty, or from before there were any."""
     return MigrationContext.configure(connection).get_current_revision()
 
 
-def newest_revision() -> str:
+def latest_revision() -> str:
     """The revision that this relume works with."""
     (head,) = _scripts().get_heads()
     return head
 
 
-def upgrade(engine: Engine, *, by_hand: bool) -> list[Note]:
+def upgrade(engine: Engine, *, is_requested: bool) -> list[RevisionNote]:
     """Make all revisions that a database lacks, in one transaction; of several processes one makes them.
 
     Args:
         engine: of the database.
-        by_hand: whether somebody asked for it, so that no older relume is at work; else only what adds is made.
+        is_requested: whether somebody asked for it, so that no older relume is at work; else only what adds is made.
     Returns:
         The revisions that were made.
     Raises:
         LedgerVersionError: a newer relume has upgraded the database, or one that only people may make is lacking.
     """
     with engine.connect() as connection:
-        if not _lacking(connection):
+        if not _missing_revisions(connection):
             return []
-    with _alone(engine) as connection:
-        lacking = _lacking(connection)
-        if not by_hand and not all(script.module.is_additive for script in lacking):
+    with _exclusive_transaction(engine) as connection:
+        missing = _missing_revisions(connection)
+        if not is_requested and not all(script.module.is_additive for script in missing):
             raise LedgerVersionError(
                 "the ledger is to be changed in a way that relumes from before cannot work with; stop all that use it, "
                 "run: relume backup FOLDER, then: relume ledger upgrade"
@@ -63,10 +63,10 @@ def upgrade(engine: Engine, *, by_hand: bool) -> list[Note]:
         config = _config()
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
-        return [(script.revision, script.doc.rstrip(".")) for script in lacking]
+        return [(script.revision, script.doc.rstrip(".")) for script in missing]
 
 
-def draft(connection: Connection, metadata: object, message: str) -> Path:
+def draft_revision(connection: Connection, metadata: object, message: str) -> Path:
     """Write a revision, to be looked through, that makes what the code's tables have and a database lacks.
 
     Args:
@@ -77,7 +77,7 @@ def draft(connection: Connection, metadata: object, message: str) -> Path:
     """
     config = _config()
     config.attributes.update(connection=connection, metadata=metadata)
-    number = f"{int(newest_revision()) + 1:04d}"
+    number = f"{int(latest_revision()) + 1:04d}"
     script = command.revision(config, message, autogenerate=True, rev_id=number)
     assert isinstance(script, Script)
     return Path(script.path)
@@ -95,20 +95,20 @@ def _scripts() -> ScriptDirectory:
     return ScriptDirectory.from_config(_config())
 
 
-def _lacking(connection: Connection) -> list[Script]:
+def _missing_revisions(connection: Connection) -> list[Script]:
     """Revisions from a database's own to the newest, in order."""
-    current, known = revision_of(connection), list(_scripts().walk_revisions())
-    names = [script.revision for script in known]
+    current, revisions = get_revision(connection), list(_scripts().walk_revisions())
+    names = [script.revision for script in revisions]
     if current is not None and current not in names:
         raise LedgerVersionError(
             f"the ledger was upgraded by a newer relume (revision {current[:40]}, this one knows {names[0]}); "
             "run that relume, or restore a backup from before"
         )
-    return known[: names.index(current) if current is not None else None][::-1]
+    return revisions[: names.index(current) if current is not None else None][::-1]
 
 
 @contextmanager
-def _alone(engine: Engine) -> Iterator[Connection]:
+def _exclusive_transaction(engine: Engine) -> Iterator[Connection]:
     """A transaction in which nobody else changes the schema."""
     with engine.connect() as connection:
         if engine.dialect.name != "sqlite":

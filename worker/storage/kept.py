@@ -19,9 +19,9 @@ from relume.folders import folder_bytes
 from relume.replacing import UNFINISHED
 from relume.store.publish import manifest_digests
 from relume.store.schema import MANIFEST_NAME
-from worker.storage.locks import open_locked
-from worker.storage.parts import forget_parts
-from worker.storage.remote import Remote, configured
+from worker.storage.locks import open_lock_file
+from worker.storage.parts import delete_partial
+from worker.storage.remote import ObjectStorage, get_storage
 
 DEFAULT_CACHE_BYTES = 20 << 30
 
@@ -38,19 +38,19 @@ def cache_bytes() -> int:
 
 def push(path: Path) -> None:
     """Store a scene's folder or a published bake, where there is a storage that lacks it. Raises StorageError."""
-    there = configured()
-    if there is None or there.has(_name(path)):
+    storage = get_storage()
+    if storage is None or storage.has(_name(path)):
         return
     if path.suffix == ".zarr":
         files = [*manifest_digests(path), MANIFEST_NAME]
     else:
         files = sorted(file.name for file in path.iterdir() if file.is_file() and not file.match(UNFINISHED))
-    there.put(_name(path), path, files)
+    storage.put(_name(path), path, files)
     if path.suffix == ".zarr":
-        _make_room(path.parent, there, 0)
+        _evict_until_fits(path.parent, storage, 0)
 
 
-def fetched(path: Path) -> Path:
+def fetch_if_missing(path: Path) -> Path:
     """A scene's folder or a bake's store, fetched where it is only in the storage; not there where nobody has it.
 
     Args:
@@ -60,65 +60,65 @@ def fetched(path: Path) -> Path:
     Raises:
         StorageError: the storage does not answer.
     """
-    there = configured()
-    if there is None or path.exists():
+    storage = get_storage()
+    if storage is None or path.exists():
         return path
-    with _locked(path, "fetch", fcntl.LOCK_EX):
+    with _with_lock(path, "fetch", fcntl.LOCK_EX):
         if path.exists():  # another process was faster
             return path
         if path.suffix == ".zarr":
-            _make_room(path.parent, there, there.num_bytes(_name(path)))
+            _evict_until_fits(path.parent, storage, storage.num_bytes(_name(path)))
         unfinished = path.with_name(UNFINISHED.replace("*", path.name))
-        if there.fetch(_name(path), unfinished):
+        if storage.fetch(_name(path), unfinished):
             unfinished.rename(path)
     return path
 
 
-def open_kept(path: Path, open_store: Callable[[Path], Opened]) -> Opened:
+def open_cached(path: Path, open_store: Callable[[Path], Opened]) -> Opened:
     """Open a bake, fetched where it is only in the storage; it stays here for as long as what was opened lives.
 
     Args:
         path: of its store. open_store: what opens it; raises where there is none.
     """
-    if configured() is None:
+    if get_storage() is None:
         return open_store(path)
     lock = _lock(path, "use", fcntl.LOCK_SH)
     try:
-        opened = open_store(fetched(path))
+        bake = open_store(fetch_if_missing(path))
     except BaseException:
         os.close(lock)
         raise
-    weakref.finalize(opened, os.close, lock)
-    return opened
+    weakref.finalize(bake, os.close, lock)
+    return bake
 
 
-def is_elsewhere(path: Path) -> bool:
+def is_in_storage(path: Path) -> bool:
     """Whether the storage has a scene or a bake. Raises StorageError."""
-    there = configured()
-    return there is not None and there.has(_name(path))
+    storage = get_storage()
+    return storage is not None and storage.has(_name(path))
 
 
-def forget(path: Path) -> None:
+def delete_remote(path: Path) -> None:
     """Delete a scene or a bake from the storage; here, whoever asks deletes it. Raises StorageError."""
-    if (there := configured()) is not None:
-        there.delete(_name(path))
+    if (storage := get_storage()) is not None:
+        storage.delete(_name(path))
         if path.suffix == ".zarr":
-            forget_parts(path.stem)
+            delete_partial(path.stem)
 
 
-def _make_room(bakes: Path, there: Remote, num_bytes: int) -> None:
+def _evict_until_fits(bakes: Path, storage: ObjectStorage, num_bytes: int) -> None:
     """Let go of bakes until there is room for so many bytes more."""
-    stores = sorted(bakes.glob("[!.]*.zarr"), key=_last_used)
+    stores = sorted(bakes.glob("[!.]*.zarr"), key=_last_use_s)
     sizes = {store: folder_bytes(store) for store in stores}
     excess = sum(sizes.values()) + num_bytes - cache_bytes()
     for store in stores:
         if excess <= 0:
             return
-        if there.has(_name(store)) and _let_go(store):
+        if storage.has(_name(store)) and _evict(store):
             excess -= sizes[store]
 
 
-def _let_go(store: Path) -> bool:
+def _evict(store: Path) -> bool:
     """Delete a store unless somebody has it open."""
     try:
         lock = _lock(store, "use", fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -131,7 +131,7 @@ def _let_go(store: Path) -> bool:
     return True
 
 
-def _last_used(store: Path) -> float:
+def _last_use_s(store: Path) -> float:
     """When a store was opened last, or made."""
     lock = _lock_path(store, "use")
     return max(path.stat().st_mtime for path in (store, lock) if path.exists())
@@ -141,15 +141,15 @@ def _name(path: Path) -> str:
     return f"{path.parent.name}/{path.name}"
 
 
-def _lock_path(path: Path, what: str) -> Path:
-    return path.parent / "locks" / f"{path.stem}.{what}"
+def _lock_path(path: Path, purpose: str) -> Path:
+    return path.parent / "locks" / f"{path.stem}.{purpose}"
 
 
-def _lock(path: Path, what: str, how: int) -> int:
-    """A lock of a scene or a bake, see `open_locked`; a shared one says when it was opened last."""
-    descriptor = open_locked(_lock_path(path, what), how)
+def _lock(path: Path, purpose: str, mode: int) -> int:
+    """A lock of a scene or a bake, see `open_lock_file`; a shared one says when it was opened last."""
+    descriptor = open_lock_file(_lock_path(path, purpose), mode)
     try:
-        if how == fcntl.LOCK_SH:
+        if mode == fcntl.LOCK_SH:
             os.utime(descriptor)
     except BaseException:
         os.close(descriptor)
@@ -158,8 +158,8 @@ def _lock(path: Path, what: str, how: int) -> int:
 
 
 @contextmanager
-def _locked(path: Path, what: str, how: int) -> Iterator[None]:
-    descriptor = _lock(path, what, how)
+def _with_lock(path: Path, purpose: str, mode: int) -> Iterator[None]:
+    descriptor = _lock(path, purpose, mode)
     try:
         yield
     finally:

@@ -7,18 +7,18 @@ import os
 from pathlib import Path
 
 
-def open_locked(file: Path, how: int) -> int:
+def open_lock_file(file: Path, mode: int) -> int:
     """An open file that holds a lock; closing it gives it up, as does the end of the process.
 
     Args:
-        file: made where it is missing. how: as `fcntl.flock` takes it.
+        file: made where it is missing. mode: as `fcntl.flock` takes it.
     Raises:
-        BlockingIOError: somebody else has it, and `how` is not to wait.
+        BlockingIOError: somebody else has it, and `mode` is not to wait.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
-        fcntl.flock(descriptor, how)
+        fcntl.flock(descriptor, mode)
     except BaseException:
         os.close(descriptor)
         raise

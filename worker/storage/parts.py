@@ -13,15 +13,15 @@ from pathlib import Path
 
 from relume.errors import StorageError
 from relume.replacing import UNFINISHED
-from worker.database.faults import Complaint
-from worker.storage.remote import configured
+from worker.database.faults import DatabaseError
+from worker.storage.remote import get_storage
 
 log = logging.getLogger(__name__)
 TaskName = tuple[int, int]
 """Stage and index."""
 
 
-class Parts:
+class PartialUploads:
     """Those of one run of a bake; nothing where there is no storage.
 
     A storage that is away delays nothing: what it lacks is stored with the next task.
@@ -32,27 +32,29 @@ class Parts:
     """
 
     def __init__(self, staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> None:
-        self._staging, self._there, self._name = staging, configured(), _name(bake_id, run)
-        self._tasks, self._stored = set(tasks), dict[str, tuple[int, int]]()
-        self._complaint = Complaint(log, f"parts of bake {bake_id} cannot be stored", asks_database=False)
+        self._staging, self._storage, self._name = staging, get_storage(), _name(bake_id, run)
+        self._tasks, self._stored_files = set(tasks), dict[str, tuple[int, int]]()
+        self._storage_error = DatabaseError(log, f"parts of bake {bake_id} cannot be stored", asks_database=False)
 
     def store(self, task: TaskName) -> None:
         """Store what has appeared since the last time, that of a finished task among it."""
-        if self._there is None:
+        if self._storage is None:
             return
         self._tasks.add(task)
-        found = {name: state for name, state in _files(self._staging).items() if self._stored.get(name) != state}
+        changed = {
+            name: state for name, state in _files(self._staging).items() if self._stored_files.get(name) != state
+        }
         try:
-            self._there.put_files(self._name, self._staging, list(found))
-            self._there.put_document(self._name, sorted(self._tasks))
+            self._storage.put_files(self._name, self._staging, list(changed))
+            self._storage.put_document(self._name, sorted(self._tasks))
         except StorageError as error:
-            self._complaint.meet(error)
+            self._storage_error.report_failure(error)
             return
-        self._complaint.well()
-        self._stored |= found
+        self._storage_error.report_recovered()
+        self._stored_files |= changed
 
 
-def fetch_parts(staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> bool:
+def fetch_partial(staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> bool:
     """Fetch the parts of a run in the place of what is there, where the storage has those of all these tasks.
 
     Args:
@@ -60,21 +62,23 @@ def fetch_parts(staging: Path, bake_id: str, run: str, tasks: Collection[TaskNam
     Raises:
         StorageError: the storage does not answer.
     """
-    there = configured()
-    if there is None or not tasks:
+    storage = get_storage()
+    if storage is None or not tasks:
         return False
-    stored = there.document(_name(bake_id, run))
-    if not isinstance(stored, list) or not set(tasks) <= {tuple(each) for each in stored if isinstance(each, list)}:
+    stored_tasks = storage.document(_name(bake_id, run))
+    if not isinstance(stored_tasks, list) or not set(tasks) <= {
+        tuple(entry) for entry in stored_tasks if isinstance(entry, list)
+    }:
         return False
     shutil.rmtree(staging, ignore_errors=True)
-    there.fetch_files(_name(bake_id, run), staging)
+    storage.fetch_files(_name(bake_id, run), staging)
     return True
 
 
-def forget_parts(bake_id: str) -> None:
+def delete_partial(bake_id: str) -> None:
     """Delete the parts of all runs of a bake. Raises StorageError."""
-    if (there := configured()) is not None:
-        there.delete(f"parts/{bake_id}")
+    if (storage := get_storage()) is not None:
+        storage.delete(f"parts/{bake_id}")
 
 
 def _name(bake_id: str, run: str) -> str:
@@ -83,9 +87,9 @@ def _name(bake_id: str, run: str) -> str:
 
 def _files(staging: Path) -> dict[str, tuple[int, int]]:
     """Whole files of an unfinished store, each with size and time."""
-    found = {}
+    files = {}
     for path in staging.rglob("*"):
         if path.suffix != ".partial" and not path.match(UNFINISHED) and path.is_file():
-            told = path.stat()
-            found[path.relative_to(staging).as_posix()] = told.st_size, told.st_mtime_ns
-    return found
+            stat = path.stat()
+            files[path.relative_to(staging).as_posix()] = stat.st_size, stat.st_mtime_ns
+    return files

@@ -25,20 +25,20 @@ from obstore.exceptions import BaseError
 from obstore.store import from_url
 
 from relume.errors import ParameterError, StorageError
-from relume.replacing import replacing
-from worker.database.faults import Absence
+from relume.replacing import atomic_write
+from worker.database.faults import MissingDatabase
 
 SCHEMES = ("s3://", "file://")
-AT_ONCE = 4
+NUM_THREADS = 4
 MAX_RETRIES, RETRY_S = 6, 20
 PIECE_BYTES = 8 << 20
 MAX_INDEX_BYTES = 64 << 20
 
 log = logging.getLogger(__name__)
-storage_away = Absence(log, "the object storage")
+storage_outage = MissingDatabase(log, "the object storage")
 
 
-class Remote:
+class ObjectStorage:
     """One place in object storage; safe to use from several threads."""
 
     def __init__(self, url: str) -> None:
@@ -54,8 +54,8 @@ class Remote:
         try:
             self._store = from_url(url, **options)
         except (BaseError, ValueError, OSError) as error:
-            why = str(error).partition("\n")[0][:200]  # what follows is the library's own
-            raise ParameterError("RELUME_STORAGE", url, f"one that can be used ({why})") from None
+            reason = str(error).partition("\n")[0][:200]  # what follows is the library's own
+            raise ParameterError("RELUME_STORAGE", url, f"one that can be used ({reason})") from None
 
     def put(self, name: str, folder: Path, files: Sequence[str]) -> None:
         """Store a folder under a name, whole or not at all; what was there under it is replaced.
@@ -66,7 +66,7 @@ class Remote:
         Raises:
             StorageError: the storage does not answer, or refuses.
         """
-        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+        with _translate_errors(), ThreadPoolExecutor(NUM_THREADS) as threads:
 
             def put(file: str) -> dict[str, Any]:
                 path = folder / file
@@ -80,7 +80,7 @@ class Remote:
 
     def has(self, name: str) -> bool:
         """Whether a folder is there, whole. Raises StorageError."""
-        with _named_faults():
+        with _translate_errors():
             try:
                 obstore.head(self._store, _index(name))
             except FileNotFoundError:
@@ -97,7 +97,7 @@ class Remote:
         Raises:
             StorageError: the storage does not answer, or what it has is damaged.
         """
-        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+        with _translate_errors(), ThreadPoolExecutor(NUM_THREADS) as threads:
             entries = self._entries(name)
             if entries is None:
                 return False
@@ -114,12 +114,12 @@ class Remote:
         """
         if not files:  # nothing is asked, so that nothing can be said of the storage
             return
-        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+        with _translate_errors(), ThreadPoolExecutor(NUM_THREADS) as threads:
             list(threads.map(lambda file: obstore.put(self._store, f"{name}/{file}", folder / file), files))
 
     def fetch_files(self, name: str, folder: Path) -> None:
         """Fetch all files under a name that has no list of them. Raises StorageError."""
-        with _named_faults(), ThreadPoolExecutor(AT_ONCE) as threads:
+        with _translate_errors(), ThreadPoolExecutor(NUM_THREADS) as threads:
             keys = [item["path"] for page in obstore.list(self._store, f"{name}/") for item in page]
             files = [key.partition(f"{name}/")[2] for key in keys]
             if any({"", ".", ".."} & set(file.split("/")) for file in files):
@@ -128,12 +128,12 @@ class Remote:
 
     def put_document(self, name: str, document: Any) -> None:
         """Store JSON under a name. Raises StorageError."""
-        with _named_faults():
+        with _translate_errors():
             obstore.put(self._store, f"{name}.json", json.dumps(document).encode())
 
     def document(self, name: str) -> Any:
         """JSON that is stored under a name; None where there is none. Raises StorageError."""
-        with _named_faults():
+        with _translate_errors():
             try:
                 return json.loads(bytes(obstore.get(self._store, f"{name}.json").bytes()))
             except FileNotFoundError:
@@ -143,12 +143,12 @@ class Remote:
 
     def num_bytes(self, name: str) -> int:
         """Size of a folder; 0 where there is none. Raises StorageError."""
-        with _named_faults():
+        with _translate_errors():
             return sum(size for _, size, _ in self._entries(name) or ())
 
     def delete(self, name: str) -> None:
         """Delete a folder, if it is there. Raises StorageError."""
-        with _named_faults():
+        with _translate_errors():
             keys = [_index(name), *(item["path"] for page in obstore.list(self._store, f"{name}/") for item in page)]
             for key in keys:  # the index first: what is half deleted is not there
                 try:
@@ -158,14 +158,14 @@ class Remote:
 
     def _entries(self, name: str) -> list[tuple[str, int, str]] | None:
         try:
-            found = obstore.get(self._store, _index(name))
+            index_object = obstore.get(self._store, _index(name))
         except FileNotFoundError:
             return None
-        if found.meta["size"] > MAX_INDEX_BYTES:
+        if index_object.meta["size"] > MAX_INDEX_BYTES:
             raise StorageError(f"the list of {name} in the object storage is too long to be relume's")
         try:
-            files = json.loads(bytes(found.bytes()))["files"]
-            entries = [(str(one["path"]), int(one["bytes"]), str(one["sha256"])) for one in files]
+            files = json.loads(bytes(index_object.bytes()))["files"]
+            entries = [(str(entry["path"]), int(entry["bytes"]), str(entry["sha256"])) for entry in files]
         except (ValueError, KeyError, TypeError) as error:
             raise StorageError(f"the list of {name} in the object storage is unreadable") from error
         if any({"", ".", ".."} & set(path.split("/")) for path, _, _ in entries):
@@ -182,11 +182,11 @@ class Remote:
         """Fetch one file, which appears whole; it is checked where its hash is known."""
         target.parent.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256()
-        with replacing(target) as unfinished:
-            with unfinished.open("wb") as writing:
+        with atomic_write(target) as unfinished:
+            with unfinished.open("wb") as stream:
                 for piece in obstore.get(self._store, key).stream(min_chunk_size=PIECE_BYTES):
                     digest.update(piece)
-                    writing.write(piece)
+                    stream.write(piece)
             if sha256 not in (None, digest.hexdigest()):
                 raise StorageError(f"{key} is damaged in the object storage; delete the bake and bake again")
 
@@ -206,22 +206,22 @@ def _index(name: str) -> str:
 
 
 @contextmanager
-def _named_faults() -> Iterator[None]:
+def _translate_errors() -> Iterator[None]:
     """Say what fails in words for everybody, and once in the log in those of the storage, which name addresses."""
     try:
         yield
     except (BaseError, FileNotFoundError) as error:  # what is on the list, and is not there
-        storage_away.meet(StorageError(str(error).split("\n")[0]))  # what follows is for those who debug it
+        storage_outage.report_failure(StorageError(str(error).split("\n")[0]))  # what follows is for those who debug it
         raise StorageError("the object storage cannot be used now; try again in a while") from error
-    storage_away.well()
+    storage_outage.report_recovered()
 
 
 @lru_cache(maxsize=4)
-def _remote(url: str) -> Remote:
-    return Remote(url)
+def _open_storage(url: str) -> ObjectStorage:
+    return ObjectStorage(url)
 
 
-def configured() -> Remote | None:
+def get_storage() -> ObjectStorage | None:
     """The storage that `RELUME_STORAGE` names, which worker processes inherit; None where there is none."""
     url = os.environ.get("RELUME_STORAGE", "")
-    return _remote(url) if url else None
+    return _open_storage(url) if url else None

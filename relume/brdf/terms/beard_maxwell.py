@@ -41,7 +41,7 @@ def quotient(tau, omega, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no
     return _QUARTER * (obscuration / (max(wi_z, MIN_COSINE) * max(wo_z, MIN_COSINE)))
 
 
-def facets(theta_h: F64, params: Params) -> F64:
+def ndf(theta_h: F64, params: Params) -> F64:
     """D = B / (cos θh (σ² + tan² θh)), with the B that makes ∫ D cos θh dωh one."""
     sigma2 = params["sigma"] ** 2
     a2 = 1.0 - sigma2
@@ -57,7 +57,7 @@ def reflectance(theta_d: F64, params: Params) -> F64:
     return fresnel(np.cos(theta_d), params["ior"], params["extinction"])
 
 
-def settle(params: Params) -> dict[str, Any]:
+def normalize(params: Params) -> dict[str, Any]:
     """The quotient of this much shadowing."""
     return {"quotient": partial(quotient, math.radians(params["tau"]), math.radians(params["omega"]))}
 
@@ -73,7 +73,7 @@ BEARD_MAXWELL = Term(
         Parameter("omega", "Shadowing Ω", 1.0, 180.0, 40.0, "°", "log", "From which tilt on facets are hidden."),
     ),
     curves=(
-        Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("sigma",), 256),
+        Curve("theta_h", "half angle θh", Angle.THETA_H, ndf, ("sigma",), 256),
         Curve("theta_d", "difference angle θd", Angle.THETA_D, reflectance, ("ior", "extinction"), 64),
     ),
     quotient=partial(quotient, math.radians(15.0), math.radians(40.0)),
@@ -81,6 +81,6 @@ BEARD_MAXWELL = Term(
     texture="specular",
     help="Painted surfaces as remote sensing knows them: tilted facets hide and shade each other.",
     fixed=("tau", "omega"),
-    settle=settle,
+    normalize=normalize,
     width=("sigma", 2),
 )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from relume.brdf.local import one_above
+from relume.brdf.local import hemisphere_indicator
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 
@@ -23,7 +23,7 @@ BLINN_PHONG = Term(
         Parameter("exponent", "Exponent", 1.0, 2e5, 50.0, "", "log", "Higher is a smaller, brighter highlight."),
     ),
     curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, lobe, ("exponent",), 256),),
-    quotient=one_above,
+    quotient=hemisphere_indicator,
     source="Nguyen 2010, tables 3 and 4: f = (s+2)/(2π) cos^s θh",
     texture="specular",
     help="A simple round highlight without Fresnel effect; reflects up to four times its colour at high exponents.",

@@ -15,15 +15,15 @@ import numpy as np
 
 from relume.brdf.term import Parameter, Term
 from relume.btf.average import mean_brdf
-from relume.btf.compress import MOST_COMPONENTS
-from relume.btf.eigen import F32, EigenBtf
-from relume.btf.shelf import STORE, btf
+from relume.btf.compress import MAX_COMPONENTS
+from relume.btf.eigen import F32, LocalPcaBtf
+from relume.btf.shelf import STORE, load_btf
 from relume.errors import ParameterError
-from relume.memory import stored
+from relume.memory import asset_cached
 
 
 @dataclass(frozen=True, eq=False)
-class Texels:
+class BtfRef:
     """How a surface is covered with a BTF.
 
     Attributes:
@@ -33,13 +33,13 @@ class Texels:
 
     data: str
     components: int
-    btf: EigenBtf
+    btf: LocalPcaBtf
     scale: float
     rotation: float
 
     @property
     def tables(self) -> F32:
-        """Of the BTF, see `EigenBtf.tables`; made where they are asked for first, which takes a while."""
+        """Of the BTF, see `LocalPcaBtf.tables`; made where they are asked for first, which takes a while."""
         return _tables(self.data, self.components)
 
 
@@ -47,22 +47,22 @@ def _without_data(*directions: object) -> NoReturn:
     raise ParameterError("data", None, "the data of a BTF that was imported or made")
 
 
-@stored("BTF")
-def _with_components(data: str, components: int) -> EigenBtf:
-    return btf(data).with_components(components)
+@asset_cached("BTF")
+def _with_components(data: str, components: int) -> LocalPcaBtf:
+    return load_btf(data).with_components(components)
 
 
-@stored("BTF tables")
+@asset_cached("BTF tables")
 def _tables(data: str, components: int) -> F32:
     return _with_components(data, components).tables()
 
 
-def _settle(fixed: Mapping[str, Any]) -> dict[str, Any]:
+def _normalize(fixed: Mapping[str, Any]) -> dict[str, Any]:
     data, components = fixed["data"], int(fixed["components"])
-    found, rotation = _with_components(data, components), float(np.radians(fixed["rotation"]))
+    btf, rotation = _with_components(data, components), float(np.radians(fixed["rotation"]))
     return {
-        "quotient": partial(mean_brdf, found.rings, found.average, rotation),
-        "texels": Texels(data, components, found, float(fixed["scale"]), rotation),
+        "quotient": partial(mean_brdf, btf.grid, btf.average, rotation),
+        "texels": BtfRef(data, components, btf, float(fixed["scale"]), rotation),
     }
 
 
@@ -76,8 +76,8 @@ MEASURED_BTF = Term(
             "components",
             "Quality",
             0,
-            MOST_COMPONENTS,
-            MOST_COMPONENTS,
+            MAX_COMPONENTS,
+            MAX_COMPONENTS,
             "",
             "linear",
             "Components that are summed for each texel: fewer are quicker, and nearer to the mean.",
@@ -90,7 +90,7 @@ MEASURED_BTF = Term(
     texture="diffuse",
     help="A texture that looks different from every side and in every light: cloth, pebbles, leather.",
     fixed=("scale", "rotation", "components"),
-    settle=_settle,
+    normalize=_normalize,
     num_channels=3,
     data=STORE,
 )

@@ -29,7 +29,7 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
     return _SCALE * (masking / (max(wi_z, MIN_COSINE) * max(wo_z, MIN_COSINE)))
 
 
-def facets(theta_h: F64, params: Params) -> F64:
+def ndf(theta_h: F64, params: Params) -> F64:
     """D = exp(-tan² θh / σ²) / (σ² cos⁴ θh)."""
     sigma2 = params["sigma"] ** 2
     cos2 = np.maximum(np.cos(theta_h) ** 2, 1e-30)  # at 90° the exponential wins over the vanishing cosine
@@ -50,7 +50,7 @@ COOK_TORRANCE = Term(
         Parameter("extinction", "Extinction k", 0.0, 10.0, 0.0, "", "linear", "Absorption; 0 for dielectrics."),
     ),
     curves=(
-        Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("sigma",), 256),
+        Curve("theta_h", "half angle θh", Angle.THETA_H, ndf, ("sigma",), 256),
         Curve("theta_d", "difference angle θd", Angle.THETA_D, reflectance, ("ior", "extinction"), 64),
     ),
     quotient=quotient,

@@ -32,7 +32,7 @@ def roughness_to_alpha(roughness: float) -> float:
     return roughness * roughness
 
 
-def facets(theta_h: F64, params: Params) -> F64:
+def ndf(theta_h: F64, params: Params) -> F64:
     """D = α² / (π cos⁴ θh (α² + tan² θh)²), eq. 33, Walter 2007; written without the tangent, which has a pole."""
     alpha2 = roughness_to_alpha(params["roughness"]) ** 2
     cos2 = np.cos(theta_h) ** 2
@@ -60,7 +60,7 @@ GGX = Term(
         Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "Seen head-on; 0.04 for plastic and glass."),
     ),
     curves=(
-        Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("roughness",), 256),
+        Curve("theta_h", "half angle θh", Angle.THETA_H, ndf, ("roughness",), 256),
         Curve("theta_d", "difference angle θd", Angle.THETA_D, reflectance, ("f0",), 64),
         Curve("theta_i", "light masking θi", Angle.THETA_I, masking, ("roughness",), 64),
         Curve("theta_o", "view masking θo", Angle.THETA_O, masking, ("roughness",), 64),

@@ -21,17 +21,22 @@ _NUM_RADII, _NUM_AROUND = 64, 24  # half vectors, to one side of the plane of wo
 _NUM_COSINES = 64  # of the mean
 _STEPS = 64  # of the roughness, between which E is linear
 _NUM_BANDS = 64
-_NODES = _NUM_BANDS + 1  # of the angle, where bands end: within each the curve is one polynomial, whose mean is exact
-_LEAST_MISSING = 1e-7  # of a mean: what is as smooth as that sends nothing between its facets
+_NUM_NODES = (
+    _NUM_BANDS + 1
+)  # of the angle, where bands end: within each the curve is one polynomial, whose mean is exact
+_MIN_MISSING_ENERGY = 1e-7  # of a mean: what is as smooth as that sends nothing between its facets
 _MEAN_RISE = 1 / 21  # of (1 − cos θ)⁵, weighed by the cosine
 
 
-def _sent_at_once(theta_o: F64, roughness: float) -> F64:
+def _single_scattering_albedo(theta_o: F64, roughness: float) -> F64:
     """E(θo) = ∫ D G1(θi) G1(θo) (wo·h) / cos θo dωh: of white facets. (n,) -> (n,)"""
     alpha, params = roughness_to_alpha(roughness), {"roughness": roughness}
     # tan² θh = α² u / (1 − u) spreads D cos θh evenly; u = 1 − (1 − s)³ has many in the tail, which is long
-    left = 1 - (np.arange(_NUM_RADII) + 0.5) / _NUM_RADII
-    theta_h, weight = np.arctan(alpha * np.sqrt((1 - left**3) / left**3))[:, None], 3 * left[:, None] ** 2
+    one_minus_s = 1 - (np.arange(_NUM_RADII) + 0.5) / _NUM_RADII
+    theta_h, weight = (
+        np.arctan(alpha * np.sqrt((1 - one_minus_s**3) / one_minus_s**3))[:, None],
+        3 * one_minus_s[:, None] ** 2,
+    )
     phi = np.pi * (np.arange(_NUM_AROUND) + 0.5) / _NUM_AROUND
     sine, cosine = np.sin(theta_o)[:, None, None], np.cos(theta_o)[:, None, None]
     facing = sine * np.sin(theta_h) * np.cos(phi) + cosine * np.cos(theta_h)
@@ -40,47 +45,47 @@ def _sent_at_once(theta_o: F64, roughness: float) -> F64:
     theta_i = np.arccos(np.clip(np.where(is_above, cos_i, 1), 0, 1))
     # G1(θo) / cos θo, which has a limit at the horizon
     towards = 2 / (cosine + np.sqrt(cosine**2 + (alpha * sine) ** 2))
-    sent = weight * np.where(is_above, masking(theta_i, params) * facing / np.cos(theta_h), 0) * towards
-    return np.asarray(sent.mean(axis=(1, 2)))
+    integrand = weight * np.where(is_above, masking(theta_i, params) * facing / np.cos(theta_h), 0) * towards
+    return np.asarray(integrand.mean(axis=(1, 2)))
 
 
 @lru_cache(maxsize=1)
-def _missing() -> tuple[F64, F64]:
+def _tabulate_missing_energy() -> tuple[F64, F64]:
     """1 − E at `_NODES` angles, evenly over [0, π/2], for `_STEPS` + 1 roughnesses over [0, 1], and its means."""
-    theta = np.linspace(0, np.pi / 2, _NODES)
+    theta = np.linspace(0, np.pi / 2, _NUM_NODES)
     nodes, weights = np.polynomial.legendre.leggauss(_NUM_COSINES)
     cosines = (nodes + 1) / 2
     roughness = np.linspace(0, 1, _STEPS + 1)[1:]
-    rows = np.maximum(1 - np.stack([_sent_at_once(theta, r) for r in roughness]), 0)
-    rows = np.concatenate([np.zeros((1, _NODES)), rows])
+    rows = np.maximum(1 - np.stack([_single_scattering_albedo(theta, r) for r in roughness]), 0)
+    rows = np.concatenate([np.zeros((1, _NUM_NODES)), rows])
     means = [weights @ (cosines * np.interp(np.arccos(cosines), theta, row)) for row in rows]
     return rows, np.array(means)
 
 
-def _missing_at(roughness: float) -> tuple[F64, float]:
+def _interpolate_missing_energy(roughness: float) -> tuple[F64, float]:
     """1 − E at `_NODES` angles, and its mean, at one roughness."""
-    rows, means = _missing()
-    place = float(np.clip(roughness, 0, 1)) * _STEPS
-    below = min(int(place), _STEPS - 1)
-    share = place - below
-    row, mean = ((1 - share) * values[below] + share * values[below + 1] for values in (rows, means))
+    rows, means = _tabulate_missing_energy()
+    position = float(np.clip(roughness, 0, 1)) * _STEPS
+    below = min(int(position), _STEPS - 1)
+    fraction = position - below
+    row, mean = ((1 - fraction) * values[below] + fraction * values[below + 1] for values in (rows, means))
     return np.asarray(row), float(mean)
 
 
-def kept(theta: F64, params: Params) -> F64:
+def retained_energy(theta: F64, params: Params) -> F64:
     """1 − E(θ): what facets keep of light at first, or have sent elsewhere."""
-    row, _ = _missing_at(params["roughness"])
-    return np.asarray(PchipInterpolator(np.linspace(0, np.pi / 2, _NODES), row)(theta))
+    row, _ = _interpolate_missing_energy(params["roughness"])
+    return np.asarray(PchipInterpolator(np.linspace(0, np.pi / 2, _NUM_NODES), row)(theta))
 
 
-def released(theta_o: F64, params: Params) -> F64:
+def released_energy(theta_o: F64, params: Params) -> F64:
     """F_ms (1 − E(θo)) / (1 − Ē): what comes out in the end."""
-    _, mean = _missing_at(params["roughness"])
-    if mean < _LEAST_MISSING:
+    _, mean = _interpolate_missing_energy(params["roughness"])
+    if mean < _MIN_MISSING_ENERGY:
         return np.zeros_like(theta_o)
     reflected = params["f0"] + (1 - params["f0"]) * _MEAN_RISE
-    between = reflected**2 * (1 - mean) / (1 - reflected * mean)
-    return np.asarray(between / mean * kept(theta_o, params))
+    multiple_scattering = reflected**2 * (1 - mean) / (1 - reflected * mean)
+    return np.asarray(multiple_scattering / mean * retained_energy(theta_o, params))
 
 
 GGX_MULTIPLE = Term(
@@ -91,8 +96,8 @@ GGX_MULTIPLE = Term(
         Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "That of the GGX it stands beside."),
     ),
     curves=(
-        Curve("theta_i", "light angle θi", Angle.THETA_I, kept, ("roughness",), _NUM_BANDS),
-        Curve("theta_o", "view angle θo", Angle.THETA_O, released, ("roughness", "f0"), _NUM_BANDS),
+        Curve("theta_i", "light angle θi", Angle.THETA_I, retained_energy, ("roughness",), _NUM_BANDS),
+        Curve("theta_o", "view angle θo", Angle.THETA_O, released_energy, ("roughness", "f0"), _NUM_BANDS),
     ),
     quotient=quotient,
     source="Kulla and Conty 2017: f = F_ms (1 − E(θi)) (1 − E(θo)) / (π (1 − Ē))",

@@ -9,14 +9,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from relume.brdf.local import one_above
+from relume.brdf.local import hemisphere_indicator
 from relume.brdf.term import Angle, Curve, Parameter, Params, Term
 from relume.brdf.terms.blinn_phong import lobe
 
 _LOBE = Curve("lobe", "lobe angle", Angle.LOBE, lobe, ("exponent",), 256, (-1.0, -1.0, 1.0))
 
 
-def settle(params: Params) -> dict[str, Any]:
+def normalize(params: Params) -> dict[str, Any]:
     """The curve over the lobe that C makes; all C zero make no lobe, every angle is a right one."""
     c = (params["c_x"], params["c_y"], params["c_z"])
     largest = max(map(abs, c)) or 1.0
@@ -33,11 +33,11 @@ LAFORTUNE = Term(
         Parameter("c_z", "Cz", 0.0, 1.0, 1.0, "", "linear", "Below |Cx|, the lobe leans over, off the mirror angle."),
     ),
     curves=(_LOBE,),
-    quotient=one_above,
+    quotient=hemisphere_indicator,
     source="Lafortune 1997, eq. 4, normalised by Nguyen 2010: f = (s+2)/(2π) cos^s γ",
     texture="specular",
     help="A highlight that leans away from the mirror direction, or back to the light.",
     fixed=("c_x", "c_y", "c_z"),
-    settle=settle,
+    normalize=normalize,
     width=("exponent", -4),
 )

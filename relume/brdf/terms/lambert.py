@@ -23,7 +23,7 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
     return 1.0 / math.pi
 
 
-def one(theta_i: F64, params: Params) -> F64:
+def constant(theta_i: F64, params: Params) -> F64:
     """The unedited curve: one at every angle. (...) -> (...)"""
     return np.ones_like(theta_i)
 
@@ -32,7 +32,7 @@ LAMBERT = Term(
     model="lambert",
     label="Lambert (diffuse)",
     parameters=(),
-    curves=(Curve("theta_i", "light angle θi", Angle.THETA_I, one, (), 64),),
+    curves=(Curve("theta_i", "light angle θi", Angle.THETA_I, constant, (), 64),),
     quotient=quotient,
     source="Lambert 1760: f = 1/π",
     texture="diffuse",

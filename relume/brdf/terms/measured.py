@@ -19,15 +19,15 @@ import numpy as np
 from relume.basis.bands import MAX_ANGLE
 from relume.brdf.term import F64, Angle, Curve, Params, Term
 from relume.errors import ParameterError
-from relume.measured.asset_store import STORE, material
-from relume.measured.lookup import NUM_KNOTS, THETA_D, THETA_H, THETA_I, THETA_O, Part, quotients
-from relume.memory import stored
+from relume.measured.asset_store import STORE, load_material
+from relume.measured.lookup import NUM_KNOTS, THETA_D, THETA_H, THETA_I, THETA_O, QuotientKind, measured_over_model
+from relume.memory import asset_cached
 
 _ROWS = {Angle.THETA_I: THETA_I, Angle.THETA_H: THETA_H, Angle.THETA_D: THETA_D, Angle.THETA_O: THETA_O}
 
 
 @dataclass(frozen=True, eq=False)
-class Factor:
+class MeasuredFactor:
     """A curve at its knots, linear between: along θh in the root of the angle, as the MERL grid has it.
 
     Attributes:
@@ -39,12 +39,12 @@ class Factor:
 
     def __call__(self, gamma: F64) -> F64:
         """γ in radians (...) -> (3, ...)."""
-        share = np.clip(gamma / MAX_ANGLE, 0.0, 1.0)
-        position = NUM_KNOTS * (np.sqrt(share) if self.angle is Angle.THETA_H else share)
+        fraction = np.clip(gamma / MAX_ANGLE, 0.0, 1.0)
+        position = NUM_KNOTS * (np.sqrt(fraction) if self.angle is Angle.THETA_H else fraction)
         return np.stack([np.interp(position, np.arange(NUM_KNOTS), channel) for channel in self.knots])
 
 
-def _one(gamma: F64, params: Params) -> F64:
+def _constant(gamma: F64, params: Params) -> F64:
     """The declared curve, which stands where no data are named: one at every angle."""
     return np.ones_like(gamma)
 
@@ -54,46 +54,46 @@ def _without_data(*directions: object) -> NoReturn:
 
 
 _CURVES = {
-    "theta_i": Curve("theta_i", "light angle θi", Angle.THETA_I, _one, (), 64),
-    "theta_h": Curve("theta_h", "half angle θh", Angle.THETA_H, _one, (), 256),
-    "theta_d": Curve("theta_d", "difference angle θd", Angle.THETA_D, _one, (), 64),
-    "theta_o": Curve("theta_o", "view angle θo", Angle.THETA_O, _one, (), 64),
+    "theta_i": Curve("theta_i", "light angle θi", Angle.THETA_I, _constant, (), 64),
+    "theta_h": Curve("theta_h", "half angle θh", Angle.THETA_H, _constant, (), 256),
+    "theta_d": Curve("theta_d", "difference angle θd", Angle.THETA_D, _constant, (), 64),
+    "theta_o": Curve("theta_o", "view angle θo", Angle.THETA_O, _constant, (), 64),
 }
 
 
-@stored("measured quotient")
-def _settle(part: Part, data: str) -> dict[str, Any]:
+@asset_cached("measured quotient")
+def _normalize(kind: QuotientKind, data: str) -> dict[str, Any]:
     """Quotient and curves of one material."""
-    found = material(data)
-    knots = found.homomorphic if part is Part.HOMOMORPHIC else found.lobes
-    curves = tuple(replace(c, factor=Factor(c.angle, knots[_ROWS[c.angle]])) for c in _curves_of(part))
-    return {"quotient": partial(quotients, part, found.table, knots), "curves": curves}
+    measured = load_material(data)
+    knots = measured.homomorphic if kind is QuotientKind.HOMOMORPHIC else measured.lobes
+    curves = tuple(replace(c, factor=MeasuredFactor(c.angle, knots[_ROWS[c.angle]])) for c in _declared_curves(kind))
+    return {"quotient": partial(measured_over_model, kind, measured.table, knots), "curves": curves}
 
 
-def _settled(part: Part) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    return lambda fixed: _settle(part, fixed["data"])
+def _make_normalize(kind: QuotientKind) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    return lambda fixed: _normalize(kind, fixed["data"])
 
 
-def _curves_of(part: Part) -> tuple[Curve, ...]:
+def _declared_curves(kind: QuotientKind) -> tuple[Curve, ...]:
     names = {
-        Part.DIFFUSE: ("theta_i", "theta_o"),
-        Part.SPECULAR: ("theta_h", "theta_d"),
-        Part.HOMOMORPHIC: ("theta_h", "theta_i", "theta_o"),
+        QuotientKind.DIFFUSE: ("theta_i", "theta_o"),
+        QuotientKind.SPECULAR: ("theta_h", "theta_d"),
+        QuotientKind.HOMOMORPHIC: ("theta_h", "theta_i", "theta_o"),
     }
-    return tuple(_CURVES[name] for name in names[part])
+    return tuple(_CURVES[name] for name in names[kind])
 
 
-def _term(model: str, label: str, part: Part, source: str, texture: str, text: str) -> Term:
+def _term(model: str, label: str, kind: QuotientKind, source: str, texture: str, text: str) -> Term:
     return Term(
         model=model,
         label=label,
         parameters=(),
-        curves=_curves_of(part),
+        curves=_declared_curves(kind),
         quotient=_without_data,
         source=source,
         texture=texture,
         help=text,
-        settle=_settled(part),
+        normalize=_make_normalize(kind),
         num_channels=3,
         data=STORE,
     )
@@ -102,7 +102,7 @@ def _term(model: str, label: str, part: Part, source: str, texture: str, text: s
 MEASURED_LV = _term(
     "measured_lv",
     "Measured, diffuse-like",
-    Part.DIFFUSE,
+    QuotientKind.DIFFUSE,
     "Ben-Artzi 2006, eq. 18: ρd = q g(θi) g(θo)",
     "diffuse",
     "The part of a measured material that hardly changes with the azimuth; adds up to it with measured_hd.",
@@ -110,7 +110,7 @@ MEASURED_LV = _term(
 MEASURED_HD = _term(
     "measured_hd",
     "Measured, specular-like",
-    Part.SPECULAR,
+    QuotientKind.SPECULAR,
     "Ben-Artzi 2006, eq. 18: ρs = q f(θh) f'(θd)",
     "specular",
     "The highlight of a measured material; adds up to it with measured_lv.",
@@ -118,7 +118,7 @@ MEASURED_HD = _term(
 MEASURED_HF = _term(
     "measured_hf",
     "Measured, in one product",
-    Part.HOMOMORPHIC,
+    QuotientKind.HOMOMORPHIC,
     "McCool 2001, Ben-Artzi 2006, eq. 17: ρ = q P(θi) Q(θh) P(θo)",
     "specular",
     "A whole measured material in one product; for cloth and others without two lobes.",

@@ -12,7 +12,7 @@ from typing import Any
 
 from relume.brdf.local import HALF, MIN_COSINE, ONE, ZERO, quotient_ufunc_with
 from relume.brdf.term import Angle, Curve, Parameter, Params, Term
-from relume.brdf.terms.lambert import one
+from relume.brdf.terms.lambert import constant
 
 _PER_PI, _PER_HALF_PI = 1.0 / math.pi, 2.0 / math.pi
 
@@ -38,19 +38,19 @@ def quotient(sigma, albedo, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore
     cos_phi = (wi_x * wo_x + wi_y * wo_y) / max(sines, 1e-12)
     cos_phi = min(max(cos_phi, -ONE), ONE)
     variance = sigma * sigma
-    share = variance / (variance + 0.09)
+    roughness_factor = variance / (variance + 0.09)
     low = beta * _PER_HALF_PI
     c1 = ONE - HALF * variance / (variance + 0.33)
-    c2 = 0.45 * share * (sin_alpha - (low * low * low if cos_phi < ZERO else ZERO))
-    c3 = 0.125 * share * (alpha * _PER_HALF_PI * low) ** 2
-    tan_of_half = (sin_alpha + sin_beta) / (cos_alpha + cos_beta)  # of α + β
-    once = c1 + cos_phi * c2 * sin_beta / cos_beta + c3 * (ONE - abs(cos_phi)) * tan_of_half
-    twice = albedo * 0.17 * variance / (variance + 0.13) * (ONE - cos_phi * low * low)
+    c2 = 0.45 * roughness_factor * (sin_alpha - (low * low * low if cos_phi < ZERO else ZERO))
+    c3 = 0.125 * roughness_factor * (alpha * _PER_HALF_PI * low) ** 2
+    tan_half_sum = (sin_alpha + sin_beta) / (cos_alpha + cos_beta)  # of α + β
+    single_bounce = c1 + cos_phi * c2 * sin_beta / cos_beta + c3 * (ONE - abs(cos_phi)) * tan_half_sum
+    double_bounce = albedo * 0.17 * variance / (variance + 0.13) * (ONE - cos_phi * low * low)
     # the published fit falls below zero where very rough facets are seen against grazing light
-    return _PER_PI * max(once + twice, ZERO)
+    return _PER_PI * max(single_bounce + double_bounce, ZERO)
 
 
-def settle(params: Params) -> dict[str, Any]:
+def normalize(params: Params) -> dict[str, Any]:
     """The quotient of facets this rough."""
     return {"quotient": partial(quotient, params["sigma"], params["albedo"])}
 
@@ -62,11 +62,11 @@ OREN_NAYAR = Term(
         Parameter("sigma", "Roughness σ", 0.0, 1.0, 0.5, "rad", "linear", "Deviation of slopes; 0 is Lambert."),
         Parameter("albedo", "Albedo between facets", 0.0, 1.0, 0.5, "", "linear", "Of light that is reflected twice."),
     ),
-    curves=(Curve("theta_i", "light angle θi", Angle.THETA_I, one, (), 64),),
+    curves=(Curve("theta_i", "light angle θi", Angle.THETA_I, constant, (), 64),),
     quotient=partial(quotient, 0.5, 0.5),
     source="Oren & Nayar 1994, the full model with interreflections",
     texture="diffuse",
     help="Clay, plaster, the moon: flatter than Lambert, and bright where light and eye agree.",
     fixed=("sigma", "albedo"),
-    settle=settle,
+    normalize=normalize,
 )

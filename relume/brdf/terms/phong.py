@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from relume.brdf.local import one_above
+from relume.brdf.local import hemisphere_indicator
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 
@@ -23,7 +23,7 @@ PHONG = Term(
         Parameter("exponent", "Exponent", 1.0, 1e5, 20.0, "", "log", "Higher is a smaller, brighter highlight."),
     ),
     curves=(Curve("theta_r", "mirror angle θr", Angle.THETA_R, lobe, ("exponent",), 256),),
-    quotient=one_above,
+    quotient=hemisphere_indicator,
     source="Phong 1975, as Mahajan 2008, eq. 5: f = (s+1)/(2π) cos^s θr",
     texture="specular",
     help="The oldest highlight: round at every angle, and never more light than arrives.",

@@ -27,7 +27,7 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
     return _SCALE * (ONE / (max(wi_z, MIN_COSINE) * max(wo_z, MIN_COSINE)))
 
 
-def facets(theta_h: F64, params: Params) -> F64:
+def ndf(theta_h: F64, params: Params) -> F64:
     """Z = r / (1 + r t² - t²)², t = cos θh; written with the sine, for 1 - t² loses its digits at the peak."""
     r = params["roughness"]
     return np.asarray(r / np.square(r * np.cos(theta_h) ** 2 + np.sin(theta_h) ** 2))
@@ -46,7 +46,7 @@ SCHLICK = Term(
         Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "Seen head-on; 0.04 for plastic and glass."),
     ),
     curves=(
-        Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("roughness",), 256),
+        Curve("theta_h", "half angle θh", Angle.THETA_H, ndf, ("roughness",), 256),
         Curve("theta_d", "difference angle θd", Angle.THETA_D, reflectance, ("f0",), 64),
     ),
     quotient=quotient,

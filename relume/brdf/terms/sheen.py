@@ -19,16 +19,16 @@ from relume.brdf.local import HALF, MIN_COSINE, ONE, TWO, ZERO, quotient_ufunc_w
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 from relume.uncounted import UNCOUNTED
 
-LEAST_ROUGHNESS = 0.07  # of the specification's sample implementation; less is a spike at the horizon
+MIN_ROUGHNESS = 0.07  # of the specification's sample implementation; less is a spike at the horizon
 _QUARTER = np.float32(0.25)
 # a to e of the fit at α = 0 and at α = 1 (Estevez and Kulla 2017, table 1)
-_SMOOTH = (25.3245, 3.32435, 0.16801, -1.27393, -4.85967)
-_ROUGH = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
+_FIT_SMOOTH = (25.3245, 3.32435, 0.16801, -1.27393, -4.85967)
+_FIT_ROUGH = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
 _DEFAULT = 0.5
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _hidden(a, b, c, d, e, cosine):  # type: ignore[no-untyped-def]
+def _masking(a, b, c, d, e, cosine):  # type: ignore[no-untyped-def]
     """Λ of fibres that are seen at a cosine, eq. 3: e^L(x), and about x = 1/2 its logarithm is odd."""
     x = min(cosine, ONE - cosine)
     fit = a / (ONE + b * x**c) + d * x + e
@@ -43,46 +43,49 @@ def quotient(a, b, c, d, e, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore
     """1/(4 (n·wi)(n·wo) (1 + Λ(θi) + Λ(θo))), zero at and below the horizon.
 
     Args:
-        a, b, c, d, e: of the fit, see `fit_of`.
+        a, b, c, d, e: of the fit, see `fit_coefficients`.
         wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
         wo_x, wo_y, wo_z: view direction, likewise; they broadcast.
     """
     if wi_z <= ZERO or wo_z <= ZERO:
         return ZERO
     cos_i, cos_o = min(max(wi_z, MIN_COSINE), ONE), min(max(wo_z, MIN_COSINE), ONE)
-    hidden = _hidden(a, b, c, d, e, cos_i) + _hidden(a, b, c, d, e, cos_o)
-    return _QUARTER / (cos_i * cos_o * (ONE + hidden))
+    masking = _masking(a, b, c, d, e, cos_i) + _masking(a, b, c, d, e, cos_o)
+    return _QUARTER / (cos_i * cos_o * (ONE + masking))
 
 
-def fit_of(roughness: float) -> tuple[float, ...]:
+def fit_coefficients(roughness: float) -> tuple[float, ...]:
     """a to e of Λ at a roughness."""
-    share = (1 - roughness**2) ** 2
-    return tuple(share * one + (1 - share) * other for one, other in zip(_SMOOTH, _ROUGH, strict=True))
+    smooth_weight = (1 - roughness**2) ** 2
+    return tuple(
+        smooth_weight * smooth + (1 - smooth_weight) * rough
+        for smooth, rough in zip(_FIT_SMOOTH, _FIT_ROUGH, strict=True)
+    )
 
 
-def fibres(theta_h: F64, params: Params) -> F64:
+def sheen_distribution(theta_h: F64, params: Params) -> F64:
     """D, in 1/sr, of the width α = roughness²."""
     exponent = 1 / params["roughness"] ** 2
     return np.asarray((2 + exponent) * np.sin(theta_h) ** exponent / (2 * np.pi))
 
 
-def settle(params: Params) -> dict[str, Any]:
+def normalize(params: Params) -> dict[str, Any]:
     """The quotient of fibres this rough."""
-    return {"quotient": partial(quotient, *fit_of(params["roughness"]))}
+    return {"quotient": partial(quotient, *fit_coefficients(params["roughness"]))}
 
 
 SHEEN = Term(
     model="sheen",
     label="Sheen (velvet)",
     parameters=(
-        Parameter("roughness", "Roughness", LEAST_ROUGHNESS, 1.0, _DEFAULT, "", "linear", "Less is a narrower rim."),
+        Parameter("roughness", "Roughness", MIN_ROUGHNESS, 1.0, _DEFAULT, "", "linear", "Less is a narrower rim."),
     ),
-    curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, fibres, ("roughness",), 256),),
-    quotient=partial(quotient, *fit_of(_DEFAULT)),
+    curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, sheen_distribution, ("roughness",), 256),),
+    quotient=partial(quotient, *fit_coefficients(_DEFAULT)),
     source="Estevez & Kulla 2017: f = D / (4 (n·wi)(n·wo) (1 + Λ(θi) + Λ(θo)))",
     texture="specular",
     help="The bright rim of velvet: fibres that scatter light at grazing angles. The sheen of glTF materials.",
     fixed=("roughness",),
-    settle=settle,
+    normalize=normalize,
     is_steep=True,
 )

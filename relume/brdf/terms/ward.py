@@ -24,23 +24,23 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
     return ONE / math.sqrt(max(wi_z, MIN_COSINE) * max(wo_z, MIN_COSINE))
 
 
-def gaussian(angle: F64, alpha: float) -> F64:
+def slope_distribution(angle: F64, alpha: float) -> F64:
     """exp(-tan² γ / α²), zero at a right angle."""
     cos2 = np.maximum(np.cos(angle) ** 2, 1e-30)  # there the exponential wins over the vanishing cosine
     return np.asarray(np.exp(-(1.0 - cos2) / (cos2 * alpha * alpha)))
 
 
-def facets(theta_h: F64, params: Params) -> F64:
+def ndf(theta_h: F64, params: Params) -> F64:
     """exp(-tan² θh / α²) / (4π α²)."""
     alpha = params["alpha"]
-    return gaussian(theta_h, alpha) / (4.0 * math.pi * alpha * alpha)
+    return slope_distribution(theta_h, alpha) / (4.0 * math.pi * alpha * alpha)
 
 
 WARD = Term(
     model="ward",
     label="Ward",
     parameters=(Parameter("alpha", "Width α", 0.005, 2.0, 0.15, "", "log", "Root-mean-square slope of the surface."),),
-    curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("alpha",), 256),),
+    curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, ndf, ("alpha",), 256),),
     quotient=quotient,
     source="Ward 1992, eq. 4: f = exp(-tan² θh / α²) / (4π α² √((n·wi)(n·wo)))",
     texture="specular",

@@ -9,19 +9,19 @@ from __future__ import annotations
 import math
 
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
-from relume.brdf.terms.ward import gaussian, quotient
+from relume.brdf.terms.ward import quotient, slope_distribution
 
 _SCALE = 1.0 / math.sqrt(4.0 * math.pi)
 
 
 def lobe_x(tilt_x: F64, params: Params) -> F64:
     """exp(-tan² γx / αx²) / (√(4π) αx): along the tangent."""
-    return gaussian(tilt_x, params["alpha_x"]) * (_SCALE / params["alpha_x"])
+    return slope_distribution(tilt_x, params["alpha_x"]) * (_SCALE / params["alpha_x"])
 
 
 def lobe_y(tilt_y: F64, params: Params) -> F64:
     """exp(-tan² γy / αy²) / (√(4π) αy): across the tangent."""
-    return gaussian(tilt_y, params["alpha_y"]) * (_SCALE / params["alpha_y"])
+    return slope_distribution(tilt_y, params["alpha_y"]) * (_SCALE / params["alpha_y"])
 
 
 WARD_ANISOTROPIC = Term(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from relume.brdf.local import MIN_COSINE, ONE, ZERO, quotient_ufunc
 from relume.brdf.term import Angle, Curve, Parameter, Term
-from relume.brdf.terms.ward import facets
+from relume.brdf.terms.ward import ndf
 
 
 @quotient_ufunc
@@ -25,7 +25,7 @@ WARD_DUER = Term(
     model="ward_duer",
     label="Ward–Dür",
     parameters=(Parameter("alpha", "Width α", 0.005, 2.0, 0.15, "", "log", "Root-mean-square slope of the surface."),),
-    curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, facets, ("alpha",), 256),),
+    curves=(Curve("theta_h", "half angle θh", Angle.THETA_H, ndf, ("alpha",), 256),),
     quotient=quotient,
     source="Dür 2006: f = exp(-tan² θh / α²) / (4π α² (n·wi)(n·wo))",
     texture="specular",

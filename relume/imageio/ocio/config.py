@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.errors import ParameterError
-from relume.imageio.ocio.lut import LAYOUT, bake
+from relume.imageio.ocio.lut import LAYOUT, build_lut
 from relume.imageio.ocio.view import OcioView
 from relume.parallel import for_ranges
 
@@ -31,8 +31,8 @@ _NAMES = (  # of linear Rec. 709: the interop id, then what configs called it be
     "Linear Rec.709 (sRGB)", "Linear Rec.709", "Utility - Linear - Rec.709", "Utility - Linear - sRGB",
 )  # fmt: skip
 _BUILT_IN, _BUILT_IN_SPACE = "ocio://cg-config-latest", "lin_rec709_scene"
-_TABLES_KEPT = 8  # 1.6 MB each
-_ROWS_AT_ONCE = 1 << 14
+_NUM_CACHED_TABLES = 8  # 1.6 MB each
+_ROWS_PER_RANGE = 1 << 14
 
 
 class Config:
@@ -53,10 +53,10 @@ class Config:
             ParameterError: the config cannot be used.
         """
         self._ocio = ocio = _module()
-        self._config = _read(ocio, source)
+        self._config = _read_config(ocio, source)
         self.name = str(self._config.getName() or os.path.basename(source))
-        made_by = f"{self._config.getCacheID()} {ocio.__version__} {LAYOUT}"
-        self.id = hashlib.sha256(made_by.encode()).hexdigest()[:16]
+        fingerprint = f"{self._config.getCacheID()} {ocio.__version__} {LAYOUT}"
+        self.id = hashlib.sha256(fingerprint.encode()).hexdigest()[:16]
         self.displays: Mapping[str, tuple[str, ...]] = {
             str(display): tuple(map(str, self._config.getViews(display))) for display in self._config.getDisplays()
         }
@@ -65,11 +65,13 @@ class Config:
         if not self.displays.get(display):
             raise ParameterError("RELUME_OCIO", source, "a config that has displays, and views of them")
         self.working = _working_space(ocio, self._config, working)
-        self._table = lru_cache(_TABLES_KEPT)(self._baked)
+        self._table = lru_cache(_NUM_CACHED_TABLES)(self._build_table)
         try:
             self._processor(self._to_view(self.default))
         except _failures(ocio) as error:
-            raise ParameterError("RELUME_OCIO", source, f"a config whose default view works: {_said(error)}") from None
+            raise ParameterError(
+                "RELUME_OCIO", source, f"a config whose default view works: {_error_text(error)}"
+            ) from None
 
     @cached_property
     def spaces(self) -> tuple[str, ...]:
@@ -86,11 +88,11 @@ class Config:
     def check_view(self, view: OcioView) -> None:
         """Raise ParameterError unless it is one of the config's."""
         if view.display not in self.displays:
-            raise ParameterError("display", view.display, f"one of {_list(self.displays)}")
+            raise ParameterError("display", view.display, f"one of {_join_names(self.displays)}")
         if view.view not in self.displays[view.display]:
-            raise ParameterError("view", view.view, f"one of {_list(self.displays[view.display])}")
+            raise ParameterError("view", view.view, f"one of {_join_names(self.displays[view.display])}")
 
-    def space_of(self, name: str) -> str:
+    def canonical_space(self, name: str) -> str:
         """The config's name of a linear colour space.
 
         Args:
@@ -98,25 +100,27 @@ class Config:
         Raises:
             ParameterError: the config has none that is called so.
         """
-        found = str(self._config.getCanonicalName(name))
-        if found not in self.spaces:
-            raise ParameterError("color_space", name, f"a linear colour space of the config: {_list(self.spaces)}")
-        return found
+        canonical_name = str(self._config.getCanonicalName(name))
+        if canonical_name not in self.spaces:
+            raise ParameterError(
+                "color_space", name, f"a linear colour space of the config: {_join_names(self.spaces)}"
+            )
+        return canonical_name
 
-    def show(self, pixels: F32, view: OcioView, *, quick: bool = False) -> None:
+    def apply_view(self, pixels: F32, view: OcioView, *, use_table: bool = False) -> None:
         """Turn light into what a display is sent, in place.
 
         Args:
             pixels: linear Rec. 709, C-contiguous. (n, 3)
-            quick: by the view's table, in a third of the time, as the editor shows it.
+            use_table: by the view's table, in a third of the time, as the editor shows it.
         Raises:
             ParameterError: the config has no such view, or it does not work.
         """
         self.check_view(view)
-        if quick:
-            from relume.imageio.ocio.sampling import show_by  # compiled
+        if use_table:
+            from relume.imageio.ocio.sampling import apply_lut  # compiled
 
-            return show_by(self.table(view), pixels)
+            return apply_lut(self.table(view), pixels)
         return self._apply(self._to_view(view), pixels, f"the view {view.view!r} of {view.display!r}")
 
     def convert(self, pixels: F32, space: str) -> None:
@@ -124,7 +128,7 @@ class Config:
 
         Args:
             pixels: linear Rec. 709, C-contiguous. (n, 3)
-            space: as `space_of` names it.
+            space: as `canonical_space` names it.
         Raises:
             ParameterError: the conversion does not work.
         """
@@ -132,17 +136,17 @@ class Config:
         self._apply(transform, pixels, f"the colour space {space!r}")
 
     def primaries(self, space: str) -> F64:
-        """What red, green and blue of a linear colour space, as `space_of` names it, are in ours. (3, 3), columns"""
-        ours = np.eye(3, dtype=np.float32)
-        self.convert(ours, space)
-        return np.asarray(np.linalg.inv(ours.T.astype(np.float64)))
+        """The primaries of a linear colour space, as `canonical_space` names it, in ours. (3, 3), columns"""
+        rgb_axes = np.eye(3, dtype=np.float32)
+        self.convert(rgb_axes, space)
+        return np.asarray(np.linalg.inv(rgb_axes.T.astype(np.float64)))
 
     def table(self, view: OcioView) -> NDArray[np.uint16]:
         """The view as a table, see `relume.imageio.ocio.lut`. (N, N, N, 3) Raises ParameterError."""
         return self._table(view)
 
-    def _baked(self, view: OcioView) -> NDArray[np.uint16]:
-        return bake(lambda pixels: self.show(pixels, view))
+    def _build_table(self, view: OcioView) -> NDArray[np.uint16]:
+        return build_lut(lambda pixels: self.apply_view(pixels, view))
 
     def _to_view(self, view: OcioView) -> Any:
         return self._ocio.DisplayViewTransform(src=self.working, display=view.display, view=view.view)
@@ -150,14 +154,14 @@ class Config:
     def _processor(self, transform: Any) -> Any:
         return self._config.getProcessor(transform).getDefaultCPUProcessor()
 
-    def _apply(self, transform: Any, pixels: F32, what: str) -> None:
+    def _apply(self, transform: Any, pixels: F32, label: str) -> None:
         try:
             processor = self._processor(transform)  # the config keeps them
         except _failures(self._ocio) as error:
-            log.warning("%s does not work: %s", what, error)
+            log.warning("%s does not work: %s", label, error)
             allowed = "another: a file that it needs is missing or damaged, the server's log says which"
-            raise ParameterError("color", what, allowed) from None
-        for_ranges(lambda start, stop: processor.applyRGB(pixels[start:stop]), len(pixels), _ROWS_AT_ONCE)
+            raise ParameterError("color", label, allowed) from None
+        for_ranges(lambda start, stop: processor.applyRGB(pixels[start:stop]), len(pixels), _ROWS_PER_RANGE)
 
 
 def _module() -> Any:
@@ -172,15 +176,15 @@ def _failures(ocio: Any) -> tuple[type[Exception], ...]:
     return ocio.Exception, ocio.ExceptionMissingFile, UnicodeError  # its words about what is no text are none either
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return " ".join(str(error).split())[:400]
 
 
-def _list(names: Any) -> str:
+def _join_names(names: Any) -> str:
     return ", ".join(names)[:400]
 
 
-def _read(ocio: Any, source: str) -> Any:
+def _read_config(ocio: Any, source: str) -> Any:
     allowed = "the path of a .ocio or .ocioz file, the name of a built-in config (ocio://studio-config-latest), or none"
     path = source if source.startswith("ocio://") else os.path.abspath(source)
     if path is not source and not os.path.isfile(path):
@@ -188,20 +192,20 @@ def _read(ocio: Any, source: str) -> Any:
     try:
         config = ocio.Config.CreateFromFile(path)
     except _failures(ocio) as error:
-        raise ParameterError("RELUME_OCIO", source, f"{allowed}; {_said(error)}") from None
+        raise ParameterError("RELUME_OCIO", source, f"{allowed}; {_error_text(error)}") from None
     try:
         config.validate()
     except _failures(ocio) as error:  # many that work well have faults
-        log.warning("the OpenColorIO config %s is not valid: %s", source, _said(error))
+        log.warning("the OpenColorIO config %s is not valid: %s", source, _error_text(error))
     return config
 
 
-def _working_space(ocio: Any, config: Any, asked: str | None) -> str:
+def _working_space(ocio: Any, config: Any, requested: str | None) -> str:
     """The config's name of linear Rec. 709. Raises ParameterError."""
-    if asked is not None:
-        space = config.getColorSpace(asked)
+    if requested is not None:
+        space = config.getColorSpace(requested)
         if space is None or space.isData():
-            raise ParameterError("RELUME_OCIO_SPACE", asked, "a colour space of the config")
+            raise ParameterError("RELUME_OCIO_SPACE", requested, "a colour space of the config")
         return str(space.getName())
     for name in _NAMES:
         if (space := config.getColorSpace(name)) is not None:
@@ -210,6 +214,6 @@ def _working_space(ocio: Any, config: Any, asked: str | None) -> str:
         built_in = ocio.Config.CreateFromFile(_BUILT_IN)
         return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, _BUILT_IN_SPACE))
     except _failures(ocio):
-        known = _list(str(space.getName()) for space in config.getColorSpaces())
-        allowed = f"the config's name of linear Rec. 709, which cannot be told from what it holds: {known}"
+        names = _join_names(str(space.getName()) for space in config.getColorSpaces())
+        allowed = f"the config's name of linear Rec. 709, which cannot be told from what it holds: {names}"
         raise ParameterError("RELUME_OCIO_SPACE", None, allowed) from None

@@ -8,43 +8,43 @@ from contextlib import contextmanager
 from relume.errors import ParameterError
 from relume.imageio.ocio.config import Config
 
-_told: tuple[str, str | None] | None = None
-_opened: Config | None = None
+_requested: tuple[str, str | None] | None = None
+_active_config: Config | None = None
 
 
-def use(source: str | None, working: str | None = None) -> None:
+def use_config(source: str | None, working: str | None = None) -> None:
     """Use a config from now on, as `Config` takes it; None: none."""
-    global _told, _opened
-    _told, _opened = None if source is None else (source, working), None
+    global _requested, _active_config
+    _requested, _active_config = None if source is None else (source, working), None
 
 
 @contextmanager
-def using(source: str | None, working: str | None = None) -> Iterator[None]:
+def using_config(source: str | None, working: str | None = None) -> Iterator[None]:
     """The same for as long as the block runs."""
-    before = _told
-    use(source, working)
+    previous = _requested
+    use_config(source, working)
     try:
         yield
     finally:
-        use(*before or (None,))
+        use_config(*previous or (None,))
 
 
-def source() -> tuple[str, ...]:
+def config_source() -> tuple[str, ...]:
     """What `use` was told, for another process that is to use the same; nothing where there is none."""
-    return () if _told is None else tuple(part for part in _told if part is not None)
+    return () if _requested is None else tuple(value for value in _requested if value is not None)
 
 
-def current() -> Config | None:
+def get_config() -> Config | None:
     """The config in use; None where there is none. Raises ParameterError where it cannot be read."""
-    global _opened
-    if _told is not None and _opened is None:
-        _opened = Config(*_told)
-    return _opened
+    global _active_config
+    if _requested is not None and _active_config is None:
+        _active_config = Config(*_requested)
+    return _active_config
 
 
-def needed() -> Config:
+def require_config() -> Config:
     """The config in use. Raises ParameterError where there is none."""
-    config = current()
+    config = get_config()
     if config is None:
         raise ParameterError("RELUME_OCIO", "not set", "an OpenColorIO config, which this needs")
     return config

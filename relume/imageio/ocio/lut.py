@@ -29,21 +29,21 @@ LAYOUT = f"roots {SIZE} {GAIN}"
 _CHANNELS = np.arange(3)
 
 
-def bake(show: Callable[[F32], None]) -> U16:
+def build_lut(apply_view: Callable[[F32], None]) -> U16:
     """The table of a view.
 
     Args:
-        show: turns linear light into display values, in place. (n, 3)
+        apply_view: turns linear light into display values, in place. (n, 3)
     Returns:
         Display values, 65535 for 1; red is the slowest. (N, N, N, 3) uint16
     """
     light = (np.expm1(2 * np.log1p(GAIN) * np.arange(SIZE) / (SIZE - 1)) / GAIN) ** 2
     nodes = np.stack(np.meshgrid(light, light, light, indexing="ij"), axis=-1).astype(np.float32)
-    show(nodes.reshape(-1, 3))
+    apply_view(nodes.reshape(-1, 3))
     return np.asarray(np.clip(np.nan_to_num(nodes), 0, 1) * 65535 + 0.5, np.uint16)
 
 
-def sample(table: U16, light: F32) -> F64:
+def sample_lut(table: U16, light: F32) -> F64:
     """Display values by a table: the twin of the editor's shader.
 
     Args:
@@ -51,15 +51,17 @@ def sample(table: U16, light: F32) -> F64:
         light: linear, after exposure. (n, 3)
     """
     roots = np.sqrt(np.maximum(light.astype(np.float64), 0))
-    place = np.minimum(np.log1p(GAIN * roots) / (2 * np.log1p(GAIN)), 1) * (SIZE - 1)
-    node = np.minimum(place.astype(int), SIZE - 2)
-    part = place - node
-    order = np.argsort(-part, axis=1, kind="stable")  # from the corner at 0 along the longest part first, to that at 1
-    steps = np.take_along_axis(part, order, axis=1)
+    position = np.minimum(np.log1p(GAIN * roots) / (2 * np.log1p(GAIN)), 1) * (SIZE - 1)
+    node = np.minimum(position.astype(int), SIZE - 2)
+    fraction = position - node
+    order = np.argsort(
+        -fraction, axis=1, kind="stable"
+    )  # from the corner at 0 along the longest part first, to that at 1
+    steps = np.take_along_axis(fraction, order, axis=1)
     weights = -np.diff(steps, axis=1, prepend=1, append=0)  # of the four corners
-    shown = np.zeros(light.shape)
+    display = np.zeros(light.shape)
     for k in range(4):
-        shown += weights[:, k, None] * table[tuple(node.T)]
+        display += weights[:, k, None] * table[tuple(node.T)]
         if k < 3:
             node += order[:, k, None] == _CHANNELS
-    return shown / 65535
+    return display / 65535

@@ -27,14 +27,14 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.fresnel import fresnel, schlick
 from relume.brdf.registry import TERMS
 from relume.color import srgb_encode
-from relume.look.library.materials import DATA, terms_of
+from relume.look.library.materials import DATA, make_preset_terms
 
 Fit = Mapping[str, Any]
 Params = dict[str, float]
 
 MERL_CHANNEL_SCALE = (1.0, 1.15, 1.66)
-_LARGEST = 10.0  # η and k that `cook_torrance` allows
-_HIGHEST = 0.96  # F head-on at η = 1 and a k just below that
+_MAX_INDEX = 10.0  # η and k that `cook_torrance` allows
+_MAX_F0 = 0.96  # F head-on at η = 1 and a k just below that
 _DIGITS = 5
 
 GROUPS = {
@@ -47,27 +47,27 @@ GROUPS = {
 }
 
 
-def conductor_of(f0: float) -> tuple[float, float, float]:
+def fit_conductor(f0: float) -> tuple[float, float, float]:
     """η, k and a gain so that gain · F(η, k) is f0 seen head-on and as near as can be to Schlick's curve up to 80°.
 
     The exact curve of a strong dielectric dips before it rises, Schlick's does not: a conductor follows it better. What
     no conductor with k ≤ 10 reflects is gain.
     """
-    reached = min(f0, _HIGHEST)
-    root = math.sqrt(reached)
+    clamped_f0 = min(f0, _MAX_F0)
+    root = math.sqrt(clamped_f0)
     dielectric = (1.0 + root) / (1.0 - root)
     cosine = np.cos(np.radians(np.arange(0.0, 81.0, 4.0)))
-    found = (math.inf, 1.0, 0.0)
-    for ior in np.linspace(1.0, min(dielectric, _LARGEST), 200):
-        extinction = math.sqrt(max(reached * (ior + 1.0) ** 2 - (ior - 1.0) ** 2, 0.0) / (1.0 - reached))
-        if extinction <= _LARGEST:
-            error = float(np.abs(fresnel(cosine, ior, extinction) - schlick(cosine, reached)).max())
-            found = min(found, (error, float(ior), extinction))
-    return found[1], found[2], f0 / reached
+    best = (math.inf, 1.0, 0.0)
+    for ior in np.linspace(1.0, min(dielectric, _MAX_INDEX), 200):
+        extinction = math.sqrt(max(clamped_f0 * (ior + 1.0) ** 2 - (ior - 1.0) ** 2, 0.0) / (1.0 - clamped_f0))
+        if extinction <= _MAX_INDEX:
+            error = float(np.abs(fresnel(cosine, ior, extinction) - schlick(cosine, clamped_f0)).max())
+            best = min(best, (error, float(ior), extinction))
+    return best[1], best[2], f0 / clamped_f0
 
 
 def _ngan_cook_torrance(fit: Fit) -> tuple[float, Params]:
-    ior, extinction, gain = conductor_of(fit["eta"])
+    ior, extinction, gain = fit_conductor(fit["eta"])
     return 4.0 / math.pi * gain, {"sigma": fit["roughness"], "ior": ior, "extinction": extinction}
 
 
@@ -103,30 +103,32 @@ CONVERSIONS: dict[str, tuple[str, Callable[[Fit], tuple[float, Params]]]] = {
 }
 
 
-def converted(table: str, fit: Mapping[str, Fit]) -> list[float] | None:
+def convert_row(table: str, fit: Mapping[str, Fit]) -> list[float] | None:
     """Numbers of one material: diffuse RGB, highlight RGB, parameters in the order of the term's declaration.
 
     Returns:
         None where a parameter lies outside what the term allows.
     """
     model, convert = CONVERSIONS[table]
-    diffuse, highlight = (np.array(part["albedo"]) for part in fit.values())
+    diffuse, highlight = (np.array(lobe["albedo"]) for lobe in fit.values())
     scale = np.array(MERL_CHANNEL_SCALE if table.startswith("ngan") else (1.0, 1.0, 1.0))
     factor, params = convert(list(fit.values())[1])
-    declared = TERMS[model].parameters
-    rounded = [float(f"{params[p.name]:.{_DIGITS}g}") for p in declared]
-    if any(not p.minimum <= value <= p.maximum for p, value in zip(declared, rounded, strict=True)):
+    parameters = TERMS[model].parameters
+    rounded_params = [float(f"{params[p.name]:.{_DIGITS}g}") for p in parameters]
+    if any(not p.minimum <= value <= p.maximum for p, value in zip(parameters, rounded_params, strict=True)):
         return None
     colors = [*(diffuse * scale), *(highlight * scale * factor)]
-    return [float(f"{value:.{_DIGITS}g}") for value in colors] + rounded
+    return [float(f"{value:.{_DIGITS}g}") for value in colors] + rounded_params
 
 
-def group_of(material: str) -> str:
+def material_group(material: str) -> str:
     """What a material is made of, by its name: a key of `GROUPS`, or metal."""
-    return next((group for group, words in GROUPS.items() if any(word in material for word in words)), "metal")
+    return next(
+        (group for group, keywords in GROUPS.items() if any(keyword in material for keyword in keywords)), "metal"
+    )
 
 
-def swatch_of(terms: list[dict[str, Any]]) -> str:
+def compute_swatch(terms: list[dict[str, Any]]) -> str:
     """Colour under even light, seen at 45 degrees, as "#rrggbb"."""
     edges = np.concatenate([[0.0], np.geomspace(1e-3, np.pi / 2, 120)])
     theta, phi = np.meshgrid(0.5 * (edges[1:] + edges[:-1]), (np.arange(48) + 0.5) * (np.pi / 24), indexing="ij")
@@ -147,11 +149,14 @@ def convert_all(fits: Mapping[str, Mapping[str, Mapping[str, Fit]]]) -> dict[str
     tables: dict[str, Any] = {}
     materials: dict[str, Any] = {}
     for table, (model, _) in CONVERSIONS.items():
-        rows = {name: numbers for name, fit in fits[table].items() if (numbers := converted(table, fit)) is not None}
+        rows = {name: numbers for name, fit in fits[table].items() if (numbers := convert_row(table, fit)) is not None}
         tables[table] = {"model": model, "materials": dict(sorted(rows.items()))}
         for name, numbers in rows.items():
             if name not in materials:
-                materials[name] = {"group": group_of(name), "swatch": swatch_of(terms_of(model, numbers))}
+                materials[name] = {
+                    "group": material_group(name),
+                    "swatch": compute_swatch(make_preset_terms(model, numbers)),
+                }
     return {"materials": dict(sorted(materials.items())), "tables": tables}
 
 

@@ -40,7 +40,7 @@ class Preset:
     terms: list[dict[str, Any]]
 
 
-def terms_of(model: str, numbers: list[float]) -> list[dict[str, Any]]:
+def make_preset_terms(model: str, numbers: list[float]) -> list[dict[str, Any]]:
     """Terms of one row: diffuse RGB, highlight RGB, the model's parameters in their order."""
     names = [parameter.name for parameter in TERMS[model].parameters]
     params = dict(zip(names, numbers[6:], strict=True))
@@ -53,10 +53,10 @@ def terms_of(model: str, numbers: list[float]) -> list[dict[str, Any]]:
 @cache
 def presets() -> tuple[Preset, ...]:
     """Every material of the library under every model that was fitted to it."""
-    return presets_of(json.loads(DATA.read_text(encoding="utf-8")))
+    return read_presets(json.loads(DATA.read_text(encoding="utf-8")))
 
 
-def presets_of(data: dict[str, Any]) -> tuple[Preset, ...]:
+def read_presets(data: dict[str, Any]) -> tuple[Preset, ...]:
     """The presets of a data file's content."""
     return tuple(
         Preset(
@@ -66,7 +66,7 @@ def presets_of(data: dict[str, Any]) -> tuple[Preset, ...]:
             model=rows["model"],
             source=SOURCES[table.partition("_")[0]],
             swatch=data["materials"][material]["swatch"],
-            terms=terms_of(rows["model"], numbers),
+            terms=make_preset_terms(rows["model"], numbers),
         )
         for table, rows in data["tables"].items()
         for material, numbers in rows["materials"].items()

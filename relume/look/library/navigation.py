@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from relume.errors import ParameterError
-from relume.look.library.materials import Preset, presets, terms_of
+from relume.look.library.materials import Preset, make_preset_terms, presets
 
 F64 = NDArray[np.float64]
 
@@ -47,10 +47,12 @@ class NavigationMap:
         if not (math.isfinite(f0) and math.isfinite(sigma) and sigma > 0):
             raise ParameterError("point", (f0, sigma), "f0 and σ as numbers, σ above zero")
         corners, weights = self._barycentric(np.array([f0, math.log(sigma)]))
-        points = weights @ self._corners[corners]
+        position = weights @ self._corners[corners]
         rows = np.array([_numbers(self.presets[k]) for k in corners])
         colors = weights @ rows[:, :6]
-        return terms_of("cook_torrance", [*map(float, colors), math.exp(points[1]), ior_of(float(points[0])), 0.0])
+        return make_preset_terms(
+            "cook_torrance", [*map(float, colors), math.exp(position[1]), ior_from_reflectance(float(position[0])), 0.0]
+        )
 
     def _barycentric(self, point: F64) -> tuple[NDArray[np.int64], F64]:
         """Corners and weights of the triangle that holds a point, or of the one nearest to it."""
@@ -69,17 +71,17 @@ class NavigationMap:
         """The nearest point of any edge: outside the hull, that is one of the hull's."""
         pairs = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
         start, along = self._corners[pairs[:, 0]], self._corners[pairs[:, 1]] - self._corners[pairs[:, 0]]
-        share = np.clip(np.einsum("ec,ec->e", point - start, along) / np.einsum("ec,ec->e", along, along), 0.0, 1.0)
-        best = int(np.argmin(np.linalg.norm(start + share[:, None] * along - point, axis=1)))
-        return pairs[best], np.array([1.0 - share[best], share[best]])
+        fraction = np.clip(np.einsum("ec,ec->e", point - start, along) / np.einsum("ec,ec->e", along, along), 0.0, 1.0)
+        best = int(np.argmin(np.linalg.norm(start + fraction[:, None] * along - point, axis=1)))
+        return pairs[best], np.array([1.0 - fraction[best], fraction[best]])
 
 
-def reflectance_of(ior: float) -> float:
+def reflectance_from_ior(ior: float) -> float:
     """F0, seen head-on, of a refractive index of at least 1."""
     return float(((ior - 1) / (ior + 1)) ** 2)
 
 
-def ior_of(f0: float) -> float:
+def ior_from_reflectance(f0: float) -> float:
     """The refractive index of a reflectance below 1."""
     root = math.sqrt(f0)
     return (1 + root) / (1 - root)
@@ -93,14 +95,14 @@ def _numbers(preset: Preset) -> list[float]:
 @cache
 def navigation_map() -> NavigationMap:
     """The map of the library's Cook–Torrance materials."""
-    found = tuple(preset for preset in presets() if preset.id.startswith(_TABLE + "/"))
-    params = [preset.terms[1]["params"] for preset in found]
-    f0 = np.array([reflectance_of(p["ior"]) for p in params])
+    map_presets = tuple(preset for preset in presets() if preset.id.startswith(_TABLE + "/"))
+    params = [preset.terms[1]["params"] for preset in map_presets]
+    f0 = np.array([reflectance_from_ior(p["ior"]) for p in params])
     sigma = np.array([p["sigma"] for p in params])
     corners = np.column_stack([f0, np.log(sigma)])
     # triangles as round as they can be where both axes are as long
     triangles = Delaunay(corners / np.ptp(corners, axis=0)).simplices.astype(np.int64)
     a, b, c = (corners[triangles[:, k]] for k in range(3))
-    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    triangles[turn < 0] = triangles[turn < 0][:, [0, 2, 1]]
-    return NavigationMap(found, f0, sigma, triangles, corners)
+    orientation = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    triangles[orientation < 0] = triangles[orientation < 0][:, [0, 2, 1]]
+    return NavigationMap(map_presets, f0, sigma, triangles, corners)

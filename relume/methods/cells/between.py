@@ -15,97 +15,142 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.methods.cells.bounces import bounce, bounced, preview_bounced
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.leaving import NOTHING, InLobes, Leaving, padded, sent_once
-from relume.methods.cells.quick import arriving_quickly
-from relume.methods.cells.reflecting import Arrived, Reflecting
+from relume.methods.cells.bounces import bounces, one_bounce, preview_bounces
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.leaving import EMPTY_BINS, OutgoingHighlights, OutgoingRadiance, first_bounce, pad
+from relume.methods.cells.quick import incident_fast
+from relume.methods.cells.reflecting import IncidentLight, ReflectanceOperator
 
 F32 = NDArray[np.float32]
 
-_DIRECTED, _MOST_DIRECTED = 2, 4  # reflections
-_LITTLE = 0.1  # of the light, that highlights have sent on each time
+_MIN_DIRECTIONAL_BOUNCES, _MAX_DIRECTIONAL_BOUNCES = 2, 4  # reflections
+_ENERGY_CUTOFF = 0.1  # of the light, that highlights have sent on each time
 
 
-def sent_between(
-    cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int, in_lobes: InLobes | None = None
-) -> Leaving:
+def solve_indirect(
+    patches: PatchLight,
+    reflectance_operator: ReflectanceOperator,
+    incident: IncidentLight,
+    first: int,
+    last: int,
+    outgoing_highlights: OutgoingHighlights | None = None,
+) -> OutgoingRadiance:
     """What every cell sends out of light that surfaces have reflected `first` to `last` times, its own included.
 
     Args:
-        cells: that send it. reflecting: what they make of light.
-        arrived: from the lights. first: at least 1. last: not less.
-        in_lobes: sharp highlights, and what they send of it; None: functions say it.
+        patches: that send it. reflectance_operator: what they make of light.
+        incident: from the lights. first: at least 1. last: not less.
+        outgoing_highlights: sharp highlights, and what they send of it; None: functions say it.
     """
-    links, rho = cells.links, reflecting.reflectance
+    gather_hits, rho = patches.gather_hits, reflectance_operator.reflectance
 
-    def again(now: Leaving) -> Leaving:
-        return sent_once(reflecting, cells.arriving(now.sent(cells, to_narrow_lobes=False), now.rows))
+    def reflect(outgoing: OutgoingRadiance) -> OutgoingRadiance:
+        return first_bounce(
+            reflectance_operator,
+            patches.incident_light(outgoing.outgoing_light(patches, to_narrow_lobes=False), outgoing.rows),
+        )
 
-    once = sent_once(reflecting, arrived, in_lobes)
-    return _between(cells, reflecting, once, first, last, again, lambda even, num: bounced(links, rho, even, num))
+    first_outgoing = first_bounce(reflectance_operator, incident, outgoing_highlights)
+    return _sum_bounces(
+        patches,
+        reflectance_operator,
+        first_outgoing,
+        first,
+        last,
+        reflect,
+        lambda even, num: bounces(gather_hits, rho, even, num),
+    )
 
 
-def _num_directed(reflecting: Reflecting) -> int:
+def _num_directional_bounces(reflectance_operator: ReflectanceOperator) -> int:
     """How many reflections keep directions: until highlights have sent little each time."""
-    share = float(reflecting.reflectance[reflecting.rows].sum(dtype=np.float64)) / max(1, reflecting.reflectance.size)
-    return int(np.clip(np.ceil(np.log(_LITTLE) / np.log(np.clip(share, 1e-6, 0.999))), _DIRECTED, _MOST_DIRECTED))
+    mean_reflectance = float(reflectance_operator.reflectance[reflectance_operator.rows].sum(dtype=np.float64)) / max(
+        1, reflectance_operator.reflectance.size
+    )
+    return int(
+        np.clip(
+            np.ceil(np.log(_ENERGY_CUTOFF) / np.log(np.clip(mean_reflectance, 1e-6, 0.999))),
+            _MIN_DIRECTIONAL_BOUNCES,
+            _MAX_DIRECTIONAL_BOUNCES,
+        )
+    )
 
 
-def quickly_between(
-    cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int, in_lobes: InLobes | None = None
-) -> Leaving:
+def solve_indirect_fast(
+    patches: PatchLight,
+    reflectance_operator: ReflectanceOperator,
+    incident: IncidentLight,
+    first: int,
+    last: int,
+    outgoing_highlights: OutgoingHighlights | None = None,
+) -> OutgoingRadiance:
     """The same for a moving hand: by squares in place of directions, and few rays where light is even.
 
     Args:
-        cells, reflecting, arrived, first, last, in_lobes: as of `sent_between`.
+        patches, reflectance_operator, incident, first, last, outgoing_highlights: as of `sent_between`.
     """
-    links, few, rho = cells.links, cells.few_links, reflecting.reflectance
+    gather_hits, few_rays, rho = patches.gather_hits, patches.few_rays, reflectance_operator.reflectance
 
-    def again(now: Leaving) -> Leaving:
-        return sent_once(reflecting, arriving_quickly(cells, now.sent(cells, to_narrow_lobes=False), now.rows))
+    def reflect(outgoing: OutgoingRadiance) -> OutgoingRadiance:
+        return first_bounce(
+            reflectance_operator,
+            incident_fast(patches, outgoing.outgoing_light(patches, to_narrow_lobes=False), outgoing.rows),
+        )
 
-    return _between(
-        cells, reflecting, sent_once(reflecting, arrived, in_lobes), first, last, again,
-        lambda even, num: preview_bounced(links, few, rho, even, num),
+    return _sum_bounces(
+        patches, reflectance_operator, first_bounce(reflectance_operator, incident, outgoing_highlights), first, last,
+        reflect,
+        lambda even, num: preview_bounces(gather_hits, few_rays, rho, even, num),
     )  # fmt: skip
 
 
-def _between(
-    cells: CellLight, reflecting: Reflecting, once: Leaving, first: int, last: int,
-    again: Callable[[Leaving], Leaving], summed: Callable[[F32, int], F32],
-) -> Leaving:  # fmt: skip
+def _sum_bounces(
+    patches: PatchLight, reflectance_operator: ReflectanceOperator, first_outgoing: OutgoingRadiance, first: int,
+    last: int,
+    reflect: Callable[[OutgoingRadiance], OutgoingRadiance], sum_isotropic: Callable[[F32, int], F32],
+) -> OutgoingRadiance:  # fmt: skip
     """Reflect light between cells.
 
     Args:
-        once: what they send of light that comes from the lights.
-        again: reflects light that has directions once more.
-        summed: the sum of even light and what becomes of it in some reflections.
+        first_outgoing: what they send of light that comes from the lights.
+        reflect: reflects light that has directions once more.
+        sum_isotropic: the sum of even light and what becomes of it in some reflections.
     """
-    now, number = once, 1
-    directed = min(last, _num_directed(reflecting)) if len(once.rows) else 1
-    total, vectors = (float(first == 1) * array.astype(np.float64) for array in (once.even, once.vectors))
-    while number < directed:
-        now, number = again(now), number + 1
-        if number >= first:
-            total, vectors = total + now.even, vectors + now.vectors
-    if number < last:
-        even = now.seen(cells)
-        start = max(first, number + 1)
-        for _ in range(start - number):
-            even = bounce(cells.links, reflecting.reflectance, even)
-        total += summed(even, last - start)
-    found = total.astype(np.float32), once.rows, vectors.astype(np.float32)
-    return Leaving(*found, once.widening, once.squares if first == 1 else NOTHING)
+    outgoing, bounce_index = first_outgoing, 1
+    num_directional = min(last, _num_directional_bounces(reflectance_operator)) if len(first_outgoing.rows) else 1
+    total, coefficients = (
+        float(first == 1) * array.astype(np.float64)
+        for array in (first_outgoing.isotropic, first_outgoing.coefficients)
+    )
+    while bounce_index < num_directional:
+        outgoing, bounce_index = reflect(outgoing), bounce_index + 1
+        if bounce_index >= first:
+            total, coefficients = total + outgoing.isotropic, coefficients + outgoing.coefficients
+    if bounce_index < last:
+        isotropic = outgoing.mean_to_others(patches)
+        start = max(first, bounce_index + 1)
+        for _ in range(start - bounce_index):
+            isotropic = one_bounce(patches.gather_hits, reflectance_operator.reflectance, isotropic)
+        total += sum_isotropic(isotropic, last - start)
+    outgoing_fields = total.astype(np.float32), first_outgoing.rows, coefficients.astype(np.float32)
+    return OutgoingRadiance(
+        *outgoing_fields, first_outgoing.roughening, first_outgoing.bins if first == 1 else EMPTY_BINS
+    )
 
 
-def preview_between(cells: CellLight, reflecting: Reflecting, arrived: Arrived, first: int, last: int) -> F32:
+def solve_indirect_preview(
+    patches: PatchLight, reflectance_operator: ReflectanceOperator, incident: IncidentLight, first: int, last: int
+) -> F32:
     """The same roughly, without directions, as others see it in the mean. (NO_CELL + 1, 3) float32
 
     Args:
-        cells, reflecting, arrived, first, last: as of `sent_between`.
+        patches, reflectance_operator, incident, first, last: as of `sent_between`.
     """
-    even = cells.seen(*reflecting.sent(arrived), reflecting.rows)
+    isotropic = patches.mean_to_others(*reflectance_operator.apply(incident), reflectance_operator.rows)
     for _ in range(first - 1):
-        even = bounce(cells.links, reflecting.reflectance, even)
-    return padded(preview_bounced(cells.links, cells.few_links, reflecting.reflectance, even, last - first))
+        isotropic = one_bounce(patches.gather_hits, reflectance_operator.reflectance, isotropic)
+    return pad(
+        preview_bounces(
+            patches.gather_hits, patches.few_rays, reflectance_operator.reflectance, isotropic, last - first
+        )
+    )

@@ -14,28 +14,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.light.triangles import TriangleLights
-from relume.parallel import for_ranges, for_shares
-from relume.trace.cell_tree import NO_CELL
+from relume.parallel import for_ranges, parallel_for_chunks
+from relume.trace.cell_tree import NO_PATCH
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
-_POINTS_A_RANGE = 2048
+_POINTS_PER_RANGE = 2048
 _PREVIEW_BOUNCES = 6  # a thousandth of the light in a Cornell box is wrong then
-_LARGEST_SHARE = 0.999
+_MAX_BOUNCE_RATIO = 0.999
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
-def _irradiance(normal, visible, directions, across, start, stop, out):  # type: ignore[no-untyped-def]
+def _irradiance(normal, visible, directions, normal_irradiance, start, stop, out):  # type: ignore[no-untyped-def]
     for p in range(start, stop):
         red = green = blue = 0.0
         nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
         for m in range(directions.shape[0]):
             if (visible[p, m >> 3] >> (m & 7)) & 1:
                 cosine = max(nx * directions[m, 0] + ny * directions[m, 1] + nz * directions[m, 2], np.float32(0))
-                red += cosine * across[m, 0]
-                green += cosine * across[m, 1]
-                blue += cosine * across[m, 2]
+                red += cosine * normal_irradiance[m, 0]
+                green += cosine * normal_irradiance[m, 1]
+                blue += cosine * normal_irradiance[m, 2]
         out[p, 0], out[p, 1], out[p, 2] = red, green, blue
 
 
@@ -51,47 +51,49 @@ def irradiance(normal: F32, visible: NDArray[np.uint8], lights: TriangleLights) 
     """
     out = np.empty((len(normal), 3), np.float32)
     args = (normal, visible, lights.direction, lights.irradiance)
-    for_ranges(lambda start, stop: _irradiance(*args, start, stop, out), len(normal), _POINTS_A_RANGE)
+    for_ranges(lambda start, stop: _irradiance(*args, start, stop, out), len(normal), _POINTS_PER_RANGE)
     return out
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
-def _bounce(links, reflectance, radiance, start, stop, out):  # type: ignore[no-untyped-def]
-    """Reflect once. radiance: four channels, so that a cell's are added at once; black in row `NO_CELL`."""
-    share = np.float32(1 / links.shape[1])
+def _bounce_kernel(gather_hits, reflectance, radiance, start, stop, out):  # type: ignore[no-untyped-def]
+    """Reflect once. radiance: four channels, so that a cell's are added at once; black in row `NO_PATCH`."""
+    ray_weight = np.float32(1 / gather_hits.shape[1])
     total = np.empty(4, np.float32)
-    for cell in range(start, stop):
+    for patch in range(start, stop):
         total[:] = 0
-        for ray in range(links.shape[1]):
-            seen = radiance[links[cell, ray]]
+        for ray in range(gather_hits.shape[1]):
+            hit_radiance = radiance[gather_hits[patch, ray]]
             for channel in range(4):
-                total[channel] += seen[channel]
+                total[channel] += hit_radiance[channel]
         for channel in range(3):
-            out[cell, channel] = reflectance[cell, channel] * total[channel] * share
+            out[patch, channel] = reflectance[patch, channel] * total[channel] * ray_weight
 
 
-def bounce(links: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
+def one_bounce(gather_hits: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
     """Reflect the light of cells once more: L_{b+1} of L_b.
 
     Args:
-        links: cell that each ray of a cell hits. (C, rays) uint16
+        gather_hits: cell that each ray of a cell hits. (C, rays) uint16
         reflectance: in [0, 1]. (C, 3) float32. radiance: L_b. (C, 3) float32
     Returns:
         L_{b+1}. (C, 3) float32
     Cost: O(C · rays) reads at random from the radiance, which fits a core's cache.
     """
     out = np.empty_like(radiance)
-    padded = np.zeros((NO_CELL + 1, 4), np.float32)
+    padded = np.zeros((NO_PATCH + 1, 4), np.float32)
     padded[: len(radiance), :3] = radiance
-    for_shares(lambda start, stop: _bounce(links, reflectance, padded, start, stop, out), len(links))
+    parallel_for_chunks(
+        lambda start, stop: _bounce_kernel(gather_hits, reflectance, padded, start, stop, out), len(gather_hits)
+    )
     return out
 
 
-def bounced(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int) -> F32:
+def bounces(gather_hits: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int) -> F32:
     """Sum the radiance that cells send out after at most `num_bounces` reflections between them, L_0 included.
 
     Args:
-        links, reflectance: as in `bounce`. direct: L_0. (C, 3) float32
+        gather_hits, reflectance: as in `one_bounce`. direct: L_0. (C, 3) float32
         num_bounces: at least 0.
     Returns:
         Σ_b L_b. (C, 3) float32
@@ -99,32 +101,32 @@ def bounced(links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounce
     total = direct.astype(np.float64)
     radiance = direct
     for _ in range(num_bounces):
-        radiance = bounce(links, reflectance, radiance)
+        radiance = one_bounce(gather_hits, reflectance, radiance)
         total += radiance
     return total.astype(np.float32)
 
 
-def preview_bounced(
-    links: NDArray[np.uint16], few_links: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int
+def preview_bounces(
+    gather_hits: NDArray[np.uint16], few_rays: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int
 ) -> F32:
-    """Estimate `bounced` for a moving hand: after a few bounces, as if each left the same share of the one before.
+    """Estimate `bounces` for a moving hand: after a few bounces, as if each left the same share of the one before.
 
     The bounces are a power iteration: their shape settles soon, and then only their size changes.
 
     Args:
-        links: of all rays, for the first bounce. (C, rays) uint16
-        few_links: of some of them, for all other bounces, whose light is even already. What noise they leave is each
+        gather_hits: of all rays, for the first bounce. (C, rays) uint16
+        few_rays: of some of them, for all other bounces, whose light is even already. What noise they leave is each
             cell's own, and gather rays see many cells. (C, fewer rays) uint16
-        reflectance, direct, num_bounces: as in `bounced`.
+        reflectance, direct, num_bounces: as in `bounces`.
     Returns:
         Σ_b L_b, roughly. (C, 3) float32
     """
-    first = min(num_bounces, _PREVIEW_BOUNCES)
-    total, radiance, before = direct.astype(np.float64), direct, direct
-    for k in range(first):
-        radiance, before = bounce(links if k == 0 else few_links, reflectance, radiance), radiance
+    num_exact = min(num_bounces, _PREVIEW_BOUNCES)
+    total, radiance, previous = direct.astype(np.float64), direct, direct
+    for k in range(num_exact):
+        radiance, previous = one_bounce(gather_hits if k == 0 else few_rays, reflectance, radiance), radiance
         total += radiance
-    size, size_before = (np.sqrt(np.square(a, dtype=np.float64).sum(axis=0)) for a in (radiance, before))
-    share = np.minimum(size / np.maximum(size_before, 1e-30), _LARGEST_SHARE)
-    total += radiance * (share * (1 - share ** (num_bounces - first)) / (1 - share))
+    size, previous_size = (np.sqrt(np.square(a, dtype=np.float64).sum(axis=0)) for a in (radiance, previous))
+    bounce_ratio = np.minimum(size / np.maximum(previous_size, 1e-30), _MAX_BOUNCE_RATIO)
+    total += radiance * (bounce_ratio * (1 - bounce_ratio ** (num_bounces - num_exact)) / (1 - bounce_ratio))
     return total.astype(np.float32)

@@ -13,66 +13,83 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.channels import NormalMap
-from relume.methods.cells.cell_light import CellLight
-from relume.parallel import for_steps
-from relume.points import Points
+from relume.methods.cells.cell_light import PatchLight
+from relume.parallel import parallel_for_cancellable
+from relume.points import SurfacePoints
 from relume.trace.tangents import any_tangent
-from relume.views.leaning import lean
-from relume.views.worn_store import Tracer
+from relume.views.leaning import perturb_normals
+from relume.views.worn_store import RayTracer
 
-_CELLS_A_STEP = 512  # a twentieth of a second's rays
+_PATCHES_PER_STEP = 512  # a twentieth of a second's rays
 
 
-def leant_cells(
-    cells: CellLight, normals: Sequence[NormalMap | None], tracer: Tracer, cancelled: Callable[[], bool] = lambda: False
-) -> CellLight:
+def normal_mapped_patches(
+    patches: PatchLight,
+    normals: Sequence[NormalMap | None],
+    tracer: RayTracer,
+    is_canceled: Callable[[], bool] = lambda: False,
+) -> PatchLight:
     """Lean the cells of some materials.
 
     Args:
-        cells: as they were baked. normals: the image that leans each material, None for none. (materials,)
-        tracer: of rays that the bake did not trace. cancelled: asked now and then.
+        patches: as they were baked. normals: the image that leans each material, None for none. (materials,)
+        tracer: of rays that the bake did not trace. is_canceled: asked now and then.
     Returns:
         All cells; those of bakes that do not say how textures lie on them stay as they are.
     Raises:
         StoreError: the store does not say what is needed to trace its rays. NotFoundError, SceneError: an image cannot
-            be had. CancelledError: `cancelled` said so.
+            be had. CancelledError: `is_canceled` said so.
     Cost: O(points · (rays of a point + lights that come up)) rays.
     """
-    if cells.uv is None or cells.surface_normal is None:
-        return cells
-    for material, map_ in enumerate(normals):
-        rows = np.flatnonzero(cells.material == material)
-        if map_ is not None and len(rows):
-            leaning = _leaning(cells, rows, map_)
-            cells = _traced(cells, leaning, rows, tracer, cancelled)
-    return cells
+    if patches.uv is None or patches.surface_normal is None:
+        return patches
+    for material, normal_map in enumerate(normals):
+        rows = np.flatnonzero(patches.material == material)
+        if normal_map is not None and len(rows):
+            perturbed_points = _perturbed_points(patches, rows, normal_map)
+            patches = _retrace(patches, perturbed_points, rows, tracer, is_canceled)
+    return patches
 
 
-def _leaning(cells: CellLight, rows: NDArray[np.intp], map_: NormalMap) -> Points:
+def _perturbed_points(patches: PatchLight, rows: NDArray[np.intp], normal_map: NormalMap) -> SurfacePoints:
     """The points of all cells where some lean. rows: which. (G,)"""
-    assert cells.uv is not None  # who calls has looked
-    assert cells.surface_normal is not None
-    points = cells.points_of(rows)
-    uv, smooth = cells.uv[rows].reshape(points.num_points, -1), cells.surface_normal[rows].reshape(-1, 3)
-    found = lean(map_, uv, smooth, points.normal, points.tangent, smooth).normal
-    at = (rows[:, None] * cells.points_a_cell + np.arange(cells.points_a_cell)).ravel()
-    normal, tangent = cells.points.normal.copy(), cells.points.tangent.copy()
-    normal[at], tangent[at] = found, any_tangent(found)
-    return cells.points._replace(normal=normal, tangent=tangent)
+    assert patches.uv is not None  # who calls has looked
+    assert patches.surface_normal is not None
+    points = patches.points_of(rows)
+    uv, surface_normal = patches.uv[rows].reshape(points.num_points, -1), patches.surface_normal[rows].reshape(-1, 3)
+    perturbed_normal = perturb_normals(
+        normal_map, uv, surface_normal, points.normal, points.tangent, surface_normal
+    ).normal
+    point_rows = (rows[:, None] * patches.points_per_patch + np.arange(patches.points_per_patch)).ravel()
+    normal, tangent = patches.points.normal.copy(), patches.points.tangent.copy()
+    normal[point_rows], tangent[point_rows] = perturbed_normal, any_tangent(perturbed_normal)
+    return patches.points._replace(normal=normal, tangent=tangent)
 
 
-def _traced(
-    cells: CellLight, leaning: Points, rows: NDArray[np.intp], tracer: Tracer, cancelled: Callable[[], bool]
-) -> CellLight:
+def _retrace(
+    patches: PatchLight,
+    perturbed_points: SurfacePoints,
+    rows: NDArray[np.intp],
+    tracer: RayTracer,
+    is_canceled: Callable[[], bool],
+) -> PatchLight:
     """Cells with other normals, and what some of them see and hit. leaning: points of all. rows: those cells. (G,)"""
-    found = replace(cells, points=leaning, visible=cells.visible.copy(), links=cells.links.copy())
+    retraced = replace(
+        patches, points=perturbed_points, visible=patches.visible.copy(), gather_hits=patches.gather_hits.copy()
+    )
 
     def trace(start: int, stop: int) -> None:
-        some = rows[start:stop]
-        before, now = cells.points_of(some), found.points_of(some)
-        seen = tracer.seen(now, before.normal, cells.visible[some].reshape(now.num_points, -1))
-        found.visible[some] = seen.reshape(len(some), *found.visible.shape[1:])
-        found.links[some] = tracer.linked(now, now.normal, cells.pattern).reshape(len(some), -1)
+        step_rows = rows[start:stop]
+        baked_points, step_points = patches.points_of(step_rows), retraced.points_of(step_rows)
+        visible = tracer.visibility(
+            step_points, baked_points.normal, patches.visible[step_rows].reshape(step_points.num_points, -1)
+        )
+        retraced.visible[step_rows] = visible.reshape(len(step_rows), *retraced.visible.shape[1:])
+        retraced.gather_hits[step_rows] = tracer.gather_hits(step_points, step_points.normal, patches.pattern).reshape(
+            len(step_rows), -1
+        )
 
-    for_steps(trace, len(rows), _CELLS_A_STEP, lambda share: None, cancelled, "tracing cells that lean")
-    return found
+    parallel_for_cancellable(
+        trace, len(rows), _PATCHES_PER_STEP, lambda share: None, is_canceled, "tracing cells that lean"
+    )
+    return retraced

@@ -7,19 +7,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.lobe_grid import NUM_SQUARES
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.lobes import Lobes
-from relume.methods.cells.reflecting import Arrived, Reflecting
-from relume.project.sent import Sent, falls_of, sent_by
-from relume.trace.cell_tree import NO_CELL
+from relume.basis.lobe_grid import NUM_DIRECTION_BINS
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.lobes import HighlightTables
+from relume.methods.cells.reflecting import IncidentLight, ReflectanceOperator
+from relume.project.sent import OutgoingLight, decay_of, radiance_from_patch
+from relume.trace.cell_tree import NO_PATCH
 
 F32 = NDArray[np.float32]
-InLobes = tuple[Lobes, F32]
+OutgoingHighlights = tuple[HighlightTables, F32]
 """Highlights of cells, and what these send of light, see `relume.methods.cells.in_lobes`. (F, 3, squares) float32"""
 
 
-class InSquares(NamedTuple):
+class BinnedRadiance(NamedTuple):
     """What some cells send besides, by squares.
 
     Attributes:
@@ -29,75 +29,89 @@ class InSquares(NamedTuple):
     rows: NDArray[np.intp]
     radiance: F32
 
-    def less(self, other: InSquares) -> InSquares:
+    def subtract(self, subtrahend: BinnedRadiance) -> BinnedRadiance:
         """The difference to another, whose rows may be others."""
-        rows = np.union1d(self.rows, other.rows)
+        rows = np.union1d(self.rows, subtrahend.rows)
         radiance = np.zeros((len(rows), *self.radiance.shape[1:]), np.float32)
         radiance[np.searchsorted(rows, self.rows)] = self.radiance
-        radiance[np.searchsorted(rows, other.rows)] -= other.radiance
-        return InSquares(rows, radiance)
+        radiance[np.searchsorted(rows, subtrahend.rows)] -= subtrahend.radiance
+        return BinnedRadiance(rows, radiance)
 
 
-NOTHING = InSquares(np.empty(0, np.intp), np.empty((0, 3, NUM_SQUARES), np.float32))
+EMPTY_BINS = BinnedRadiance(np.empty(0, np.intp), np.empty((0, 3, NUM_DIRECTION_BINS), np.float32))
 
 
-class Leaving(NamedTuple):
+class OutgoingRadiance(NamedTuple):
     """What cells send out.
 
     Attributes:
-        even: the part that is the same everywhere. (C, 3) float32
-        rows: the cells that send more one way than another. (G,) intp. vectors: L_j of each. (G, 3, J) float32
-        widening: by their highlights, see `Reflecting`. (G,) float32
-        squares: what those of them send besides whose highlights are sharp.
+        isotropic: the part that is the same everywhere. (C, 3) float32
+        rows: the cells that send more one way than another. (G,) intp. coefficients: L_j of each. (G, 3, J) float32
+        roughening: by their highlights, see `ReflectanceOperator`. (G,) float32
+        bins: what those of them send besides whose highlights are sharp.
     """
 
-    even: F32
+    isotropic: F32
     rows: NDArray[np.intp]
-    vectors: F32
-    widening: F32
-    squares: InSquares = NOTHING
+    coefficients: F32
+    roughening: F32
+    bins: BinnedRadiance = EMPTY_BINS
 
-    def sent(self, cells: CellLight, *, to_narrow_lobes: bool = True) -> Sent:
+    def outgoing_light(self, patches: PatchLight, *, to_narrow_lobes: bool = True) -> OutgoingLight:
         """As rays look it up. to_narrow_lobes: whether rays of pictures do"""
-        falls = falls_of(self.widening) if to_narrow_lobes else None
-        at = np.searchsorted(self.rows, self.squares.rows)
-        frames = cells.frames[self.rows]
-        return sent_by(padded(self.even), self.rows, frames, self.vectors, falls, (at, self.squares.radiance))
+        decay = decay_of(self.roughening) if to_narrow_lobes else None
+        bin_rows = np.searchsorted(self.rows, self.bins.rows)
+        frames = patches.frames[self.rows]
+        return radiance_from_patch(
+            pad(self.isotropic), self.rows, frames, self.coefficients, decay, (bin_rows, self.bins.radiance)
+        )
 
-    def seen(self, cells: CellLight) -> F32:
+    def mean_to_others(self, patches: PatchLight) -> F32:
         """What other cells see of each in the mean, that by squares left out. (C, 3) float32"""
-        return cells.seen(self.even, self.vectors, self.rows)
+        return patches.mean_to_others(self.isotropic, self.coefficients, self.rows)
 
-    def less(self, other: Leaving) -> Leaving:
+    def subtract(self, subtrahend: OutgoingRadiance) -> OutgoingRadiance:
         """The difference to another, whose rows may be others."""
-        rows = np.union1d(self.rows, other.rows)
-        vectors = np.zeros((len(rows), *self.vectors.shape[1:]), np.float32)
-        vectors[np.searchsorted(rows, self.rows)] += self.vectors
-        vectors[np.searchsorted(rows, other.rows)] -= other.vectors
-        widening = np.zeros(len(rows), np.float32)
-        for one in (other, self):
-            widening[np.searchsorted(rows, one.rows)] = one.widening
-        return Leaving(self.even - other.even, rows, vectors, widening, self.squares.less(other.squares))
+        rows = np.union1d(self.rows, subtrahend.rows)
+        coefficients = np.zeros((len(rows), *self.coefficients.shape[1:]), np.float32)
+        coefficients[np.searchsorted(rows, self.rows)] += self.coefficients
+        coefficients[np.searchsorted(rows, subtrahend.rows)] -= subtrahend.coefficients
+        roughening = np.zeros(len(rows), np.float32)
+        for operand in (subtrahend, self):
+            roughening[np.searchsorted(rows, operand.rows)] = operand.roughening
+        return OutgoingRadiance(
+            self.isotropic - subtrahend.isotropic, rows, coefficients, roughening, self.bins.subtract(subtrahend.bins)
+        )
 
 
-def sent_once(reflecting: Reflecting, arrived: Arrived, in_lobes: InLobes | None = None) -> Leaving:
+def first_bounce(
+    reflectance_operator: ReflectanceOperator,
+    incident: IncidentLight,
+    outgoing_highlights: OutgoingHighlights | None = None,
+) -> OutgoingRadiance:
     """What cells send of what comes to them.
 
     Args:
-        reflecting: what they make of it. arrived: what comes.
-        in_lobes: what sharp highlights send; None: functions say it.
+        reflectance_operator: what they make of it. incident: what comes.
+        outgoing_highlights: what sharp highlights send; None: functions say it.
     """
-    even, vectors = reflecting.sent(arrived)
-    if in_lobes is None:
-        return Leaving(even, reflecting.rows, vectors, reflecting.widening)
-    lobes, radiance = in_lobes
-    vectors[np.searchsorted(reflecting.rows, lobes.rows)] = 0
-    even[lobes.rows] -= lobes.reflectance / np.float32(np.pi) * arrived.irradiance[lobes.rows]
-    return Leaving(even, reflecting.rows, vectors, reflecting.widening, InSquares(lobes.rows, radiance))
+    isotropic, coefficients = reflectance_operator.apply(incident)
+    if outgoing_highlights is None:
+        return OutgoingRadiance(isotropic, reflectance_operator.rows, coefficients, reflectance_operator.roughening)
+    highlights, radiance = outgoing_highlights
+    coefficients[np.searchsorted(reflectance_operator.rows, highlights.rows)] = 0
+    isotropic[highlights.rows] -= highlights.reflectance / np.float32(np.pi) * incident.irradiance[highlights.rows]
+    return OutgoingRadiance(
+        isotropic,
+        reflectance_operator.rows,
+        coefficients,
+        reflectance_operator.roughening,
+        BinnedRadiance(highlights.rows, radiance),
+    )
 
 
-def padded(even: NDArray[np.floating[Any]]) -> F32:
+def pad(radiance: NDArray[np.floating[Any]]) -> F32:
     """Radiance of cells, (C, 3), and black for those that are none. (NO_CELL + 1, 3) float32"""
-    out = np.zeros((NO_CELL + 1, 3), np.float32)
-    out[: len(even)] = even
+    out = np.zeros((NO_PATCH + 1, 3), np.float32)
+    out[: len(radiance)] = radiance
     return out

@@ -2,7 +2,7 @@
 
     t_j(c) = π / N Σ_r L(link(c, r), square it leaves by) h̄_j(square it comes in by)
 
-with h̄ the functions' means over squares, and t_j in the frame of the cell. `CellLight.arriving` is what it estimates.
+with h̄ the functions' means over squares, and t_j in the frame of the cell. `PatchLight.arriving` is what it estimates.
 """
 
 from __future__ import annotations
@@ -12,40 +12,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.lobe_grid import SIDE
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.reflecting import Arrived
-from relume.parallel import for_shares
-from relume.project.sent import Sent, grid_means, light_along
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.reflecting import IncidentLight
+from relume.parallel import parallel_for_chunks
+from relume.project.sent import OutgoingLight, bin_means, incident_along
 
 F32 = NDArray[np.float32]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _arriving(links, leaving, coming, sent, row_of, start, stop, irradiance, squares):  # type: ignore[no-untyped-def]
+def _incident_kernel(  # type: ignore[no-untyped-def]
+    gather_hits, outgoing_bins, incident_bins, outgoing, row_index, start, stop, irradiance, binned_light
+):
     """Sum the rays of cells [start, stop). row_of: each cell's row among the squares, −1 for none. (C,)"""
-    share = np.float32(np.pi / links.shape[1])
-    light = np.empty((3, links.shape[1]), np.float32)
-    for cell in range(start, stop):
-        light_along(sent, links[cell], leaving[cell], light)
+    ray_weight = np.float32(np.pi / gather_hits.shape[1])
+    light = np.empty((3, gather_hits.shape[1]), np.float32)
+    for patch in range(start, stop):
+        incident_along(outgoing, gather_hits[patch], outgoing_bins[patch], light)
         for channel in range(3):
-            irradiance[cell, channel] = share * light[channel].sum()
-        if row_of[cell] < 0:
+            irradiance[patch, channel] = ray_weight * light[channel].sum()
+        if row_index[patch] < 0:
             continue
-        into = squares[row_of[cell]]
-        for ray in range(links.shape[1]):
+        bins = binned_light[row_index[patch]]
+        for ray in range(gather_hits.shape[1]):
             for channel in range(3):
-                into[channel, coming[cell, ray]] += share * light[channel, ray]
+                bins[channel, incident_bins[patch, ray]] += ray_weight * light[channel, ray]
 
 
-def arriving_quickly(cells: CellLight, sent: Sent, rows: NDArray[np.intp]) -> Arrived:
+def incident_fast(patches: PatchLight, outgoing: OutgoingLight, rows: NDArray[np.intp]) -> IncidentLight:
     """What arrives from other cells, whose light differs by direction.
 
     Args:
-        cells: that it comes to. sent: by all cells. rows: those of which light vectors are wanted. (G,)
+        patches: that it comes to. outgoing: by all cells. rows: those of which light vectors are wanted. (G,)
     """
-    irradiance, squares = np.empty((cells.num_cells, 3), np.float32), np.zeros((len(rows), 3, SIDE * SIDE), np.float32)
-    row_of = np.full(cells.num_cells, -1, np.int32)
-    row_of[rows] = np.arange(len(rows))
-    args = (cells.links, cells.leaving, cells.coming, sent, row_of)
-    for_shares(lambda start, stop: _arriving(*args, start, stop, irradiance, squares), cells.num_cells)
-    return Arrived(irradiance, squares @ grid_means().T)
+    irradiance, binned_light = (
+        np.empty((patches.num_patches, 3), np.float32),
+        np.zeros((len(rows), 3, SIDE * SIDE), np.float32),
+    )
+    row_index = np.full(patches.num_patches, -1, np.int32)
+    row_index[rows] = np.arange(len(rows))
+    args = (patches.gather_hits, patches.outgoing_bins, patches.incident_bins, outgoing, row_index)
+    parallel_for_chunks(
+        lambda start, stop: _incident_kernel(*args, start, stop, irradiance, binned_light), patches.num_patches
+    )
+    return IncidentLight(irradiance, binned_light @ bin_means().T)

@@ -9,83 +9,89 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import SENT_DEGREE, ladder
-from relume.brdf.albedo import PAIRS, Reflectances, shares_in
+from relume.basis.zernike import OUTGOING_DEGREE, recurrence
+from relume.brdf.albedo import PAIRS, Reflectances, unpack_reflectance
 
 F32 = NDArray[np.float32]
 
 
-_OF_DEGREE = {2 * rung: PAIRS.index((rung, rung)) for rung in range(1 + SENT_DEGREE // 2)}  # those of order 0
+_DIAGONAL_PAIRS = {2 * rung: PAIRS.index((rung, rung)) for rung in range(1 + OUTGOING_DEGREE // 2)}  # those of order 0
 
 
-class Arrived(NamedTuple):
+class IncidentLight(NamedTuple):
     """What has come to cells.
 
     Attributes:
         irradiance: E of all. (C, 3) float32
-        vectors: t of those that send more one way than another, `Reflecting.rows`. (G, 3, J) float32
+        coefficients: t of those that send more one way than another, `ReflectanceOperator.rows`. (G, 3, J) float32
     """
 
     irradiance: F32
-    vectors: F32
+    coefficients: F32
 
 
 @dataclass(frozen=True)
-class Reflecting:
+class ReflectanceOperator:
     """F of all cells, textures included.
 
     Attributes:
         reflectance: F_00, never above one. (C, 3) float32
         has_lobe: tells which materials send more one way than another; as bytes, a part of keys.
         rows: cells of these. (G,) intp
-        shares: all of F of those. (pairs, G, 3) float32
-        held: what all that cells send is multiplied by, so that none sends more than it gets. (C, 3) float32
+        reflectance_matrix: all of F of those. (pairs, G, 3) float32
+        energy_scale: what all that cells send is multiplied by, so that none sends more than it gets. (C, 3) float32
     """
 
     reflectance: F32
     has_lobe: bytes
     rows: NDArray[np.intp]
-    shares: F32
-    held: F32
+    reflectance_matrix: F32
+    energy_scale: F32
 
     @cached_property
-    def widening(self) -> F32:
+    def roughening(self) -> F32:
         """How fast the highlights of `rows` let light fall with the degree n, as e^(−n (n + 2) f). f: (G,) float32"""
-        low, high = (np.abs(self.shares[_OF_DEGREE[n]]).mean(axis=1) for n in (2, SENT_DEGREE))
-        falls = np.log(np.maximum(low, 1e-30) / np.maximum(high, 1e-30)) / (SENT_DEGREE * (SENT_DEGREE + 2) - 2 * 4)
-        return np.asarray(np.clip(falls, 0, 1), np.float32)
+        low, high = (np.abs(self.reflectance_matrix[_DIAGONAL_PAIRS[n]]).mean(axis=1) for n in (2, OUTGOING_DEGREE))
+        decay = np.log(np.maximum(low, 1e-30) / np.maximum(high, 1e-30)) / (
+            OUTGOING_DEGREE * (OUTGOING_DEGREE + 2) - 2 * 4
+        )
+        return np.asarray(np.clip(decay, 0, 1), np.float32)
 
     @classmethod
-    def of(cls, reflectances: Reflectances, material: NDArray[np.uint16], textures: F32) -> Reflecting:
+    def from_materials(
+        cls, reflectances: Reflectances, material: NDArray[np.uint16], textures: F32
+    ) -> ReflectanceOperator:
         """F of cells.
 
         Args:
             reflectances: of all materials. material: of each cell. (C,) uint16
             textures: multipliers of each of `relume.brdf.channels.TEXTURES`. (2, C, 3) float32
         """
-        known = np.stack([shares_in(of_material) for of_material in reflectances])
-        plain = np.concatenate([np.ones_like(textures[:1]), textures])
-        whole = np.einsum("tnc,ntc->nc", plain, known[material, :, :, 0])
-        has_lobe = np.abs(known[:, :, :, 1:]).max(axis=(1, 2, 3)) > 0
+        matrices = np.stack([unpack_reflectance(material_reflectance) for material_reflectance in reflectances])
+        multipliers = np.concatenate([np.ones_like(textures[:1]), textures])
+        total_reflectance = np.einsum("tnc,ntc->nc", multipliers, matrices[material, :, :, 0])
+        has_lobe = np.abs(matrices[:, :, :, 1:]).max(axis=(1, 2, 3)) > 0
         rows = np.flatnonzero(has_lobe[material])
-        shares = np.einsum("tnc,ntcp->pnc", plain[:, rows], known[material[rows]])
-        held = (np.clip(whole, 0, 1) / np.maximum(whole, 1e-30)).astype(np.float32)
-        shares *= held[rows]
-        reflectance = np.clip(whole, 0, 1).astype(np.float32)
-        return cls(reflectance, has_lobe.tobytes(), rows, shares.astype(np.float32), held)
+        reflectance_matrix = np.einsum("tnc,ntcp->pnc", multipliers[:, rows], matrices[material[rows]])
+        energy_scale = (np.clip(total_reflectance, 0, 1) / np.maximum(total_reflectance, 1e-30)).astype(np.float32)
+        reflectance_matrix *= energy_scale[rows]
+        reflectance = np.clip(total_reflectance, 0, 1).astype(np.float32)
+        return cls(reflectance, has_lobe.tobytes(), rows, reflectance_matrix.astype(np.float32), energy_scale)
 
-    def sent(self, arrived: Arrived) -> tuple[F32, F32]:
+    def apply(self, incident: IncidentLight) -> tuple[F32, F32]:
         """What cells send of what arrives.
 
         Returns:
             The part that is the same everywhere, (C, 3), and L_j of `rows` beside it, (G, 3, J); float32
         """
-        vectors = np.ascontiguousarray(arrived.vectors.transpose(2, 0, 1))  # a function's numbers lie together
-        rungs, found = ladder(SENT_DEGREE), np.zeros_like(vectors)
+        coefficients = np.ascontiguousarray(
+            incident.coefficients.transpose(2, 0, 1)
+        )  # a function's numbers lie together
+        recurrence_table, outgoing = recurrence(OUTGOING_DEGREE), np.zeros_like(coefficients)
         for pair, (j, k) in enumerate(PAIRS[1:], 1):
-            for part in (rungs.cosine, rungs.sine)[: 2 if rungs.order[j] else 1]:
-                found[part[j]] += self.shares[pair] * vectors[part[k]]
+            for index in (recurrence_table.cosine, recurrence_table.sine)[: 2 if recurrence_table.order[j] else 1]:
+                outgoing[index[j]] += self.reflectance_matrix[pair] * coefficients[index[k]]
                 if j != k:
-                    found[part[k]] += self.shares[pair] * vectors[part[j]]
-        even = (self.reflectance / np.float32(np.pi) * arrived.irradiance).astype(np.float32)
-        return even, np.ascontiguousarray(found.transpose(1, 2, 0))
+                    outgoing[index[k]] += self.reflectance_matrix[pair] * coefficients[index[j]]
+        isotropic = (self.reflectance / np.float32(np.pi) * incident.irradiance).astype(np.float32)
+        return isotropic, np.ascontiguousarray(outgoing.transpose(1, 2, 0))

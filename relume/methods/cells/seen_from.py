@@ -7,32 +7,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.basis.lobe_grid import SIDE
-from relume.project.sent import grid_means
-from relume.project.squares import Squares
-from relume.trace.cell_tree import NO_CELL
+from relume.project.sent import bin_means
+from relume.project.squares import DirectionBins
+from relume.trace.cell_tree import NO_PATCH
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
-def _count(links, squares, counts):  # type: ignore[no-untyped-def]
+def _count(gather_hits, bins, counts):  # type: ignore[no-untyped-def]
     """Count rays by the cell that they hit and the square that they come from. counts: (C, SIDE²)"""
-    for p in range(links.shape[0]):
-        for ray in range(links.shape[1]):
-            if links[p, ray] != NO_CELL:
-                counts[links[p, ray], squares[p, ray]] += np.float32(1)
+    for p in range(gather_hits.shape[0]):
+        for ray in range(gather_hits.shape[1]):
+            if gather_hits[p, ray] != NO_PATCH:
+                counts[gather_hits[p, ray], bins[p, ray]] += np.float32(1)
 
 
-def seen_from(links: NDArray[np.uint16], squares: Squares, num_cells: int) -> F32:
+def mean_incoming(gather_hits: NDArray[np.uint16], bins: DirectionBins, num_patches: int) -> F32:
     """Mean of every function over the directions in which rays see cells.
 
     Args:
-        links: cells that rays hit. (n, rays) uint16. squares: in which they see them. (n, rays) uint8
-        num_cells: C.
+        gather_hits: cells that rays hit. (n, rays) uint16. bins: in which they see them. (n, rays) uint8
+        num_patches: C.
     Returns:
         Zero where nothing sees a cell. (C, J) float32
     """
-    counts = np.zeros((num_cells, SIDE * SIDE), np.float32)
-    _count(links, squares, counts)
-    return np.asarray(counts @ grid_means().T / np.maximum(counts.sum(axis=1, keepdims=True), 1), np.float32)
+    counts = np.zeros((num_patches, SIDE * SIDE), np.float32)
+    _count(gather_hits, bins, counts)
+    return np.asarray(counts @ bin_means().T / np.maximum(counts.sum(axis=1, keepdims=True), 1), np.float32)

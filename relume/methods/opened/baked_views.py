@@ -14,47 +14,47 @@ from numpy.typing import NDArray
 from relume import environments
 from relume.bake import StoreReader
 from relume.code_version import image_code
-from relume.environments.equirect import lookup, shrunk, turned
-from relume.light.blur import blurred, reduced
+from relume.environments.equirect import halve_to_width, lookup, rotate_about_y
+from relume.light.blur import downsampled, prefiltered
 from relume.light.local import num_samples
-from relume.light.merged import merge, num_merged
+from relume.light.merged import cluster_lights, num_clusters
 from relume.light.tiles import Tiles
-from relume.light.triangles import TriangleLights, Unturned, weigh
+from relume.light.triangles import RotatedEnvironment, TriangleLights, integrate_environment
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry
-from relume.memory import Memory
-from relume.methods.local_lights import LocalLights, Shadows
-from relume.methods.reflected import Reflected
-from relume.methods.retracing import Retracing
-from relume.methods.store_io import read_lights, read_tiles, read_traced_directions
-from relume.methods.thrown import MoreThrown
+from relume.memory import Cache
+from relume.methods.local_lights import LocalLights, ShadowCache
+from relume.methods.reflected import IndirectSolver
+from relume.methods.retracing import NormalRetracer
+from relume.methods.store_io import read_lights, read_shadow_ray_directions, read_tiles
+from relume.methods.thrown import AddedMirrorLights
 from relume.operators.image_files import ImageFiles
-from relume.picture.light import Light, leaning_as_baked
-from relume.picture.transfer import Arriving, Axis, Eyes
-from relume.points import Points
-from relume.project.receivers import GatherRays, Rays, Receivers
-from relume.project.sent import Sent
-from relume.views.thinned import ThinnedStore
+from relume.picture.light import Illumination, with_baked_normals
+from relume.picture.transfer import CameraMode, EditAxis, LightsAndPoints
+from relume.points import SurfacePoints
+from relume.project.receivers import GatherRays, RayList, ShadingPoints
+from relume.project.sent import OutgoingLight
+from relume.views.thinned import DownsampledStore
 from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
-Lights = Callable[[EnvironmentKey], TriangleLights]
+LightFinder = Callable[[EnvironmentKey], TriangleLights]
 """Finds the triangles of an environment."""
 
 
 @dataclass(frozen=True)
-class BakedViews:
-    """One bake of fixed views in which light comes straight; a `relume.picture.transfer.Transfer`.
+class BakedFixedViews:
+    """One bake of fixed views in which light comes straight; a `relume.picture.transfer.FixedViewTransfer`.
 
     Attributes:
-        memory: of all that is made from the bake and may be made again.
+        cache: of all that is made from the bake and may be made again.
         key: path of the store; tells this bake's entries from other bakes' in the memory.
         default_look: the complete look of the scene as it was imported.
     """
 
-    memory: Memory
+    cache: Cache
     key: str
     store: StoreReader
     scene_id: str
@@ -64,8 +64,8 @@ class BakedViews:
     material_names: Sequence[str]
     views: dict[str, View]
 
-    eyes = Eyes.BAKED
-    axes = frozenset((Axis.CURVE, Axis.PARAMETER, Axis.LIGHT, Axis.ENVIRONMENT))
+    camera_mode = CameraMode.FIXED
+    axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.LIGHT, EditAxis.ENVIRONMENT))
 
     @cached_property
     def derived(self) -> ImageFiles:
@@ -84,86 +84,95 @@ class BakedViews:
     @cached_property
     def local(self) -> LocalLights:
         """What local lights need."""
-        return LocalLights(self.store, self.memory, self.key)
+        return LocalLights(self.store, self.cache, self.key)
 
     @cached_property
-    def tracer(self) -> Retracing:
+    def tracer(self) -> NormalRetracer:
         """Rays for normals that the bake did not know."""
-        return Retracing(self.store, self.local, None)
+        return NormalRetracer(self.store, self.local, None)
 
     @cached_property
     def lights(self) -> TriangleLights:
         """The environment's triangles."""
         return read_lights(self.store)
 
-    def radiance_of(self, name: str | None) -> NDArray[np.float32]:
+    def environment_radiance(self, name: str | None) -> NDArray[np.float32]:
         """Radiance of an environment, None for the scene's own. (height, width, 3) float32
 
         Raises:
             NotFoundError: it is not here. SceneError: its files are damaged.
         """
-        return environments.find(name).radiance if name is not None else self._own_radiance()
+        return environments.load_environment(name).radiance if name is not None else self._scene_radiance()
 
-    def _own_radiance(self) -> F32:
+    def _scene_radiance(self) -> F32:
         def read() -> F32:
             return np.asarray(self.store.read("lights/environment"), np.float32)
 
-        return self.memory.keep((self.key, "environment"), read)
+        return self.cache.get_value((self.key, "environment"), read)
 
-    def lights_in(self, environment: EnvironmentKey) -> TriangleLights:
+    def light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
         """The triangles of an environment: the tiles of the bake, weighed again."""
-        return self.lights if environment == BAKED_ENVIRONMENT else self._weighed(environment)
+        return self.lights if environment == BAKED_ENVIRONMENT else self._integrate_environment(environment)
 
-    def lights_of(self, light: Light) -> TriangleLights:
+    def lights_for(self, light: Illumination) -> TriangleLights:
         """Those of them by which light comes straight to the picture."""
-        return shown_of(self.lights_in(light.environment), light)
+        return displayed_of(self.light_of_environment(light.environment), light)
 
-    def merged(self, light: Light) -> TriangleLights:
-        """The same, merged into a few. See `Transfer`."""
+    def clustered_lights(self, light: Illumination) -> TriangleLights:
+        """The same, merged into a few. See `FixedViewTransfer`."""
 
-        def merged() -> TriangleLights:
-            return merge(self.lights_in(light.environment), self.tiles, num_merged(self.num_lights))
+        def merge_lights() -> TriangleLights:
+            return cluster_lights(
+                self.light_of_environment(light.environment), self.tiles, num_clusters(self.num_lights)
+            )
 
-        return shown_of(self.memory.keep((self.key, "merged lights", light.environment), merged), light)
+        return displayed_of(self.cache.get_value((self.key, "merged lights", light.environment), merge_lights), light)
 
-    def preview_lights_of(self, light: Light) -> TriangleLights:
+    def preview_lights_for(self, light: Illumination) -> TriangleLights:
         """The same, found quickly."""
-        return shown_of(self.preview_lights_in(light.environment), light)
+        return displayed_of(self.preview_light_of_environment(light.environment), light)
 
-    def _weighed(self, environment: EnvironmentKey) -> TriangleLights:
-        def weighed() -> TriangleLights:
-            return weigh(self.tiles, Unturned.of(self.radiance_of(environment.map)), environment.rotation)
+    def _integrate_environment(self, environment: EnvironmentKey) -> TriangleLights:
+        def integrate() -> TriangleLights:
+            return integrate_environment(
+                self.tiles,
+                RotatedEnvironment.from_radiance(self.environment_radiance(environment.map)),
+                environment.rotation,
+            )
 
-        return self.memory.keep((self.key, "lights", environment), weighed)
+        return self.cache.get_value((self.key, "lights", environment), integrate)
 
-    def preview_lights_in(self, environment: EnvironmentKey) -> TriangleLights:
+    def preview_light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
         """The triangles of an environment from a map of at most 256 texels' width: a large one takes seconds."""
-        return self.weighed_quickly("lights", environment, self.radiance_of)
+        return self.coarse_weights("lights", environment, self.environment_radiance)
 
-    def weighed_quickly(
-        self, what: str, environment: EnvironmentKey, radiance_of: Callable[[str | None], F32]
+    def coarse_weights(
+        self, label: str, environment: EnvironmentKey, find_radiance: Callable[[str | None], F32]
     ) -> TriangleLights:
         """The same of a part of an environment; what stays while it is turned is kept.
 
         Args:
-            what: of it, in words. environment: whose. radiance_of: finds the part by the environment's name.
+            label: of it, in words. environment: whose. find_radiance: finds the part by the environment's name.
         """
-        key = self.owner_of(environment.map), f"texels of preview {what}", environment.map
+        key = self.cache_owner(environment.map), f"texels of preview {label}", environment.map
 
-        def weighed() -> TriangleLights:
-            of = self.memory.keep(key, lambda: Unturned.of(shrunk(radiance_of(environment.map), PREVIEW_WIDTH)))
-            return weigh(self.tiles, of, environment.rotation)
+        def integrate() -> TriangleLights:
+            rotatable = self.cache.get_value(
+                key,
+                lambda: RotatedEnvironment.from_radiance(halve_to_width(find_radiance(environment.map), PREVIEW_WIDTH)),
+            )
+            return integrate_environment(self.tiles, rotatable, environment.rotation)
 
-        return self.memory.passing.keep((self.key, f"preview {what}", environment), weighed)
+        return self.cache.transient.get_value((self.key, f"preview {label}", environment), integrate)
 
-    def owner_of(self, name: str | None) -> str:
+    def cache_owner(self, name: str | None) -> str:
         """Whose entries in the memory those made of an environment are: the bake's where it is its own."""
         return self.key if name is None else "environments"
 
     @cached_property
-    def traced_directions(self) -> F32:
+    def shadow_ray_directions(self) -> F32:
         """Where shadow rays went. (M, 3) float32"""
-        return read_traced_directions(self.store)
+        return read_shadow_ray_directions(self.store)
 
     @cached_property
     def tiles(self) -> Tiles:
@@ -171,141 +180,150 @@ class BakedViews:
         return read_tiles(self.store)
 
     @property
-    def reflected(self) -> Reflected | None:
+    def indirect(self) -> IndirectSolver | None:
         """Light between surfaces: none was baked."""
         return None
 
-    def reflected_in(self, light: Light) -> Sent | None:
+    def outgoing_patch_light(self, light: Illumination) -> OutgoingLight | None:
         """What the gather cells send; None where nothing of it comes to the picture."""
-        return self.reflected.under(light) if self.reflected is not None and light.paths.reflect else None
+        return self.indirect.exact(light) if self.indirect is not None and light.paths.has_indirect else None
 
-    def trace_cells(self, light: Light, cancelled: Callable[[], bool]) -> None:
-        """Trace what gather cells lack: there are none. See `Transfer`."""
+    def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
+        """Trace what gather cells lack: there are none. See `FixedViewTransfer`."""
 
-    def between_surfaces(
-        self, light: Light, gathered: GatherRays, thrown: NDArray[np.uint8] | None
-    ) -> tuple[Rays, ...]:
+    def indirect_rays(
+        self, light: Illumination, gather_rays: GatherRays, mirror_visibility: NDArray[np.uint8] | None
+    ) -> tuple[RayList, ...]:
         """The rays of samples that bring what surfaces send.
 
         Args:
             light: all that shines.
-            gathered: their gather rays, of which `sent` does not count. thrown: what they see in flat mirrors.
+            gather_rays: their gather rays, of which `sent` does not count. mirror_visibility: what they see in flat
+                mirrors.
         """
-        sent = self.reflected_in(light)
-        return () if sent is None else (replace(gathered, sent=sent),)
+        outgoing = self.outgoing_patch_light(light)
+        return () if outgoing is None else (replace(gather_rays, outgoing=outgoing),)
 
-    def arriving(self, view: View, material: int, light: Light, memory: Memory) -> Arriving:
-        """What arrives at a material's samples in a light; shadows that the memory lacks are traced. See `Transfer`."""
-        lights = self.lights_of(light)
+    def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
+        """Incident light of a material's samples; shadows that the cache lacks are traced. See `FixedViewTransfer`."""
+        lights = self.lights_for(light)
         receivers = view.receivers(material, is_lit=lights.num_lights > 0)
-        return lights, replace(receivers, rays=self._rays(view, material, light, memory))
+        return lights, replace(receivers, rays=self._rays(view, material, light, cache))
 
-    def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
+    def _rays(self, view: View, material: int, light: Illumination, cache: Cache) -> Sequence[RayList]:
         """The rays among what arrives: those of local lights."""
         if not light.local:
             return ()
 
-        def remembered(geometry: LightGeometry, points: Points) -> Shadows:
-            key = (self.key, *view.place(material), "shadows", geometry)
-            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.samples_of(geometry)) // 8)
-            return memory.get(key, Shadows, num_bytes, lambda: self.local.shadows(geometry, points))
+        def cached_shadows(geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
+            key = (self.key, *view.sample_key(material), "shadows", geometry)
+            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.num_samples(geometry)) // 8)
+            return cache.get(key, ShadowCache, num_bytes, lambda: self.local.shadows(geometry, points))
 
-        return self.local.all_rays(light, view.points(material), remembered)
+        return self.local.rays_to(light, view.surface_points(material), cached_shadows)
 
-    def thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
-        """The lights that a material's samples see in flat mirrors: none without gather rays. See `Transfer`."""
+    def mirror_lights_of(self, view: View, material: int) -> NDArray[np.uint8] | None:
+        """Lights that a material's samples see in flat mirrors: none without gather rays. See `FixedViewTransfer`."""
         return None
 
-    def more_thrown(self, before: Light, after: Light) -> MoreThrown | None:
-        """How much more flat mirrors throw after than before: nothing. See `Transfer`."""
+    def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
+        """How much more flat mirrors throw after than before: nothing. See `FixedViewTransfer`."""
         return None
 
-    def some(self, view: View, material: int, chosen: NDArray[np.integer], *, reflects: bool) -> FewSamples:
-        """Some of a material's samples. See `Transfer`."""
-        few = view.receivers(material, is_lit=False).places(chosen)
-        visible = np.asarray(view.read_some("visibility", material, chosen), np.uint8)
-        return FewSamples(self, replace(few, visible=visible))
+    def subset(
+        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+    ) -> SampledTransfer:
+        """Some of a material's samples. See `FixedViewTransfer`."""
+        shading_points = view.receivers(material, is_lit=False).without_light(sample_indices)
+        visible = np.asarray(view.read_rows("visibility", material, sample_indices), np.uint8)
+        return SampledTransfer(self, replace(shading_points, visible=visible))
 
-    def open_sky(self, light: Light, points: Points, *, is_preview: bool) -> Arriving:
-        """What the environment brings to points, seen along their normals, if nothing hides it. See `Transfer`."""
-        straight = light._replace(paths=light.paths._replace(direct=True).without_reflections())
-        above = points.normal @ self.traced_directions.T > 0
-        seen = np.packbits(above, axis=1, bitorder="little")
-        lights = self.preview_lights_of(straight) if is_preview else self.lights_of(straight)
-        return lights, Receivers(points, points.normal, seen)
+    def unoccluded_environment(
+        self, light: Illumination, points: SurfacePoints, *, is_preview: bool
+    ) -> LightsAndPoints:
+        """Unoccluded light of the environment at points, seen along their normals. See `FixedViewTransfer`."""
+        direct_light = light._replace(paths=light.paths._replace(direct=True).without_reflections())
+        above = points.normal @ self.shadow_ray_directions.T > 0
+        visible = np.packbits(above, axis=1, bitorder="little")
+        lights = self.preview_lights_for(direct_light) if is_preview else self.lights_for(direct_light)
+        return lights, ShadingPoints(points, points.normal, visible)
 
-    def thinned(self, view_name: str, step: int) -> Self:
+    def downsampled(self, view_name: str, step: int) -> Self:
         """One view of the bake with 1 / step² of its pixels. Its images are not kept: no folder is beside its key."""
         index = self.views[view_name].index
-        store, key = ThinnedStore(self.store, index, step), f"{self.key}/{step}"
-        return replace(self, key=key, store=store, views={view_name: open_view(store, index, self.memory, key)})
+        store, key = DownsampledStore(self.store, index, step), f"{self.key}/{step}"
+        return replace(self, key=key, store=store, views={view_name: open_view(store, index, self.cache, key)})
 
-    def shines_at(self, view: View, material: int) -> NDArray[np.bool_]:
+    def is_emissive_at(self, view: View, material: int) -> NDArray[np.bool_]:
         """Whether the samples of a material that shines are seen from a side that does."""
-        return self.local.shines_at(material, view.eyes(view.rows(material)), view.points(material).position)
+        return self.local.is_emissive_at(
+            material, view.ray_origins(view.rows(material)), view.surface_points(material).position
+        )
 
     def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
         """Radiance of a view's samples of an environment. (n, 3) float32"""
         if environment == BAKED_ENVIRONMENT:
             return view.background()
-        return self.seen_in(environment, view.background_directions())
+        return self.environment_along(environment, view.background_directions())
 
-    def seen_in(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
+    def environment_along(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
         """Radiance of an environment in unit directions (n, 3), blurred by `blur` degrees. (n, 3) float32"""
-        radiance = self.map_of(environment.map, blur)
-        return lookup(radiance, turned(directions, -environment.rotation).astype(np.float32))
+        radiance = self.environment_map(environment.map, blur)
+        return lookup(radiance, rotate_about_y(directions, -environment.rotation).astype(np.float32))
 
-    def map_of(self, name: str | None, blur: float = 0) -> F32:
+    def environment_map(self, name: str | None, blur: float = 0) -> F32:
         """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
-        return self._blurred(name, blur) if blur else self.radiance_of(name)
+        return self._prefiltered_map(name, blur) if blur else self.environment_radiance(name)
 
-    def _blurred(self, name: str | None, degrees: float) -> F32:
-        owner = self.owner_of(name)
+    def _prefiltered_map(self, name: str | None, degrees: float) -> F32:
+        owner = self.cache_owner(name)
 
-        def few() -> F32:
-            return reduced(self.radiance_of(name))
+        def downsample() -> F32:
+            return downsampled(self.environment_radiance(name))
 
-        def made() -> F32:
-            return blurred(self.memory.keep((owner, "reduced environment", name), few), degrees)
+        def prefilter() -> F32:
+            return prefiltered(self.cache.get_value((owner, "reduced environment", name), downsample), degrees)
 
-        return self.memory.passing.keep((owner, "blurred environment", name, degrees), made)
+        return self.cache.transient.get_value((owner, "blurred environment", name, degrees), prefilter)
 
 
 @dataclass(frozen=True)
-class FewSamples:
+class SampledTransfer:
     """A few samples of a material, shaded at once in any light; a `relume.picture.transfer.Few`.
 
     Attributes:
         receivers: without any rays.
-        gathered: their gather rays, where those were baked; they bring nothing yet.
-        thrown: the lights that they see in flat mirrors, where those were baked. (n, bytes) uint8
+        gather_rays: their gather rays, where those were baked; they bring nothing yet.
+        mirror_visibility: the lights that they see in flat mirrors, where those were baked. (n, bytes) uint8
     """
 
-    transfer: BakedViews
-    receivers: Receivers
-    gathered: GatherRays | None = None
-    thrown: NDArray[np.uint8] | None = None
+    transfer: BakedFixedViews
+    receivers: ShadingPoints
+    gather_rays: GatherRays | None = None
+    mirror_visibility: NDArray[np.uint8] | None = None
 
     @property
     def num_bytes(self) -> int:
         """Memory they hold."""
-        few, links = self.receivers, 0 if self.gathered is None else self.gathered.links.nbytes
-        return int(2 * few.normal.nbytes + few.tangent.nbytes + few.wo.nbytes + few.visible.nbytes + links)
+        points, hit_bytes = self.receivers, 0 if self.gather_rays is None else self.gather_rays.gather_hits.nbytes
+        return int(
+            2 * points.normal.nbytes + points.tangent.nbytes + points.wo.nbytes + points.visible.nbytes + hit_bytes
+        )
 
-    def arriving(self, light: Light) -> Arriving:
+    def incident_light(self, light: Illumination) -> LightsAndPoints:
         """What arrives at them in a light; the environment from a small map, local lights exactly, what surfaces send
         as if they leant as they were baked: tracing how they do now takes longer than a preview."""
-        transfer, reflected = self.transfer, tuple[Rays, ...]()
-        if self.gathered is not None:
-            reflected = transfer.between_surfaces(leaning_as_baked(light), self.gathered, self.thrown)
-        local = transfer.local.all_rays(light, self.receivers.points)
-        return transfer.preview_lights_of(light), replace(self.receivers, rays=(*reflected, *local))
+        transfer, indirect_rays = self.transfer, tuple[RayList, ...]()
+        if self.gather_rays is not None:
+            indirect_rays = transfer.indirect_rays(with_baked_normals(light), self.gather_rays, self.mirror_visibility)
+        local = transfer.local.rays_to(light, self.receivers.points)
+        return transfer.preview_lights_for(light), replace(self.receivers, rays=(*indirect_rays, *local))
 
 
-def shown_of(lights: TriangleLights, light: Light) -> TriangleLights:
+def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:
     """The triangles of an environment by which light comes straight to the picture, beside local lights."""
-    if not light.shows_sky:
-        return lights.none()
+    if not light.has_direct_environment:
+        return lights.empty()
     if light.environment_gain == (1.0, 1.0, 1.0):
         return lights
     return replace(lights, irradiance=lights.irradiance * np.array(light.environment_gain, np.float32))

@@ -9,118 +9,130 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.memory import Memory
-from relume.methods.cells.cell_light import CellLight
-from relume.methods.cells.leaning import leant_cells
+from relume.memory import Cache
+from relume.methods.cells.cell_light import PatchLight
+from relume.methods.cells.leaning import normal_mapped_patches
 from relume.methods.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.methods.local_lights import LocalLights
-from relume.methods.on_cells import LightOnCells
-from relume.methods.opened.baked_views import BakedViews, FewSamples, Lights
-from relume.methods.reflected import Reflected
-from relume.methods.retracing import Retracing
-from relume.methods.thrown import MoreThrown, Thrown, ThrownLight
-from relume.picture.light import Light, Normals
-from relume.picture.transfer import Axis
-from relume.project.receivers import GatherRays, Rays
-from relume.project.sent import evenly
-from relume.trace.cell_tree import NO_CELL
+from relume.methods.on_cells import DirectPatchLight
+from relume.methods.opened.baked_views import BakedFixedViews, LightFinder, SampledTransfer
+from relume.methods.reflected import IndirectSolver
+from relume.methods.retracing import NormalRetracer
+from relume.methods.thrown import AddedMirrorLights, MirrorLights, MirrorLightTransfer
+from relume.picture.light import Illumination, Normals
+from relume.picture.transfer import EditAxis
+from relume.project.receivers import GatherRays, RayList
+from relume.project.sent import isotropic
+from relume.trace.cell_tree import NO_PATCH
 from relume.views.view import View
 
-_NOTHING = evenly(np.zeros((NO_CELL + 1, 3), np.float32))
+_NO_LIGHT = isotropic(np.zeros((NO_PATCH + 1, 3), np.float32))
 
 
 @dataclass(frozen=True)
-class BouncedViews(BakedViews):
+class BakedIndirectViews(BakedFixedViews):
     """A bake of fixed views in which light comes from other surfaces, too.
 
     Attributes:
-        cells: gather cells, which send it.
-        thrown: what flat mirrors send exactly; None where there are none.
+        patches: gather cells, which send it.
+        mirror_lights: what flat mirrors send exactly; None where there are none.
     """
 
-    cells: CellLight
-    thrown: Thrown | None
+    patches: PatchLight
+    mirror_lights: MirrorLights | None
 
-    axes = BakedViews.axes | {Axis.BOUNCES}
+    axes = BakedFixedViews.axes | {EditAxis.BOUNCES}
 
     @cached_property
-    def reflected(self) -> Reflected:
+    def indirect(self) -> IndirectSolver:
         """Light that gather cells send out."""
-        on_cells = LightOnCells(self.cells, *self._on_cells, self.harmonic)
-        return Reflected(on_cells, self._on_leant_cells, self.memory, self.key)
+        direct_light = DirectPatchLight(self.patches, *self._direct_light_args, self.harmonic)
+        return IndirectSolver(direct_light, self._normal_mapped_direct_light, self.cache, self.key)
 
-    def _on_leant_cells(self, normals: Normals) -> LightOnCells:
+    def _normal_mapped_direct_light(self, normals: Normals) -> DirectPatchLight:
         """The light on cells of which some lean as images say. normals: the image of each material, None for none"""
-        return LightOnCells(self._leant_cells(normals), *self._on_cells, leaning=(normals,))
+        return DirectPatchLight(
+            self._normal_mapped_patches(normals), *self._direct_light_args, normal_overrides=(normals,)
+        )
 
-    def _leant_cells(self, normals: Normals, cancelled: Callable[[], bool] = lambda: False) -> CellLight:
+    def _normal_mapped_patches(self, normals: Normals, is_canceled: Callable[[], bool] = lambda: False) -> PatchLight:
         key = self.key, "cells that lean", normals
-        return self.memory.keep(key, lambda: leant_cells(self.cells, normals, self.tracer, cancelled))
+        return self.cache.get_value(key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled))
 
-    def trace_cells(self, light: Light, cancelled: Callable[[], bool]) -> None:
-        """Trace what cells lack that lean otherwise than they were baked. See `Transfer`."""
+    def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
+        """Trace what cells lack that lean otherwise than they were baked. See `FixedViewTransfer`."""
         if any(normals := light.normals):
-            self._leant_cells(normals, cancelled)
+            self._normal_mapped_patches(normals, is_canceled)
 
     @property
-    def _on_cells(self) -> tuple[LocalLights, Lights, Lights, Memory, str]:
+    def _direct_light_args(self) -> tuple[LocalLights, LightFinder, LightFinder, Cache, str]:
         """What light comes to cells, and where it is kept."""
-        return self.local, self.lights_in, self.preview_lights_in, self.memory, self.key
+        return self.local, self.light_of_environment, self.preview_light_of_environment, self.cache, self.key
 
     @cached_property
-    def thrown_light(self) -> ThrownLight | None:
+    def mirror_light(self) -> MirrorLightTransfer | None:
         """The same in any look."""
-        if self.thrown is None:
+        if self.mirror_lights is None:
             return None
-        return ThrownLight(self.thrown, self.cells, self.lights_in, self.memory, self.key)
+        return MirrorLightTransfer(self.mirror_lights, self.patches, self.light_of_environment, self.cache, self.key)
 
     @cached_property
-    def tracer(self) -> Retracing:
+    def tracer(self) -> NormalRetracer:
         """Rays for normals that the bake did not know."""
-        return Retracing(self.store, self.local, self.thrown)
+        return NormalRetracer(self.store, self.local, self.mirror_lights)
 
     @cached_property
     def harmonic(self) -> HarmonicLight | None:
         """How smooth light comes to points and cells, where that was baked."""
-        return read_harmonic_light(self.store, self.cells)
+        return read_harmonic_light(self.store, self.patches)
 
-    def _rays(self, view: View, material: int, light: Light, memory: Memory) -> Sequence[Rays]:
+    def _rays(self, view: View, material: int, light: Illumination, cache: Cache) -> Sequence[RayList]:
         """The rays among what arrives: those of gather cells, and of local lights."""
-        local = super()._rays(view, material, light, memory)
-        if not light.paths.reflect:
+        local = super()._rays(view, material, light, cache)
+        if not light.paths.has_indirect:
             return local
-        rays, seen = view.gather_rays(material, _NOTHING), self.thrown_to(view, material)
-        return (*self.between_surfaces(light, rays, seen), *local)
+        rays, mirror_visibility = view.gather_rays(material, _NO_LIGHT), self.mirror_lights_of(view, material)
+        return (*self.indirect_rays(light, rays, mirror_visibility), *local)
 
-    def between_surfaces(
-        self, light: Light, gathered: GatherRays, thrown: NDArray[np.uint8] | None
-    ) -> tuple[Rays, ...]:
-        """The rays of samples that bring what surfaces send. See `BakedViews`."""
-        by_mirrors = self.thrown_light
-        if thrown is None or by_mirrors is None or not by_mirrors.is_in(light):
-            return super().between_surfaces(light, gathered, thrown)
-        beside = self.reflected.beside(light, by_mirrors.taken)
-        return replace(gathered, sent=beside), by_mirrors.rays(light, thrown)
+    def indirect_rays(
+        self, light: Illumination, gather_rays: GatherRays, mirror_visibility: NDArray[np.uint8] | None
+    ) -> tuple[RayList, ...]:
+        """The rays of samples that bring what surfaces send. See `BakedFixedViews`."""
+        mirror_light = self.mirror_light
+        if mirror_visibility is None or mirror_light is None or not mirror_light.is_in(light):
+            return super().indirect_rays(light, gather_rays, mirror_visibility)
+        outgoing = self.indirect.excluding(light, mirror_light.patch_part)
+        return replace(gather_rays, outgoing=outgoing), mirror_light.rays(light, mirror_visibility)
 
-    def thrown_to(self, view: View, material: int) -> NDArray[np.uint8] | None:
+    def mirror_lights_of(self, view: View, material: int) -> NDArray[np.uint8] | None:
         """The lights that a material's samples see in flat mirrors. (n, bytes) uint8"""
-        if self.thrown is None:
+        if self.mirror_lights is None:
             return None
         rows = view.rows(material)
 
         def read() -> NDArray[np.uint8]:
             return view.store.read(f"views/{view.index}/thrown", rows.start, rows.stop)
 
-        return self.memory.passing.keep((self.key, "thrown", *view.place(material)), read)
+        return self.cache.transient.get_value((self.key, "thrown", *view.sample_key(material)), read)
 
-    def more_thrown(self, before: Light, after: Light) -> MoreThrown | None:
-        """How much more flat mirrors throw after than before. See `Transfer`."""
-        return None if self.thrown_light is None else self.thrown_light.more(before, after)
+    def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
+        """How much more flat mirrors throw after than before. See `FixedViewTransfer`."""
+        return None if self.mirror_light is None else self.mirror_light.delta(before, after)
 
-    def some(self, view: View, material: int, chosen: NDArray[np.integer], *, reflects: bool) -> FewSamples:
-        """Some of a material's samples. See `Transfer`."""
-        few = super().some(view, material, chosen, reflects=reflects)
-        if not reflects:
-            return few
-        thrown = None if self.thrown is None else np.asarray(view.read_some("thrown", material, chosen), np.uint8)
-        return replace(few, gathered=view.some_gather_rays(material, chosen, _NOTHING), thrown=thrown)
+    def subset(
+        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+    ) -> SampledTransfer:
+        """Some of a material's samples. See `FixedViewTransfer`."""
+        samples = super().subset(view, material, sample_indices, has_indirect=has_indirect)
+        if not has_indirect:
+            return samples
+        mirror_visibility = (
+            None
+            if self.mirror_lights is None
+            else np.asarray(view.read_rows("thrown", material, sample_indices), np.uint8)
+        )
+        return replace(
+            samples,
+            gather_rays=view.subset_rays(material, sample_indices, _NO_LIGHT),
+            mirror_visibility=mirror_visibility,
+        )

@@ -7,42 +7,42 @@ from typing import Any
 from relume.bake import StoreReader
 from relume.errors import ParameterError, StoreError
 from relume.look import complete
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.views.view import open_view
 
 
-def described(store: StoreReader, key: str, memory: Memory) -> dict[str, Any]:
-    """The fields of `BakedViews` as a store has them.
+def read_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
+    """The fields of `BakedFixedViews` as a store has them.
 
     Args:
-        store: an open one. key: of the bake in the memory. memory: of all that is made from the bake.
+        store: an open one. key: of the bake in the memory. cache: of all that is made from the bake.
     Raises:
         StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
     """
-    fields = described_light(store, key, memory)
-    views = (open_view(store, k, memory, key) for k in range(len(store.attributes["views"])))
+    fields = read_light_fields(store, key, cache)
+    views = (open_view(store, k, cache, key) for k in range(len(store.attributes["views"])))
     return {**fields, "views": {view.name: view for view in views}}
 
 
-def described_light(store: StoreReader, key: str, memory: Memory) -> dict[str, Any]:
+def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
     """Those of them that light needs: no views.
 
     Args:
-        store: an open one. key: of the bake in the memory. memory: of all that is made from the bake.
+        store: an open one. key: of the bake in the memory. cache: of all that is made from the bake.
     Raises:
         StoreError: its description is not of this form.
     """
-    found = store.attributes
+    attributes = store.attributes
     try:
         return {
-            "memory": memory,
+            "cache": cache,
             "key": key,
             "store": store,
-            "scene_id": found["scene"],
-            "method": found["method"],
-            "num_lights": found["num_lights"],
-            "default_look": complete({}, found["look"]),
-            "material_names": tuple(found["materials"]),
+            "scene_id": attributes["scene"],
+            "method": attributes["method"],
+            "num_lights": attributes["num_lights"],
+            "default_look": complete({}, attributes["look"]),
+            "material_names": tuple(attributes["materials"]),
             "views": {},
         }
     except (KeyError, TypeError, IndexError, ParameterError) as error:

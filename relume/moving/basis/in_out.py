@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 from relume.basis.zernike import NUM_FUNCTIONS, num_functions
 from relume.moving.basis.lobes import is_narrow
-from relume.moving.basis.out_factors import of_white
+from relume.moving.basis.out_factors import white_coefficients
 
 BOUND = 0.05
 
 
-class InOut(NamedTuple):
+class FactorizationError(NamedTuple):
     """How a term is sent in moving views.
 
     Attributes:
@@ -27,9 +27,9 @@ class InOut(NamedTuple):
     is_mirror: bool
 
 
-def in_out(term_document: Mapping[str, Any]) -> InOut:
+def factorization_error(term_document: Mapping[str, Any]) -> FactorizationError:
     """Of one term of a complete look."""
-    known = of_white(term_document)
-    missed = known.missed_by_degree
-    needed = next((num_functions(degree) for degree, share in enumerate(missed) if share <= BOUND), None)
-    return InOut(NUM_FUNCTIONS, missed[-1], needed, is_narrow(known))
+    coefficients = white_coefficients(term_document)
+    residuals = coefficients.residual_by_degree
+    needed = next((num_functions(degree) for degree, residual in enumerate(residuals) if residual <= BOUND), None)
+    return FactorizationError(NUM_FUNCTIONS, residuals[-1], needed, is_narrow(coefficients))

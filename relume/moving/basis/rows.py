@@ -11,33 +11,33 @@ import numpy as np
 from relume.moving.basis.out_factors import NUM_ROWS
 from relume.uncounted import UNCOUNTED
 
-LEAST_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
+MIN_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
 
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
-def row_of(cosine):  # type: ignore[no-untyped-def]
+def table_row(cosine):  # type: ignore[no-untyped-def]
     """Find where cos θo lies in tables: a row, and the share of the next."""
-    place = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
-    row: Any = min(np.int64(place), NUM_ROWS - 2)
-    return row, np.float32(place - row)
+    row_coordinate = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
+    row: Any = min(np.int64(row_coordinate), NUM_ROWS - 2)
+    return row, np.float32(row_coordinate - row)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def seen_from(position, normal, tangent, eye):  # type: ignore[no-untyped-def]
+def view_direction_local(position, normal, tangent, camera_position):  # type: ignore[no-untyped-def]
     """Find where a point's wo lies in tables: a row, the share of the next, and cos φo, sin φo.
 
     Args:
-        position, normal, tangent: of the point. eye: where it is.
+        position, normal, tangent: of the point. camera_position: where it is.
     """
-    x, y, z = eye[0] - position[0], eye[1] - position[1], eye[2] - position[2]
+    x, y, z = camera_position[0] - position[0], camera_position[1] - position[1], camera_position[2] - position[2]
     scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
     x, y, z = scale * x, scale * y, scale * z
     n, t = normal, tangent
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     across, along = t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z
-    cosine: Any = min(max(n[0] * x + n[1] * y + n[2] * z, LEAST_COSINE), np.float32(1))
+    cosine: Any = min(max(n[0] * x + n[1] * y + n[2] * z, MIN_COSINE), np.float32(1))
     length = math.sqrt(across * across + along * along)
-    row, share = row_of(cosine)
+    row, fraction = table_row(cosine)
     if length < np.float32(1e-6):
-        return row, share, np.float32(1), np.float32(0)
-    return row, share, np.float32(across / length), np.float32(along / length)
+        return row, fraction, np.float32(1), np.float32(0)
+    return row, fraction, np.float32(across / length), np.float32(along / length)

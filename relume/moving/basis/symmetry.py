@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import NUM_FUNCTIONS, ladder
+from relume.basis.zernike import NUM_FUNCTIONS, recurrence
 
 F64 = NDArray[np.float64]
 
 
-def all_around(quarter: F64) -> F64:
+def expand_quarter(quarter: F64) -> F64:
     """Find the out-factors of a mirrored term all around from those of a quarter.
 
     Args:
@@ -18,11 +18,11 @@ def all_around(quarter: F64) -> F64:
     Returns:
         For φo from 0 to 2π, the end not among them. (rows, columns, channels, K)
     """
-    rungs = ladder()
+    recurrence_table = recurrence()
     across, along = np.ones((2, NUM_FUNCTIONS))  # signs of the functions where x and where y is turned about
-    across[rungs.cosine] = (-1.0) ** rungs.order
-    odd = rungs.order > 0
-    across[rungs.sine[odd]] = -((-1.0) ** rungs.order[odd])
-    along[rungs.sine[odd]] = -1
+    across[recurrence_table.cosine] = (-1.0) ** recurrence_table.order
+    odd = recurrence_table.order > 0
+    across[recurrence_table.sine[odd]] = -((-1.0) ** recurrence_table.order[odd])
+    along[recurrence_table.sine[odd]] = -1
     half = np.concatenate([quarter, across * quarter[:, -2::-1]], axis=1)
     return np.concatenate([half, along * half[:, -2:0:-1]], axis=1)

@@ -17,129 +17,136 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-NUM_NUMBERS = 5  # cos θ of both, s_1, both σ
-_ROUNDS = 12
-_APART = 0.5  # of σ, that each begins off the middle
+NUM_PARAMETERS = 5  # cos θ of both, s_1, both σ
+_NUM_ITERATIONS = 12
+_INITIAL_OFFSET = 0.5  # of σ, that each begins off the middle
 _NARROWEST, _WIDEST = np.float32(1e-8), np.float32(1.0)  # σ²
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def _share_of_first(x):  # type: ignore[no-untyped-def]
+def _responsibility(x):  # type: ignore[no-untyped-def]
     """Find 1 / (1 + e^x), to 1e-4, by Lambert's continued fraction of the hyperbolic tangent: eight at once."""
     h = min(max(np.float32(-0.5) * x, np.float32(-4.9)), np.float32(4.9))
     q = h * h
-    above = h * (np.float32(135135) + q * (np.float32(17325) + q * (np.float32(378) + q)))
-    below = np.float32(135135) + q * (np.float32(62370) + q * (np.float32(3150) + q * np.float32(28)))
-    return np.float32(0.5) + np.float32(0.5) * above / below
+    numerator = h * (np.float32(135135) + q * (np.float32(17325) + q * (np.float32(378) + q)))
+    denominator = np.float32(135135) + q * (np.float32(62370) + q * (np.float32(3150) + q * np.float32(28)))
+    return np.float32(0.5) + np.float32(0.5) * numerator / denominator
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def _width_of(length):  # type: ignore[no-untyped-def]
+def _squared_width(length):  # type: ignore[no-untyped-def]
     """Find σ² = 1 / κ from the length of the mean direction, R: κ ≈ R (3 − R²) / (1 − R²)."""
     r = min(max(length, np.float32(1e-3)), np.float32(1 - 1e-7))
     return min(max((np.float32(1) - r * r) / (r * (np.float32(3) - r * r)), _NARROWEST), _WIDEST)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _fit(x, z, area, sent, start, stop, out):  # type: ignore[no-untyped-def]
-    """Fit the rows [start, stop). out: (rows, `NUM_NUMBERS`)"""
+def _fit(x, z, area, brdf_cosine, start, stop, out):  # type: ignore[no-untyped-def]
+    """Fit the rows [start, stop). out: (rows, `NUM_PARAMETERS`)"""
     num = x.shape[1]
     weight = np.empty(num, np.float32)
     for row in range(start, stop):
-        total = squares = np.float32(0)
-        along_x = along_z = square_x = square_z = np.float32(0)
+        total = squared_total = np.float32(0)
+        along_x = along_z = squared_x = squared_z = np.float32(0)
         for k in range(num):
-            weight[k] = sent[row, k] * area[k]
-            square = sent[row, k] * weight[k]
+            weight[k] = brdf_cosine[row, k] * area[k]
+            squared_weight = brdf_cosine[row, k] * weight[k]
             total += weight[k]
             along_x += weight[k] * x[row, k]
             along_z += weight[k] * z[row, k]
-            squares += square
-            square_x += square * x[row, k]
-            square_z += square * z[row, k]
+            squared_total += squared_weight
+            squared_x += squared_weight * x[row, k]
+            squared_z += squared_weight * z[row, k]
         out[row, 0] = out[row, 1] = out[row, 3] = out[row, 4] = 1
         out[row, 2] = 0.5
-        if not squares > 0:
+        if not squared_total > 0:
             continue
-        per = np.float32(1) / total
-        along_x, along_z = along_x * per, along_z * per
+        inverse_total = np.float32(1) / total
+        along_x, along_z = along_x * inverse_total, along_z * inverse_total
         # squares of a density are as wide as √½ of it, wherever it is bright
         variance = max(
-            np.float32(2) - np.float32(2) * math.sqrt(square_x * square_x + square_z * square_z) / squares, _NARROWEST
+            np.float32(2) - np.float32(2) * math.sqrt(squared_x * squared_x + squared_z * squared_z) / squared_total,
+            _NARROWEST,
         )
-        middle, off = math.atan2(square_x, square_z), np.float32(_APART) * math.sqrt(variance)
+        middle, off = math.atan2(squared_x, squared_z), np.float32(_INITIAL_OFFSET) * math.sqrt(variance)
         first: Any = np.float32(0.5)
-        one: Any = variance / np.float32(1.5)
-        other: Any = variance / np.float32(0.75)
-        one_x, one_z = math.sin(middle + off), math.cos(middle + off)
-        other_x, other_z = math.sin(middle - off), math.cos(middle - off)
-        for _ in range(_ROUNDS):
-            kappa, kappa_other = np.float32(1) / one, np.float32(1) / other
-            peak = first * kappa / (np.float32(1) - math.exp(np.float32(-2) * kappa))
-            peak_other = (np.float32(1) - first) * kappa_other
-            peak_other /= np.float32(1) - math.exp(np.float32(-2) * kappa_other)
-            head = np.float32(math.log(peak_other / peak)) + kappa - kappa_other
-            by_x, by_z = kappa_other * other_x - kappa * one_x, kappa_other * other_z - kappa * one_z
-            share = mean_x = mean_z = np.float32(0)
+        variance_1: Any = variance / np.float32(1.5)
+        variance_2: Any = variance / np.float32(0.75)
+        x_1, z_1 = math.sin(middle + off), math.cos(middle + off)
+        x_2, z_2 = math.sin(middle - off), math.cos(middle - off)
+        for _ in range(_NUM_ITERATIONS):
+            kappa_1, kappa_2 = np.float32(1) / variance_1, np.float32(1) / variance_2
+            peak_1 = first * kappa_1 / (np.float32(1) - math.exp(np.float32(-2) * kappa_1))
+            peak_2 = (np.float32(1) - first) * kappa_2
+            peak_2 /= np.float32(1) - math.exp(np.float32(-2) * kappa_2)
+            log_ratio = np.float32(math.log(peak_2 / peak_1)) + kappa_1 - kappa_2
+            gradient_x, gradient_z = kappa_2 * x_2 - kappa_1 * x_1, kappa_2 * z_2 - kappa_1 * z_1
+            responsibility_sum = mean_x = mean_z = np.float32(0)
             for k in range(num):
-                its = per * weight[k] * _share_of_first(head + by_x * x[row, k] + by_z * z[row, k])
-                share += its
-                mean_x += its * x[row, k]
-                mean_z += its * z[row, k]
-            first = min(max(share, np.float32(1e-3)), np.float32(1 - 1e-3))
-            rest_x, rest_z = along_x - mean_x, along_z - mean_z
+                responsibility = (
+                    inverse_total
+                    * weight[k]
+                    * _responsibility(log_ratio + gradient_x * x[row, k] + gradient_z * z[row, k])
+                )
+                responsibility_sum += responsibility
+                mean_x += responsibility * x[row, k]
+                mean_z += responsibility * z[row, k]
+            first = min(max(responsibility_sum, np.float32(1e-3)), np.float32(1 - 1e-3))
+            remainder_x, remainder_z = along_x - mean_x, along_z - mean_z
             length: Any = max(np.float32(math.hypot(mean_x, mean_z)), np.float32(1e-12))
-            rest: Any = max(np.float32(math.hypot(rest_x, rest_z)), np.float32(1e-12))
-            one_x, one_z, one = mean_x / length, mean_z / length, _width_of(length / first)
-            other_x, other_z = rest_x / rest, rest_z / rest
-            other = _width_of(rest / (np.float32(1) - first))
-        out[row, 0] = min(max(one_z, np.float32(0)), np.float32(1)) if one_x > 0 else np.float32(1)
-        out[row, 1] = min(max(other_z, np.float32(0)), np.float32(1)) if other_x > 0 else np.float32(1)
+            remainder_length: Any = max(np.float32(math.hypot(remainder_x, remainder_z)), np.float32(1e-12))
+            x_1, z_1, variance_1 = mean_x / length, mean_z / length, _squared_width(length / first)
+            x_2, z_2 = remainder_x / remainder_length, remainder_z / remainder_length
+            variance_2 = _squared_width(remainder_length / (np.float32(1) - first))
+        out[row, 0] = min(max(z_1, np.float32(0)), np.float32(1)) if x_1 > 0 else np.float32(1)
+        out[row, 1] = min(max(z_2, np.float32(0)), np.float32(1)) if x_2 > 0 else np.float32(1)
         out[row, 2] = first
-        out[row, 3], out[row, 4] = math.sqrt(one), math.sqrt(other)
+        out[row, 3], out[row, 4] = math.sqrt(variance_1), math.sqrt(variance_2)
 
 
-def fit_two(x: F32, z: F32, area: F32, sent: F32) -> F32:
+def fit_two_lobes(x: F32, z: F32, area: F32, brdf_cosine: F32) -> F32:
     """Fit two lobes to each of some highlights, the same on both sides of a plane.
 
     Args:
         x, z: of directions, along the surface and along the normal, in the plane. (rows, n) float32
-        area: solid angle of each. (n,) float32. sent: f cos θi there, not negative. (rows, n) float32
+        area: solid angle of each. (n,) float32. brdf_cosine: f cos θi there, not negative. (rows, n) float32
     Returns:
         cos θ of both on the side of positive x, none beyond the normal; the share of the first, s_1; σ of both,
         radians. (rows, 5) float32
     """
-    out = np.empty((len(x), NUM_NUMBERS), np.float32)
-    for_shares(lambda start, stop: _fit(x, z, area, sent, start, stop, out), len(x))
+    out = np.empty((len(x), NUM_PARAMETERS), np.float32)
+    parallel_for_chunks(lambda start, stop: _fit(x, z, area, brdf_cosine, start, stop, out), len(x))
     return out
 
 
-def fit_two_numpy(x: F64, z: F64, area: F64, sent: F64) -> F64:
-    """Do as `fit_two` for one row, in plain NumPy: its oracle.
+def fit_two_lobes_numpy(x: F64, z: F64, area: F64, brdf_cosine: F64) -> F64:
+    """Do as `fit_two_lobes` for one row, in plain NumPy: its oracle.
 
     Args:
-        x, z, area, sent: as there. (n,)
+        x, z, area, brdf_cosine: as there. (n,)
     Returns:
         (5,)
     """
-    weight, square = sent * area / (sent @ area), sent**2 * area / (sent**2 @ area)
-    middle = np.array([square @ x, square @ z])
+    weight, squared_weight = brdf_cosine * area / (brdf_cosine @ area), brdf_cosine**2 * area / (brdf_cosine**2 @ area)
+    middle = np.array([squared_weight @ x, squared_weight @ z])
     variance = 2 - 2 * np.linalg.norm(middle)
-    angle, off = np.arctan2(*middle), _APART * np.sqrt(variance)
+    angle, off = np.arctan2(*middle), _INITIAL_OFFSET * np.sqrt(variance)
     towards = np.array([[np.sin(angle + side), np.cos(angle + side)] for side in (off, -off)])
     first, width = 0.5, variance / np.array([1.5, 0.75])
-    for _ in range(_ROUNDS):
+    for _ in range(_NUM_ITERATIONS):
         log_density = np.log(np.array([[first], [1 - first]]) / width[:, None] / (1 - np.exp(-2 / width[:, None])))
         log_density = log_density - (1 - towards @ np.array([x, z])) / width[:, None]
-        its = weight / (1 + np.exp(np.minimum(log_density[1] - log_density[0], 700)))
-        mean = np.array([[its @ x, its @ z], [(weight - its) @ x, (weight - its) @ z]])
-        first = float(its.sum())
+        responsibility = weight / (1 + np.exp(np.minimum(log_density[1] - log_density[0], 700)))
+        mean = np.array(
+            [[responsibility @ x, responsibility @ z], [(weight - responsibility) @ x, (weight - responsibility) @ z]]
+        )
+        first = float(responsibility.sum())
         length = np.linalg.norm(mean, axis=1)
         towards, r = mean / length[:, None], length / [first, 1 - first]
         width = (1 - r**2) / (r * (3 - r**2))

@@ -8,26 +8,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.environments.equirect import turned
-from relume.light.suns import NUM_TARGETS, TURNS, Sun
+from relume.environments.equirect import rotate_about_y
+from relume.light.suns import NUM_TARGET_SETS, NUM_TARGETS, SunDisk
 from relume.light.triangles import TriangleLights
 from relume.look import LightGeometry
-from relume.picture.light import Light, Source
-from relume.points import Points
-from relume.project.light_vectors import light_vectors
+from relume.picture.light import Illumination, LightSource
+from relume.points import SurfacePoints
+from relume.project.light_vectors import incident_coefficients
 
 F32 = NDArray[np.float32]
 
-_KINDS = "point", "spot", "directional"  # of lamps that have no extent
-_MOST_LAMPS = 4
+_DELTA_LIGHT_KINDS = "point", "spot", "directional"  # of lamps that have no extent
+_MAX_LOCAL_LIGHTS = 4
 
 
-class Targets(NamedTuple):
+class ShadowTargets(NamedTuple):
     """What shadow rays are sent to.
 
     Attributes:
-        towards: unit directions, or places in metres; each has an equal share of the light. One of `TURNS` sets is a
-            pixel's own. (`TURNS`, `NUM_TARGETS`, 3) float32
+        towards: unit directions, or places in metres; each has an equal share of the light. One of `NUM_TARGET_SETS`
+            sets is a pixel's own. (`NUM_TARGET_SETS`, `NUM_TARGETS`, 3) float32
         is_far: they are directions.
     """
 
@@ -35,7 +35,7 @@ class Targets(NamedTuple):
     is_far: bool
 
 
-class Beam(NamedTuple):
+class HardShadowLight(NamedTuple):
     """One source.
 
     Attributes:
@@ -45,57 +45,59 @@ class Beam(NamedTuple):
     """
 
     key: Hashable
-    targets: Targets
+    targets: ShadowTargets
     vectors: F32
     gain: F32
 
-    def spread(self, chosen: NDArray[np.intp], shape: tuple[int, int, int]) -> Beam:
+    def scatter(self, rows: NDArray[np.intp], shape: tuple[int, int, int]) -> HardShadowLight:
         """The same of as many points as vectors of this shape have, whose light is that of some. chosen: these. (n,)"""
         vectors = np.zeros(shape, np.float32)
-        vectors[chosen] = self.vectors
+        vectors[rows] = self.vectors
         return self._replace(vectors=vectors)
 
     @property
-    def middle(self) -> F32:
+    def center(self) -> F32:
         """Where its light comes from: a direction, not quite unit, or a place. (3,) float32"""
         return np.asarray(self.targets.towards.mean(axis=(0, 1)), np.float32)
 
 
-def lamps_of(light: Light) -> tuple[Source, ...]:
+def hard_shadow_lights(light: Illumination) -> tuple[LightSource, ...]:
     """Find the lamps of a light that are beams: all of those without an extent, unless they are many."""
-    found = tuple(source for source in light.local if source.geometry.kind in _KINDS and light.paths.direct)
-    return found if len(found) <= _MOST_LAMPS else ()
+    sources = tuple(
+        source for source in light.local if source.geometry.kind in _DELTA_LIGHT_KINDS and light.paths.direct
+    )
+    return sources if len(sources) <= _MAX_LOCAL_LIGHTS else ()
 
 
-def targets_of_sun(sun: Sun, rotation: float) -> Targets:
+def sun_shadow_targets(sun_disk: SunDisk, rotation: float) -> ShadowTargets:
     """Aim at a sun of a map that is turned by `rotation` degrees."""
-    towards = turned(sun.towards.reshape(-1, 3), rotation).reshape(sun.towards.shape)
-    return Targets(np.ascontiguousarray(towards, np.float32), True)
+    towards = rotate_about_y(sun_disk.directions.reshape(-1, 3), rotation).reshape(sun_disk.directions.shape)
+    return ShadowTargets(np.ascontiguousarray(towards, np.float32), True)
 
 
-def targets_of_lamp(geometry: LightGeometry) -> Targets:
+def local_shadow_targets(geometry: LightGeometry) -> ShadowTargets:
     """Aim at a lamp without an extent."""
     is_far = geometry.kind == "directional"
-    where = np.array(geometry.position, np.float64)
+    location = np.array(geometry.position, np.float64)
     if is_far:
-        where = -np.array(geometry.direction, np.float64)
-        where /= np.linalg.norm(where)
-    return Targets(np.tile(where, (TURNS, NUM_TARGETS, 1)).astype(np.float32), is_far)
+        location = -np.array(geometry.direction, np.float64)
+        location /= np.linalg.norm(location)
+    return ShadowTargets(np.tile(location, (NUM_TARGET_SETS, NUM_TARGETS, 1)).astype(np.float32), is_far)
 
 
-def light_of_sun(sun: Sun, rotation: float, points: Points) -> F32:
+def unoccluded_sun_vectors(sun_disk: SunDisk, rotation: float, probes: SurfacePoints) -> F32:
     """Find what points get of a sun if nothing hides it.
 
     Args:
-        sun: of a map. rotation: of the map, degrees. points: that are asked about.
+        sun_disk: of a map. rotation: of the map, degrees. probes: that are asked about.
     Returns:
         Light vectors. (points, 3, K) float32
     """
-    mean = turned(sun.mean[None], rotation)
+    mean = rotate_about_y(sun_disk.mean[None], rotation)
     length = np.linalg.norm(mean)
-    one = TriangleLights(
+    lights = TriangleLights(
         np.zeros((3, 6, 1), np.float32),
         (mean / length).astype(np.float32),
-        (sun.irradiance[None] * length).astype(np.float32),
+        (sun_disk.irradiance[None] * length).astype(np.float32),
     )
-    return light_vectors(points, np.full((points.num_points, 1), 1, np.uint8), one, ())
+    return incident_coefficients(probes, np.full((probes.num_points, 1), 1, np.uint8), lights, ())

@@ -4,7 +4,7 @@
 
 L is the sky in a lobe (`relume.moving.basis.lobes`), times what a point sees of it: a control variate; in fine frames,
 and where one lobe would stand for the highlight badly, L_2, the sky in two. It is what turns fastest where surfaces are
-curved, twice as fast as their normals. B is summed over lights (`relume.moving.highlights.by_lights`), or it is what
+curved, twice as fast as their normals. B is summed over lights (`relume.moving.highlights.sum_lights`), or it is what
 the in-basis says, Σ_k p_k t_k of the sky, where that tells as much. Beside what is bright this rings, and says what
 cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple. Lights are
 summed for the normal of a point: where a normal map bends it by more than a lobe is wide, L_2 alone is believed.
@@ -19,77 +19,117 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.moving.basis.lobes import Lobes
-from relume.moving.evaluate import Sent
-from relume.moving.highlights.looking import SkyLight, add_sky_in_lobe, along_both, along_lobe
-from relume.moving.points.surface import Surface
-from relume.parallel import for_shares
+from relume.moving.evaluate import ProbeRadiance
+from relume.moving.highlights.looking import (
+    PrefilteredEnvironment,
+    add_environment_in_lobe,
+    evaluate_lobe,
+    evaluate_two_lobes,
+)
+from relume.moving.points.surface import StoredScene
+from relume.parallel import parallel_for_chunks
 
 F32 = NDArray[np.float32]
 
-BUMPY = np.float32(4)  # σ² of normals over that of a lobe, which turns twice as far
+NORMAL_VARIANCE_FACTOR = np.float32(4)  # σ² of normals over that of a lobe, which turns twice as far
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add(points, material, lobes, light, eye, glances, lit, bumpiness, is_fine, rows, start, stop, sent, sky):  # type: ignore[no-untyped-def]
+def _add_highlights(  # type: ignore[no-untyped-def]
+    probes,
+    material,
+    lobes,
+    environment,
+    camera_position,
+    lobe_visibility,
+    light_sums,
+    normal_variation,
+    is_fine,
+    rows,
+    start,
+    stop,
+    outgoing,
+    basis_radiance,
+):
     """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
-    position, normal, _, _, _ = points
-    shown, both = np.empty(3, np.float32), np.empty(3, np.float32)
+    position, normal, _, _, _ = probes
+    lobe_radiance, two_lobe_radiance = np.empty(3, np.float32), np.empty(3, np.float32)
     for p in rows[start:stop]:
-        lobe = lobes.of[material[p]]
+        lobe = lobes.lobe_index[material[p]]
         if lobe < 0:
             continue
         n = normal[p, 0], normal[p, 1], normal[p, 2]
-        x, y, z = position[p, 0] - eye[0], position[p, 1] - eye[1], position[p, 2] - eye[2]
+        x, y, z = (
+            position[p, 0] - camera_position[0],
+            position[p, 1] - camera_position[1],
+            position[p, 2] - camera_position[2],
+        )
         scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
         d = scale * x, scale * y, scale * z
-        seen = glances[p, 0], glances[p, 1], glances[p, 2]
+        visibility = lobe_visibility[p, 0], lobe_visibility[p, 1], lobe_visibility[p, 2]
         for channel in range(3):
-            shown[channel] = both[channel] = 0
-        row, share, one, other, first, sigma, sigma_2 = along_both(lobes, lobe, n, d)
-        add_sky_in_lobe(light, seen, one, sigma, first, both)
-        add_sky_in_lobe(light, seen, other, sigma_2, np.float32(1) - first, both)
+            lobe_radiance[channel] = two_lobe_radiance[channel] = 0
+        row, fraction, direction_1, direction_2, weight_1, sigma_1, sigma_2 = evaluate_two_lobes(lobes, lobe, n, d)
+        add_environment_in_lobe(environment, visibility, direction_1, sigma_1, weight_1, two_lobe_radiance)
+        add_environment_in_lobe(
+            environment, visibility, direction_2, sigma_2, np.float32(1) - weight_1, two_lobe_radiance
+        )
         if is_fine or lobes.is_two[lobe]:
-            shown[0], shown[1], shown[2] = both[0], both[1], both[2]
+            lobe_radiance[0], lobe_radiance[1], lobe_radiance[2] = (
+                two_lobe_radiance[0],
+                two_lobe_radiance[1],
+                two_lobe_radiance[2],
+            )
         else:
-            _, _, ray, wide = along_lobe(lobes, lobe, n, d)
-            add_sky_in_lobe(light, seen, ray, wide, np.float32(1), shown)
-        most, near = lobes.most[lobe], lobes.believed[lobe, row]
-        believed = near + share * (lobes.believed[lobe, row + 1] - near)
-        sigma = min(sigma, sigma_2)
-        flat = sigma * sigma / (sigma * sigma + BUMPY * bumpiness[material[p]])
+            _, _, direction, single_sigma = evaluate_lobe(lobes, lobe, n, d)
+            add_environment_in_lobe(environment, visibility, direction, single_sigma, np.float32(1), lobe_radiance)
+        max_ratio, lower = lobes.max_ratio[lobe], lobes.lobe_confidence[lobe, row]
+        confidence = lower + fraction * (lobes.lobe_confidence[lobe, row + 1] - lower)
+        sigma_1 = min(sigma_1, sigma_2)
+        normal_factor = sigma_1 * sigma_1 / (sigma_1 * sigma_1 + NORMAL_VARIANCE_FACTOR * normal_variation[material[p]])
         for channel in range(3):
-            both[channel] += flat * (lit[p, channel] - (np.float32(1) - believed) * both[channel])
-        for group in range(sent.shape[1]):
+            two_lobe_radiance[channel] += normal_factor * (
+                light_sums[p, channel] - (np.float32(1) - confidence) * two_lobe_radiance[channel]
+            )
+        for group in range(outgoing.shape[1]):
             for channel in range(3):
-                near = lobes.albedo[lobe, row, group, channel]
-                albedo = light.gain[channel] * (near + share * (lobes.albedo[lobe, row + 1, group, channel] - near))
-                said = albedo * both[channel]
-                held = min(max(sky[p, group, channel], said / most), said * most)
-                sent[p, group, channel] += held - albedo * shown[channel]
+                lower = lobes.albedo[lobe, row, group, channel]
+                albedo = environment.gain[channel] * (
+                    lower + fraction * (lobes.albedo[lobe, row + 1, group, channel] - lower)
+                )
+                estimate = albedo * two_lobe_radiance[channel]
+                clamped = min(max(basis_radiance[p, group, channel], estimate / max_ratio), estimate * max_ratio)
+                outgoing[p, group, channel] += clamped - albedo * lobe_radiance[channel]
 
 
-def add_sky_in_highlights(
-    surface: Surface,
+def add_environment_highlights(
+    stored_scene: StoredScene,
     lobes: Lobes,
-    light: SkyLight,
-    eye: F32,
-    glances: F32,
-    lit: F32,
+    environment: PrefilteredEnvironment,
+    camera_position: F32,
+    lobe_visibility: F32,
+    light_sums: F32,
     is_needed: NDArray[np.uint8],
-    sent: Sent,
+    outgoing: ProbeRadiance,
     *,
     is_fine: bool,
 ) -> None:
     """Add what points know of the sky in highlights, less what pixels find.
 
     Args:
-        surface: whose points. lobes: of all materials. light: that they show. eye: where it is. (3,) float32
-        glances: of the points along their lobes, from `relume.moving.highlights.glances`. (points, 3)
-        lit: by lights, from `relume.moving.highlights.by_lights`. (points, 3)
+        stored_scene: whose points. lobes: of all materials. environment: that they show. camera_position: where it is.
+            (3,) float32
+        lobe_visibility: of the points along their lobes, from `relume.moving.highlights.glances`. (points, 3)
+        light_sums: by lights, from `relume.moving.highlights.sum_lights`. (points, 3)
         is_needed: points that are asked. (points,) uint8
-        sent: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
+        outgoing: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
     """
     rows = np.flatnonzero(is_needed.view(np.bool_))
-    seen = np.ascontiguousarray(eye, np.float32), glances, lit, surface.bumpiness
-    args = (surface.points, surface.material, lobes, light, *seen, is_fine, rows)
-    for_shares(lambda start, stop: _add(*args, start, stop, *sent), len(rows))
+    probe_args = (
+        np.ascontiguousarray(camera_position, np.float32),
+        lobe_visibility,
+        light_sums,
+        stored_scene.normal_variation,
+    )
+    args = (stored_scene.probes, stored_scene.material, lobes, environment, *probe_args, is_fine, rows)
+    parallel_for_chunks(lambda start, stop: _add_highlights(*args, start, stop, *outgoing), len(rows))

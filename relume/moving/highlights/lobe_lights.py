@@ -20,9 +20,9 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.light.suns import MOST_SUNS
+from relume.light.suns import MAX_SUN_DISKS
 from relume.moving.basis.lobes import Lobes
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
@@ -30,40 +30,40 @@ F64 = NDArray[np.float64]
 
 SIDE = 24  # of the map, in squares
 NUM_LISTED = 32  # lights in a list, at most
-MOST_LAMPS, LIGHTS_A_LAMP = MOST_SUNS, 16
-NARROWEST = 0.05  # σ of the first width, radians; each is √2 times the one before
+MAX_BRIGHT_LIGHTS, LIGHTS_PER_BRIGHT_LIGHT = MAX_SUN_DISKS, 16
+MIN_SIGMA = 0.05  # σ of the first width, radians; each is √2 times the one before
 NUM_WIDTHS = 10
 _SHARPNESS = 8  # of the polynomial
-_WIDTH_OF_RADIUS = 8.0  # a triangle's r² over that of the circle about it: of an equilateral one, along an axis
+_RADIUS_TO_VARIANCE = 8.0  # a triangle's r² over that of the circle about it: of an equilateral one, along an axis
 
 
-class LobeLights(NamedTuple):
+class LobeLightLists(NamedTuple):
     """Lights of a sky, and lists of them.
 
     Attributes:
         lights: of each light the direction, r², and E, luminous, without lamps. (lights, 5) float32
         lists: lights of every width and square; after the last of a list −1. (lists, `NUM_LISTED`) int32
         first: list of the first square of each width, or of the nearest that has lists. (`NUM_WIDTHS`,) int32
-        lamps: the lights that most of each lamp comes by, then −1. (lamps, `LIGHTS_A_LAMP`) int32
-        share: how much of it comes by each, one in all. (lamps, `LIGHTS_A_LAMP`) float32
+        bright_lights: the lights that most of each lamp comes by, then −1. (lamps, `LIGHTS_PER_BRIGHT_LIGHT`) int32
+        bright_light_weights: how much of it comes by each, one in all. (lamps, `LIGHTS_PER_BRIGHT_LIGHT`) float32
     """
 
     lights: F32
     lists: NDArray[np.int32]
     first: NDArray[np.int32]
-    lamps: NDArray[np.int32]
-    share: F32
+    bright_lights: NDArray[np.int32]
+    bright_light_weights: F32
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def width_of(sigma):  # type: ignore[no-untyped-def]
+def width_index(sigma):  # type: ignore[no-untyped-def]
     """Find which width's lists a lobe of σ takes: the nearest."""
-    step = np.float32(2) * math.log2(max(sigma, np.float32(1e-6)) * np.float32(1 / NARROWEST))
+    step = np.float32(2) * math.log2(max(sigma, np.float32(1e-6)) * np.float32(1 / MIN_SIGMA))
     return min(max(np.int64(step + np.float32(0.5)), 0), NUM_WIDTHS - 1)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def square_of(x, y, z):  # type: ignore[no-untyped-def]
+def bin_of(x, y, z):  # type: ignore[no-untyped-def]
     """Find the square of a direction, whose parts are x, y, z."""
     per = np.float32(1) / (abs(x) + abs(y) + abs(z))
     u, v = x * per, z * per
@@ -77,7 +77,7 @@ def square_of(x, y, z):  # type: ignore[no-untyped-def]
     return row * SIDE + column
 
 
-def _squares() -> tuple[F64, F64]:
+def _direction_bins() -> tuple[F64, F64]:
     """Directions of the squares' middles (squares, 3), and the angle from each to its farthest corner (squares,)."""
     edge = np.linspace(-1, 1, SIDE + 1)
     middle = 0.5 * (edge[1:] + edge[:-1])
@@ -89,66 +89,66 @@ def _squares() -> tuple[F64, F64]:
         return np.asarray(raw / np.linalg.norm(raw, axis=-1, keepdims=True))
 
     v, u = np.meshgrid(middle, middle, indexing="ij")
-    about = towards(u, v)
+    centers = towards(u, v)
     v, u = np.meshgrid(edge, edge, indexing="ij")
     corners = towards(u, v)
-    each = [corners[a : SIDE + a, b : SIDE + b] for a in (0, 1) for b in (0, 1)]
-    cosine = np.min([np.einsum("abk,abk->ab", about, corner) for corner in each], axis=0)
-    return about.reshape(-1, 3), np.arccos(np.clip(cosine, -1, 1)).ravel()
+    bin_corners = [corners[a : SIDE + a, b : SIDE + b] for a in (0, 1) for b in (0, 1)]
+    cosine = np.min([np.einsum("abk,abk->ab", centers, corner) for corner in bin_corners], axis=0)
+    return centers.reshape(-1, 3), np.arccos(np.clip(cosine, -1, 1)).ravel()
 
 
-_SQUARES = _squares()
+_DIRECTION_BINS = _direction_bins()
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def weight_of(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
+def light_weight(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
     """Find w of a light.
 
     Args:
-        lights, light: of `LobeLights`, and which. x, y, z: about what a lobe is, unit. variance: of the lobe, σ².
+        lights, light: of `LobeLightLists`, and which. x, y, z: about what a lobe is, unit. variance: of the lobe, σ².
     """
-    off = np.float32(1) - (x * lights[light, 0] + y * lights[light, 1] + z * lights[light, 2])
-    return _weight(off, lights[light, 3], lights[light, 4], variance)
+    one_minus_cosine = np.float32(1) - (x * lights[light, 0] + y * lights[light, 1] + z * lights[light, 2])
+    return _weight(one_minus_cosine, lights[light, 3], lights[light, 4], variance)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def _weight(off, spread, luminous, variance):  # type: ignore[no-untyped-def]
+def _weight(one_minus_cosine, spread, luminance, variance):  # type: ignore[no-untyped-def]
     """Find w from 1 − ω · ω_l, r² and E."""
-    per = np.float32(1) / (variance + spread)
-    left = max(np.float32(1) - off * per * np.float32(1 / _SHARPNESS), np.float32(0))
-    left *= left
-    left *= left
-    return luminous * per * left * left
+    inverse_variance = np.float32(1) / (variance + spread)
+    remainder = max(np.float32(1) - one_minus_cosine * inverse_variance * np.float32(1 / _SHARPNESS), np.float32(0))
+    remainder *= remainder
+    remainder *= remainder
+    return luminance * inverse_variance * remainder * remainder
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _list(columns, about, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
+def _list_lights(columns, centers, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
     """List the lights that weigh most anywhere in squares [start, stop). columns: of the lights. (5, lights)"""
-    num, most = columns.shape[1], out.shape[1]
+    num, max_listed = columns.shape[1], out.shape[1]
     weight = np.empty(num, np.float32)
     bits = weight.view(np.int32)  # of numbers that are not negative these are in the same order
-    for square in range(start, stop):
-        x, y, z = about[square, 0], about[square, 1], about[square, 2]
-        cosine, sine = np.float32(math.cos(radius[square])), np.float32(math.sin(radius[square]))
+    for bin_index in range(start, stop):
+        x, y, z = centers[bin_index, 0], centers[bin_index, 1], centers[bin_index, 2]
+        cosine, sine = np.float32(math.cos(radius[bin_index])), np.float32(math.sin(radius[bin_index]))
         for k in range(num):  # without a branch: eight at once
             along = x * columns[0, k] + y * columns[1, k] + z * columns[2, k]
             across = math.sqrt(max(np.float32(1) - along * along, np.float32(0)))
             nearest = along * cosine + across * sine  # at the place in the square that is nearest to the light
-            off = np.float32(1) - (nearest if along < cosine else np.float32(1))
-            weight[k] = _weight(off, columns[3, k], columns[4, k], variance)
-        least, alike = _least_of(bits, most)
+            one_minus_cosine = np.float32(1) - (nearest if along < cosine else np.float32(1))
+            weight[k] = _weight(one_minus_cosine, columns[3, k], columns[4, k], variance)
+        threshold, num_equal = _selection_threshold(bits, max_listed)
         n = 0
         for k in range(num):
-            if bits[k] > least or (bits[k] == least and alike > 0):
-                alike -= bits[k] == least
-                out[square, n] = k
+            if bits[k] > threshold or (bits[k] == threshold and num_equal > 0):
+                num_equal -= bits[k] == threshold
+                out[bin_index, n] = k
                 n += 1
-        out[square, n:] = -1
+        out[bin_index, n:] = -1
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _least_of(bits, most):  # type: ignore[no-untyped-def]
-    """Find the least of the largest `most` numbers, none of them 0.
+def _selection_threshold(bits, max_count):  # type: ignore[no-untyped-def]
+    """Find the least of the largest `max_count` numbers, none of them 0.
 
     By halving the range that it is in: counting is vector code, sorting is not.
 
@@ -161,8 +161,8 @@ def _least_of(bits, most):  # type: ignore[no-untyped-def]
     for k in range(bits.shape[0]):
         num_lit += bits[k] > 0
         high = max(high, bits[k])
-    if num_lit <= most:
-        return np.int32(1), np.int32(most)
+    if num_lit <= max_count:
+        return np.int32(1), np.int32(max_count)
     # more than `most` are at least `low`, fewer at least `high`
     low, high, above = np.int32(1), high + np.int32(1), np.int32(0)
     while high - low > 1:
@@ -170,78 +170,80 @@ def _least_of(bits, most):  # type: ignore[no-untyped-def]
         count = np.int32(0)
         for k in range(bits.shape[0]):
             count += bits[k] >= middle
-        if count == most:
+        if count == max_count:
             return middle, count
-        if count > most:
+        if count > max_count:
             low = middle
         else:
             high, above = middle, count
-    return low, np.int32(most) - above
+    return low, np.int32(max_count) - above
 
 
-def lobe_lights(directions: F32, radius: F32, luminous: F32, of_lamps: F32, widths: Sequence[int]) -> LobeLights:
+def build_light_lists(
+    directions: F32, radius: F32, luminance: F32, bright_light_fractions: F32, widths: Sequence[int]
+) -> LobeLightLists:
     """List the lights of a sky.
 
     Args:
         directions: unit, that points see them in or not. (lights, 3) float32
         radius: of a circle about each, radians. (lights,) float32
-        luminous: E of each without lamps, luminance. (lights,) float32
-        of_lamps: how much of each lamp comes by each light. (lamps, lights) float32
-        widths: that lobes have, from `widths_of`; ascending, one at least.
+        luminance: E of each without lamps, luminance. (lights,) float32
+        bright_light_fractions: how much of each lamp comes by each light. (lamps, lights) float32
+        widths: that lobes have, from `lobe_widths`; ascending, one at least.
     """
-    lights = np.column_stack([directions, radius**2 / _WIDTH_OF_RADIUS, luminous]).astype(np.float32)
-    columns, (about, farthest) = np.ascontiguousarray(lights.T), _SQUARES
-    lists = np.empty((len(widths), len(about), NUM_LISTED), np.int32)
-    for part, width in zip(lists, widths, strict=True):
-        args = columns, about.astype(np.float32), farthest, np.float32(sigma_of(width) ** 2)
-        for_shares(partial(_list_into, args, part), len(about))
+    lights = np.column_stack([directions, radius**2 / _RADIUS_TO_VARIANCE, luminance]).astype(np.float32)
+    columns, (centers, farthest) = np.ascontiguousarray(lights.T), _DIRECTION_BINS
+    lists = np.empty((len(widths), len(centers), NUM_LISTED), np.int32)
+    for width_lists, width in zip(lists, widths, strict=True):
+        args = columns, centers.astype(np.float32), farthest, np.float32(sigma_at_width(width) ** 2)
+        parallel_for_chunks(partial(_list_lights_into, args, width_lists), len(centers))
     nearest = np.abs(np.arange(NUM_WIDTHS)[:, None] - np.array(widths)).argmin(axis=1)
-    first = (nearest * len(about)).astype(np.int32)
-    return LobeLights(lights, lists.reshape(-1, NUM_LISTED), first, *_lamp_lights(of_lamps))
+    first = (nearest * len(centers)).astype(np.int32)
+    return LobeLightLists(lights, lists.reshape(-1, NUM_LISTED), first, *_bright_light_lists(bright_light_fractions))
 
 
-def _lamp_lights(of_lamps: F32) -> tuple[NDArray[np.int32], F32]:
+def _bright_light_lists(bright_light_fractions: F32) -> tuple[NDArray[np.int32], F32]:
     """Find the fields `lamps` and `share`."""
-    num = min(LIGHTS_A_LAMP, of_lamps.shape[1])
-    lamps = np.full((len(of_lamps), LIGHTS_A_LAMP), -1, np.int32)
-    share = np.zeros(lamps.shape, np.float32)
-    lamps[:, :num] = np.argsort(-of_lamps, axis=1)[:, :num]
-    share[:, :num] = np.take_along_axis(of_lamps, lamps[:, :num], axis=1)
-    lamps[share <= 0] = -1
-    return lamps, share / np.maximum(share.sum(axis=1, keepdims=True), np.float32(1e-20))
+    num_lights = min(LIGHTS_PER_BRIGHT_LIGHT, bright_light_fractions.shape[1])
+    lights = np.full((len(bright_light_fractions), LIGHTS_PER_BRIGHT_LIGHT), -1, np.int32)
+    weights = np.zeros(lights.shape, np.float32)
+    lights[:, :num_lights] = np.argsort(-bright_light_fractions, axis=1)[:, :num_lights]
+    weights[:, :num_lights] = np.take_along_axis(bright_light_fractions, lights[:, :num_lights], axis=1)
+    lights[weights <= 0] = -1
+    return lights, weights / np.maximum(weights.sum(axis=1, keepdims=True), np.float32(1e-20))
 
 
-def _list_into(args: tuple[Any, ...], lists: NDArray[np.int32], start: int, stop: int) -> None:
-    _list(*args, start, stop, lists)  # type: ignore[call-arg]
+def _list_lights_into(args: tuple[Any, ...], lists: NDArray[np.int32], start: int, stop: int) -> None:
+    _list_lights(*args, start, stop, lists)  # type: ignore[call-arg]
 
 
-def lists_numpy(listed: LobeLights, width: int, square: int) -> NDArray[np.intp]:
+def lists_numpy(lobe_lights: LobeLightLists, width: int, bin_index: int) -> NDArray[np.intp]:
     """Find the lights of a list in plain NumPy: the oracle, in no order.
 
     Args:
-        listed: whose lights. width, square: of the list.
+        lobe_lights: whose lights. width, bin_index: of the list.
     """
-    about, farthest = _SQUARES
-    lights = listed.lights.astype(np.float64)
-    off = np.maximum(np.arccos(np.clip(lights[:, :3] @ about[square], -1, 1)) - farthest[square], 0)
-    variance = sigma_of(width) ** 2 + lights[:, 3]
-    weight = lights[:, 4] / variance * np.maximum(1 - (1 - np.cos(off)) / (_SHARPNESS * variance), 0) ** _SHARPNESS
+    centers, farthest = _DIRECTION_BINS
+    lights = lobe_lights.lights.astype(np.float64)
+    angle = np.maximum(np.arccos(np.clip(lights[:, :3] @ centers[bin_index], -1, 1)) - farthest[bin_index], 0)
+    variance = sigma_at_width(width) ** 2 + lights[:, 3]
+    weight = lights[:, 4] / variance * np.maximum(1 - (1 - np.cos(angle)) / (_SHARPNESS * variance), 0) ** _SHARPNESS
     heaviest = np.argsort(-weight)[:NUM_LISTED]
     return np.asarray(heaviest[weight[heaviest] > 0])
 
 
-def sigma_of(width: int) -> float:
+def sigma_at_width(width: int) -> float:
     """Find the σ that lists of a width are made for, radians."""
-    return float(NARROWEST * 2 ** (width / 2))
+    return float(MIN_SIGMA * 2 ** (width / 2))
 
 
-def widths_of(lobes: Lobes) -> tuple[int, ...]:
-    """Find the widths that lobes have, as `relume.moving.highlights.glances` takes them: the two of one together."""
+def lobe_widths(lobes: Lobes) -> tuple[int, ...]:
+    """Find the widths of lobes, as `relume.moving.highlights.lobe_visibility` takes them: two a lobe."""
     if not len(lobes.sigma):
         return ()
     angle = np.arccos(np.clip(lobes.cosine.astype(np.float64), -1, 1))
-    share = np.stack([lobes.first, 1 - lobes.first], axis=-1)
-    middle = (share * np.exp(1j * angle)).sum(axis=-1)
-    sigma = np.sqrt((share * lobes.sigma**2).sum(axis=-1) + 1 - np.abs(middle))
-    low, high = (int(width_of(np.float32(end))) for end in (sigma.min(), sigma.max()))
+    weights = np.stack([lobes.first, 1 - lobes.first], axis=-1)
+    middle = (weights * np.exp(1j * angle)).sum(axis=-1)
+    sigma = np.sqrt((weights * lobes.sigma**2).sum(axis=-1) + 1 - np.abs(middle))
+    low, high = (int(width_index(np.float32(end))) for end in (sigma.min(), sigma.max()))
     return tuple(range(low, high + 1))

@@ -15,57 +15,62 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from relume.moving.points.grids import Lattice, in_the_middle, steps_of
+from relume.moving.points.grids import ProbeGrid, enumerate_nodes, find_edge_midpoints
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-POINTS_A_VERTEX = 4
-APART = 1e3  # spacings between materials, and between sides
-_BENDS = 0.05  # how far off what is linear may stay, beside how far weights change
-_LEAST_WEIGHT = 2e-3
-_AT_ONCE = 1 << 16  # vertices
+PROBES_PER_NODE = 4
+MATERIAL_SEPARATION = 1e3  # spacings between materials, and between sides
+_REGULARIZATION = 0.05  # how far off what is linear may stay, beside how far weights change
+_MIN_WEIGHT = 2e-3
+_NODES_PER_BATCH = 1 << 16  # vertices
 
 
-class Follows(NamedTuple):
+class NodeWeights(NamedTuple):
     """Points and weights of vertices.
 
     Attributes:
-        point: unlike each other or of no weight. (V, `POINTS_A_VERTEX`) uint32
-        weight: of each, one in sum. (V, `POINTS_A_VERTEX`) float32
+        probe: unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
+        weight: of each, one in sum. (V, `PROBES_PER_NODE`) float32
     """
 
-    point: NDArray[np.uint32]
+    probe: NDArray[np.uint32]
     weight: F32
 
 
-def from_nearby(points: F64, places: F64, normals: F32) -> Follows:
+def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals: F32) -> NodeWeights:
     """Weigh the points about some places.
 
     Args:
-        points, places: in spacings; coordinates, then what makes them unlike. (n, d), (V, d)
+        probe_features, node_features: in spacings; coordinates, then what makes them unlike. (n, d), (V, d)
         normals: at the places, unit. (V, 3)
     """
-    tree = cKDTree(points)
-    few = min(len(points), POINTS_A_VERTEX + 1)
-    distance, near = tree.query(places, few, workers=-1)
-    distance, near = distance.reshape(len(places), few), near.reshape(len(places), few)
+    tree = cKDTree(probe_features)
+    num_neighbors = min(len(probe_features), PROBES_PER_NODE + 1)
+    distance, neighbors = tree.query(node_features, num_neighbors, workers=-1)
+    distance, neighbors = (
+        distance.reshape(len(node_features), num_neighbors),
+        neighbors.reshape(len(node_features), num_neighbors),
+    )
     reach = np.maximum(distance[:, -1:], 1e-12)
-    inside = np.clip(distance[:, :-1], 1e-6 * reach, None) if few > 1 else np.ones((len(places), 1))
-    raw = np.square((reach - inside) / (reach * inside)) if few > 1 else inside
-    raw[distance[:, : raw.shape[1]] > APART / 2] = 0  # another material's, where there are so few
+    inside = np.clip(distance[:, :-1], 1e-6 * reach, None) if num_neighbors > 1 else np.ones((len(node_features), 1))
+    raw = np.square((reach - inside) / (reach * inside)) if num_neighbors > 1 else inside
+    raw[distance[:, : raw.shape[1]] > MATERIAL_SEPARATION / 2] = 0  # another material's, where there are so few
     raw[:, 0] = np.maximum(raw[:, 0], 1e-12)
-    found = _nothing(len(places))
-    found.weight[:, : raw.shape[1]] = raw / raw.sum(axis=1, keepdims=True)
-    found.point[:, : raw.shape[1]] = near[:, : raw.shape[1]]
-    for start in range(0, len(places), _AT_ONCE):
-        rows = slice(start, start + _AT_ONCE)
-        towards = (points[found.point[rows], :3] - places[rows, None, :3]).transpose(0, 2, 1)
-        found.weight[rows] = linear(found.weight[rows].astype(np.float64), towards, normals[rows].astype(np.float64))
-    return found
+    node_weights = _empty_weights(len(node_features))
+    node_weights.weight[:, : raw.shape[1]] = raw / raw.sum(axis=1, keepdims=True)
+    node_weights.probe[:, : raw.shape[1]] = neighbors[:, : raw.shape[1]]
+    for start in range(0, len(node_features), _NODES_PER_BATCH):
+        rows = slice(start, start + _NODES_PER_BATCH)
+        towards = (probe_features[node_weights.probe[rows], :3] - node_features[rows, None, :3]).transpose(0, 2, 1)
+        node_weights.weight[rows] = make_weights_linear(
+            node_weights.weight[rows].astype(np.float64), towards, normals[rows].astype(np.float64)
+        )
+    return node_weights
 
 
-def linear(weight: F64, towards: F64, normal: F64) -> F64:
+def make_weights_linear(weight: F64, towards: F64, normal: F64) -> F64:
     """Change weights as little as it takes for the points' mean to lie under their vertex, Σ w x = 0, nearly.
 
     With W the weights on a diagonal, F the x, in units of their spread, above a row of ones, and b = (0, 0, 0, 1):
@@ -80,56 +85,63 @@ def linear(weight: F64, towards: F64, normal: F64) -> F64:
     x *= weight[:, None] > 0
     x /= np.maximum(np.sqrt(np.einsum("vcp,vp->v", x**2, weight)), 1e-9)[:, None, None]
     ends = np.concatenate([x, np.ones_like(x[:, :1])], axis=1)
-    weighed = ends * weight[:, None]
-    gram = np.einsum("vcp,vdp->vcd", weighed, ends) + np.diag([_BENDS] * 3 + [1e-9])
-    missed = np.einsum("vcp,vp->vc", ends, weight) - [0, 0, 0, 1]
-    found = weight - np.einsum("vcp,vc->vp", weighed, np.linalg.solve(gram, missed[..., None])[..., 0])
-    return _in_sum_one(found)
+    weighted_ends = ends * weight[:, None]
+    gram = np.einsum("vcp,vdp->vcd", weighted_ends, ends) + np.diag([_REGULARIZATION] * 3 + [1e-9])
+    residual = np.einsum("vcp,vp->vc", ends, weight) - [0, 0, 0, 1]
+    corrected_weight = weight - np.einsum(
+        "vcp,vc->vp", weighted_ends, np.linalg.solve(gram, residual[..., None])[..., 0]
+    )
+    return _normalize(corrected_weight)
 
 
-def from_ends(near: Follows, alone: NDArray[np.intp], vertex: NDArray[np.intp], lattice: Lattice) -> Follows:
+def weights_from_edge_ends(
+    seed_weights: NodeWeights, seed_nodes: NDArray[np.intp], node_index: NDArray[np.intp], probe_grid: ProbeGrid
+) -> NodeWeights:
     """Let the other vertices be the mean of both ends of the edges that they are in the middle of, coarse ones first.
 
     Args:
-        near: of the vertices `alone`. vertex: that each node of the lattice is. (nodes,)
+        seed_weights: of the vertices `seed_nodes`. node_index: that each node of the lattice is. (nodes,)
     """
-    num, num_points = int(vertex.max()) + 1, int(near.point.max()) + 1
-    place = np.repeat(alone, POINTS_A_VERTEX), near.point.ravel().astype(np.intp)
-    known = csr_array((near.weight.ravel(), place), shape=(num, num_points))
-    known.eliminate_zeros()
-    is_known = np.zeros(num, np.bool_)
-    is_known[alone] = True
-    steps, step = steps_of(lattice.num_rows), 1 << int(np.log2(lattice.num_rows.max()))
+    num_lattice_nodes, num_probes = int(node_index.max()) + 1, int(seed_weights.probe.max()) + 1
+    coordinates = np.repeat(seed_nodes, PROBES_PER_NODE), seed_weights.probe.ravel().astype(np.intp)
+    weights = csr_array((seed_weights.weight.ravel(), coordinates), shape=(num_lattice_nodes, num_probes))
+    weights.eliminate_zeros()
+    is_solved = np.zeros(num_lattice_nodes, np.bool_)
+    is_solved[seed_nodes] = True
+    steps, step = enumerate_nodes(probe_grid.num_rows), 1 << int(np.log2(probe_grid.num_rows.max()))
     while step >= 1:
-        node, *ends = in_the_middle(steps, lattice.first, np.flatnonzero(~is_known[vertex]), step)
-        which, once = np.unique(vertex[node], return_index=True)
-        both = np.concatenate([vertex[end[once]] for end in ends])
-        means = csr_array((np.full(len(both), np.float32(0.5)), (np.tile(which, 2), both)), shape=(num, num))
-        known = known + means @ known
-        is_known[which] = True
+        node, *ends = find_edge_midpoints(steps, probe_grid.first, np.flatnonzero(~is_solved[node_index]), step)
+        midpoints, first_index = np.unique(node_index[node], return_index=True)
+        edge_ends = np.concatenate([node_index[end[first_index]] for end in ends])
+        means = csr_array(
+            (np.full(len(edge_ends), np.float32(0.5)), (np.tile(midpoints, 2), edge_ends)),
+            shape=(num_lattice_nodes, num_lattice_nodes),
+        )
+        weights = weights + means @ weights
+        is_solved[midpoints] = True
         step //= 2
-    return _heaviest(known)
+    return _select_heaviest(weights)
 
 
-def _heaviest(known: csr_array) -> Follows:
+def _select_heaviest(weights: csr_array) -> NodeWeights:
     """Keep the points of the greatest weight in each row, as many as a vertex has."""
-    count = np.diff(known.indptr)
+    count = np.diff(weights.indptr)
     row = np.repeat(np.arange(len(count)), count)
-    order = np.lexsort((-known.data, row))
-    rank = np.arange(len(order)) - np.repeat(known.indptr[:-1], count)
-    kept = rank < POINTS_A_VERTEX
-    found = _nothing(len(count))
-    found.point[row[kept], rank[kept]] = known.indices[order[kept]]
-    found.weight[row[kept], rank[kept]] = known.data[order[kept]]
-    return Follows(found.point, _in_sum_one(found.weight))
+    order = np.lexsort((-weights.data, row))
+    rank = np.arange(len(order)) - np.repeat(weights.indptr[:-1], count)
+    is_heaviest = rank < PROBES_PER_NODE
+    node_weights = _empty_weights(len(count))
+    node_weights.probe[row[is_heaviest], rank[is_heaviest]] = weights.indices[order[is_heaviest]]
+    node_weights.weight[row[is_heaviest], rank[is_heaviest]] = weights.data[order[is_heaviest]]
+    return NodeWeights(node_weights.probe, _normalize(node_weights.weight))
 
 
-def _in_sum_one(weight: NDArray[Any]) -> NDArray[Any]:
+def _normalize(weight: NDArray[Any]) -> NDArray[Any]:
     """Leave out what is below nothing, and what cannot be seen: each point that is asked sums all its lights."""
-    kept = np.where(weight < _LEAST_WEIGHT, 0, weight)
-    return np.asarray(kept / kept.sum(axis=1, keepdims=True), weight.dtype)
+    thresholded = np.where(weight < _MIN_WEIGHT, 0, weight)
+    return np.asarray(thresholded / thresholded.sum(axis=1, keepdims=True), weight.dtype)
 
 
-def _nothing(num: int) -> Follows:
-    shape = num, POINTS_A_VERTEX
-    return Follows(np.zeros(shape, np.uint32), np.zeros(shape, np.float32))
+def _empty_weights(num: int) -> NodeWeights:
+    shape = num, PROBES_PER_NODE
+    return NodeWeights(np.zeros(shape, np.uint32), np.zeros(shape, np.float32))

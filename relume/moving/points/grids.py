@@ -13,14 +13,14 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.parallel import for_shares
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
 
 
-class Lattice(NamedTuple):
+class ProbeGrid(NamedTuple):
     """The grid of every side of every face; side 0 is the one where the corners are counter-clockwise.
 
     Attributes:
@@ -34,34 +34,36 @@ class Lattice(NamedTuple):
     node: NDArray[np.uint32]
 
 
-class Density(NamedTuple):
+class ProbeDensity(NamedTuple):
     """How many times farther apart than a spacing points are, at the nodes of a lattice's grids.
 
     Attributes:
-        grids: whose nodes; they are no vertices yet.
+        probe_grid: whose nodes; they are no vertices yet.
         power: of two. (nodes,) int8
     """
 
-    grids: Lattice
+    probe_grid: ProbeGrid
     power: NDArray[np.int8]
 
-    def at(self, steps: Steps) -> NDArray[np.int8]:
+    def at(self, steps: GridSteps) -> NDArray[np.int8]:
         """Find it at the nodes of other grids on the same faces, the least of the three about each. (n,) int8"""
         out = np.empty(len(steps.grid), np.int8)
-        for_shares(lambda start, stop: _least(self.grids, self.power, steps, start, stop, out), len(out))
+        parallel_for_chunks(
+            lambda start, stop: _surrounding_minimum(self.probe_grid, self.power, steps, start, stop, out), len(out)
+        )
         return out
 
-    def of_faces(self) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    def face_extremes(self) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
         """Find the least and the most on each face, 0 where it has no nodes. (faces,) int8 each"""
-        rows = self.grids.num_rows
+        rows = self.probe_grid.num_rows
         face = np.repeat(np.arange(rows.size) // 2, num_nodes(rows).ravel())
-        least, most = np.full(len(rows), 127, np.int8), np.full(len(rows), -128, np.int8)
-        np.minimum.at(least, face, self.power)
-        np.maximum.at(most, face, self.power)
-        return np.where(least <= most, least, 0), np.where(least <= most, most, 0)
+        lowest, highest = np.full(len(rows), 127, np.int8), np.full(len(rows), -128, np.int8)
+        np.minimum.at(lowest, face, self.power)
+        np.maximum.at(highest, face, self.power)
+        return np.where(lowest <= highest, lowest, 0), np.where(lowest <= highest, highest, 0)
 
 
-class Steps(NamedTuple):
+class GridSteps(NamedTuple):
     """Where nodes are in their grids.
 
     Attributes:
@@ -89,56 +91,58 @@ def first_nodes(rows: NDArray[np.integer]) -> NDArray[np.uint32]:
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def node_of(rows, i, j):  # type: ignore[no-untyped-def]
+def node_index(rows, i, j):  # type: ignore[no-untyped-def]
     """Number of a node in a grid of so many rows: i steps towards the second corner, j towards the third."""
     return i * (rows + 1) - (i * (i - 1)) // 2 + j
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def nodes_about(lattice, face, side, u, v):  # type: ignore[no-untyped-def]
+def surrounding_nodes(probe_grid, face, side, u, v):  # type: ignore[no-untyped-def]
     """Find the three nodes about a place in a face, and their weights.
 
     Args:
-        lattice: with nodes there. face, side: where. u, v: barycentric, of the second and third corner.
+        probe_grid: with nodes there. face, side: where. u, v: barycentric, of the second and third corner.
     """
-    rows = np.int64(lattice.num_rows[face, side])
+    rows = np.int64(probe_grid.num_rows[face, side])
     x: Any = u * rows
     y: Any = v * rows
     i: Any = min(max(np.int64(x), 0), rows - 1)
     j: Any = min(max(np.int64(y), 0), rows - 1 - i)
     fx: Any = x - i
     fy: Any = y - j
-    first = np.int64(lattice.first[face, side])
-    b, c = first + node_of(rows, i + 1, j), first + node_of(rows, i, j + 1)
+    first = np.int64(probe_grid.first[face, side])
+    b, c = first + node_index(rows, i + 1, j), first + node_index(rows, i, j + 1)
     if fx + fy <= 1 or i + j == rows - 1:
-        return first + node_of(rows, i, j), b, c, np.float32(1 - fx - fy), np.float32(fx), np.float32(fy)
-    return first + node_of(rows, i + 1, j + 1), b, c, np.float32(fx + fy - 1), np.float32(1 - fy), np.float32(1 - fx)
+        return first + node_index(rows, i, j), b, c, np.float32(1 - fx - fy), np.float32(fx), np.float32(fy)
+    return first + node_index(rows, i + 1, j + 1), b, c, np.float32(fx + fy - 1), np.float32(1 - fy), np.float32(1 - fx)
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _least(grids, power, steps, start, stop, out):  # type: ignore[no-untyped-def]
+def _surrounding_minimum(probe_grid, power, steps, start, stop, out):  # type: ignore[no-untyped-def]
     """Find the least of the three nodes about each of the steps [start, stop)."""
     for k in range(start, stop):
         rows = np.float32(steps.rows[k])
         u, v = np.float32(steps.i[k]) / rows, np.float32(steps.j[k]) / rows
-        a, b, c, _, _, _ = nodes_about(grids, steps.grid[k] // 2, steps.grid[k] % 2, u, v)
+        a, b, c, _, _, _ = surrounding_nodes(probe_grid, steps.grid[k] // 2, steps.grid[k] % 2, u, v)
         out[k] = min(power[a], power[b], power[c])
 
 
-def steps_of(num_rows: NDArray[np.integer]) -> Steps:
-    """List the nodes of all grids, in the order of `node_of`. num_rows: (faces, 2)"""
+def enumerate_nodes(num_rows: NDArray[np.integer]) -> GridSteps:
+    """List the nodes of all grids, in the order of `node_index`. num_rows: (faces, 2)"""
     flat = num_rows.ravel().astype(np.int32)
     first = first_nodes(flat).astype(np.int64)
     grid = np.repeat(np.arange(len(flat), dtype=np.int32), num_nodes(flat))
     i, j = np.empty(len(grid), np.int32), np.empty(len(grid), np.int32)
     for rows in map(int, np.unique(flat[flat > 0])):
         steps = np.array([(i, j) for i in range(rows + 1) for j in range(rows + 1 - i)])
-        where = first[flat == rows, None] + np.arange(len(steps))
-        i[where], j[where] = steps.T
-    return Steps(grid, i, j, flat[grid])
+        node_indices = first[flat == rows, None] + np.arange(len(steps))
+        i[node_indices], j[node_indices] = steps.T
+    return GridSteps(grid, i, j, flat[grid])
 
 
-def in_the_middle(steps: Steps, first: NDArray[np.integer], nodes: NDArray[np.intp], step: int) -> tuple[I64, I64, I64]:
+def find_edge_midpoints(
+    steps: GridSteps, first: NDArray[np.integer], nodes: NDArray[np.intp], step: int
+) -> tuple[I64, I64, I64]:
     """Find those nodes that lie in the middle of an edge of 2 · `step` steps, and the ends of it.
 
     Args:
@@ -147,10 +151,10 @@ def in_the_middle(steps: Steps, first: NDArray[np.integer], nodes: NDArray[np.in
         The nodes, and both ends. (m,) each
     """
     i, j = steps.i[nodes], steps.j[nodes]
-    lies = (i % step == 0) & (j % step == 0) & ((i % (2 * step) != 0) | (j % (2 * step) != 0))
-    nodes, i, j = nodes[lies], i[lies], j[lies]
+    is_midpoint = (i % step == 0) & (j % step == 0) & ((i % (2 * step) != 0) | (j % (2 * step) != 0))
+    nodes, i, j = nodes[is_midpoint], i[is_midpoint], j[is_midpoint]
     along, across = np.where(i % (2 * step) != 0, step, 0), np.where(j % (2 * step) != 0, step, 0)
     across = np.where((along > 0) & (across > 0), -across, across)  # the diagonal goes the other way
-    begin, rows = first.ravel()[steps.grid[nodes]].astype(np.int64), steps.rows[nodes]
-    one, other = (begin + node_of(rows, i + way * along, j + way * across) for way in (-1, 1))
-    return nodes, one, other
+    grid_start, rows = first.ravel()[steps.grid[nodes]].astype(np.int64), steps.rows[nodes]
+    end_a, end_b = (grid_start + node_index(rows, i + sign * along, j + sign * across) for sign in (-1, 1))
+    return nodes, end_a, end_b

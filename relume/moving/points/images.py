@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.channels import Images, NormalMap
-from relume.images.shelf import normals_of, texture_of
-from relume.moving.points.surface import MAX_TEXTURE_SIDE, Surface, Textures, stacked
+from relume.images.shelf import load_normal_map, load_texture
+from relume.moving.points.surface import MAX_TEXTURE_SIDE, StoredScene, Textures, concatenate_textures
 from relume.scene.model import WRAPS, Texture
-from relume.trace.surface import projected_axes
+from relume.trace.surface import triplanar_axes
 
 F32 = NDArray[np.float32]
 
 
-class Wears(NamedTuple):
+class ProbeMapOverrides(NamedTuple):
     """What a look names in the place of a material's images: of each of `TEXTURES`, and of its normal map; None for
     its own."""
 
@@ -26,15 +26,15 @@ class Wears(NamedTuple):
 
     @property
     def columns(self) -> tuple[str | NormalMap | None, ...]:
-        """The same as columns of `Textures.of_material`."""
+        """The same as columns of `Textures.material_textures`."""
         return *self.images, self.normals
 
 
-OWN = Wears()
+NO_OVERRIDES = ProbeMapOverrides()
 
 
-class Dressed(NamedTuple):
-    """What of a surface differs by such images: fields of `relume.moving.points.surface.Surface`."""
+class OverriddenTextures(NamedTuple):
+    """What of a surface differs by such images: fields of `relume.moving.points.stored_scene.Surface`."""
 
     textures: Textures
     uvs: F32
@@ -43,80 +43,91 @@ class Dressed(NamedTuple):
     tangents: F32
 
 
-def dressed(surface: Surface, positions: F32, wears: Sequence[Wears]) -> Dressed:
+def overridden_textures(
+    stored_scene: StoredScene, positions: F32, overrides: Sequence[ProbeMapOverrides]
+) -> OverriddenTextures:
     """Put images onto a surface.
 
     Args:
-        surface: as it was baked. positions: of the triangles' corners. (corners, 3) float32
-        wears: what a look names, of each material.
+        stored_scene: as it was baked. positions: of the triangles' corners. (corners, 3) float32
+        overrides: what a look names, of each material.
     Raises:
         NotFoundError, SceneError: an image cannot be had.
     """
-    names = list(dict.fromkeys(name for of in wears for name in of.columns if name is not None))
-    shown = list(map(_texture_of, names))
-    before, added = surface.textures, stacked(shown, MAX_TEXTURE_SIDE)
-    wraps = np.array([[WRAPS.index(wrap) for wrap in texture.wrap] for texture in shown], np.int64).reshape(-1, 2)
-    of_material = before.of_material.copy()
-    for material, of in enumerate(wears):
-        for column, name in enumerate(of.columns):
-            if name is not None:
-                of_material[material, column] = len(before.wraps) + names.index(name)
-    textures = Textures(
-        np.concatenate([before.texels, added.texels]),
-        np.concatenate([before.levels, added.levels + np.array([len(before.texels), 0, 0])]),
-        np.concatenate([before.first, before.first[-1] + added.first[1:]]),
-        np.concatenate([before.wraps, wraps]),
-        of_material,
+    names = list(dict.fromkeys(name for override in overrides for name in override.columns if name is not None))
+    override_textures = list(map(_load_texture, names))
+    baked_textures, override_levels = stored_scene.textures, concatenate_textures(override_textures, MAX_TEXTURE_SIDE)
+    wraps = np.array([[WRAPS.index(wrap) for wrap in texture.wrap] for texture in override_textures], np.int64).reshape(
+        -1, 2
     )
-    uvs, uv_faces, uv_scale = _projected(surface, positions, np.array([of != OWN for of in wears]))
-    has_bumps = np.array([of.normals is not None for of in wears])
-    return Dressed(textures, uvs, uv_faces, uv_scale, _tangents(surface, positions, uvs[uv_faces], has_bumps))
+    material_textures = baked_textures.material_textures.copy()
+    for material, override in enumerate(overrides):
+        for column, name in enumerate(override.columns):
+            if name is not None:
+                material_textures[material, column] = len(baked_textures.wraps) + names.index(name)
+    textures = Textures(
+        np.concatenate([baked_textures.texels, override_levels.texels]),
+        np.concatenate([baked_textures.levels, override_levels.levels + np.array([len(baked_textures.texels), 0, 0])]),
+        np.concatenate([baked_textures.first, baked_textures.first[-1] + override_levels.first[1:]]),
+        np.concatenate([baked_textures.wraps, wraps]),
+        material_textures,
+    )
+    uvs, uv_faces, uv_scale = _project_uvs(
+        stored_scene, positions, np.array([override != NO_OVERRIDES for override in overrides])
+    )
+    has_normal_map = np.array([override.normals is not None for override in overrides])
+    return OverriddenTextures(
+        textures, uvs, uv_faces, uv_scale, _tangents(stored_scene, positions, uvs[uv_faces], has_normal_map)
+    )
 
 
-def _texture_of(name: str | NormalMap) -> Texture:
-    return normals_of(name) if isinstance(name, NormalMap) else texture_of(name)
+def _load_texture(name: str | NormalMap) -> Texture:
+    return load_normal_map(name) if isinstance(name, NormalMap) else load_texture(name)
 
 
-def _tangents(surface: Surface, positions: F32, places: F32, has_bumps: NDArray[np.bool_]) -> F32:
+def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, has_normal_map: NDArray[np.bool_]) -> F32:
     """Give corners tangents that have none: along u, averaged over the triangles about each, the larger ones more.
 
     Args:
-        places: in textures, of each triangle's corners. (faces, 3, 2) has_bumps: which materials need them.
+        uv_coordinates: in textures, of each triangle's corners. (faces, 3, 2) has_normal_map: which materials need
+            them.
     """
-    if not has_bumps.any():
-        return surface.tangents
-    out = surface.tangents.copy() if len(surface.tangents) else np.zeros((len(positions), 4), np.float32)
-    chosen = has_bumps[surface.face_material]
-    chosen &= ~out[surface.faces].any(axis=(1, 2))
-    faces = surface.faces[chosen]
-    p, uv = positions[faces].astype(np.float64), places[chosen].astype(np.float64)
+    if not has_normal_map.any():
+        return stored_scene.tangents
+    out = stored_scene.tangents.copy() if len(stored_scene.tangents) else np.zeros((len(positions), 4), np.float32)
+    needs_tangent = has_normal_map[stored_scene.face_material]
+    needs_tangent &= ~out[stored_scene.faces].any(axis=(1, 2))
+    faces = stored_scene.faces[needs_tangent]
+    p, uv = positions[faces].astype(np.float64), uv_coordinates[needs_tangent].astype(np.float64)
     e, d = p[:, 1:] - p[:, :1], uv[:, 1:] - uv[:, :1]
     area = d[:, 0, 0] * d[:, 1, 1] - d[:, 1, 0] * d[:, 0, 1]
     along = np.sign(area)[:, None] * (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:])
-    of_face = np.column_stack([along, -np.sign(area) * np.linalg.norm(np.cross(e[:, 0], e[:, 1]), axis=1)])
+    face_tangents = np.column_stack([along, -np.sign(area) * np.linalg.norm(np.cross(e[:, 0], e[:, 1]), axis=1)])
     corners = faces.ravel()
-    total = np.stack([np.bincount(corners, np.repeat(c, 3), len(out)) for c in of_face.T], axis=1)
+    total = np.stack([np.bincount(corners, np.repeat(c, 3), len(out)) for c in face_tangents.T], axis=1)
     length = np.linalg.norm(total[:, :3], axis=1)
-    given = np.flatnonzero(length > 0)
-    out[given, :3] = total[given, :3] / length[given, None]
-    out[given, 3] = np.where(total[given, 3] < 0, -1, 1)
+    is_defined = np.flatnonzero(length > 0)
+    out[is_defined, :3] = total[is_defined, :3] / length[is_defined, None]
+    out[is_defined, 3] = np.where(total[is_defined, 3] < 0, -1, 1)
     return out
 
 
-def _projected(surface: Surface, positions: F32, has_images: NDArray[np.bool_]) -> tuple[F32, NDArray[np.uint32], F32]:
+def _project_uvs(
+    stored_scene: StoredScene, positions: F32, has_images: NDArray[np.bool_]
+) -> tuple[F32, NDArray[np.uint32], F32]:
     """Give triangles a place in textures that have none: along the axis of the world that they face most, in metres.
 
     Returns:
         Fields `uvs`, `uv_faces` and `uv_scale` of the surface.
     """
-    flat = np.flatnonzero((surface.uv_scale == 0) & has_images[surface.face_material])
+    flat = np.flatnonzero((stored_scene.uv_scale == 0) & has_images[stored_scene.face_material])
     if not len(flat):
-        return surface.uvs, surface.uv_faces, surface.uv_scale
-    across, up = projected_axes(surface.face_normal[flat])
-    corners = positions[surface.faces[flat]]
+        return stored_scene.uvs, stored_scene.uv_faces, stored_scene.uv_scale
+    across, up = triplanar_axes(stored_scene.face_normal[flat])
+    corners = positions[stored_scene.faces[flat]]
     u, v = np.einsum("fkc,fc->fk", corners, across), -np.einsum("fkc,fc->fk", corners, up)
-    uvs = np.concatenate([surface.uvs, np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32)])
-    uv_faces, uv_scale = surface.uv_faces.copy(), surface.uv_scale.copy()
-    uv_faces[flat] = len(surface.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
+    uvs = np.concatenate([stored_scene.uvs, np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32)])
+    uv_faces, uv_scale = stored_scene.uv_faces.copy(), stored_scene.uv_scale.copy()
+    uv_faces[flat] = len(stored_scene.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
     uv_scale[flat] = 1
     return uvs, uv_faces, uv_scale

@@ -15,20 +15,20 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.scene.model import Camera
-from relume.trace.geometry import Geometry
-from relume.trace.on_faces import places_on
+from relume.trace.geometry import SceneBuffers
+from relume.trace.on_faces import positions_on_faces
 from relume.trace.photons import lobe_directions
-from relume.trace.primary import Hits, camera_directions, trace_from
+from relume.trace.primary import Hits, camera_directions, trace_rays
 
 F32 = NDArray[np.float32]
 
-_MOST_RAYS = 2_000_000
-_RAYS_A_SIDE = 8
-_EYE_PIXELS = (64, 64)
-_RAYS_AT_ONCE = 250_000
+_MAX_RAYS = 2_000_000
+_RAYS_PER_SIDE = 8
+_CAMERA_PIXELS = (64, 64)
+_RAYS_PER_BATCH = 250_000
 
 
-def open_sides(geometry: Geometry, cameras: Sequence[Camera], seed: int) -> NDArray[np.bool_]:
+def visible_sides(geometry: SceneBuffers, cameras: Sequence[Camera], seed: int) -> NDArray[np.bool_]:
     """Find the sides of faces that can be seen.
 
     Args:
@@ -38,25 +38,25 @@ def open_sides(geometry: Geometry, cameras: Sequence[Camera], seed: int) -> NDAr
     """
     num_faces = len(geometry.faces)
     outside, rng, normals = 2 * num_faces, np.random.default_rng(seed), geometry.face_normals
-    links = [_seen_by(geometry, normals, camera, outside) for camera in cameras]
-    for _ in range(max(1, min(_RAYS_A_SIDE, _MOST_RAYS // (2 * num_faces)))):
-        for start in range(0, 2 * num_faces, _RAYS_AT_ONCE):
-            sides = np.arange(start, min(start + _RAYS_AT_ONCE, 2 * num_faces))
-            links.append(_seen_from(geometry, normals, sides, outside, rng))
-    one, other = np.concatenate(links, axis=1)
-    graph = coo_array((np.ones(len(one), np.bool_), (one, other)), shape=(outside + 1, outside + 1))
-    _, part = connected_components(graph, directed=False)
-    return np.asarray(part[:outside] == part[outside]).reshape(num_faces, 2)
+    edges = [_trace_from_camera(geometry, normals, camera, outside) for camera in cameras]
+    for _ in range(max(1, min(_RAYS_PER_SIDE, _MAX_RAYS // (2 * num_faces)))):
+        for start in range(0, 2 * num_faces, _RAYS_PER_BATCH):
+            sides = np.arange(start, min(start + _RAYS_PER_BATCH, 2 * num_faces))
+            edges.append(_trace_from_sides(geometry, normals, sides, outside, rng))
+    source, target = np.concatenate(edges, axis=1)
+    graph = coo_array((np.ones(len(source), np.bool_), (source, target)), shape=(outside + 1, outside + 1))
+    _, component = connected_components(graph, directed=False)
+    return np.asarray(component[:outside] == component[outside]).reshape(num_faces, 2)
 
 
-def _sides_hit(normals: F32, hits: Hits, directions: F32, outside: int) -> NDArray[np.int64]:
+def _hit_sides(normals: F32, hits: Hits, directions: F32, outside: int) -> NDArray[np.int64]:
     """Find the sides that rays hit, `outside` where they leave the scene."""
-    is_behind = np.einsum("nc,nc->n", normals[np.maximum(hits.face, 0)], directions) > 0
-    return np.where(hits.face >= 0, 2 * hits.face.astype(np.int64) + is_behind, outside)
+    is_back_side = np.einsum("nc,nc->n", normals[np.maximum(hits.face, 0)], directions) > 0
+    return np.where(hits.face >= 0, 2 * hits.face.astype(np.int64) + is_back_side, outside)
 
 
-def _seen_from(
-    geometry: Geometry, normals: F32, sides: NDArray[np.int64], outside: int, rng: np.random.Generator
+def _trace_from_sides(
+    geometry: SceneBuffers, normals: F32, sides: NDArray[np.int64], outside: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """Shoot one ray from a random place of each side. (2, rays): the side, and what it sees"""
     face = (sides // 2).astype(np.int32)
@@ -64,15 +64,15 @@ def _seen_from(
     root, v = np.sqrt(rng.random(len(sides))), rng.random(len(sides))
     uv = np.stack([root * (1 - v), root * v], axis=1).astype(np.float32)
     directions = lobe_directions(normal, 1.0, rng)
-    hits = trace_from(geometry.embree, places_on(geometry, face, uv, normal), directions)
-    return np.stack([sides, _sides_hit(normals, hits, directions, outside)])
+    hits = trace_rays(geometry.embree, positions_on_faces(geometry, face, uv, normal), directions)
+    return np.stack([sides, _hit_sides(normals, hits, directions, outside)])
 
 
-def _seen_by(geometry: Geometry, normals: F32, camera: Camera, outside: int) -> NDArray[np.int64]:
+def _trace_from_camera(geometry: SceneBuffers, normals: F32, camera: Camera, outside: int) -> NDArray[np.int64]:
     """Link what a camera sees with the outside. (2, rays)"""
-    width, height = _EYE_PIXELS
+    width, height = _CAMERA_PIXELS
     y, x = np.divmod(np.arange(width * height), width)
-    directions = camera_directions(camera, _EYE_PIXELS, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    hits = trace_from(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
-    seen = _sides_hit(normals, hits, directions, outside)
-    return np.stack([np.full(len(seen), outside), seen])
+    directions = camera_directions(camera, _CAMERA_PIXELS, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
+    hits = trace_rays(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+    sides = _hit_sides(normals, hits, directions, outside)
+    return np.stack([np.full(len(sides), outside), sides])

@@ -1,4 +1,4 @@
-"""Kernels that look textures up where an eye sees them; as `relume.trace.surface` and `relume.trace.texture` do."""
+"""Kernels that look textures up where a camera sees them, as `relume.trace.texture` does."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from relume.uncounted import UNCOUNTED
 
 # Inlined, as what it calls: calls count the references of arrays, which is two thirds of the time of a look-up.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def _add_level(textures, texture, level, u, v, share, out):  # type: ignore[no-untyped-def]
+def _add_level(textures, texture, level, u, v, weight, out):  # type: ignore[no-untyped-def]
     """Add a share of a bilinear lookup in one level of a texture. out: (3,)"""
     row = textures.first[texture] + level
     first, height, width = textures.levels[row, 0], textures.levels[row, 1], textures.levels[row, 2]
     left, right, fx = two_texels(textures.wraps[texture, 0], np.float32(u), width)
     upper, lower, fy = two_texels(textures.wraps[texture, 1], np.float32(v), height)
-    one = np.float32(1)
-    above, below = share * (one - fy), share * fy
-    a, b, c, d = above * (one - fx), above * fx, below * (one - fx), below * fx
+    unity = np.float32(1)
+    above, below = weight * (unity - fy), weight * fy
+    a, b, c, d = above * (unity - fx), above * fx, below * (unity - fx), below * fx
     at_a, at_b = first + upper * width + left, first + upper * width + right
     at_c, at_d = first + lower * width + left, first + lower * width + right
     texels = textures.texels
@@ -48,8 +48,8 @@ def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-
     size = max(textures.levels[first, 1], textures.levels[first, 2])
     level: Any = min(math.log2(max(np.float32(footprint * size), np.float32(1))), np.float32(last))
     lower = np.int64(level)
-    share = np.float32(level - lower)
+    fraction = np.float32(level - lower)
     out[0] = out[1] = out[2] = 0  # assigning a slice is a call
-    _add_level(textures, texture, lower, u, v, np.float32(1) - share, out)
-    if share > 0:
-        _add_level(textures, texture, lower + 1, u, v, share, out)
+    _add_level(textures, texture, lower, u, v, np.float32(1) - fraction, out)
+    if fraction > 0:
+        _add_level(textures, texture, lower + 1, u, v, fraction, out)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from relume.moving.relief.tables import ReliefTables, relief_tables
-from relume.picture.jobs import Cancelled, Progress
+from relume.moving.relief.tables import TexelTables, get_texel_tables
+from relume.picture.jobs import CancelCheck, ProgressCallback
 
 
 @dataclass(frozen=True)
@@ -15,27 +15,27 @@ class TablesJob:
     """Makes them; a `relume.picture.jobs.Job`.
 
     Attributes:
-        data, components: of `relief_tables`. take: called when they are there.
+        data, components: of `get_texel_tables`. on_done: called when they are there.
     """
 
     data: str
     components: int
-    take: Callable[[], None]
+    on_done: Callable[[], None]
 
-    what = "measured texture"
+    label = "measured texture"
     state: ClassVar[Literal["freezing"]] = "freezing"
-    refines = False
-    goes_on = True
+    is_refinement = False
+    is_resumable = True
 
     @property
     def key(self) -> tuple[Hashable, ...]:
         """Equal for jobs of one BTF."""
         return "tables of a BTF", self.data, self.components
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> ReliefTables:
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> TexelTables:
         """Find the tables, or wait for whoever does: seconds for 128 x 128 texels."""
-        return relief_tables(self.data, self.components)
+        return get_texel_tables(self.data, self.components)
 
-    def install(self, made: ReliefTables) -> None:
+    def install(self, result: TexelTables) -> None:
         """Have them shown."""
-        self.take()
+        self.on_done()

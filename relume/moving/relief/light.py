@@ -14,23 +14,23 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import ladder
-from relume.moving.look_up import need_points
-from relume.moving.points.surface import Surface
-from relume.moving.points.vertices import Vertices
-from relume.moving.relief.numbers import EMPTY, FUNCTIONS, HALF, OF_ORDER, PAIRS, WIDTH
-from relume.moving.relief.place import cross, dot, face_places, row
-from relume.parallel import for_shares
+from relume.basis.zernike import recurrence
+from relume.moving.look_up import mark_needed_probes
+from relume.moving.points.surface import StoredScene
+from relume.moving.points.vertices import LatticeNodes
+from relume.moving.relief.numbers import EMPTY_LANE, FUNCTIONS, HALF, HAS_ORDER, PAIRS, WIDTH
+from relume.moving.relief.place import cross, dot, face_placements, vector_row
+from relume.parallel import parallel_for_chunks
 from relume.uncounted import UNCOUNTED
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
 
-_LEAST = np.float32(1e-12)
-_NOTHING = np.empty((0, 3), np.float32)
+_EPSILON = np.float32(1e-12)
+_NO_VECTORS = np.empty((0, 3), np.float32)
 
 
-class VertexLight(NamedTuple):
+class NodeLight(NamedTuple):
     """What arrives about vertices.
 
     Attributes:
@@ -44,83 +44,84 @@ class VertexLight(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def turned_by(x, y):  # type: ignore[no-untyped-def]
+def rotation_from_vector(x, y):  # type: ignore[no-untyped-def]
     """Find cos δ and sin δ, of δ as a vector of any length; (0, 0) turns nothing."""
-    square = x * x + y * y
-    if square > _LEAST:
-        scale = np.float32(1) / math.sqrt(square)
+    squared_length = x * x + y * y
+    if squared_length > _EPSILON:
+        scale = np.float32(1) / math.sqrt(squared_length)
         return np.float32(x * scale), np.float32(y * scale)
     return np.float32(1), np.float32(0)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def _turn_by(x, y):  # type: ignore[no-untyped-def]
+def _rotation_powers(x, y):  # type: ignore[no-untyped-def]
     """Find cos mδ and sin mδ for m of 1 to 4, of δ as `turned_by` has it."""
-    c1, s1 = turned_by(x, y)
+    c1, s1 = rotation_from_vector(x, y)
     c2, s2 = c1 * c1 - s1 * s1, np.float32(2) * c1 * s1
     return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
-def add_turned(lanes, turn, side, weight, is_added, out):  # type: ignore[no-untyped-def]
+def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[no-untyped-def]
     """Add a light vector, turned.
 
     Args:
-        lanes: of it. (3 F,) float32. turn: from `_turn_by`. side: −1 where azimuths run the other way round, else 1.
+        lanes: of it. (3 F,) float32. rotation: from `_rotation_powers`. side: −1 where azimuths run the other way
+            round, else 1.
         weight: that it counts with. is_added: to what is in `out`, which is written. (3 F,) float32
     """
-    c1, s1, c2, s2, c3, s3, c4, s4 = turn
+    c1, s1, c2, s2, c3, s3, c4, s4 = rotation
     for i in range(PAIRS):
         # sums over orders, of which each lane has one: what is looked up in arrays that were just written stalls
-        is0, is1, is2, is3, is4 = OF_ORDER[0, i], OF_ORDER[1, i], OF_ORDER[2, i], OF_ORDER[3, i], OF_ORDER[4, i]
+        is0, is1, is2, is3, is4 = HAS_ORDER[0, i], HAS_ORDER[1, i], HAS_ORDER[2, i], HAS_ORDER[3, i], HAS_ORDER[4, i]
         cosine = weight * (is0 + c1 * is1 + c2 * is2 + c3 * is3 + c4 * is4)
         sine = weight * (s1 * is1 + s2 * is2 + s3 * is3 + s4 * is4)
         mirror = is0 + side * (np.float32(1) - is0)  # what no order turns is not mirrored either
         a, b = lanes[i], mirror * lanes[PAIRS + i]
-        before, other = (out[i], out[PAIRS + i]) if is_added else (np.float32(0), np.float32(0))
-        out[i] = before + cosine * a - sine * b
-        out[PAIRS + i] = other + sine * a + cosine * b
+        cosine_sum, sine_sum = (out[i], out[PAIRS + i]) if is_added else (np.float32(0), np.float32(0))
+        out[i] = cosine_sum + cosine * a - sine * b
+        out[PAIRS + i] = sine_sum + sine * a + cosine * b
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
-def _lay(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
+def _fill_lanes(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Lay the light vectors of the points that are [start, stop) of rows into lanes. out: (points, 3 F)"""
     for p in rows[start:stop]:
         for channel in range(3):
             for i in range(WIDTH):
-                if i != EMPTY:  # what that lane had at first, nothing, stays
-                    place = i if i < HALF else PAIRS - HALF + i
-                    out[p, channel * HALF + place] = vectors[p, channel, FUNCTIONS[i]]
+                if i != EMPTY_LANE:  # what that lane had at first, nothing, stays
+                    lane = i if i < HALF else PAIRS - HALF + i
+                    out[p, channel * HALF + lane] = vectors[p, channel, FUNCTIONS[i]]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _spread(vertices, tangents, lanes, rows, start, stop, tangent, out):  # type: ignore[no-untyped-def]
+def _sum_at_nodes(lattice_nodes, tangents, lanes, rows, start, stop, tangent, out):  # type: ignore[no-untyped-def]
     """Find what arrives about the vertices that are [start, stop) of rows."""
-    normal, points, weights = vertices
-    of_one, sums = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
+    normal, probes, weights = lattice_nodes
+    lane_buffer, sums = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
     for v in rows[start:stop]:
         heaviest = 0
         for k in range(1, weights.shape[1]):
             if weights[v, k] > weights[v, heaviest]:
                 heaviest = k
-        n, t = row(normal, v), row(tangents, points[v, heaviest])
+        n, t = vector_row(normal, v), vector_row(tangents, probes[v, heaviest])
         b = cross(n, t)
         tangent[v, 0], tangent[v, 1], tangent[v, 2] = t
         for i in range(3 * WIDTH):
             sums[i] = 0
         for k in range(weights.shape[1]):
-            weight, point = weights[v, k], points[v, k]
+            weight, probe = weights[v, k], probes[v, k]
             if weight > 0:
-                of_point = row(tangents, point)
-                turn = _turn_by(dot(of_point, t), dot(of_point, b))
+                probe_tangent = vector_row(tangents, probe)
+                rotation = _rotation_powers(dot(probe_tangent, t), dot(probe_tangent, b))
                 for i in range(3 * WIDTH):  # a row by itself would be counted as a reference
-                    of_one[i] = lanes[point, i]
-                add_turned(of_one, turn, np.float32(1), weight, True, sums)
+                    lane_buffer[i] = lanes[probe, i]
+                add_rotated(lane_buffer, rotation, np.float32(1), weight, True, sums)
         for i in range(3 * WIDTH):
             out[v, i] = sums[i]
 
 
-class ReliefLight:
+class TexelLight:
     """What arrives about the vertices that a moving picture has seen in a light, and where textures lie.
 
     Used from one thread at a time.
@@ -128,60 +129,72 @@ class ReliefLight:
 
     def __init__(self) -> None:
         self._vectors: F32 | None = None
-        self._places: F32 | None = None
-        self._lanes, self._found, self._is_found = _NOTHING, VertexLight(_NOTHING, _NOTHING), np.empty(0, np.uint8)
+        self._texture_placements: F32 | None = None
+        self._lanes, self._node_light, self._is_current = (
+            _NO_VECTORS,
+            NodeLight(_NO_VECTORS, _NO_VECTORS),
+            np.empty(0, np.uint8),
+        )
 
-    def places(self, surface: Surface, positions: F32) -> F32:
+    def texture_placements(self, stored_scene: StoredScene, positions: F32) -> F32:
         """Find where the surface's triangles lie in textures, once: it stays as it is.
 
         Args:
-            surface, positions: as in `face_places`, which is what is returned.
+            stored_scene, positions: as in `face_placements`, which is what is returned.
         """
-        if self._places is None:
-            self._places = face_places(positions, surface)
-        return self._places
+        if self._texture_placements is None:
+            self._texture_placements = face_placements(positions, stored_scene)
+        return self._texture_placements
 
-    def about(self, surface: Surface, vectors: F32, is_asked: U8) -> VertexLight:
+    def around_nodes(self, stored_scene: StoredScene, vectors: F32, is_requested: U8) -> NodeLight:
         """Find what arrives about vertices, which is kept as long as the light is.
 
         Args:
-            surface: with them and their points. vectors: of the points, never written to. (points, 3, K) float32
-            is_asked: vertices that are asked about; the others have anything. (vertices,) uint8
+            stored_scene: with them and their points. vectors: of the points, never written to. (points, 3, K) float32
+            is_requested: vertices that are asked about; the others have anything. (vertices,) uint8
         """
         if vectors is not self._vectors:
-            if len(self._is_found) != len(is_asked):
-                num = len(is_asked)
+            if len(self._is_current) != len(is_requested):
+                num_nodes = len(is_requested)
                 self._lanes = np.zeros((len(vectors), 3 * WIDTH), np.float32)
-                self._found = VertexLight(np.zeros((num, 3), np.float32), np.zeros((num, 3 * WIDTH), np.float32))
-            self._vectors, self._is_found = vectors, np.zeros_like(is_asked)
-        rows = np.flatnonzero(is_asked & ~self._is_found)
+                self._node_light = NodeLight(
+                    np.zeros((num_nodes, 3), np.float32), np.zeros((num_nodes, 3 * WIDTH), np.float32)
+                )
+            self._vectors, self._is_current = vectors, np.zeros_like(is_requested)
+        rows = np.flatnonzero(is_requested & ~self._is_current)
         if len(rows):
             is_needed = np.zeros(len(vectors), np.uint8)
-            need_points(surface.vertices, is_asked, is_needed)
-            points = np.flatnonzero(is_needed)
-            for_shares(lambda start, stop: _lay(vectors, points, start, stop, self._lanes), len(points))
-            args = (surface.vertices, surface.points.tangent, self._lanes, rows)
-            for_shares(lambda start, stop: _spread(*args, start, stop, *self._found), len(rows))
-            self._is_found[rows] = 1
-        return self._found
+            mark_needed_probes(stored_scene.lattice_nodes, is_requested, is_needed)
+            probes = np.flatnonzero(is_needed)
+            parallel_for_chunks(lambda start, stop: _fill_lanes(vectors, probes, start, stop, self._lanes), len(probes))
+            args = (stored_scene.lattice_nodes, stored_scene.probes.tangent, self._lanes, rows)
+            parallel_for_chunks(lambda start, stop: _sum_at_nodes(*args, start, stop, *self._node_light), len(rows))
+            self._is_current[rows] = 1
+        return self._node_light
 
 
-def light_about_numpy(vertices: Vertices, tangents: F32, vectors: F32, vertex: int) -> tuple[NDArray[np.float64], F32]:
-    """Do as `ReliefLight.about` for one vertex, in plain NumPy: its oracle.
+def node_light_numpy(
+    lattice_nodes: LatticeNodes, tangents: F32, vectors: F32, lattice_node: int
+) -> tuple[NDArray[np.float64], F32]:
+    """Do as `TexelLight.about` for one vertex, in plain NumPy: its oracle.
 
     Args:
-        vertices: all. tangents, vectors: of points, (points, 3), (points, 3, K). vertex: number of it.
+        lattice_nodes: all. tangents, vectors: of points, (points, 3), (points, 3, K). lattice_node: number of it.
     Returns:
         Its light vector by functions, (3, K), its tangent (3,).
     """
-    rungs, weights, points = ladder(), vertices.weight[vertex], vertices.point[vertex]
-    n, t = vertices.normal[vertex], tangents[points[weights.argmax()]]
+    recurrence_table, weights, probes = (
+        recurrence(),
+        lattice_nodes.weight[lattice_node],
+        lattice_nodes.point[lattice_node],
+    )
+    n, t = lattice_nodes.normal[lattice_node], tangents[probes[weights.argmax()]]
     out = np.zeros(vectors.shape[1:])
-    for weight, point in zip(weights, points, strict=True):
-        turn = np.arctan2(tangents[point] @ np.cross(n, t), tangents[point] @ t)
-        for m, cosine, sine in zip(rungs.order, rungs.cosine, rungs.sine, strict=True):
-            phase = vectors[point, :, cosine] + 1j * (vectors[point, :, sine] if m else 0)
-            phase = weight * phase * np.exp(1j * m * turn)
+    for weight, probe in zip(weights, probes, strict=True):
+        angle = np.arctan2(tangents[probe] @ np.cross(n, t), tangents[probe] @ t)
+        for m, cosine, sine in zip(recurrence_table.order, recurrence_table.cosine, recurrence_table.sine, strict=True):
+            phase = vectors[probe, :, cosine] + 1j * (vectors[probe, :, sine] if m else 0)
+            phase = weight * phase * np.exp(1j * m * angle)
             out[:, sine] += phase.imag
             out[:, cosine] += phase.real
     return out, t

@@ -20,14 +20,14 @@ NUM_FUNCTIONS = num_functions(DEGREE)
 WIDTH = 16  # F: lanes of a channel
 HALF = WIDTH // 2
 PAIRS = 3 * HALF  # of lanes that turn together, of all channels
-OF_ORDER = (np.tile([1, 2, 0, 0, 1, 3, 2, 4], 3) == np.arange(DEGREE + 1)[:, None]).astype(np.float32)
+HAS_ORDER = (np.tile([1, 2, 0, 0, 1, 3, 2, 4], 3) == np.arange(DEGREE + 1)[:, None]).astype(np.float32)
 """Whether m, up to 4, is the order of pairs of lanes. (5, 24) float32"""
 FUNCTIONS = np.array([1, 4, 0, 3, 6, 8, 11, 13, 2, 5, 10, -1, 7, 9, 12, 14])
 """Which function of the in-basis each lane has; the two that no order turns share a pair, one lane has none. (F,)"""
-EMPTY = int(np.flatnonzero(FUNCTIONS < 0)[0])
+EMPTY_LANE = int(np.flatnonzero(FUNCTIONS < 0)[0])
 
-NUMBERS = 24  # of a texel, from each side
-LANE_OF = np.array([*range(EMPTY), 2, *range(EMPTY + 1, WIDTH), 0, 1, 2, 3, 8, 9, 0, 8])
+NUM_COEFFICIENTS = 24  # of a texel, from each side
+COEFFICIENT_LANE = np.array([*range(EMPTY_LANE), 2, *range(EMPTY_LANE + 1, WIDTH), 0, 1, 2, 3, 8, 9, 0, 8])
 """Lane that each number counts for. (24,)"""
-AXIS_OF = np.array([*[0] * EMPTY, 2, *[0] * (WIDTH - EMPTY - 1), *[1] * 6, *[2] * 2])
+COEFFICIENT_AXIS = np.array([*[0] * EMPTY_LANE, 2, *[0] * (WIDTH - EMPTY_LANE - 1), *[1] * 6, *[2] * 2])
 """Axis of colours that it counts along. (24,)"""

@@ -9,27 +9,27 @@ from typing import ClassVar, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.errors import CancelledError, NotMadeError, RelumeError
+from relume.errors import CancelledError, RelumeError, ResultUnavailableError
 from relume.look import Look
-from relume.memory import Memory
-from relume.moving.correction import Places, correction
-from relume.moving.picture import MovingPicture
-from relume.picture.finish import finish
-from relume.picture.jobs import Cancelled, Progress
+from relume.memory import Cache
+from relume.moving.correction import CorrectionSamples, residual
+from relume.moving.picture import FreeCameraPicture
+from relume.picture.finish import render_exact
+from relume.picture.jobs import CancelCheck, ProgressCallback
 from relume.picture.light import Solo
 from relume.picture.picture import Picture
-from relume.picture.transfer import Transfer
+from relume.picture.transfer import FixedViewTransfer
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
-Eye = tuple[Camera, tuple[int, int]]
+SizedCamera = tuple[Camera, tuple[int, int]]
 
-TRACING = 0.5  # of what a still tells to be done; the rest is shading
-STEP = 8  # pixels from one sparse sample to the next
-_FEWEST_SPARSE = 1000  # samples; with fewer the exact picture itself is as soon there
+TRACING_FRACTION = 0.5  # of what a still tells to be done; the rest is shading
+SAMPLE_SPACING = 8  # pixels from one sparse sample to the next
+_MIN_SPARSE_SAMPLES = 1000  # samples; with fewer the exact picture itself is as soon there
 
 
-class MakeStill(Protocol):
+class StaticViewFactory(Protocol):
     """Finds what an eye sees: an opened bake of this one fixed view."""
 
     def __call__(
@@ -37,135 +37,155 @@ class MakeStill(Protocol):
         camera: Camera,
         size: tuple[int, int],
         reflects: bool,
-        progress: Progress,
-        cancelled: Cancelled,
+        progress: ProgressCallback,
+        is_canceled: CancelCheck,
         *,
         smooths_edges: bool = True,
-    ) -> Transfer:
-        """Trace it; see `relume.methods.stills.Stills.make`."""
+    ) -> FixedViewTransfer:
+        """Trace it; see `relume.methods.static_views.StaticViewBuilder.make`."""
         ...
 
 
 @dataclass(frozen=True)
-class ExactView:
+class StaticViewState:
     """What is to be seen exactly.
 
     Attributes:
-        make_still: finds what it sees; heavy. memory: of what is made for the picture.
-        eye: camera, and size of its picture. look, solo: that it is shown in.
+        make_static_view: finds what it sees; heavy. cache: of what is made for the picture.
+        sized_camera: camera, and size of its picture. look, solo: that it is shown in.
     """
 
-    make_still: MakeStill
-    memory: Memory
-    eye: Eye
+    make_static_view: StaticViewFactory
+    cache: Cache
+    sized_camera: SizedCamera
     look: Look
     solo: Solo
 
     @property
-    def reflects(self) -> bool:
+    def is_indirect(self) -> bool:
         """Whether light between surfaces is shown."""
-        return self.look.transport.paths.reflect
+        return self.look.transport.paths.has_indirect
 
-    def picture(self, progress: Progress, cancelled: Cancelled, *, smooths_edges: bool = True) -> Picture:
+    def static_picture(
+        self, progress: ProgressCallback, is_canceled: CancelCheck, *, smooths_edges: bool = True
+    ) -> Picture:
         """Trace and shade it.
 
         Args:
-            progress: called with about the share done. cancelled: asked now and then.
+            progress: called with about the share done. is_canceled: asked now and then.
             smooths_edges: whether pixels across edges have several samples.
         Raises:
-            CancelledError: `cancelled` said so.
+            CancelledError: `is_canceled` said so.
         """
-        (camera, size), look = self.eye, self.look
-        transfer = self.make_still(
-            camera, size, self.reflects, lambda share: progress(TRACING * share), cancelled, smooths_edges=smooths_edges
+        (camera, size), look = self.sized_camera, self.look
+        transfer = self.make_static_view(
+            camera,
+            size,
+            self.is_indirect,
+            lambda share: progress(TRACING_FRACTION * share),
+            is_canceled,
+            smooths_edges=smooths_edges,
         )
-        picture = Picture(transfer, next(iter(transfer.views)), self.memory)
+        picture = Picture(transfer, next(iter(transfer.views)), self.cache)
         picture.set_look(look, solo=self.solo)
-        finish(picture, look, lambda share: progress(TRACING + (1 - TRACING) * share), cancelled)
+        render_exact(
+            picture, look, lambda share: progress(TRACING_FRACTION + (1 - TRACING_FRACTION) * share), is_canceled
+        )
         return picture
 
 
 @dataclass(frozen=True)
-class SparseJob:
+class SparseExactJob:
     """By how much a moving picture's straight light is off, from few samples; a `relume.picture.jobs.Job`.
 
     Attributes:
-        wanted: what is to be seen exactly. moving: the picture that is off, for this job alone.
-        key: equal for jobs of one eye and look. take: gets what was made; None where nothing is to be corrected.
+        view_state: what is to be seen exactly. free_camera_picture: the picture that is off, for this job alone.
+        key: equal for jobs of one eye and look. on_done: gets what was made; None where nothing is to be corrected.
     """
 
-    wanted: ExactView
-    moving: MovingPicture
+    view_state: StaticViewState
+    free_camera_picture: FreeCameraPicture
     key: tuple[Hashable, ...]
-    take: Callable[[F32 | None], None]
+    on_done: Callable[[F32 | None], None]
 
-    what = "a first exact look from here"
+    label = "a first exact look from here"
     state: ClassVar[Literal["shading"]] = "shading"
-    refines = True
-    goes_on = False
+    is_refinement = True
+    is_resumable = False
 
     @staticmethod
-    def is_worth(wanted: ExactView) -> bool:
+    def should_refine(view_state: StaticViewState) -> bool:
         """Whether light comes straight, to a picture that is large enough."""
-        width, height = wanted.eye[1]
-        return wanted.look.transport.paths.direct and (width // STEP) * (height // STEP) >= _FEWEST_SPARSE
+        width, height = view_state.sized_camera[1]
+        return (
+            view_state.look.transport.paths.direct
+            and (width // SAMPLE_SPACING) * (height // SAMPLE_SPACING) >= _MIN_SPARSE_SAMPLES
+        )
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> F32 | None:
-        """Trace, shade and compare. (height, width, 3). Raises CancelledError where `cancelled` said so."""
-        moving, (camera, size), seen = self.moving, self.wanted.eye, self.moving.seen
-        if len(seen.panes.ray):  # of what glass shows and what is behind it, each is off by something else
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> F32 | None:
+        """Trace, shade and compare. (height, width, 3). Raises CancelledError where `is_canceled` said so."""
+        picture, (camera, size), gbuffer = (
+            self.free_camera_picture,
+            self.view_state.sized_camera,
+            self.free_camera_picture.gbuffer,
+        )
+        if len(gbuffer.glass.ray):  # of what glass shows and what is behind it, each is off by something else
             return None
-        transport = self.wanted.look.transport.model_copy(update={"show": "direct"})
-        look = self.wanted.look.model_copy(update={"transport": transport})
-        few = size[0] // STEP, size[1] // STEP
-        straight = replace(self.wanted, eye=(camera, few), look=look)
+        transport = self.view_state.look.transport.model_copy(update={"show": "direct"})
+        look = self.view_state.look.model_copy(update={"transport": transport})
+        coarse_size = size[0] // SAMPLE_SPACING, size[1] // SAMPLE_SPACING
+        direct_view = replace(self.view_state, sized_camera=(camera, coarse_size), look=look)
         try:
-            exact = straight.picture(progress, cancelled, smooths_edges=False).image()
+            exact = direct_view.static_picture(progress, is_canceled, smooths_edges=False).image()
         except CancelledError:
             raise
         except RelumeError:  # the scene is gone, or it needs more memory than there is
             return None
-        moving.set_look(look, solo=straight.solo)
-        radiance, seen_by_few = moving.along_middles(few)
-        of_samples = Places.of(moving.surface, seen_by_few, camera, few[0]).off_edges(seen.owner, size)
-        of_pixels = Places.of(moving.surface, seen.middles(size[0] * size[1]), camera, size[0])
-        by = correction(radiance, exact, of_samples, of_pixels)
-        return by if by.any() else None
+        picture.set_look(look, solo=direct_view.solo)
+        radiance, sample_gbuffer = picture.render_pixel_centers(coarse_size)
+        samples = CorrectionSamples.from_gbuffer(
+            picture.stored_scene, sample_gbuffer, camera, coarse_size[0]
+        ).exclude_edges(gbuffer.owner, size)
+        pixels = CorrectionSamples.from_gbuffer(
+            picture.stored_scene, gbuffer.pixel_centers(size[0] * size[1]), camera, size[0]
+        )
+        residual_image = residual(radiance, exact, samples, pixels)
+        return residual_image if residual_image.any() else None
 
-    def install(self, made: F32 | None) -> None:
+    def install(self, result: F32 | None) -> None:
         """Hand it over."""
-        self.take(made)
+        self.on_done(result)
 
 
 @dataclass(frozen=True)
-class StillJob:
+class StaticViewJob:
     """The exact picture of where an eye rests, made beside the frames; a `relume.picture.jobs.Job`.
 
     Attributes:
-        wanted: what is made; looks that came meanwhile are followed from there.
+        view_state: what is made; looks that came meanwhile are followed from there.
         key: jobs of one eye and look are one: while hands edit, nothing takes a core from them.
-        take: gets whether light between surfaces can be shown, and the picture when it is there; None where it cannot
-            be had.
+        on_done: gets whether light between surfaces can be shown, and the picture when it is there; None where it
+            cannot be had.
     """
 
-    wanted: ExactView
+    view_state: StaticViewState
     key: tuple[Hashable, ...]
-    take: Callable[[bool, Picture | None], None]
+    on_done: Callable[[bool, Picture | None], None]
 
-    what = "the exact picture from here"
+    label = "the exact picture from here"
     state: ClassVar[Literal["shading"]] = "shading"
-    refines = True
-    goes_on = False
+    is_refinement = True
+    is_resumable = False
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> Picture | NotMadeError:
-        """Trace and shade it, or why not. Raises CancelledError where `cancelled`, asked now and then, said so."""
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Picture | ResultUnavailableError:
+        """Trace and shade it, or why not. Raises CancelledError where `is_canceled`, asked now and then, said so."""
         try:
-            return self.wanted.picture(progress, cancelled)
+            return self.view_state.static_picture(progress, is_canceled)
         except CancelledError:
             raise
         except RelumeError as error:  # the scene is gone, or it needs more memory than there is
-            return NotMadeError(f"the moving picture stays: {self.what} cannot be had, for {error}")
+            return ResultUnavailableError(f"the moving picture stays: {self.label} cannot be had, for {error}")
 
-    def install(self, made: Picture | NotMadeError) -> None:
+    def install(self, result: Picture | ResultUnavailableError) -> None:
         """Hand it over."""
-        self.take(self.wanted.reflects, None if isinstance(made, NotMadeError) else made)
+        self.on_done(self.view_state.is_indirect, None if isinstance(result, ResultUnavailableError) else result)

@@ -9,33 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.look.model import Rgb
-from relume.moving.beams.beam import Beam
-from relume.moving.transfer import MovingTransfer
-from relume.picture.light import Light, vector_of
+from relume.moving.beams.beam import HardShadowLight
+from relume.moving.transfer import FreeCameraTransfer
+from relume.picture.light import Illumination, element_gains
 from relume.project.light_vectors import add_scaled
 
 F32 = NDArray[np.float32]
 
 
-class Arriving(NamedTuple):
+class IncidentCoefficients(NamedTuple):
     """What arrives at points.
 
     Attributes:
         total: light vectors of all light but that of beams. (points, 3, K) float32
-        others: of that which is not the sky's own, lamps that are beams included. (points, 3, K) float32
-        beams: whose shadows pixels find by themselves.
+        non_environment: of that which is not the sky's own, lamps that are beams included. (points, 3, K) float32
+        hard_shadow_lights: whose shadows pixels find by themselves.
     """
 
     total: F32
-    others: F32
-    beams: tuple[Beam, ...] = ()
+    non_environment: F32
+    hard_shadow_lights: tuple[HardShadowLight, ...] = ()
 
-    def copy(self) -> Arriving:
+    def copy(self) -> IncidentCoefficients:
         """One that may be added to."""
-        return self._replace(total=self.total.copy(), others=self.others.copy())
+        return self._replace(total=self.total.copy(), non_environment=self.non_environment.copy())
 
 
-class Found(NamedTuple):
+class PartialCoefficients(NamedTuple):
     """Light vectors of some points.
 
     Attributes:
@@ -46,50 +46,57 @@ class Found(NamedTuple):
     rows: NDArray[np.intp] | None = None
 
 
-def summed(
-    transfer: MovingTransfer,
-    light: Light,
-    vectors_of: Callable[[Light], Found],
-    beams: tuple[Beam, ...] = (),
-    between: Sequence[tuple[Found, Rgb]] | None = None,
-    chosen: NDArray[np.intp] | None = None,
-) -> Arriving:
+def combine(
+    transfer: FreeCameraTransfer,
+    light: Illumination,
+    get_vectors: Callable[[Illumination], PartialCoefficients],
+    hard_shadow_lights: tuple[HardShadowLight, ...] = (),
+    indirect: Sequence[tuple[PartialCoefficients, Rgb]] | None = None,
+    rows: NDArray[np.intp] | None = None,
+) -> IncidentCoefficients:
     """Sum over sources: transport is linear in them.
 
     Args:
         transfer: of the points. light: that arrives.
-        vectors_of: finds those of one source and one kind of way, suns that are beams left out.
-        beams: of the light.
-        between: what surfaces send, with its gains, in place of what `vectors_of` finds of it.
-        chosen: points that are asked about, the others have anything; None: all.
+        get_vectors: finds those of one source and one kind of way, suns that are beams left out.
+        hard_shadow_lights: of the light.
+        indirect: what surfaces send, with its gains, in place of what `get_vectors` finds of it.
+        rows: points that are asked about, the others have anything; None: all.
     """
-    total, others = (np.zeros(transfer.vectors_shape, np.float32) for _ in range(2))
-    of_beams = {beam.key for beam in beams}
-    for element, gain in vector_of(light).items():
-        if element.paths.reflect and between is not None:
+    total, non_environment = (np.zeros(transfer.vectors_shape, np.float32) for _ in range(2))
+    hard_shadow_keys = {hard_shadow_light.key for hard_shadow_light in hard_shadow_lights}
+    for element, gain in element_gains(light).items():
+        if element.paths.has_indirect and indirect is not None:
             continue
-        found = vectors_of(element)
-        if not (element.paths.direct and any(lamp in of_beams for lamp, _ in element.local)):
-            _add(total, found, gain, chosen)
-        if not element.shows_sky:
-            _add(others, found, gain, chosen)
-    for found, gain in between or ():
-        for into in (total, others):
-            _add(into, found, gain, chosen)
-    return Arriving(total, others, beams)
+        contribution = get_vectors(element)
+        if not (element.paths.direct and any(geometry in hard_shadow_keys for geometry, _ in element.local)):
+            _add(total, contribution, gain, rows)
+        if not element.has_direct_environment:
+            _add(non_environment, contribution, gain, rows)
+    for contribution, gain in indirect or ():
+        for into in (total, non_environment):
+            _add(into, contribution, gain, rows)
+    return IncidentCoefficients(total, non_environment, hard_shadow_lights)
 
 
-def _add(total: F32, found: Found, gain: Rgb, chosen: NDArray[np.intp] | None) -> None:
-    is_of_all = found.rows is None
-    rows = chosen if is_of_all else found.rows
-    add_scaled(total, found.vectors, np.array(gain, np.float32), rows, is_of_all=is_of_all)
+def _add(total: F32, contribution: PartialCoefficients, gain: Rgb, default_rows: NDArray[np.intp] | None) -> None:
+    has_all_probes = contribution.rows is None
+    rows = default_rows if has_all_probes else contribution.rows
+    add_scaled(total, contribution.vectors, np.array(gain, np.float32), rows, has_all_rows=has_all_probes)
 
 
-def wholly(transfer: MovingTransfer, light: Light, *, has_beams: bool = False) -> Arriving:
+def combine_all(
+    transfer: FreeCameraTransfer, light: Illumination, *, has_hard_shadows: bool = False
+) -> IncidentCoefficients:
     """Find what arrives at all points, where it is not known too.
 
     Args:
-        transfer: of the points. light: that arrives. has_beams: pixels find the shadows of beams.
+        transfer: of the points. light: that arrives. has_hard_shadows: pixels find the shadows of beams.
     """
-    beams = transfer.beams(light, None) if has_beams else ()
-    return summed(transfer, light, lambda element: Found(transfer.vectors(element, has_beams)), beams)
+    hard_shadow_lights = transfer.hard_shadow_lights(light, None) if has_hard_shadows else ()
+    return combine(
+        transfer,
+        light,
+        lambda element: PartialCoefficients(transfer.vectors(element, has_hard_shadows)),
+        hard_shadow_lights,
+    )

@@ -9,93 +9,104 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.look.model import Rgb
-from relume.moving.transfer import MovingTransfer
-from relume.moving.vectors.arriving import Arriving, Found
-from relume.picture.light import Light, vector_of
+from relume.moving.transfer import FreeCameraTransfer
+from relume.moving.vectors.arriving import IncidentCoefficients, PartialCoefficients
+from relume.picture.light import Illumination, element_gains
 from relume.project.light_vectors import add_scaled
 
 F32 = NDArray[np.float32]
 
 
-class Between(NamedTuple):
+class IndirectCoefficients(NamedTuple):
     """What surfaces send to points under a light.
 
     Attributes:
-        light: that they send. is_there: points that all of it has been found for. (points,) uint8
-        exact: what is known of some sources, with their gains. quick: of the others, of points that were asked about.
+        light: that they send. is_complete: points that all of it has been found for. (points,) uint8
+        exact: what is known of some sources, with their gains. approximate: of the others, of points that were asked
+            about.
     """
 
-    light: Light
-    is_there: NDArray[np.uint8]
-    exact: Mapping[Light, tuple[Found, Rgb]]
-    quick: Sequence[tuple[Found, Rgb]]
+    light: Illumination
+    is_complete: NDArray[np.uint8]
+    exact: Mapping[Illumination, tuple[PartialCoefficients, Rgb]]
+    approximate: Sequence[tuple[PartialCoefficients, Rgb]]
 
     @property
-    def parts(self) -> Sequence[tuple[Found, Rgb]]:
+    def contributions(self) -> Sequence[tuple[PartialCoefficients, Rgb]]:
         """All of it."""
-        return [*self.exact.values(), *self.quick]
+        return [*self.exact.values(), *self.approximate]
 
 
-def is_between_same(one: Light, other: Light) -> bool:
+def same_indirect(first: Illumination, second: Illumination) -> bool:
     """Whether surfaces send each other the same under two lights."""
-    return _alone(one) == _alone(other)
+    return _indirect_only(first) == _indirect_only(second)
 
 
-def _alone(light: Light) -> Light:
+def _indirect_only(light: Illumination) -> Illumination:
     return light._replace(paths=light.paths.without_direct())
 
 
-def _elements(light: Light) -> dict[Light, Rgb]:
+def _indirect_elements(light: Illumination) -> dict[Illumination, Rgb]:
     """What surfaces send of the light of each source, gain 1, and its gain."""
-    return {element: gain for element, gain in vector_of(light).items() if element.paths.reflect}
+    return {element: gain for element, gain in element_gains(light).items() if element.paths.has_indirect}
 
 
-def are_known(transfer: MovingTransfer, light: Light) -> bool:
+def is_cached(transfer: FreeCameraTransfer, light: Illumination) -> bool:
     """Whether all that surfaces send under a light is there at once."""
-    return all(transfer.knows(element, beside_suns=False) for element in _elements(light))
+    return all(transfer.has_vectors(element, without_sun_disks=False) for element in _indirect_elements(light))
 
 
-def between_of(transfer: MovingTransfer, light: Light, is_needed: NDArray[np.uint8]) -> Between:
+def indirect_of(
+    transfer: FreeCameraTransfer, light: Illumination, is_needed: NDArray[np.uint8]
+) -> IndirectCoefficients:
     """Find what surfaces send to some points, exactly where that is known, else quickly.
 
     Args:
         transfer: of the points. light: that surfaces send. is_needed: points that are asked about. (points,) uint8
     """
     exact = {
-        element: (Found(transfer.vectors(element, beside_suns=False)), gain)
-        for element, gain in _elements(light).items()
-        if transfer.knows(element, beside_suns=False)
+        element: (PartialCoefficients(transfer.vectors(element, without_sun_disks=False)), gain)
+        for element, gain in _indirect_elements(light).items()
+        if transfer.has_vectors(element, without_sun_disks=False)
     }
-    return widened(transfer, Between(light, np.zeros_like(is_needed), exact, ()), is_needed)
+    return extend(transfer, IndirectCoefficients(light, np.zeros_like(is_needed), exact, ()), is_needed)
 
 
-def widened(transfer: MovingTransfer, between: Between, is_needed: NDArray[np.uint8]) -> Between:
+def extend(
+    transfer: FreeCameraTransfer, indirect: IndirectCoefficients, is_needed: NDArray[np.uint8]
+) -> IndirectCoefficients:
     """Find the same for points that it has not been found for: those that an eye sees since.
 
     Args:
-        transfer, is_needed: as of `between_of`. between: what has been found.
+        transfer, is_needed: as of `indirect_of`. indirect: what has been found.
     """
-    new = np.flatnonzero(is_needed & ~between.is_there)
+    new = np.flatnonzero(is_needed & ~indirect.is_complete)
     if not len(new):
-        return between
-    found = [
-        (Found(transfer.preview_vectors(element, new, beside_suns=False), new), gain)
-        for element, gain in _elements(between.light).items()
-        if element not in between.exact
+        return indirect
+    contributions = [
+        (PartialCoefficients(transfer.fast_vectors(element, new, without_sun_disks=False), new), gain)
+        for element, gain in _indirect_elements(indirect.light).items()
+        if element not in indirect.exact
     ]
-    return between._replace(is_there=between.is_there | is_needed, quick=[*between.quick, *found])
+    return indirect._replace(
+        is_complete=indirect.is_complete | is_needed, approximate=[*indirect.approximate, *contributions]
+    )
 
 
-def changed(
-    transfer: MovingTransfer, before: Light, known: Arriving, light: Light, chosen: NDArray[np.intp]
-) -> Arriving:
+def update_reflectances(
+    transfer: FreeCameraTransfer,
+    before: Illumination,
+    previous: IncidentCoefficients,
+    light: Illumination,
+    rows: NDArray[np.intp],
+) -> IncidentCoefficients:
     """Find what arrives at some points where surfaces reflect otherwise than before, quickly: what arrived, changed.
 
     Args:
-        transfer: of the points. before: a light of the same sources. known: what arrives of it, exactly.
-        light: that arrives. chosen: points that are asked about. (n,)
+        transfer: of the points. before: a light of the same sources. previous: what arrives of it, exactly.
+        light: that arrives. rows: points that are asked about. (n,)
     """
-    change, found = transfer.change_between(before, light, chosen), known.copy()
-    for into in (found.total, found.others):
-        add_scaled(into, change, np.ones(3, np.float32), chosen)
-    return found
+    delta, incident = transfer.indirect_delta(before, light, rows), previous.copy()
+    for into in (incident.total, incident.non_environment):
+        add_scaled(into, delta, np.ones(3, np.float32), rows)
+    return incident

@@ -7,83 +7,83 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from relume.errors import CancelledError
-from relume.moving.transfer import MovingTransfer
-from relume.moving.vectors.arriving import Arriving, Found, summed
-from relume.parallel import beside_frames
-from relume.picture.jobs import Cancelled, Progress
-from relume.picture.light import Light, vector_of
+from relume.moving.transfer import FreeCameraTransfer
+from relume.moving.vectors.arriving import IncidentCoefficients, PartialCoefficients, combine
+from relume.parallel import low_priority
+from relume.picture.jobs import CancelCheck, ProgressCallback
+from relume.picture.light import Illumination, element_gains
 
 
 @dataclass(frozen=True)
-class LightJob:
+class ProbeLightJob:
     """What arrives, exactly, when a hand rests.
 
     Attributes:
-        has_beams: pixels find the shadows of beams. take: gets it when it is there.
+        has_hard_shadows: pixels find the shadows of beams. on_done: gets it when it is there.
     """
 
-    transfer: MovingTransfer
-    light: Light
-    has_beams: bool
-    take: Callable[[Light, bool, Arriving], None]
+    transfer: FreeCameraTransfer
+    light: Illumination
+    has_hard_shadows: bool
+    on_done: Callable[[Illumination, bool, IncidentCoefficients], None]
 
-    what = "light on the points"
+    label = "light on the points"
     state: ClassVar[Literal["shading"]] = "shading"
-    refines = True
-    goes_on = False
+    is_refinement = True
+    is_resumable = False
 
     @property
     def key(self) -> tuple[Hashable, ...]:
         """Jobs of one light are one."""
-        return self.transfer.key, "light vectors", self.light, self.has_beams
+        return self.transfer.key, "light vectors", self.light, self.has_hard_shadows
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> Arriving:
-        """Find it, source by source. Raises CancelledError where `cancelled`, asked before each, said so."""
-        num, done = len(vector_of(self.light)), 0
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> IncidentCoefficients:
+        """Find it, source by source. Raises CancelledError where `is_canceled`, asked before each, said so."""
+        num, done = len(element_gains(self.light)), 0
 
-        def found(element: Light) -> Found:
+        def get_vectors(element: Illumination) -> PartialCoefficients:
             nonlocal done
-            if cancelled():
+            if is_canceled():
                 raise CancelledError("light on the points was cancelled")
-            vectors, done = self.transfer.vectors(element, self.has_beams), done + 1
+            vectors, done = self.transfer.vectors(element, self.has_hard_shadows), done + 1
             progress(done / num)
-            return Found(vectors)
+            return PartialCoefficients(vectors)
 
-        beams = self.transfer.beams(self.light, None) if self.has_beams else ()
-        return summed(self.transfer, self.light, found, beams)
+        hard_shadow_lights = self.transfer.hard_shadow_lights(self.light, None) if self.has_hard_shadows else ()
+        return combine(self.transfer, self.light, get_vectors, hard_shadow_lights)
 
-    def install(self, made: Arriving) -> None:
+    def install(self, result: IncidentCoefficients) -> None:
         """Hand it over."""
-        self.take(self.light, self.has_beams, made)
+        self.on_done(self.light, self.has_hard_shadows, result)
 
 
 @dataclass(frozen=True)
-class FollowJob:
+class IncrementalProbeLightJob:
     """What surfaces send each other under a hand, quickly: some frames behind it, and never given up for a newer look.
 
     Attributes:
-        light: of the look when it was begun. find: finds it. take: gets it when it is there.
+        light: of the look when it was begun. compute: finds it. on_done: gets it when it is there.
     """
 
-    light: Light
-    find: Callable[[], Any]
-    take: Callable[[Any], None]
+    light: Illumination
+    compute: Callable[[], Any]
+    on_done: Callable[[Any], None]
 
-    what = "light between surfaces"
+    label = "light between surfaces"
     state: ClassVar[Literal["following"]] = "following"
-    refines = False
-    goes_on = False
+    is_refinement = False
+    is_resumable = False
 
     @property
     def key(self) -> tuple[Hashable, ...]:
         """Jobs of one light are one."""
         return "light that follows", self.light
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> Any:
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Any:
         """Find it, by threads that let frames go first."""
-        with beside_frames():
-            return self.find()
+        with low_priority():
+            return self.compute()
 
-    def install(self, made: Any) -> None:
+    def install(self, result: Any) -> None:
         """Hand it over."""
-        self.take(made)
+        self.on_done(result)

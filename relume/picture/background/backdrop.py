@@ -17,52 +17,52 @@ from relume.color import luminance, srgb_encode
 from relume.look import EnvironmentKey, Look
 from relume.look.model import BackgroundLook, Rgb
 from relume.picture.background.coverage import Coverage
-from relume.picture.background.unshadowed import Unshadowed
-from relume.picture.light import Light, Source
+from relume.picture.background.unshadowed import UnoccludedLight
+from relume.picture.light import Illumination, LightSource
 from relume.picture.material_image import MaterialImage
-from relume.picture.mirrors import rectangles_of
+from relume.picture.mirrors import lit_rectangles
 from relume.picture.view_images import ViewImages
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _MAP = BackgroundLook(kind="map", color=(0, 0, 0), blur=0)
-MOST_SHARE = 8.0  # times what is behind: where next to nothing but reflected light arrives there is no measure
-_LEAST_GAIN = 1e-12  # what is not the environment's is divided by its gain, which multiplies the finished picture
+MAX_CATCHER_RATIO = 8.0  # times what is behind: where next to nothing but reflected light arrives there is no measure
+_MIN_GAIN = 1e-12  # what is not the environment's is divided by its gain, which multiplies the finished picture
 
 
-class _Shown(NamedTuple):
+class _BackgroundState(NamedTuple):
     """All that what is behind depends on.
 
     Attributes:
         factor: multiplies the map, or the colour, for the gain of the finished picture is yet to.
-        lamps: that shine before it in mirrors.
+        mirror_emitters: that shine before it in mirrors.
     """
 
     background: BackgroundLook
     environment: EnvironmentKey
     factor: tuple[float, ...]
     is_direct: bool
-    lamps: tuple[Source, ...]
+    mirror_emitters: tuple[LightSource, ...]
 
 
-class Backdrop:
+class Background:
     """Of one picture; what it was last is kept, for most edits leave it as it is."""
 
     def __init__(self, images: ViewImages) -> None:
         self._images, self._view = images, images.view
-        self._shown: _Shown | None = None
-        self._unshadowed: dict[int, Unshadowed] = {}
-        self._open: dict[int, tuple[Hashable, F32]] = {}
+        self._state: _BackgroundState | None = None
+        self._unoccluded_lights: dict[int, UnoccludedLight] = {}
+        self._unoccluded_images: dict[int, tuple[Hashable, F32]] = {}
         self._coverage: dict[bool, Coverage] = {}
         self.is_transparent = False
 
     @staticmethod
-    def gain_of(gain: Rgb, background: BackgroundLook) -> F64:
+    def clamped_gain(gain: Rgb, background: BackgroundLook) -> F64:
         """What multiplies the finished picture: never nothing before a colour, which is seen where no light is."""
-        return np.asarray(np.maximum(np.array(gain), _LEAST_GAIN if background.kind == "color" else 0.0))
+        return np.asarray(np.maximum(np.array(gain), _MIN_GAIN if background.kind == "color" else 0.0))
 
-    def follow(self, look: Look, light: Light, gain: F64, radiance: F32) -> bool:
+    def update(self, look: Look, light: Illumination, gain: F64, radiance: F32) -> bool:
         """Bring the samples of the background and the factors of catchers to a look.
 
         Args:
@@ -73,24 +73,27 @@ class Backdrop:
         """
         background = look.background
         factor = tuple(1 / gain) if background.kind == "color" else light.environment_gain
-        lamps = self._images.mirrors.lamps(light)
-        shown = _Shown(background, light.environment, factor, light.paths.direct, rectangles_of(light))
+        emitter_radiance = self._images.mirrors.mirror_emitters(light)
+        state = _BackgroundState(background, light.environment, factor, light.paths.direct, lit_rectangles(light))
         for name, material in self._images.by_name.items():
             if material.num_samples and look.materials[name].catcher:
-                self._catch(material, shown, light)
+                self._update_catcher(material, state, light)
             else:
                 material.set_factor(None, None, None, None)
-        if shown == self._shown:
+        if state == self._state:
             return False
-        self._shown, self.is_transparent = shown, background.kind == "transparent"
+        self._state, self.is_transparent = state, background.kind == "transparent"
         first, mirrored = self._view.num_surface_samples, self._view.mirrored
-        radiance[:, first:] = self._behind(shown, None).T if shown.is_direct else 0
-        if mirrored is not None and shown.is_direct:  # mirrors show the light, whatever is put behind
-            among = mirrored.within(slice(first, self._view.num_view_samples))
-            seen, light_itself = mirrored.sample[among], shown._replace(background=_MAP, factor=light.environment_gain)
-            radiance[:, seen] = self._behind(light_itself, None)[seen - first].T
-            if lamps is not None:
-                radiance[:, seen] += lamps[:, among]
+        radiance[:, first:] = self._background_radiance(state, None).T if state.is_direct else 0
+        if mirrored is not None and state.is_direct:  # mirrors show the light, whatever is put behind
+            selection = mirrored.restrict_to(slice(first, self._view.num_view_samples))
+            samples, unblurred_state = (
+                mirrored.sample[selection],
+                state._replace(background=_MAP, factor=light.environment_gain),
+            )
+            radiance[:, samples] = self._background_radiance(unblurred_state, None)[samples - first].T
+            if emitter_radiance is not None:
+                radiance[:, samples] += emitter_radiance[:, selection]
         return True
 
     def alpha(self, *, for_display: bool) -> F32:
@@ -101,49 +104,49 @@ class Backdrop:
                 light leaves three quarters of the value; else over linear ones.
         """
         if for_display not in self._coverage:
-            hidden = self._hidden_from_display if for_display else self._hidden
-            self._coverage[for_display] = Coverage(self._view, hidden)
+            catcher_opacity = self._display_shadow_opacity if for_display else self._shadow_opacity
+            self._coverage[for_display] = Coverage(self._view, catcher_opacity)
         return self._coverage[for_display].pixels(self._images.by_name.values())
 
-    def _hidden_from_display(self, material: MaterialImage) -> F32:
-        return np.asarray(1 - srgb_encode(1 - self._hidden(material)), np.float32)
+    def _display_shadow_opacity(self, material: MaterialImage) -> F32:
+        return np.asarray(1 - srgb_encode(1 - self._shadow_opacity(material)), np.float32)
 
-    def _hidden(self, material: MaterialImage) -> F32:
+    def _shadow_opacity(self, material: MaterialImage) -> F32:
         """The share of light that does not arrive at samples of a catcher. (n,) float32"""
-        is_direct = self._shown is None or self._shown.is_direct
-        arriving = material.terms[0].displayed.image.transpose(1, 0, 2).reshape(3, -1)[:, : material.num_samples]
-        unhidden = self._open[material.index][1].T
-        share = np.divide(arriving, unhidden, out=np.full_like(unhidden, is_direct), where=unhidden > 0)
-        return np.asarray(1 - luminance(np.clip(share, 0, 1).T), np.float32)
+        is_direct = self._state is None or self._state.is_direct
+        incident = material.terms[0].displayed.image.transpose(1, 0, 2).reshape(3, -1)[:, : material.num_samples]
+        unoccluded = self._unoccluded_images[material.index][1].T
+        ratio = np.divide(incident, unoccluded, out=np.full_like(unoccluded, is_direct), where=unoccluded > 0)
+        return np.asarray(1 - luminance(np.clip(ratio, 0, 1).T), np.float32)
 
-    def _catch(self, material: MaterialImage, shown: _Shown, light: Light) -> None:
+    def _update_catcher(self, material: MaterialImage, state: _BackgroundState, light: Illumination) -> None:
         index = material.index
-        if index not in self._unshadowed:
-            self._unshadowed[index] = Unshadowed(self._images, material)
-        of_light, unhidden = self._unhidden(material, light)
-        if material.factor_key != (shown, of_light):
-            behind = self._behind(shown, index)
-            is_lit = unhidden > 0
-            factor = np.divide(behind, unhidden, out=np.zeros_like(unhidden), where=is_lit)
-            shows_unlit = shown.is_direct and not is_lit.all()
-            unlit = np.where(is_lit, np.float32(0), behind).T if shows_unlit else None
-            most = np.ascontiguousarray(MOST_SHARE * behind.T, np.float32)
-            material.set_factor((shown, of_light), np.ascontiguousarray(factor.T), most, unlit)
+        if index not in self._unoccluded_lights:
+            self._unoccluded_lights[index] = UnoccludedLight(self._images, material)
+        light_key, unoccluded = self._unoccluded_image(material, light)
+        if material.factor_key != (state, light_key):
+            background = self._background_radiance(state, index)
+            is_lit = unoccluded > 0
+            factor = np.divide(background, unoccluded, out=np.zeros_like(unoccluded), where=is_lit)
+            has_unlit = state.is_direct and not is_lit.all()
+            unlit = np.where(is_lit, np.float32(0), background).T if has_unlit else None
+            max_radiance = np.ascontiguousarray(MAX_CATCHER_RATIO * background.T, np.float32)
+            material.set_factor((state, light_key), np.ascontiguousarray(factor.T), max_radiance, unlit)
 
-    def _unhidden(self, material: MaterialImage, light: Light) -> tuple[Hashable, F32]:
+    def _unoccluded_image(self, material: MaterialImage, light: Illumination) -> tuple[Hashable, F32]:
         """What tells a light from others here, and the image in it if nothing stood on the catcher, (n, 3): as rough as
         what is displayed, which is left as it was where another light is being made."""
-        live, known = material.terms[0], self._open.get(material.index)
-        is_rough, is_kept = not live.displayed.is_firm, live.displayed.light not in (None, light)
-        key = light.environment, light.environment_gain, light.local, is_rough
-        if known is None or (known[0] != key and not is_kept):
-            known = key, self._unshadowed[material.index].image(light, is_preview=is_rough)
-            self._open[material.index] = known
-        return known
+        live, cached = material.terms[0], self._unoccluded_images.get(material.index)
+        is_preview, is_light_changing = not live.displayed.is_converged, live.displayed.light not in (None, light)
+        key = light.environment, light.environment_gain, light.local, is_preview
+        if cached is None or (cached[0] != key and not is_light_changing):
+            cached = key, self._unoccluded_lights[material.index].image(light, is_preview=is_preview)
+            self._unoccluded_images[material.index] = cached
+        return cached
 
-    def _behind(self, shown: _Shown, material: int | None) -> F32:
+    def _background_radiance(self, state: _BackgroundState, material: int | None) -> F32:
         """Radiance behind samples of a material, of the background where None, over the gain. (n, 3) float32"""
-        background, factor = shown.background, np.array(shown.factor)
+        background, factor = state.background, np.array(state.factor)
         first, stop = self._view.num_surface_samples, self._view.num_view_samples
         rows = slice(first, stop) if material is None else self._view.rows(material)
         if background.kind in ("color", "transparent"):
@@ -151,15 +154,15 @@ class Backdrop:
             return np.tile((np.array(color) * factor).astype(np.float32), (rows.stop - rows.start, 1))
         blur = background.blur if background.kind == "blurred" else 0.0
         images = self._images
-        place = (self._view.name, None) if material is None else self._view.place(material)
-        key = images.transfer.key, "behind surfaces", *place, shown.environment, blur
-        seen = images.cache.passing.keep(key, lambda: self._map(shown.environment, material, blur))
-        return np.asarray(seen * factor, np.float32)
+        sample_key = (self._view.name, None) if material is None else self._view.sample_key(material)
+        key = images.transfer.key, "behind surfaces", *sample_key, state.environment, blur
+        radiance = images.cache.transient.get_value(key, lambda: self._map(state.environment, material, blur))
+        return np.asarray(radiance * factor, np.float32)
 
     def _map(self, environment: EnvironmentKey, material: int | None, blur: float) -> F32:
         transfer, view = self._images.transfer, self._view
         if material is not None:
-            return transfer.seen_in(environment, self._unshadowed[material].directions, blur)
+            return transfer.environment_along(environment, self._unoccluded_lights[material].directions, blur)
         if not blur:
             return transfer.background_in(environment, view)
-        return transfer.seen_in(environment, view.background_directions(), blur)
+        return transfer.environment_along(environment, view.background_directions(), blur)

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from relume.picture.fidelity import Fidelity
-from relume.picture.jobs import Job, Place
-from relume.picture.light import Light
+from relume.picture.jobs import Job, TermTarget
+from relume.picture.light import Illumination
 
 
-class LightRoute(Protocol):
+class LightStrategy(Protocol):
     """From the anchor of a term, an exact image, to the same curves in another light.
 
     Attributes:
@@ -19,14 +19,14 @@ class LightRoute(Protocol):
 
     fidelity: Fidelity
 
-    def reaches(self, place: Place, light: Light) -> bool:
+    def applicable(self, target: TermTarget, light: Illumination) -> bool:
         """Whether it leads from the term's anchor to this light, once all that it needs has been made."""
         ...
 
-    def needs(self, place: Place, light: Light) -> Sequence[Job]:
+    def prepare(self, target: TermTarget, light: Illumination) -> Sequence[Job]:
         """What must be made before it does; nothing where it does at once."""
         ...
 
-    def apply(self, place: Place, light: Light) -> None:
+    def evaluate(self, target: TermTarget, light: Illumination) -> None:
         """Put the image in this light; the route must reach it and need nothing."""
         ...

@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 
 from relume.light.triangles import NO_LIGHTS
 from relume.look import LightGeometry
-from relume.operators.shade import Shaded, shaded_bytes, shaded_rows
-from relume.parallel import for_shares
-from relume.picture.jobs import Place, weighted_sum
-from relume.picture.light import Light, Source, direct_from
+from relume.operators.shade import ShadedTerm, shade_rows, shaded_bytes
+from relume.parallel import parallel_for_chunks
+from relume.picture.jobs import TermTarget, weighted_sum
+from relume.picture.light import Illumination, LightSource, direct_from
 from relume.picture.live_term import LiveTerm
 from relume.picture.material_image import MaterialImage
 from relume.picture.view_images import ViewImages
-from relume.points import Points
+from relume.points import SurfacePoints
 from relume.project.contraction import contract
 from relume.project.levels import contract_levels
-from relume.project.receivers import LocalRays, Receivers, ThrownRays
-from relume.trace.local_shadows import arriving
-from relume.trace.preview_light import PreviewLight
-from relume.views.compose import add_even
+from relume.project.receivers import LocalRays, MirrorRays, ShadingPoints
+from relume.trace.local_shadows import compute_irradiance
+from relume.trace.preview_light import MovingLight
+from relume.views.compose import add_diffuse
 
 F32 = NDArray[np.float32]
 
@@ -36,115 +36,115 @@ class MovedLights:
 
     def __init__(self, images: ViewImages) -> None:
         self._images = images
-        self._place = images.transfer.key, images.view.name, images.view.maps
+        self._view_key = images.transfer.key, images.view.name, images.view.maps
 
-    def add_change(self, place: Place, before: Light, after: Light, out: F32) -> None:
+    def add_change(self, target: TermTarget, before: Illumination, after: Illumination, out: F32) -> None:
         """Add what comes straight to a term's samples from lights that were not there before, and take off what came
         from those that are not there any more.
 
         Args:
-            place: of the term. before: light of `out`. after: light that it is brought to.
+            target: of the term. before: light of `out`. after: light that it is brought to.
             out: shaped like the term's image. (tiles, 3, samples) float32, written
         """
         if not after.paths.direct:
             return
-        _, material, live = place
-        gone = [source for source in before.local if source not in after.local]
-        come = [source for source in after.local if source not in before.local]
-        for source in gone:
-            element = direct_from(before, (Source(source.geometry, (1.0, 1.0, 1.0)),))
+        _, material, live = target
+        removed = [source for source in before.local if source not in after.local]
+        added = [source for source in after.local if source not in before.local]
+        for source in removed:
+            element = direct_from(before, (LightSource(source.geometry, (1.0, 1.0, 1.0)),))
             red, green, blue = source.gain
-            weighted_sum(out, [(self._before(material, live, element), (-red, -green, -blue))])
-        if come:
-            self._add_now(material, live, come, out)
+            weighted_sum(out, [(self._static_image(material, live, element), (-red, -green, -blue))])
+        if added:
+            self._add_moved(material, live, added, out)
 
-    def add_thrown(self, place: Place, rays: ThrownRays, out: F32) -> None:
+    def add_mirror_lights(self, target: TermTarget, rays: MirrorRays, out: F32) -> None:
         """Add what flat mirrors throw to a term's samples, the few that see any of it.
 
         Args:
-            place, out: as of `add_change`. rays: to all samples of its material.
+            target, out: as of `add_change`. rays: to all samples of its material.
         """
-        _, material, live = place
+        _, material, live = target
         lit = np.flatnonzero(rays.visible.any(axis=1))
         if len(lit):
-            some = replace(self._images.unlit(material).places(lit), rays=[rays.alone(lit)])
+            subset = replace(self._images.unlit_samples(material).without_light(lit), rays=[rays.unshared(lit)])
             tile, offset = np.divmod(lit, out.shape[2])
-            out[tile, :, offset] += self._rows(live, some, len(lit), None)
+            out[tile, :, offset] += self._rows(live, subset, len(lit), None)
 
-    def _before(self, material: MaterialImage, live: LiveTerm, light: Light) -> F32:
+    def _static_image(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> F32:
         """What comes straight from a light that stood still, as exact as in the picture that was shaded; the same in
-        every frame, and so kept. Where a hand took its time it was made before (`Transition`)."""
+        every frame, and so kept. Where a hand took its time it was made before (`StrategyScheduler`)."""
         images = self._images
-        key = images.key_of_image(material, live, light)
+        key = images.image_key(material, live, light)
 
-        def shaded() -> Shaded:
-            rays, factor = self._exact_rays(material, light), _even_factor(live)
+        def shaded() -> ShadedTerm:
+            rays, factor = self._exact_rays(material, light), _diffuse_factor(live)
             if factor is None:
                 return self._shaded(material, live, rays)
-            found, points = np.zeros_like(live.ready.image), self._points().rows(images.view.rows(material.index))
-            for of_light in rays:
-                seen = arriving(of_light.light, of_light.strata, points, of_light.visible)
-                add_even(seen, factor * of_light.gain, found)
-            return Shaded(found)
+            image, points = np.zeros_like(live.ready.image), self._points().rows(images.view.rows(material.index))
+            for light_rays in rays:
+                irradiance = compute_irradiance(light_rays.light, light_rays.strata, points, light_rays.visible)
+                add_diffuse(irradiance, factor * light_rays.gain, image)
+            return ShadedTerm(image)
 
-        return images.cache.get(key, Shaded, shaded_bytes(material.num_samples), shaded).image
+        return images.cache.get(key, ShadedTerm, shaded_bytes(material.num_samples), shaded).image
 
-    def _exact_rays(self, material: MaterialImage, light: Light) -> list[LocalRays]:
+    def _exact_rays(self, material: MaterialImage, light: Illumination) -> list[LocalRays]:
         """Of a light that has local lights alone, as pictures at rest have them."""
         images = self._images
-        _, points = images.transfer.arriving(images.view, material.index, light, images.cache)
+        _, points = images.transfer.incident_light(images.view, material.index, light, images.cache)
         return [rays for rays in points.rays if isinstance(rays, LocalRays)]
 
-    def _add_now(self, material: MaterialImage, live: LiveTerm, come: list[Source], out: F32) -> None:
-        factor, rows = _even_factor(live), self._images.view.rows(material.index)
-        lights = [(source, self._roughly(source.geometry)) for source in come]
+    def _add_moved(self, material: MaterialImage, live: LiveTerm, added: list[LightSource], out: F32) -> None:
+        factor, rows = _diffuse_factor(live), self._images.view.rows(material.index)
+        lights = [(source, self._moving_light(source.geometry)) for source in added]
         if factor is not None:
             for source, light in lights:
-                add_even(light.arriving[rows], factor * source.gain, out)
+                add_diffuse(light.irradiance[rows], factor * source.gain, out)
             return
         local = self._images.transfer.local
         rays = [local.preview_rays(source, light.visible[rows]) for source, light in lights]
-        out += self._shaded(material, live, rays, Shaded(out).rows(material.num_samples)).image
+        out += self._shaded(material, live, rays, ShadedTerm(out).rows(material.num_samples)).image
 
-    def _roughly(self, geometry: LightGeometry) -> PreviewLight:
+    def _moving_light(self, geometry: LightGeometry) -> MovingLight:
         transfer = self._images.transfer
-        key = *self._place, "moved light", geometry
-        return self._images.cache.passing.keep(key, lambda: transfer.local.preview(geometry, self._points()))
+        key = *self._view_key, "moved light", geometry
+        return self._images.cache.transient.get_value(key, lambda: transfer.local.preview(geometry, self._points()))
 
     def _shaded(
-        self, material: MaterialImage, live: LiveTerm, rays: list[LocalRays], beside: F32 | None = None
-    ) -> Shaded:
+        self, material: MaterialImage, live: LiveTerm, rays: list[LocalRays], base_radiance: F32 | None = None
+    ) -> ShadedTerm:
         """What rays bring a term, in the threads of frames. beside: what is shown already, see `Shader`"""
-        points = replace(self._images.unlit(material), rays=rays)
-        return Shaded.of(self._rows(live, points, material.num_samples, beside))
+        receivers = replace(self._images.unlit_samples(material), rays=rays)
+        return ShadedTerm.from_rows(self._rows(live, receivers, material.num_samples, base_radiance))
 
     @staticmethod
-    def _rows(live: LiveTerm, points: Receivers, num_samples: int, beside: F32 | None) -> F32:
-        contractions = contract_levels(live.term, live.target, None)
+    def _rows(live: LiveTerm, receivers: ShadingPoints, num_samples: int, base_radiance: F32 | None) -> F32:
+        contractions = contract_levels(live.term, live.target_bands, None)
         rows = np.empty((num_samples, 3), np.float32)
 
         def add(start: int, stop: int) -> None:
-            rows[start:stop] = shaded_rows(live.term, contractions, NO_LIGHTS, points, start, stop, beside)
+            rows[start:stop] = shade_rows(live.term, contractions, NO_LIGHTS, receivers, start, stop, base_radiance)
 
-        for_shares(add, len(rows))
+        parallel_for_chunks(add, len(rows))
         return rows
 
-    def _points(self) -> Points:
+    def _points(self) -> SurfacePoints:
         """Those of the view; of samples that are seen from behind the normals are nothing, and no light arrives."""
         view = self._images.view
 
-        def read() -> Points:
-            points = view.all_points()
+        def read() -> SurfacePoints:
+            points = view.all_surface_points()
             return points._replace(normal=points.normal * (view.cos_theta_o > 0)[:, None].astype(np.float32))
 
-        return self._images.cache.keep((*self._place, "points"), read)
+        return self._images.cache.get_value((*self._view_key, "points"), read)
 
 
-def _even_factor(live: LiveTerm) -> NDArray[np.float64] | None:
+def _diffuse_factor(live: LiveTerm) -> NDArray[np.float64] | None:
     """What a term makes of all light that arrives; None where it asks where that comes from. (3,)"""
     if not live.term.is_lambertian:
         return None
-    contraction = contract(live.term, live.target, None)
+    contraction = contract(live.term, live.target_bands, None)
     if contraction.kinds.size:
         return None
     upright = live.term.quotients(*np.array([0, 0, 1, 0, 0, 1], np.float32))

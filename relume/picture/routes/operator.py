@@ -16,86 +16,98 @@ from numpy.typing import NDArray
 
 from relume.operators.operator import Operator
 from relume.picture.fidelity import Fidelity
-from relume.picture.jobs import Place, Settle
-from relume.picture.shown import MOST_IN_EXACT, Shown, length_of, rounding_of
+from relume.picture.jobs import Resum, TermTarget
+from relume.picture.shown import MAX_EXACT_ROUNDING, DisplayedImage, accumulated_error, norm_of
 
 F64 = NDArray[np.float64]
 
 # Share of an image's length that float32 sums may have left in it before it is summed anew instead of gone on with; a
 # frame's pixels have nine bits.
 MAX_ROUNDING = 2.0**-11
-_WORTH_SUMMING = 4.0  # times what that sum itself would leave
+_RESUM_RATIO = 4.0  # times what that sum itself would leave
 
 
-def step(place: Place, max_coefficients: int | None) -> None:
+def step(target: TermTarget, max_coefficients: int | None) -> None:
     """Bring the curves that a term's operator leaves free to their target, as far as the operator is there.
 
     Args:
         max_coefficients: of each channel, at most; None for all.
     """
-    images, material, live = place
-    frozen = images.operator(material, live)
-    if frozen is not None:
-        after = advance(live.ready, live.target, frozen, max_coefficients)
+    images, material, live = target
+    operator = images.operator(material, live)
+    if operator is not None:
+        after = advance(live.ready, live.target_bands, operator, max_coefficients)
         if after is not live.ready:
-            live.put(after)
+            live.set_ready(after)
 
 
-def advance(ready: Shown, target: Mapping[str, F64], frozen: Operator, max_coefficients: int | None) -> Shown:
+def advance(
+    ready: DisplayedImage, target_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
+) -> DisplayedImage:
     """What an image shows after one step along its basis; the same where that leaves nothing free that differs.
 
     Args:
-        ready: with basis and coefficients. target: bands of each of the term's curves. (3, J) each
-        frozen: the operator that the coefficients are of. max_coefficients: of each channel, at most; None for all.
+        ready: with basis and coefficients. target_bands: bands of each of the term's curves. (3, J) each
+        operator: the operator that the coefficients are of. max_coefficients: of each channel, at most; None for all.
     """
     basis, light = ready.basis, ready.light
-    if basis is None or light is None or set(ready.differing(target)).isdisjoint(basis.moves):
+    if basis is None or light is None or set(ready.changed_curves(target_bands)).isdisjoint(basis.affected_curves):
         return ready
-    moved = {**ready.bands, **{name: target[name] for name in basis.moves}}
+    new_bands = {**ready.bands, **{name: target_bands[name] for name in basis.affected_curves}}
     if basis.is_complete:
-        return _add_change(ready, moved, frozen, max_coefficients)
-    return ready.summed(frozen, basis, moved, light) if frozen.is_whole else _add_change(ready, moved, frozen, None)
+        return _add_change(ready, new_bands, operator, max_coefficients)
+    return (
+        ready.evaluate_operator(operator, basis, new_bands, light)
+        if operator.is_whole
+        else _add_change(ready, new_bands, operator, None)
+    )
 
 
-def settle_job(place: Place) -> Settle | None:
+def resum_job(target: TermTarget) -> Resum | None:
     """What makes of an image that was summed from steps one that was summed once from all coefficients.
 
     None where the operator is gone or not exact, where there is no need: a few small steps leave less than a sum of all
     coefficients, whose columns cancel; and where they cancel so that no such sum is exact.
     """
-    images, material, live = place
-    ready, frozen = live.ready, images.operator(material, live)
+    images, material, live = target
+    ready, operator = live.ready, images.operator(material, live)
     basis, coefficients = ready.basis, ready.coefficients
-    if frozen is None or basis is None or coefficients is None or not (frozen.is_exact and basis.is_complete):
+    if operator is None or basis is None or coefficients is None or not (operator.is_exact and basis.is_complete):
         return None
-    left = rounding_of(0.0, coefficients, frozen)
-    if left >= ready.rounding or left > MOST_IN_EXACT * length_of(ready.image):
+    resum_error = accumulated_error(0.0, coefficients, operator)
+    if resum_error >= ready.rounding or resum_error > MAX_EXACT_ROUNDING * norm_of(ready.image):
         return None
-    key = images.key_of_operator(material, live, basis, live.target)
-    return Settle(place, (*key, "settled"), ready, lambda image: frozen.write_image(coefficients, image), left)
+    key = images.operator_key(material, live, basis, live.target_bands)
+    return Resum(target, (*key, "settled"), ready, lambda image: operator.write_image(coefficients, image), resum_error)
 
 
-def _add_change(ready: Shown, moved: Mapping[str, F64], frozen: Operator, max_coefficients: int | None) -> Shown:
+def _add_change(
+    ready: DisplayedImage, new_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
+) -> DisplayedImage:
     """Add T · Δc; where float32 sums have left too much in the image, sum all of it anew."""
     assert ready.basis is not None
     assert ready.coefficients is not None
-    shown, perfect = ready.coefficients, ready.basis.coefficients(moved)
-    change = perfect - shown
+    current, exact = ready.coefficients, ready.basis.coefficients(new_bands)
+    change = exact - current
     budget = change.size if max_coefficients is None else change.size // change.shape[-1] * max_coefficients
     if np.count_nonzero(change) > budget:
-        weight = np.abs(change) * frozen.importance
+        weight = np.abs(change) * operator.importance
         change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
-        perfect = np.where(change == 0, shown, perfect)  # a sum would leave a rest to move again
-        unsaid = {name: np.full_like(moved[name], np.nan) for name in ready.basis.moves}  # shows no curve exactly
-        moved = {**moved, **unsaid}
-    length = length_of(ready.image)
-    frozen.add(change, ready.image)
-    rounding = float(np.hypot(ready.rounding, rounding_of(length, change, frozen)))
-    after = replace(ready, bands=moved, coefficients=perfect, rounding=rounding)
-    if not frozen.is_exact:  # at rest it is shaded
-        return replace(after, fidelity=min(ready.fidelity, Fidelity.NEAR if frozen.is_whole else Fidelity.COARSE))
-    left = rounding_of(0.0, perfect, frozen)
-    if rounding > max(MAX_ROUNDING * length, _WORTH_SUMMING * left):
-        frozen.write_image(perfect, after.image)
-        after = replace(after, rounding=left, fidelity=Fidelity.EXACT)
-    return after.as_worn()
+        exact = np.where(change == 0, current, exact)  # a sum would leave a rest to move again
+        undefined = {
+            name: np.full_like(new_bands[name], np.nan) for name in ready.basis.affected_curves
+        }  # shows no curve exactly
+        new_bands = {**new_bands, **undefined}
+    norm = norm_of(ready.image)
+    operator.add(change, ready.image)
+    rounding = float(np.hypot(ready.rounding, accumulated_error(norm, change, operator)))
+    after = replace(ready, bands=new_bands, coefficients=exact, rounding=rounding)
+    if not operator.is_exact:  # at rest it is shaded
+        return replace(
+            after, fidelity=min(ready.fidelity, Fidelity.NEARLY_EXACT if operator.is_whole else Fidelity.COARSE)
+        )
+    resum_error = accumulated_error(0.0, exact, operator)
+    if rounding > max(MAX_ROUNDING * norm, _RESUM_RATIO * resum_error):
+        operator.write_image(exact, after.image)
+        after = replace(after, rounding=resum_error, fidelity=Fidelity.EXACT)
+    return after.downgrade_if_inexact()

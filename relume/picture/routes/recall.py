@@ -5,28 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from relume.picture.fidelity import Fidelity
-from relume.picture.jobs import Job, Place
-from relume.picture.light import Light
-from relume.picture.shown import Shown
+from relume.picture.jobs import Job, TermTarget
+from relume.picture.light import Illumination
+from relume.picture.shown import DisplayedImage
 
 
-class Recall:
-    """A `LightRoute` back to where the picture has been; bit for bit what it showed there at rest."""
+class CachedImage:
+    """A `LightStrategy` back to where the picture has been; bit for bit what it showed there at rest."""
 
     fidelity = Fidelity.EXACT
 
-    def reaches(self, place: Place, light: Light) -> bool:
-        """See `LightRoute`."""
-        images, material, live = place
+    def applicable(self, target: TermTarget, light: Illumination) -> bool:
+        """See `LightStrategy`."""
+        images, material, live = target
         return images.image_in(material, live, light) is not None
 
-    def needs(self, place: Place, light: Light) -> Sequence[Job]:
-        """See `LightRoute`; it is there or it is not."""
+    def prepare(self, target: TermTarget, light: Illumination) -> Sequence[Job]:
+        """See `LightStrategy`; it is there or it is not."""
         return ()
 
-    def apply(self, place: Place, light: Light) -> None:
-        """See `LightRoute`."""
-        images, material, live = place
-        known = images.image_in(material, live, light)
-        if known is not None:
-            live.put(Shown(known.image.copy(), self.fidelity, dict(live.target), light))
+    def evaluate(self, target: TermTarget, light: Illumination) -> None:
+        """See `LightStrategy`."""
+        images, material, live = target
+        cached = images.image_in(material, live, light)
+        if cached is not None:
+            live.set_ready(DisplayedImage(cached.image.copy(), self.fidelity, dict(live.target_bands), light))

@@ -10,60 +10,62 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Literal
 
-from relume.brdf.terms.btf import Texels
-from relume.operators.arrived import Arrived, is_quick
-from relume.picture.arrivals import keep_arrived, known_arrived, may_be_kept
+from relume.brdf.terms.btf import BtfRef
+from relume.operators.arrived import BtfIncidentLight, fits_budget
+from relume.picture.arrivals import get_texel_light, is_cacheable, put_texel_light
 from relume.picture.fidelity import Fidelity
-from relume.picture.jobs import Cancelled, Place, Progress
-from relume.picture.light import Light
-from relume.picture.shown import Shown
+from relume.picture.jobs import CancelCheck, ProgressCallback, TermTarget
+from relume.picture.light import Illumination
+from relume.picture.shown import DisplayedImage
 
 
-def step(place: Place) -> None:
+def step(target: TermTarget) -> None:
     """Show a term's texture as it is wanted, where it shows nothing and what arrives at it is known."""
-    images, material, live = place
-    texels = live.term.texels
-    if texels is None or live.is_firm:
+    images, material, live = target
+    btf_ref = live.term.texels
+    if btf_ref is None or live.is_converged:
         return
-    known = known_arrived(images, material, texels, live.light)
-    if known is not None and is_quick(texels, material.num_samples):
-        image = known.sent(texels, images.unlit(material)).image
-        fidelity = Fidelity.EXACT if known.rotation == texels.rotation else Fidelity.COARSE
-        live.put(Shown(image, fidelity, dict(live.target), live.light))
+    cached = get_texel_light(images, material, btf_ref, live.light)
+    if cached is not None and fits_budget(btf_ref, material.num_samples):
+        image = cached.shade(btf_ref, images.unlit_samples(material)).image
+        fidelity = Fidelity.EXACT if cached.rotation == btf_ref.rotation else Fidelity.COARSE
+        live.set_ready(DisplayedImage(image, fidelity, dict(live.target_bands), live.light))
 
 
 @dataclass(frozen=True, eq=False)
-class Arrive:
+class SumTexels:
     """What arrives at a texture that a hand has taken hold of; found in the memory from then on."""
 
-    place: Place
-    texels: Texels
-    light: Light
+    target: TermTarget
+    btf_ref: BtfRef
+    light: Illumination
     key: tuple[Hashable, ...]
     state: Literal["freezing", "shading"] = "freezing"
-    refines = False
-    goes_on = False
+    is_refinement = False
+    is_resumable = False
 
     @property
-    def what(self) -> str:
+    def label(self) -> str:
         """In words."""
-        return f"{self.place.name}, {self.place.live.term.label}"
+        return f"{self.target.name}, {self.target.live.term.label}"
 
-    def make(self, progress: Progress, cancelled: Cancelled) -> Arrived:
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> BtfIncidentLight:
         """See `Job`."""
-        return keep_arrived(self.place.images, self.place.material, self.texels, self.light, progress, cancelled)
+        return put_texel_light(
+            self.target.images, self.target.material, self.btf_ref, self.light, progress, is_canceled
+        )
 
-    def install(self, made: Arrived) -> None:
+    def install(self, result: BtfIncidentLight) -> None:
         """See `Job`; the memory has it, which is enough."""
 
 
-def job_for(place: Place) -> Arrive | None:
+def job_for(target: TermTarget) -> SumTexels | None:
     """What a hand on a term's texture must wait for before it is followed; None where there is no need."""
-    images, material, live = place
-    texels = live.term.texels
-    if texels is None or not material.num_samples or not may_be_kept(images, material, texels):
+    images, material, live = target
+    btf_ref = live.term.texels
+    if btf_ref is None or not material.num_samples or not is_cacheable(images, material, btf_ref):
         return None
-    if known_arrived(images, material, texels, live.light) is not None:
+    if get_texel_light(images, material, btf_ref, live.light) is not None:
         return None
-    key = (*images.key_of_image(material, live, live.light), "arrived")
-    return Arrive(place, texels, live.light, key)
+    key = (*images.image_key(material, live, live.light), "arrived")
+    return SumTexels(target, btf_ref, live.light, key)

@@ -15,23 +15,23 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.brdf.angles import LOBE, THETA_D, THETA_I, THETA_R, angles_into
+from relume.brdf.angles import LOBE, THETA_D, THETA_I, THETA_R, compute_angles
 from relume.uncounted import UNCOUNTED
 
 _ZERO, _HALF, _THIRD = np.float32(0), np.float32(0.5), np.float32(1 / 3)
 CHUNK = 256  # triangles evaluated together: their scratch memory stays in a core's first-level cache
 # Half of a box has at least this width, in bands: sums of bands are differences of larger ones.
-_LEAST_HALF = np.float32(0.025)
+_MIN_HALF = np.float32(0.025)
 _CORNER = np.float32(1.64)
 # Two moments tell nothing of a peak within a box: what a leaning cosine changes is no more than this share, which the
 # error that is estimated for such a peak exceeds. Else light would be taken away, and be too little to be looked at.
-_MOST_LEANT = np.float32(0.5)
+_MAX_COSINE_CORRECTION = np.float32(0.5)
 # A mean over a box beside a lobe may be nothing at all, and a share of nothing is nothing: it is this share of what the
 # curve varies by within reach at least, which adds up to some millionths.
-_LEAST_MEAN = np.float32(1e-9)
+_MIN_MEAN = np.float32(1e-9)
 # A curve that varies by its own mean within a triangle's reach gives it at most about this share of that as an error:
 # where the angle is linear, since a box is no triangle; by an angle's pole in the ratio of reach and distance.
-_SHAPE, _BEND, _MOST_BEND = np.float32(0.08), np.float32(0.05), np.float32(0.5)
+_SHAPE, _BEND, _MAX_BEND = np.float32(0.08), np.float32(0.05), np.float32(0.5)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
@@ -43,11 +43,11 @@ def _spread(gamma, num, mean, half):  # type: ignore[no-untyped-def]
     for n in range(num):
         ab, bc, ca = a[n] - b[n], b[n] - c[n], c[n] - a[n]
         # the variance over a triangle, from midpoints of its edges, is a ninth of this; a box has a third of half²
-        half[n] = max(math.sqrt((ab * ab + bc * bc + ca * ca) * _THIRD), _LEAST_HALF)
+        half[n] = max(math.sqrt((ab * ab + bc * bc + ca * ca) * _THIRD), _MIN_HALF)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _reach_into(kind, scale, wo, local, radius, half, num, reach):  # type: ignore[no-untyped-def]
+def _compute_reach(kind, scale, wo, local, radius, half, num, reach):  # type: ignore[no-untyped-def]
     """Bound how far an angle varies within triangles, in bands.
 
     Args:
@@ -64,25 +64,25 @@ def _reach_into(kind, scale, wo, local, radius, half, num, reach):  # type: igno
         x, y, z = local[0, 3], local[1, 3], local[2, 3]
         for n in range(num):
             cosine = wo[0] * x[n] + wo[1] * y[n] + wo[2] * z[n]
-            turned = _HALF * scale * radius[n] / math.sqrt(max(_HALF + _HALF * cosine, np.float32(1e-4)))
-            reach[n] = max(turned, _CORNER * half[n])
+            half_reach = _HALF * scale * radius[n] / math.sqrt(max(_HALF + _HALF * cosine, np.float32(1e-4)))
+            reach[n] = max(half_reach, _CORNER * half[n])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
     """Find where boxes begin and end, in bands. last: angle in the last band."""
     for n in range(num):
-        low[n] = min(max(mean[n] - half[n], _ZERO), last - _LEAST_HALF)
+        low[n] = min(max(mean[n] - half[n], _ZERO), last - _MIN_HALF)
     for n in range(num):
-        high[n] = max(min(mean[n] + half[n], last), low[n] + _LEAST_HALF)
+        high[n] = max(min(mean[n] + half[n], last), low[n] + _MIN_HALF)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _lean_into(gamma, mean, local, between, num, lean):  # type: ignore[no-untyped-def]
+def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  # type: ignore[no-untyped-def]
     """Find how an angle varies with cos θi between the lights of groups: their covariance over the mean cosine.
 
     Args:
-        gamma, mean: as in `_spread`. local, between: as in `evaluate`. lean: in bands, written. (≥ num,)
+        gamma, mean: as in `_spread`. local, group_range: as in `evaluate`. cosine_shift: in bands, written. (≥ num,)
     """
     a, b, c = gamma[0], gamma[1], gamma[2]
     z_a, z_b, z_c = local[2, 3], local[2, 4], local[2, 5]
@@ -91,25 +91,28 @@ def _lean_into(gamma, mean, local, between, num, lean):  # type: ignore[no-untyp
         by_a, by_b, by_c = z_a[n] - cosine, z_b[n] - cosine, z_c[n] - cosine
         covariance = (a[n] - mean[n]) * by_a + (b[n] - mean[n]) * by_b + (c[n] - mean[n]) * by_c
         # a triangle across the horizon leans no more than one that reaches it
-        lean[n] = between[n] * covariance * _THIRD / max(cosine, abs(by_a) + abs(by_b) + abs(by_c) + np.float32(1e-6))
+        cosine_shift[n] = (
+            group_range[n] * covariance * _THIRD / max(cosine, abs(by_a) + abs(by_b) + abs(by_c) + np.float32(1e-6))
+        )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _integrals(steps, low, high, lean, num, integral):  # type: ignore[no-untyped-def]
+def _integrals(steps, low, high, cosine_shift, num, integral):  # type: ignore[no-untyped-def]
     """Integrate a curve times cos θi from where boxes begin to where they end, over the mean cosine.
 
     Args:
-        steps: of the curve, see `WholeCurves`. (≥ J, 3) low, high: from `_ends`. lean: from `_lean_into`.
+        steps: of the curve, see `WholeCurves`. (≥ J, 3) low, high: from `_ends`. cosine_shift: from
+            `_compute_cosine_shift`.
         integral: written. (≥ num,)
     """
     for n in range(num):
         first, final = np.uint32(low[n]), np.uint32(high[n])
         begins, ends = low[n] - np.float32(first), high[n] - np.float32(final)
         at_first, at_final = steps[first, 0], steps[final, 0]
-        even = steps[first, 1] - steps[final, 1] - begins * at_first + ends * at_final
+        base = steps[first, 1] - steps[final, 1] - begins * at_first + ends * at_final
         # what a curve rises by over the box, times how the cosine leans: the second of the two moments
-        rises, most = lean[n] * (at_final - at_first), _MOST_LEANT * abs(even)
-        integral[n] = even + min(max(rises, -most), most)
+        correction, max_correction = cosine_shift[n] * (at_final - at_first), _MAX_COSINE_CORRECTION * abs(base)
+        integral[n] = base + min(max(correction, -max_correction), max_correction)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
@@ -140,9 +143,9 @@ def _add_errors(mean, reach, variation, value, num, error):  # type: ignore[no-u
             where there is less. error: added to. (≥ num,) each
     """
     for n in range(num):
-        value[n] = max(value[n], _LEAST_MEAN * variation[n])
+        value[n] = max(value[n], _MIN_MEAN * variation[n])
     for n in range(num):
-        bend = min(_BEND * reach[n] / max(mean[n], np.float32(1e-6)), _MOST_BEND)
+        bend = min(_BEND * reach[n] / max(mean[n], np.float32(1e-6)), _MAX_BEND)
         error[n] += (_SHAPE + bend) * variation[n] / max(value[n], np.float32(1e-30))
 
 
@@ -153,7 +156,7 @@ def _multiply(factor, num, value):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def evaluate(curves, scale, wo, local, radius, between, num, scratch, value, error):  # type: ignore[no-untyped-def]
+def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value, error):  # type: ignore[no-untyped-def]
     """Multiply the means of all curves over triangles.
 
     Args:
@@ -161,39 +164,39 @@ def evaluate(curves, scale, wo, local, radius, between, num, scratch, value, err
         wo: times `Curve.axes`, one for each curve. (C, 3)
         local: corners and midpoints of edges, of which only these are read. (3 axes, 6, ≥ num)
         radius: of the triangles, radians. (≥ num,)
-        between: of groups, how much of their extent lies between their lights, of which each has one cos θi; of lights
-            that have one themselves, empty. (≥ num,)
+        group_range: of groups, how much of their extent lies between their lights, of which each has one cos θi; of
+            lights that have one themselves, empty. (≥ num,)
         scratch: (11, ≥ num). value: written. (1 or 3, ≥ num) error: share of it, written. (≥ num,)
     """
     kinds, steps, num_rows, _ = curves
     gamma, mean, half, reach, low = scratch[:3], scratch[3], scratch[4], scratch[5], scratch[6]
-    high, one, variation, lean = scratch[7], scratch[8], scratch[9], scratch[10]
+    high, curve_mean, variation, cosine_shift = scratch[7], scratch[8], scratch[9], scratch[10]
     value[:, :num] = 1
     error[:num] = 0
-    lean[:num] = 0
+    cosine_shift[:num] = 0
     for k in range(kinds.shape[0]):
         for node in range(3):
-            angles_into(
+            compute_angles(
                 kinds[k], scale[k], local[0, 3 + node, :num], local[1, 3 + node, :num], local[2, 3 + node, :num],
                 wo[k, 0], wo[k, 1], wo[k, 2], gamma[node],
             )  # fmt: skip
         last = scale[k] * np.float32(math.pi / 2 * (1 - 1e-6))
         _spread(gamma, num, mean, half)
-        _reach_into(kinds[k], scale[k], wo[k], local, radius, half, num, reach)
+        _compute_reach(kinds[k], scale[k], wo[k], local, radius, half, num, reach)
         _ends(mean, half, last, num, low, high)
-        if between.shape[0]:
-            _lean_into(gamma, mean, local, between, num, lean)
+        if group_range.shape[0]:
+            _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift)
         for row in range(value.shape[0]):
             if row < num_rows[k]:
-                _integrals(steps[k, row], low, high, lean, num, one)
-                _means(low, high, num, one)
+                _integrals(steps[k, row], low, high, cosine_shift, num, curve_mean)
+                _means(low, high, num, curve_mean)
                 _variations(steps[k, row], mean, reach, last, num, variation)
-                _add_errors(mean, reach, variation, one, num, error)
-            _multiply(one, num, value[row])
+                _add_errors(mean, reach, variation, curve_mean, num, error)
+            _multiply(curve_mean, num, value[row])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def look_up(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untyped-def]
+def load_nodes(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untyped-def]
     """Look up a node of listed lights [begin, begin + num).
 
     Args:
@@ -206,7 +209,7 @@ def look_up(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untyped
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def look_up_middles(nodes, light, begin, num, local):  # type: ignore[no-untyped-def]
+def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-def]
     """Look up the midpoints of edges of listed lights [begin, begin + num).
 
     Args:
@@ -223,7 +226,7 @@ def look_up_middles(nodes, light, begin, num, local):  # type: ignore[no-untyped
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def turn(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
+def rotate_nodes(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
     """Turn nodes [first_node, 6) into the frame of normal n and tangent t. local: (3, 6, ≥ num)"""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     tx, ty, tz, nx, ny, nz = t[0], t[1], t[2], n[0], n[1], n[2]
@@ -237,21 +240,21 @@ def turn(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def weigh(brings, light, shading, begin, num, weight, reach):  # type: ignore[no-untyped-def]
+def load_weights(irradiance_radius, light, shading, begin, num, weight, reach):  # type: ignore[no-untyped-def]
     """Look up what listed lights [begin, begin + num) bring, and how wide they are.
 
     Args:
-        brings: irradiance, radius. (M, 4) light: (K,). shading: (1 or 3, K).
+        irradiance_radius: irradiance, radius. (M, 4) light: (K,). shading: (1 or 3, K).
         weight: irradiance · q cos θi, written. (3, ≥ num) reach: radius, written. (≥ num,)
     """
     blue_row = shading.shape[0] - 1
     red, green, blue = weight[0], weight[1], weight[2]
     for k in range(num):
         m = np.uint32(light[begin + k])
-        red[k] = brings[m, 0] * shading[0, begin + k]
-        green[k] = brings[m, 1] * shading[blue_row // 2, begin + k]
-        blue[k] = brings[m, 2] * shading[blue_row, begin + k]
-        reach[k] = brings[m, 3]
+        red[k] = irradiance_radius[m, 0] * shading[0, begin + k]
+        green[k] = irradiance_radius[m, 1] * shading[blue_row // 2, begin + k]
+        blue[k] = irradiance_radius[m, 2] * shading[blue_row, begin + k]
+        reach[k] = irradiance_radius[m, 3]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
@@ -259,7 +262,7 @@ def sum_up(value, weight, num, total):  # type: ignore[no-untyped-def]
     """Add weight (3, ≥ num) times value (1 or 3, ≥ num) to the total (3,)."""
     blue_row = value.shape[0] - 1
     for channel in range(3):
-        of_channel, factor, added = weight[channel], value[blue_row * channel // 2], np.float32(0)
+        channel_weight, factor, channel_total = weight[channel], value[blue_row * channel // 2], np.float32(0)
         for n in range(num):
-            added += of_channel[n] * factor[n]
-        total[channel] += added
+            channel_total += channel_weight[n] * factor[n]
+        total[channel] += channel_total

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bits import into_rows, into_words
+from relume.bits import rows_to_words, words_to_rows
 from relume.brdf.term import Term
-from relume.light.triangles import Groups
+from relume.light.triangles import LightGroups
 from relume.project.contraction import Contraction
-from relume.project.listed_lights import ListedLights
-from relume.project.receivers import Receivers
-from relume.project.shading.group_kernel import add_groups, take_whole
+from relume.project.listed_lights import LightList
+from relume.project.receivers import ShadingPoints
+from relume.project.shading.group_kernel import add_groups, select_groups
 
 F32 = NDArray[np.float32]
 Bits = NDArray[np.uint8]
@@ -30,11 +30,14 @@ class GroupedLights:
     """
 
     def __init__(
-        self, term: Term, contraction: Contraction, groups: Groups, num_lights: int, receivers: Receivers
+        self, term: Term, contraction: Contraction, groups: LightGroups, num_lights: int, receivers: ShadingPoints
     ) -> None:
         self._receivers, self._contraction, self._groups = receivers, contraction, groups
-        self._listed = ListedLights(term, contraction, groups.lights, receivers)
-        self._words, self._whole = np.empty(num_lights, np.uint64), np.empty(groups.lights.num_lights, np.uint64)
+        self._light_list = LightList(term, contraction, groups.lights, receivers)
+        self._visibility_words, self._whole = (
+            np.empty(num_lights, np.uint64),
+            np.empty(groups.lights.num_lights, np.uint64),
+        )
 
     def add(self, start: int, stop: int, out: F32) -> Bits:
         """Add what groups bring to points [start, stop), at most a block.
@@ -42,19 +45,20 @@ class GroupedLights:
         Args:
             out: (points, 3, 1) float32, added to.
         Returns:
-            The lights that are left, as in `Receivers`. (stop - start, bytes) uint8
+            The lights that are left, as in `ShadingPoints`. (stop - start, bytes) uint8
         """
-        r, c, groups, listed = self._receivers, self._contraction, self._groups, self._listed
-        left = np.empty_like(r.visible[start:stop])
+        r, c, groups, light_list = self._receivers, self._contraction, self._groups, self._light_list
+        remaining = np.empty_like(r.visible[start:stop])
         whole = np.empty((stop - start, (len(self._whole) + 7) // 8), np.uint8)
-        into_words(r.visible[start:stop], self._words)
-        take_whole(self._words, groups.first, groups.part, self._whole)
-        into_rows(self._words, left)
-        into_rows(self._whole, whole)
-        shading, wo = listed.list(start, stop, whole)
-        lights = groups.lights.by_light, listed.brings, groups.between
+        rows_to_words(r.visible[start:stop], self._visibility_words)
+        select_groups(self._visibility_words, groups.first, groups.light_index, self._whole)
+        words_to_rows(self._visibility_words, remaining)
+        words_to_rows(self._whole, whole)
+        shading, wo = light_list.list(start, stop, whole)
+        lights = groups.lights.nodes_by_light, light_list.irradiance_radius, groups.between_variance
         add_groups(
-            r.normal, r.tangent, (listed.first, listed.light, shading), wo, lights, (groups.first, groups.part),
-            c.axes, c.whole, start, stop, left, out,
+            r.normal, r.tangent, (light_list.first, light_list.light, shading), wo, lights, (groups.first,
+            groups.light_index),
+            c.axes, c.whole, start, stop, remaining, out,
         )  # fmt: skip
-        return left
+        return remaining

@@ -11,8 +11,15 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.project.shading.boxes import CHUNK, evaluate, look_up, sum_up, turn
-from relume.project.shading.listed import by_axes, evaluate_listed, least_of, room, scales_of, set_aside
+from relume.project.shading.boxes import CHUNK, evaluate, load_nodes, rotate_nodes, sum_up
+from relume.project.shading.listed import (
+    allocate_chunks,
+    band_scales,
+    defer_triangles,
+    error_tolerance,
+    evaluate_listed,
+    per_axis,
+)
 from relume.uncounted import UNCOUNTED
 
 _ONE, _HALF, _QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
@@ -22,9 +29,9 @@ _MAX_DEPTH = 6
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _copy(source, which, target):  # type: ignore[no-untyped-def]
-    for n in range(which.shape[0]):
-        target[n] = source[which[n]]
+def _copy(source, indices, target):  # type: ignore[no-untyped-def]
+    for n in range(indices.shape[0]):
+        target[n] = source[indices[n]]
 
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
@@ -34,37 +41,37 @@ def _add_to(row, total):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _divide(local, weight, radius, which, parent, to_local, to_weight, to_radius):  # type: ignore[no-untyped-def]
+def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radius):  # type: ignore[no-untyped-def]
     """Make the four children of the listed triangles; returns their number.
 
     Args:
-        local, weight, radius: of a generation, as in `evaluate` and `weigh`. which: the listed. (n,)
+        local, weight, radius: of a generation, as in `evaluate` and `weigh`. indices: the listed. (n,)
         parent: scratch. (22, ≥ n) to_local, to_weight, to_radius: of the children, written.
     """
-    count = which.shape[0]
+    count = indices.shape[0]
     for node in range(6):
         for axis in range(3):
-            _copy(local[axis, node], which, parent[3 * node + axis])
+            _copy(local[axis, node], indices, parent[3 * node + axis])
     for channel in range(3):
-        _copy(weight[channel], which, parent[18 + channel])
-    _copy(radius, which, parent[21])
+        _copy(weight[channel], indices, parent[18 + channel])
+    _copy(radius, indices, parent[21])
     for child in range(4):
         begin = child * count
         for corner in range(3):
             first = 3 * _CHILDREN[child, corner]
             for axis in range(3):
-                of_parent, to = parent[first + axis], to_local[axis, corner]
+                parent_values, child_values = parent[first + axis], to_local[axis, corner]
                 for n in range(count):
-                    to[begin + n] = of_parent[n]
+                    child_values[begin + n] = parent_values[n]
         for n in range(count):
             to_weight[0, begin + n] = _QUARTER * parent[18, n]
             to_weight[1, begin + n] = _QUARTER * parent[19, n]
             to_weight[2, begin + n] = _QUARTER * parent[20, n]
             to_radius[begin + n] = _HALF * parent[21, n]
     for edge in range(3):
-        following = (edge + 1) % 3
+        next_edge = (edge + 1) % 3
         for axis in range(3):
-            a, b, middle = to_local[axis, edge], to_local[axis, following], to_local[axis, 3 + edge]
+            a, b, middle = to_local[axis, edge], to_local[axis, next_edge], to_local[axis, 3 + edge]
             for n in range(4 * count):
                 middle[n] = a[n] + b[n]
         x, y, z = to_local[0, 3 + edge], to_local[1, 3 + edge], to_local[2, 3 + edge]
@@ -75,100 +82,138 @@ def _divide(local, weight, radius, which, parent, to_local, to_weight, to_radius
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _add_divided(curves, scale, wo, alone, num, least, generations, family, scratch, total):  # type: ignore[no-untyped-def]
+def _add_divided(curves, scale, wo, no_group_range, num, tolerance, generations, division_scratch, scratch, total):  # type: ignore[no-untyped-def]
     """Add triangles that are divided: the first `num` of the first generation, and what comes of them.
 
     Args:
-        curves, scale, wo, scratch: as in `evaluate`. alone: its `between` of what is no group.
-        least: as in `set_aside`.
+        curves, scale, wo, scratch: as in `evaluate`. no_group_range: its `between` of what is no group.
+        tolerance: as in `set_aside`.
         generations: local, weight, radius, which, value and error of each, written but for the first's first three.
-        family: scratch for parents, and for how many of each generation there are, and are done, see `shade_points`.
+        division_scratch: scratch for parents, and for how many of each generation there are, and are done, see
+            `shade_points`.
         total: added to. (3,)
     """
-    local, weight, radius, which, value, error = generations
-    parent, count, done = family
+    local, weight, radius, deferred, value, error = generations
+    parent, count, done = division_scratch
     for n in range(num):
-        which[0, n] = n
+        deferred[0, n] = n
     level, count[0], done[0] = 0, num, 0
     while level >= 0:
         if done[level] == count[level]:
             level -= 1
             continue
-        listed = which[level, done[level] : min(done[level] + CHUNK // 4, count[level])]
-        done[level] += len(listed)
-        to = level + 1
-        parts = _divide(local[level], weight[level], radius[level], listed, parent, local[to], weight[to], radius[to])
-        evaluate(curves, scale, wo, local[to], radius[to], alone, parts, scratch, value[to], error[to])
-        done[to] = count[to] = 0
-        if to < _MAX_DEPTH:
-            count[to] = set_aside(value[to], weight[to], error[to], parts, least, which[to])
-        sum_up(value[to], weight[to], parts, total)
-        level = to
+        batch = deferred[level, done[level] : min(done[level] + CHUNK // 4, count[level])]
+        done[level] += len(batch)
+        child_level = level + 1
+        num_children = _divide(
+            local[level],
+            weight[level],
+            radius[level],
+            batch,
+            parent,
+            local[child_level],
+            weight[child_level],
+            radius[child_level],
+        )
+        evaluate(
+            curves,
+            scale,
+            wo,
+            local[child_level],
+            radius[child_level],
+            no_group_range,
+            num_children,
+            scratch,
+            value[child_level],
+            error[child_level],
+        )
+        done[child_level] = count[child_level] = 0
+        if child_level < _MAX_DEPTH:
+            count[child_level] = defer_triangles(
+                value[child_level],
+                weight[child_level],
+                error[child_level],
+                num_children,
+                tolerance,
+                deferred[child_level],
+            )
+        sum_up(value[child_level], weight[child_level], num_children, total)
+        level = child_level
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def shade_points(  # type: ignore[no-untyped-def]
-    normal, tangent, first, light, shading, local_wo, nodes, brings, axes, curves, start, stop, out
+    normal, tangent, first, light, shading, local_wo, nodes, irradiance_radius, axes, curves, start, stop, out
 ):
     """Add what the listed lights bring to points [start, stop).
 
     Args:
         normal, tangent, first, light, shading, local_wo, start, stop: as in `project_points`.
-        nodes: of the lights. (M, 6, 3) float32 brings: their irradiance and, in radians, radius. (M, 4) float32
+        nodes: of the lights. (M, 6, 3) float32 irradiance_radius: their irradiance and, in radians, radius. (M, 4)
+            float32
         axes: `Curve.axes` of each. (C, 3) float32
         curves: see `evaluate`.
         out: added to; what is there is part of what a point receives. (points, 3, ≥ 1) float32
     """
-    num_curves, (scale, num_rows) = axes.shape[0], scales_of(curves)
+    num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)
     # made here: a constant could not be written, and what it is handed to would be compiled once more for that
-    wo, total, alone = np.empty((num_curves, 3), np.float32), np.empty(3, np.float32), np.empty(0, np.float32)
-    chunks, of_parts = room(nodes.shape[0] // CHUNK + 1, num_rows), room(_MAX_DEPTH + 1, num_rows)
+    wo, total, no_group_range = np.empty((num_curves, 3), np.float32), np.empty(3, np.float32), np.empty(0, np.float32)
+    chunks, child_arrays = (
+        allocate_chunks(nodes.shape[0] // CHUNK + 1, num_rows),
+        allocate_chunks(_MAX_DEPTH + 1, num_rows),
+    )
     local, scratch = np.empty((_MAX_DEPTH + 1, 3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
     count, done = np.empty(_MAX_DEPTH + 1, np.int64), np.empty(_MAX_DEPTH + 1, np.int64)
-    family = (np.empty((22, CHUNK // 4), np.float32), count, done)
+    division_scratch = (np.empty((22, CHUNK // 4), np.float32), count, done)
     _shade(
-        normal, tangent, (first, light, shading), local_wo, (nodes, brings, alone), axes, (curves, scale), start, stop,
-        (wo, total, np.empty(CHUNK, np.int32), chunks, (local, *of_parts), family, scratch), out,
+        normal, tangent, (first, light, shading), local_wo, (nodes, irradiance_radius, no_group_range), axes, (curves,
+        scale), start, stop,
+        (wo, total, np.empty(CHUNK, np.int32), chunks, (local, *child_arrays), division_scratch, scratch), out,
     )  # fmt: skip
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
-def _shade(normal, tangent, listed, local_wo, lights, axes, curves, start, stop, memory, out):  # type: ignore[no-untyped-def]
+def _shade(normal, tangent, entries, local_wo, lights, axes, curves, start, stop, scratch_arrays, out):  # type: ignore[no-untyped-def]
     """Do what `shade_points` is for, in the memory that it has made."""
-    (first, light, shading), (nodes, _, alone), (curves, scale) = listed, lights, curves
-    wo, total, chosen, chunks, generations, family, scratch = memory
-    weight, reach, which, value, error = chunks
-    local, of_parts = generations[0], generations[1:]
+    (first, light, shading), (nodes, _, no_group_range), (curves, scale) = entries, lights, curves
+    wo, total, deferred_lights, chunks, generations, division_scratch, scratch = scratch_arrays
+    weight, reach, deferred, value, error = chunks
+    local, child_arrays = generations[0], generations[1:]
     for p in range(start, stop):
         begin, end = first[p - start], first[p - start + 1]
         if begin == end:
             continue
-        by_axes(axes, local_wo, begin, wo)
+        per_axis(axes, local_wo, begin, wo)
         total[:] = 0
         evaluate_listed(
-            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local[0], scratch, alone,
+            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local[0], scratch,
+            no_group_range,
             chunks, total,
         )  # fmt: skip
         row = out[p - start, :, 0]
         if axes.shape[0] == 0:
             _add_to(row, total)
             continue
-        least = least_of(total, row)  # what is there already counts as well
+        tolerance = error_tolerance(total, row)  # what is there already counts as well
         total[:] = 0
         for chunk in range((end - begin + CHUNK - 1) // CHUNK):
             at = begin + chunk * CHUNK
             num = min(CHUNK, end - at)
-            divided = set_aside(value[chunk], weight[chunk], error[chunk], num, least, which[chunk])
+            divided = defer_triangles(value[chunk], weight[chunk], error[chunk], num, tolerance, deferred[chunk])
             sum_up(value[chunk], weight[chunk], num, total)
             if divided == 0:
                 continue
-            listed = which[chunk, :divided]
-            _copy(light[at : at + num], listed, chosen)
-            _copy(reach[chunk], listed, of_parts[1][0])
+            entries = deferred[chunk, :divided]
+            _copy(light[at : at + num], entries, deferred_lights)
+            _copy(reach[chunk], entries, child_arrays[1][0])
             for channel in range(3):
-                _copy(weight[chunk, channel], listed, of_parts[0][0, channel])
+                _copy(weight[chunk, channel], entries, child_arrays[0][0, channel])
             for node in range(6):
-                look_up(nodes, node, chosen, 0, divided, local[0, 0, node], local[0, 1, node], local[0, 2, node])
-            turn(normal[p], tangent[p], 0, divided, local[0])
-            _add_divided(curves, scale, wo, alone, divided, least, generations, family, scratch, total)
+                load_nodes(
+                    nodes, node, deferred_lights, 0, divided, local[0, 0, node], local[0, 1, node], local[0, 2, node]
+                )
+            rotate_nodes(normal[p], tangent[p], 0, divided, local[0])
+            _add_divided(
+                curves, scale, wo, no_group_range, divided, tolerance, generations, division_scratch, scratch, total
+            )
         _add_to(row, total)

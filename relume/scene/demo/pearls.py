@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene.demo.surfaces import Surface, merged, normalised, revolve, sphere
+from relume.scene.demo.surfaces import GridSurface, merge_surfaces, normalize, revolve, sphere
 
 F64 = NDArray[np.float64]
 Height = Callable[[F64, F64], F64]
@@ -15,7 +15,7 @@ Height = Callable[[F64, F64], F64]
 GAP = 2e-5  # between things that touch, so that no ray starts inside the neighbour
 
 
-def resting_height(height: Height, x: float, z: float, radius: float) -> float:
+def contact_height(height: Height, x: float, z: float, radius: float) -> float:
     """Height of the centre of a sphere lowered at (x, z) until it touches the ground, metres.
 
     Args:
@@ -29,7 +29,7 @@ def resting_height(height: Height, x: float, z: float, radius: float) -> float:
     return float((ground + np.sqrt(np.maximum(radius**2 - r**2, 0))).max()) + GAP
 
 
-def string_of_pearls(height: Height, path: F64, radii: F64) -> F64:
+def place_along_path(height: Height, path: F64, radii: F64) -> F64:
     """Centres of touching pearls that are threaded along a path, each lying on the ground.
 
     Args:
@@ -40,25 +40,25 @@ def string_of_pearls(height: Height, path: F64, radii: F64) -> F64:
         (num_pearls, 3), metres
     """
     steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    centres: list[F64] = []
+    centers: list[F64] = []
     s, step = 0.0, 2e-4
     for i, radius in enumerate(radii):
         while s <= steps[-1]:
             x, z = (float(np.interp(s, steps, path[:, k])) for k in (0, 1))
-            centre = np.array([x, resting_height(height, x, z, radius), z])
+            center = np.array([x, contact_height(height, x, z, radius), z])
             s += step
-            if not centres or np.linalg.norm(centre - centres[-1]) >= radius + radii[i - 1] + GAP:
-                centres.append(centre)
+            if not centers or np.linalg.norm(center - centers[-1]) >= radius + radii[i - 1] + GAP:
+                centers.append(center)
                 break
-    return np.array(centres)
+    return np.array(centers)
 
 
-def heap(height: Height, centre: tuple[float, float], spread: float, radii: F64, seed: int) -> F64:
+def pour_heap(height: Height, center: tuple[float, float], spread: float, radii: F64, seed: int) -> F64:
     """Centres of pearls poured at one place: each takes the lowest of many spots that is free.
 
     Args:
         height: of the ground at any (x, z), metres.
-        centre: of the place in (x, z), metres.
+        center: of the place in (x, z), metres.
         spread: how far from there the spots lie, metres.
         radii: of the pearls in the order of their fall, metres. (num_pearls,)
         seed: of the spots.
@@ -66,29 +66,31 @@ def heap(height: Height, centre: tuple[float, float], spread: float, radii: F64,
         (num_pearls, 3), metres
     """
     rng = np.random.default_rng(seed)
-    placed = np.zeros((0, 3))
+    centers = np.zeros((0, 3))
     for i, radius in enumerate(radii):
         reach = spread * np.sqrt(rng.random(160))
         phi = 2 * np.pi * rng.random(160)
-        spots = np.column_stack([centre[0] + reach * np.cos(phi), centre[1] + reach * np.sin(phi)])
-        y = np.array([resting_height(height, x, z, radius) for x, z in spots])
-        for other, other_radius in zip(placed, radii[:i], strict=True):
-            touch = radius + other_radius + GAP
-            flat = ((spots - other[[0, 2]]) ** 2).sum(1)
-            y = np.maximum(y, np.where(flat < touch**2, other[1] + np.sqrt(np.maximum(touch**2 - flat, 0)), -1.0))
+        spots = np.column_stack([center[0] + reach * np.cos(phi), center[1] + reach * np.sin(phi)])
+        y = np.array([contact_height(height, x, z, radius) for x, z in spots])
+        for neighbor, neighbor_radius in zip(centers, radii[:i], strict=True):
+            touch = radius + neighbor_radius + GAP
+            flat = ((spots - neighbor[[0, 2]]) ** 2).sum(1)
+            y = np.maximum(y, np.where(flat < touch**2, neighbor[1] + np.sqrt(np.maximum(touch**2 - flat, 0)), -1.0))
         best = int(y.argmin())
-        placed = np.concatenate([placed, [[spots[best, 0], y[best], spots[best, 1]]]])
-    return placed
+        centers = np.concatenate([centers, [[spots[best, 0], y[best], spots[best, 1]]]])
+    return centers
 
 
-def pearls(centres: F64, radii: F64) -> Surface:
+def pearls(centers: F64, radii: F64) -> GridSurface:
     """Spheres at centres (n, 3), each turned a little so that no two show the same facets."""
     rng = np.random.default_rng(7)
-    parts = []
-    for centre, radius in zip(centres, radii, strict=True):
+    spheres = []
+    for center, radius in zip(centers, radii, strict=True):
         axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        parts.append(sphere(radius, 11 if radius < 0.010 else 18).moved(axes * np.sign(np.linalg.det(axes)), centre))
-    return merged(parts)
+        spheres.append(
+            sphere(radius, 11 if radius < 0.010 else 18).transform(axes * np.sign(np.linalg.det(axes)), center)
+        )
+    return merge_surfaces(spheres)
 
 
 def bowl_profile() -> F64:
@@ -103,11 +105,11 @@ def bowl_profile() -> F64:
     return _chaikin(corners, 2)
 
 
-def bowl() -> Surface:
+def bowl() -> GridSurface:
     """A small bowl, its foot at y = 0."""
     profile = bowl_profile()
     slope = np.gradient(profile, axis=0)
-    normals = normalised(np.column_stack([-slope[:, 1], slope[:, 0]]))
+    normals = normalize(np.column_stack([-slope[:, 1], slope[:, 0]]))
     return revolve(np.column_stack([profile, normals]), 56)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.scene.demo import cloth, pearls, tray
-from relume.scene.demo.surfaces import Surface, merged, turn_y
+from relume.scene.demo.surfaces import GridSurface, merge_surfaces, rotation_y
 from relume.scene.demo.teapot import teapot
 from relume.scene.model import Camera, Mesh
 
@@ -16,24 +16,26 @@ F64 = NDArray[np.float64]
 
 TRAY_Y = cloth.THICKNESS + pearls.GAP
 FLOOR_Y = TRAY_Y + tray.FLOOR + pearls.GAP
-TEAPOT_HEIGHT, TEAPOT_PLACE, TEAPOT_TURN = 0.150, (-0.048, -0.032), -26.0
-BOWL_PLACE = (0.143, 0.050)
+TEAPOT_HEIGHT, TEAPOT_POSITION, TEAPOT_ANGLE_DEG = 0.150, (-0.048, -0.032), -26.0
+BOWL_POSITION = (0.143, 0.050)
 
 
 def meshes() -> tuple[Mesh, ...]:
     """All objects in world space, materials numbered as in `relume.scene.demo.materials`."""
-    pot = teapot(14, TEAPOT_HEIGHT).moved(turn_y(TEAPOT_TURN), (TEAPOT_PLACE[0], FLOOR_Y, TEAPOT_PLACE[1]))
+    pot = teapot(14, TEAPOT_HEIGHT).transform(
+        rotation_y(TEAPOT_ANGLE_DEG), (TEAPOT_POSITION[0], FLOOR_Y, TEAPOT_POSITION[1])
+    )
     lift = (0.0, TRAY_Y, 0.0)
-    parts: list[tuple[str, Surface]] = [
+    objects: list[tuple[str, GridSurface]] = [
         ("Teapot", pot),
-        ("Tray", tray.tray().moved(np.eye(3), lift)),
-        ("Handles", tray.handles().moved(np.eye(3), lift)),
+        ("Tray", tray.tray().transform(np.eye(3), lift)),
+        ("Handles", tray.handles().transform(np.eye(3), lift)),
         ("Pearls", _pearls()),
-        ("Bowl", pearls.bowl().moved(np.eye(3), (BOWL_PLACE[0], FLOOR_Y, BOWL_PLACE[1]))),
+        ("Bowl", pearls.bowl().transform(np.eye(3), (BOWL_POSITION[0], FLOOR_Y, BOWL_POSITION[1]))),
         ("Cloth", cloth.cloth()),
         ("Table", cloth.stage()),
     ]
-    return tuple(surface.mesh(name, material) for material, (name, surface) in enumerate(parts))
+    return tuple(surface.mesh(name, material) for material, (name, surface) in enumerate(objects))
 
 
 def cameras() -> tuple[Camera, ...]:
@@ -45,20 +47,20 @@ def cameras() -> tuple[Camera, ...]:
     )
 
 
-def look_at(name: str, eye: tuple[float, float, float], target: tuple[float, float, float], yfov: float) -> Camera:
-    """A level camera at `eye` that has `target` in the middle of its picture.
+def look_at(name: str, position: tuple[float, float, float], target: tuple[float, float, float], yfov: float) -> Camera:
+    """A level camera at `position` that has `target_bands` in the middle of its picture.
 
     Args:
         name: of the view.
-        eye, target: world space, metres; neither right above the other.
+        position, target: world space, metres; neither right above the other.
         yfov: vertical field of view, radians.
     """
-    backward = np.subtract(eye, target)
+    backward = np.subtract(position, target)
     backward /= np.linalg.norm(backward)
     right = np.cross([0.0, 1.0, 0.0], backward)
     right /= np.linalg.norm(right)
     to_world = np.eye(4)
-    to_world[:3] = np.column_stack([right, np.cross(backward, right), backward, eye])
+    to_world[:3] = np.column_stack([right, np.cross(backward, right), backward, position])
     return Camera(name, to_world, yfov)
 
 
@@ -67,9 +69,9 @@ def ground_height(x: F64, z: F64) -> F64:
     return np.maximum(cloth.cloth_height(x, z), tray.tray_height(x, z) + TRAY_Y)
 
 
-def _pearls() -> Surface:
-    parts = [pearls.pearls(*_string()), pearls.pearls(*_heap()), pearls.pearls(*_loose())]
-    return merged(parts)
+def _pearls() -> GridSurface:
+    groups = [pearls.pearls(*_string()), pearls.pearls(*_heap()), pearls.pearls(*_loose())]
+    return merge_surfaces(groups)
 
 
 def _string() -> tuple[F64, F64]:
@@ -84,26 +86,30 @@ def _string() -> tuple[F64, F64]:
     num_pearls = 52
     middle = np.abs(np.linspace(-1, 1, num_pearls))
     radii = 0.0072 - 0.0026 * middle**1.5
-    centres = pearls.string_of_pearls(ground_height, path, radii)
-    return centres, radii[: len(centres)]
+    centers = pearls.place_along_path(ground_height, path, radii)
+    return centers, radii[: len(centers)]
 
 
 def _heap() -> tuple[F64, F64]:
     radii = np.random.default_rng(3).uniform(0.0070, 0.0098, 30)
-    height = _shifted(pearls.bowl_height, BOWL_PLACE, FLOOR_Y)
-    return pearls.heap(height, BOWL_PLACE, 0.034, radii, seed=11), radii
+    height = _shift_height(pearls.bowl_height, BOWL_POSITION, FLOOR_Y)
+    return pearls.pour_heap(height, BOWL_POSITION, 0.034, radii, seed=11), radii
 
 
 def _loose() -> tuple[F64, F64]:
     """Three large ones that rolled away."""
     radii = np.array([0.0135, 0.0105, 0.0085])
-    places = ((0.150, 0.205), (0.182, 0.193), (-0.168, 0.090))
-    centres = [(x, pearls.resting_height(ground_height, x, z, r), z) for (x, z), r in zip(places, radii, strict=True)]
-    return np.array(centres), radii
+    positions = ((0.150, 0.205), (0.182, 0.193), (-0.168, 0.090))
+    centers = [
+        (x, pearls.contact_height(ground_height, x, z, r), z) for (x, z), r in zip(positions, radii, strict=True)
+    ]
+    return np.array(centers), radii
 
 
-def _shifted(height: Callable[[F64, F64], F64], place: tuple[float, float], lift: float) -> Callable[[F64, F64], F64]:
-    return lambda x, z: height(x - place[0], z - place[1]) + lift
+def _shift_height(
+    height: Callable[[F64, F64], F64], position: tuple[float, float], lift: float
+) -> Callable[[F64, F64], F64]:
+    return lambda x, z: height(x - position[0], z - position[1]) + lift
 
 
 def smooth_path(corners: F64) -> F64:

@@ -15,7 +15,7 @@ I64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Surface:
+class GridSurface:
     """Triangles with shading frames, in metres, +Y up.
 
     Attributes:
@@ -28,17 +28,17 @@ class Surface:
     uvs: F64
     faces: I64
 
-    def moved(self, rotation: F64, offset: Sequence[float] | F64) -> Surface:
+    def transform(self, rotation: F64, offset: Sequence[float] | F64) -> GridSurface:
         """Turned by a rotation (3, 3), then shifted by an offset in metres."""
-        turn = rotation.T
-        positions = self.positions @ turn + np.asarray(offset)
-        return Surface(positions, self.normals @ turn, self.tangents @ turn, self.uvs, self.faces)
+        transposed = rotation.T
+        positions = self.positions @ transposed + np.asarray(offset)
+        return GridSurface(positions, self.normals @ transposed, self.tangents @ transposed, self.uvs, self.faces)
 
     def mesh(self, name: str, material: int) -> Mesh:
         """As a scene mesh: degenerate triangles left out, tangents made orthogonal to the normals."""
-        normals = normalised(self.normals)
+        normals = normalize(self.normals)
         tangents = self.tangents - normals * (normals * self.tangents).sum(1, keepdims=True)
-        tangents = np.column_stack([normalised(tangents), np.ones(len(tangents))])
+        tangents = np.column_stack([normalize(tangents), np.ones(len(tangents))])
         corners = self.positions[self.faces]
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         faces = self.faces[area > 1e-14]
@@ -47,13 +47,13 @@ class Surface:
         return Mesh(name, positions32, normals32, tangents32, uvs32, faces.astype(np.uint32), material)
 
 
-def normalised(vectors: F64) -> F64:
+def normalize(vectors: F64) -> F64:
     """Unit vectors along the last axis; a zero vector stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1)
 
 
-def turn_y(degrees: float) -> F64:
+def rotation_y(degrees: float) -> F64:
     """Rotation about +Y, counter-clockwise seen from above. (3, 3)"""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
@@ -66,25 +66,27 @@ def grid_faces(num_rows: int, num_columns: int) -> I64:
     return np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
 
 
-def grid_surface(positions: F64, uvs: F64) -> Surface:
+def grid_surface(positions: F64, uvs: F64) -> GridSurface:
     """A grid (rows, columns, 3) with normals and tangents (along a row) by central differences; nothing closes."""
     along, down = np.gradient(positions, axis=1), np.gradient(positions, axis=0)
-    return _gridded(positions, np.cross(along, down), along, uvs)
+    return _from_grid(positions, np.cross(along, down), along, uvs)
 
 
-def closed_grid_surface(positions: F64, uvs: F64) -> Surface:
+def closed_grid_surface(positions: F64, uvs: F64) -> GridSurface:
     """As `grid_surface` where the last column repeats the first, so that differences run across the seam."""
     ring = np.concatenate([positions[:, -2:-1], positions, positions[:, 1:2]], axis=1)
     along, down = (ring[:, 2:] - ring[:, :-2]) / 2, np.gradient(positions, axis=0)
-    return _gridded(positions, np.cross(along, down), along, uvs)
+    return _from_grid(positions, np.cross(along, down), along, uvs)
 
 
-def _gridded(positions: F64, normals: F64, tangents: F64, uvs: F64) -> Surface:
+def _from_grid(positions: F64, normals: F64, tangents: F64, uvs: F64) -> GridSurface:
     faces = grid_faces(*positions.shape[:2])
-    return Surface(positions.reshape(-1, 3), normals.reshape(-1, 3), tangents.reshape(-1, 3), uvs.reshape(-1, 2), faces)
+    return GridSurface(
+        positions.reshape(-1, 3), normals.reshape(-1, 3), tangents.reshape(-1, 3), uvs.reshape(-1, 2), faces
+    )
 
 
-def revolve(profile: F64, num_columns: int) -> Surface:
+def revolve(profile: F64, num_columns: int) -> GridSurface:
     """A profile of (radius, height, outward normal r, normal y) turned about +Y, listed from top to bottom.
 
     Args:
@@ -98,22 +100,22 @@ def revolve(profile: F64, num_columns: int) -> Surface:
     normals = np.stack([normal_r * c, normal_y + 0 * c, -normal_r * s], -1)
     tangents = np.stack([-s + 0 * radius, 0 * radius * c, -c + 0 * radius], -1)
     uvs = np.stack(np.broadcast_arrays(phi[None, :] / (2 * np.pi), np.linspace(0, 1, len(profile))[:, None]), -1)
-    surface = _gridded(positions, normals, tangents, uvs)
-    return Surface(surface.positions, surface.normals, surface.tangents, surface.uvs, surface.faces[:, ::-1])
+    surface = _from_grid(positions, normals, tangents, uvs)
+    return GridSurface(surface.positions, surface.normals, surface.tangents, surface.uvs, surface.faces[:, ::-1])
 
 
-def sphere(radius: float, num_rings: int) -> Surface:
+def sphere(radius: float, num_latitudes: int) -> GridSurface:
     """A sphere about the origin. num_rings latitudes, twice as many longitudes."""
-    theta = np.linspace(0, np.pi, num_rings + 1)
+    theta = np.linspace(0, np.pi, num_latitudes + 1)
     profile = np.column_stack([radius * np.sin(theta), radius * np.cos(theta), np.sin(theta), np.cos(theta)])
-    return revolve(profile, 2 * num_rings)
+    return revolve(profile, 2 * num_latitudes)
 
 
-def merged(surfaces: Sequence[Surface]) -> Surface:
+def merge_surfaces(surfaces: Sequence[GridSurface]) -> GridSurface:
     """Several surfaces joined to one."""
     starts = np.cumsum([0, *(len(s.positions) for s in surfaces[:-1])])
     faces = np.concatenate([s.faces + start for s, start in zip(surfaces, starts, strict=True)])
-    return Surface(
+    return GridSurface(
         np.concatenate([s.positions for s in surfaces]),
         np.concatenate([s.normals for s in surfaces]),
         np.concatenate([s.tangents for s in surfaces]),

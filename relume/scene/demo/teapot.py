@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene.demo.surfaces import Surface, grid_faces, merged
+from relume.scene.demo.surfaces import GridSurface, grid_faces, merge_surfaces
 
 F64 = NDArray[np.float64]
 
@@ -58,19 +58,19 @@ SPOUT = (
 
 def patches() -> Iterator[tuple[str, F64]]:
     """The 32 patches: name of the part and control points (4, 4, 3), the first axis down, the second round."""
-    for part, profiles in PROFILES.items():
+    for name, profiles in PROFILES.items():
         for profile in profiles:
-            rings = np.array([[(r * x, r * y, z) for x, y in RING] for r, z in profile])
+            control = np.array([[(r * x, r * y, z) for x, y in RING] for r, z in profile])
             if profile[1] == (0.8, 3.15):  # the knob: Newell wrote 0.45 for 0.8 × 0.56
-                rings[1, 1, 1] = rings[1, 2, 0] = 0.45
+                control[1, 1, 1] = control[1, 2, 0] = 0.45
             for quarter in range(4):
                 c, s = round(np.cos(quarter * np.pi / 2)), round(np.sin(quarter * np.pi / 2))
-                yield part, rings @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    for part, halves in (("handle", HANDLE), ("spout", SPOUT)):
+                yield name, control @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    for name, halves in (("handle", HANDLE), ("spout", SPOUT)):
         for half in halves:
-            points = np.array(half, float)
-            yield part, points[:, ::-1]
-            yield part, points * (1.0, -1.0, 1.0)
+            half_patch = np.array(half, float)
+            yield name, half_patch[:, ::-1]
+            yield name, half_patch * (1.0, -1.0, 1.0)
 
 
 def bernstein(t: F64) -> tuple[F64, F64]:
@@ -81,12 +81,12 @@ def bernstein(t: F64) -> tuple[F64, F64]:
     return value, slope
 
 
-def tessellate(control: F64, num_cells: int) -> Surface:
+def tessellate(control: F64, num_segments: int) -> GridSurface:
     """One patch as a grid of num_cells² cells with the patch's own normals, tangents along the second axis.
 
     Where a patch closes to a point its derivative vanishes; frames are taken a hair inside the edge.
     """
-    t = np.linspace(0, 1, num_cells + 1)
+    t = np.linspace(0, 1, num_segments + 1)
     value, _ = bernstein(t)
     inner_value, inner_slope = bernstein(np.clip(t, 1e-4, 1 - 1e-4))
     positions = np.einsum("ia,jb,abk->ijk", value, value, control)
@@ -94,16 +94,16 @@ def tessellate(control: F64, num_cells: int) -> Surface:
     along = np.einsum("ia,jb,abk->ijk", inner_value, inner_slope, control)
     uvs = np.stack(np.meshgrid(t, t), -1).reshape(-1, 2)
     normals = np.cross(down, along).reshape(-1, 3)
-    faces = grid_faces(num_cells + 1, num_cells + 1)[:, ::-1]
-    return Surface(positions.reshape(-1, 3), normals, along.reshape(-1, 3), uvs, faces)
+    faces = grid_faces(num_segments + 1, num_segments + 1)[:, ::-1]
+    return GridSurface(positions.reshape(-1, 3), normals, along.reshape(-1, 3), uvs, faces)
 
 
-def teapot(num_cells: int, height: float) -> Surface:
+def teapot(num_segments: int, height: float) -> GridSurface:
     """The whole teapot, +Y up, spout towards +X, standing at the origin; `height` in metres."""
     scale = height / 3.15
-    parts = []
-    for part, control in patches():
-        fitted = control * (LID_FIT, LID_FIT, 1.0) if part == "lid" else control
-        parts.append(tessellate(fitted * scale, num_cells))
+    surfaces = []
+    for name, control in patches():
+        scaled_control = control * (LID_FIT, LID_FIT, 1.0) if name == "lid" else control
+        surfaces.append(tessellate(scaled_control * scale, num_segments))
     to_y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    return merged(parts).moved(to_y_up, (0.0, 0.0, 0.0))
+    return merge_surfaces(surfaces).transform(to_y_up, (0.0, 0.0, 0.0))

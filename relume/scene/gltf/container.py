@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from relume.errors import SceneError
 from relume.scene.companions import Companions
 from relume.scene.gltf.document import Buffer, Document
-from relume.scene.gltf.layers import UNDERSTOOD
+from relume.scene.gltf.layers import MATERIAL_EXTENSIONS
 from relume.scene.gltf.names import UNREADABLE
 from relume.scene.gltf.packed import DRACO, MESHOPT, is_fallback
 
@@ -26,10 +26,10 @@ MAX_JSON_VALUES = 4_000_000
 PACK = "pack everything into one file: npx @gltf-transform/cli copy in.gltf out.glb"
 
 # Required extensions that change what an accessor or image holds and are not read, with what undoes them.
-PACKED_EXTENSIONS = {
+UNSUPPORTED_COMPRESSION = {
     "KHR_texture_basisu": "npx @gltf-transform/cli ktxdecompress in.glb out.glb",
 }
-READ_EXTENSIONS = {
+SUPPORTED_EXTENSIONS = {
     DRACO,
     *MESHOPT,
     "KHR_mesh_quantization",
@@ -38,29 +38,29 @@ READ_EXTENSIONS = {
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_variants",
-    *UNDERSTOOD,
+    *MATERIAL_EXTENSIONS,
 }
 
 
 @dataclass(frozen=True)
-class Container:
+class GltfContainer:
     """A document and the bytes of its buffers, each at least as long as declared.
 
     Attributes:
-        unpacked: buffer views that were packed, by number, once they were needed.
+        decompressed_views: buffer views that were packed, by number, once they were needed.
     """
 
     document: Document
     buffers: tuple[memoryview, ...]
     companions: Companions
-    unpacked: dict[int, memoryview] = field(default_factory=dict)
+    decompressed_views: dict[int, memoryview] = field(default_factory=dict)
 
-    def resolve(self, uri: str, what: str) -> bytes:
+    def resolve(self, uri: str, label: str) -> bytes:
         """The content of a data URI, or of a file beside this one. Raises SceneError."""
-        return _resolve(uri, self.companions, what)
+        return _resolve(uri, self.companions, label)
 
 
-def read_container(data: bytes, companions: Companions) -> Container:
+def read_container(data: bytes, companions: Companions) -> GltfContainer:
     """Splits a file into its document and its buffers, and checks both.
 
     Raises:
@@ -75,7 +75,7 @@ def read_container(data: bytes, companions: Companions) -> Container:
     document = parse_document(json_bytes)
     _check_extensions(document)
     buffers = [_buffer(i, buffer, binary, companions) for i, buffer in enumerate(document.buffers)]
-    return Container(document, tuple(buffers), companions)
+    return GltfContainer(document, tuple(buffers), companions)
 
 
 def parse_document(json_bytes: bytes) -> Document:
@@ -89,31 +89,31 @@ def parse_document(json_bytes: bytes) -> Document:
     try:
         return Document.model_validate(content)
     except ValidationError as problem:
-        fault = problem.errors(include_url=False, include_input=False)[0]
-        place = UNREADABLE.sub("", "/".join(str(step)[:40] for step in fault["loc"])) or "the document"
-        if fault["type"] == "too_long":
-            most = fault["ctx"]["max_length"]
+        first_error = problem.errors(include_url=False, include_input=False)[0]
+        location = UNREADABLE.sub("", "/".join(str(step)[:40] for step in first_error["loc"])) or "the document"
+        if first_error["type"] == "too_long":
+            max_length = first_error["ctx"]["max_length"]
             raise SceneError(
-                f"the scene has more than the {most:,} {place} that are read; join some or split it"
+                f"the scene has more than the {max_length:,} {location} that are read; join some or split it"
             ) from None
         raise SceneError(
-            f"the scene's JSON is not valid glTF 2.0 at {place}: {fault['msg']}; export it again"
+            f"the scene's JSON is not valid glTF 2.0 at {location}: {first_error['msg']}; export it again"
         ) from None
     except RecursionError:
         raise SceneError("the scene's JSON is nested too deeply; export it again") from None
 
 
-def _resolve(uri: str, companions: Companions, what: str) -> bytes:
+def _resolve(uri: str, companions: Companions, label: str) -> bytes:
     if uri[:5].lower() == "data:":
-        return _data_uri(uri, what)
-    content = companions.read(uri, what)
+        return _data_uri(uri, label)
+    content = companions.read(uri, label)
     if content is None:
-        shown = uri[:60].encode("ascii", "replace").decode()
-        raise SceneError(f"{what} lies outside the file ({shown!r}) and is not beside it; {PACK}")
+        printable = uri[:60].encode("ascii", "replace").decode()
+        raise SceneError(f"{label} lies outside the file ({printable!r}) and is not beside it; {PACK}")
     return content
 
 
-def _data_uri(uri: str, what: str) -> bytes:
+def _data_uri(uri: str, label: str) -> bytes:
     head, comma, body = uri.partition(",")
     try:
         if head.lower().endswith(";base64"):
@@ -122,7 +122,7 @@ def _data_uri(uri: str, what: str) -> bytes:
             return unquote_to_bytes(body)
     except (binascii.Error, ValueError):
         pass
-    raise SceneError(f"{what} is a damaged data URI; {PACK}")
+    raise SceneError(f"{label} is a damaged data URI; {PACK}")
 
 
 def _split_glb(data: bytes) -> tuple[bytes, memoryview | None]:
@@ -163,8 +163,8 @@ def _buffer(i: int, buffer: Buffer, binary: memoryview | None, companions: Compa
 
 def _check_extensions(document: Document) -> None:
     for name in document.extensionsRequired:
-        if name in PACKED_EXTENSIONS:
-            raise SceneError(f"the file is packed with {name}; unpack it: {PACKED_EXTENSIONS[name]}")
+        if name in UNSUPPORTED_COMPRESSION:
+            raise SceneError(f"the file is packed with {name}; unpack it: {UNSUPPORTED_COMPRESSION[name]}")
 
 
 def _refuse_constant(constant: str) -> Any:

@@ -21,7 +21,7 @@ Names = Annotated[list[Name], Field(max_length=1_000, fail_fast=True)]
 Extensions = dict[str, Any]
 
 
-class Part(BaseModel):
+class GltfPrimitivePart(BaseModel):
     """A glTF object; every one may have a name and extensions."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -29,40 +29,40 @@ class Part(BaseModel):
     extensions: Extensions = {}
 
 
-class Asset(Part):
+class Asset(GltfPrimitivePart):
     version: Annotated[str, Field(pattern=r"^2\.\d+$")]
 
 
-class Buffer(Part):
+class Buffer(GltfPrimitivePart):
     uri: str | None = None
     byteLength: Bytes  # noqa: N815  (glTF's own spelling, here and below)
 
 
-class BufferView(Part):
+class BufferView(GltfPrimitivePart):
     buffer: Index
     byteOffset: Bytes = 0  # noqa: N815
     byteLength: Annotated[Bytes, Field(ge=1)]  # noqa: N815
     byteStride: Annotated[int, Field(ge=4, le=252)] | None = None  # noqa: N815
 
 
-class SparseIndices(Part):
+class SparseIndices(GltfPrimitivePart):
     bufferView: Index  # noqa: N815
     byteOffset: Bytes = 0  # noqa: N815
     componentType: Literal[5121, 5123, 5125]  # noqa: N815
 
 
-class SparseValues(Part):
+class SparseValues(GltfPrimitivePart):
     bufferView: Index  # noqa: N815
     byteOffset: Bytes = 0  # noqa: N815
 
 
-class Sparse(Part):
+class Sparse(GltfPrimitivePart):
     count: Annotated[int, Field(ge=1, le=MAX_COUNT)]
     indices: SparseIndices
     values: SparseValues
 
 
-class Accessor(Part):
+class Accessor(GltfPrimitivePart):
     bufferView: Index | None = None  # noqa: N815
     byteOffset: Bytes = 0  # noqa: N815
     componentType: Literal[5120, 5121, 5122, 5123, 5125, 5126]  # noqa: N815
@@ -72,28 +72,28 @@ class Accessor(Part):
     sparse: Sparse | None = None
 
 
-class Image(Part):
+class Image(GltfPrimitivePart):
     uri: str | None = None
     bufferView: Index | None = None  # noqa: N815
 
 
-class Sampler(Part):
+class Sampler(GltfPrimitivePart):
     wrapS: int = 10_497  # noqa: N815
     wrapT: int = 10_497  # noqa: N815
 
 
-class Texture(Part):
+class GltfTexture(GltfPrimitivePart):
     sampler: Index | None = None
     source: Index | None = None
 
 
-class TextureInfo(Part):
+class TextureInfo(GltfPrimitivePart):
     index: Index
     texCoord: Annotated[int, Field(ge=0, le=63)] = 0  # noqa: N815
     scale: Number = 1.0
 
 
-class MetallicRoughness(Part):
+class MetallicRoughness(GltfPrimitivePart):
     baseColorFactor: Annotated[list[Factor], Field(min_length=4, max_length=4)] = [1.0, 1.0, 1.0, 1.0]  # noqa: N815
     baseColorTexture: TextureInfo | None = None  # noqa: N815
     metallicFactor: Factor = 1.0  # noqa: N815
@@ -101,7 +101,7 @@ class MetallicRoughness(Part):
     metallicRoughnessTexture: TextureInfo | None = None  # noqa: N815
 
 
-class Material(Part):
+class GltfMaterial(GltfPrimitivePart):
     pbrMetallicRoughness: MetallicRoughness = MetallicRoughness()  # noqa: N815
     normalTexture: TextureInfo | None = None  # noqa: N815
     occlusionTexture: TextureInfo | None = None  # noqa: N815
@@ -112,7 +112,7 @@ class Material(Part):
     doubleSided: bool = False  # noqa: N815
 
 
-class Primitive(Part):
+class Primitive(GltfPrimitivePart):
     attributes: Annotated[dict[str, Index], Field(max_length=256)]
     indices: Index | None = None
     material: Index | None = None
@@ -120,21 +120,21 @@ class Primitive(Part):
     targets: list[Any] = []
 
 
-class Mesh(Part):
+class GltfMesh(GltfPrimitivePart):
     primitives: Annotated[list[Primitive], Field(min_length=1, max_length=65_536, fail_fast=True)]
 
 
-class Perspective(Part):
+class Perspective(GltfPrimitivePart):
     yfov: Annotated[float, Field(gt=0, lt=3.1, allow_inf_nan=False)]
     aspectRatio: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None  # noqa: N815
 
 
-class Camera(Part):
+class GltfCamera(GltfPrimitivePart):
     type: Literal["perspective", "orthographic"]
     perspective: Perspective | None = None
 
 
-class Node(Part):
+class Node(GltfPrimitivePart):
     children: Indices = ()
     matrix: Annotated[list[Number], Field(min_length=16, max_length=16)] | None = None
     # tuples: of a hundred thousand nodes, each would copy a list that stands for what it does not say
@@ -146,11 +146,11 @@ class Node(Part):
     skin: Index | None = None
 
 
-class SceneRoot(Part):
+class SceneRoot(GltfPrimitivePart):
     nodes: Indices = ()
 
 
-class Document(Part):
+class Document(GltfPrimitivePart):
     """The whole file. Lists longer than relume allows are refused before they are looked at."""
 
     asset: Asset
@@ -160,13 +160,13 @@ class Document(Part):
     animations: list[Any] = []
     buffers: Annotated[list[Buffer], Field(max_length=10_000, fail_fast=True)] = []
     bufferViews: Annotated[list[BufferView], Field(max_length=1_000_000, fail_fast=True)] = []  # noqa: N815
-    cameras: Annotated[list[Camera], Field(max_length=1_000, fail_fast=True)] = []
+    cameras: Annotated[list[GltfCamera], Field(max_length=1_000, fail_fast=True)] = []
     images: Annotated[list[Image], Field(max_length=10_000, fail_fast=True)] = []
-    materials: Annotated[list[Material], Field(max_length=1_000, fail_fast=True)] = []
-    meshes: Annotated[list[Mesh], Field(max_length=100_000, fail_fast=True)] = []
+    materials: Annotated[list[GltfMaterial], Field(max_length=1_000, fail_fast=True)] = []
+    meshes: Annotated[list[GltfMesh], Field(max_length=100_000, fail_fast=True)] = []
     nodes: Annotated[list[Node], Field(max_length=100_000, fail_fast=True)] = []
     samplers: Annotated[list[Sampler], Field(max_length=10_000, fail_fast=True)] = []
     scene: Index | None = None
     scenes: Annotated[list[SceneRoot], Field(max_length=10_000, fail_fast=True)] = []
     skins: list[Any] = []
-    textures: Annotated[list[Texture], Field(max_length=10_000, fail_fast=True)] = []
+    textures: Annotated[list[GltfTexture], Field(max_length=10_000, fail_fast=True)] = []

@@ -8,18 +8,23 @@ from numpy.typing import NDArray
 F64 = NDArray[np.float64]
 U32 = NDArray[np.uint32]
 
-_FLAT = 1e-9  # of the largest of a transform's three scales, below which another is none
-_NOTHING = 1e-15  # of the largest, metres a metre
-_SURELY = 1e-6  # of the cube of a transform's largest number: with such a determinant it keeps three dimensions
+_MIN_RELATIVE_SCALE = 1e-9  # of the largest of a transform's three scales, below which another is none
+_MIN_SCALE = 1e-15  # of the largest, metres a metre
+_MIN_RELATIVE_DETERMINANT = (
+    1e-6  # of the cube of a transform's largest number: with such a determinant it keeps three dimensions
+)
 
 
-def dimensions(linear: F64) -> int:
+def count_dimensions(linear: F64) -> int:
     """How many dimensions a transform leaves of three. linear: (3, 3)"""
     largest = float(np.abs(linear).max())
-    if abs(determinant(linear)) > _SURELY * largest**3 and largest > 1 / _SURELY * _NOTHING:
+    if (
+        abs(determinant(linear)) > _MIN_RELATIVE_DETERMINANT * largest**3
+        and largest > 1 / _MIN_RELATIVE_DETERMINANT * _MIN_SCALE
+    ):
         return 3  # the smallest of three scales is at least the determinant over the square of the largest
     scales = np.linalg.svd(linear, compute_uv=False)
-    return int(np.count_nonzero(scales > max(_FLAT * float(scales[0]), _NOTHING)))
+    return int(np.count_nonzero(scales > max(_MIN_RELATIVE_SCALE * float(scales[0]), _MIN_SCALE)))
 
 
 def determinant(linear: F64) -> float:
@@ -38,12 +43,12 @@ def cofactors(linear: F64) -> F64:
     ])  # fmt: skip
 
 
-def with_area(positions: F64, faces: U32) -> U32:
+def remove_degenerate(positions: F64, faces: U32) -> U32:
     """The faces that have an area left. positions: (n, 3) faces: (f, 3)"""
     a, b, c = positions[faces].transpose(1, 0, 2)
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.square(np.stack([b - a, c - b, a - c])).sum(axis=2).max(axis=0)
-    return np.ascontiguousarray(faces[doubled > _FLAT * np.maximum(longest, 1e-300)])
+    return np.ascontiguousarray(faces[doubled > _MIN_RELATIVE_SCALE * np.maximum(longest, 1e-300)])
 
 
 def plane_normal(linear: F64) -> F64:

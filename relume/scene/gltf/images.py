@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 from relume.errors import SceneError
 from relume.imageio.decoding import Decoder
 from relume.scene.gltf.accessors import view_bytes
-from relume.scene.gltf.container import Container
+from relume.scene.gltf.container import GltfContainer
 
 U8 = NDArray[np.uint8]
-_KEPT_BYTES = 300_000_000  # of decoded images, for the next material that names them
+_CACHE_BYTES = 300_000_000  # of decoded images, for the next material that names them
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
 
 
 class ImageReader:
     """Decodes the images of one file, and keeps the last of them."""
 
-    def __init__(self, container: Container) -> None:
+    def __init__(self, container: GltfContainer) -> None:
         self._container = container
         self._decoded: dict[int, U8] = {}
         self._decoder = Decoder()
 
-    def texture(self, index: int, what: str) -> tuple[U8, tuple[str, str]]:
+    def texture(self, index: int, label: str) -> tuple[U8, tuple[str, str]]:
         """The bytes (height, width, 4), RGBA, of a texture and how it wraps along u and v.
 
         Raises:
@@ -34,40 +34,40 @@ class ImageReader:
         """
         document = self._container.document
         if index >= len(document.textures):
-            raise SceneError(f"{what} refers to texture {index} of {len(document.textures)}; export the scene again")
+            raise SceneError(f"{label} refers to texture {index} of {len(document.textures)}; export the scene again")
         texture = document.textures[index]
         source = texture.source
         webp = texture.extensions.get("EXT_texture_webp")
         if isinstance(webp, dict) and isinstance(webp.get("source"), int):
             source = webp["source"]
         if source is None:
-            raise SceneError(f"{what} has an image relume cannot read; use PNG, JPEG or WebP (gltf-transform png)")
-        return self._image(source, what), self._wrap(texture.sampler, what)
+            raise SceneError(f"{label} has an image relume cannot read; use PNG, JPEG or WebP (gltf-transform png)")
+        return self._image(source, label), self._wrap(texture.sampler, label)
 
-    def _wrap(self, sampler: int | None, what: str) -> tuple[str, str]:
-        if sampler is None:
+    def _wrap(self, index: int | None, label: str) -> tuple[str, str]:
+        if index is None:
             return "repeat", "repeat"
         samplers = self._container.document.samplers
-        if sampler >= len(samplers):
-            raise SceneError(f"{what} refers to sampler {sampler} of {len(samplers)}; export the scene again")
-        chosen = samplers[sampler]
-        return WRAPS.get(chosen.wrapS, "repeat"), WRAPS.get(chosen.wrapT, "repeat")
+        if index >= len(samplers):
+            raise SceneError(f"{label} refers to sampler {index} of {len(samplers)}; export the scene again")
+        sampler = samplers[index]
+        return WRAPS.get(sampler.wrapS, "repeat"), WRAPS.get(sampler.wrapT, "repeat")
 
-    def _image(self, index: int, what: str) -> U8:
+    def _image(self, index: int, label: str) -> U8:
         images = self._container.document.images
         if not 0 <= index < len(images):
-            raise SceneError(f"{what} refers to image {index} of {len(images)}; export the scene again")
+            raise SceneError(f"{label} refers to image {index} of {len(images)}; export the scene again")
         if index in self._decoded:
             self._decoded[index] = self._decoded.pop(index)  # the newest comes last
         else:
             image = images[index]
             if image.bufferView is not None:
-                data = bytes(view_bytes(self._container, image.bufferView, what))
+                data = bytes(view_bytes(self._container, image.bufferView, label))
             elif image.uri is not None:
-                data = self._container.resolve(image.uri, what)
+                data = self._container.resolve(image.uri, label)
             else:
-                raise SceneError(f"{what} has no data; export the scene again")
-            self._decoded[index] = self._decoder.decode(data, what)
-            while len(self._decoded) > 1 and sum(kept.nbytes for kept in self._decoded.values()) > _KEPT_BYTES:
+                raise SceneError(f"{label} has no data; export the scene again")
+            self._decoded[index] = self._decoder.decode(data, label)
+            while len(self._decoded) > 1 and sum(pixels.nbytes for pixels in self._decoded.values()) > _CACHE_BYTES:
                 del self._decoded[next(iter(self._decoded))]
         return self._decoded[index]

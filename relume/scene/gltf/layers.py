@@ -11,7 +11,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
-from relume.remarks import Remark, wrong
+from relume.remarks import ImportRemark, unsupported
 from relume.scene.gltf.document import Extensions, Factor, Number, TextureInfo
 
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
@@ -82,7 +82,7 @@ class Volume(BaseModel, frozen=True):
     attenuationColor: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [1.0, 1.0, 1.0]  # noqa: N815
 
 
-class Layers(BaseModel, frozen=True):
+class MaterialExtensions(BaseModel, frozen=True):
     """All that relume understands of one material's extensions."""
 
     ior: Ior = Ior()
@@ -95,15 +95,15 @@ class Layers(BaseModel, frozen=True):
     volume: Volume = Volume()
 
 
-UNDERSTOOD = {f"KHR_materials_{name}" for name in Layers.model_fields}
+MATERIAL_EXTENSIONS = {f"KHR_materials_{name}" for name in MaterialExtensions.model_fields}
 
 
-def read_layers(extensions: Extensions, what: str, warnings: list[Remark]) -> Layers:
+def read_extensions(extensions: Extensions, label: str, warnings: list[ImportRemark]) -> MaterialExtensions:
     """A material's extensions as far as they are understood.
 
     Args:
         extensions: as the document has them.
-        what: names the material in warnings.
+        label: names the material in warnings.
         warnings: gets a sentence for each extension that is not understood, or is not valid.
     """
 
@@ -112,12 +112,12 @@ def read_layers(extensions: Extensions, what: str, warnings: list[Remark]) -> La
         try:
             return model.model_validate(extensions.get(extension, {}))
         except (ValidationError, RecursionError):
-            warnings.append(wrong(f"extension {extension!r} of {what} is not valid; it is not used"))
+            warnings.append(unsupported(f"extension {extension!r} of {label} is not valid; it is not used"))
             return model()
 
-    others = sorted(extensions.keys() - UNDERSTOOD)
-    warnings.extend(wrong(f"extension {extension[:60]!r} of {what} is not used") for extension in others)
-    return Layers(
+    unread_names = sorted(extensions.keys() - MATERIAL_EXTENSIONS)
+    warnings.extend(unsupported(f"extension {extension[:60]!r} of {label} is not used") for extension in unread_names)
+    return MaterialExtensions(
         ior=read(Ior),
         specular=read(Specular),
         clearcoat=read(Clearcoat),

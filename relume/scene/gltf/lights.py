@@ -13,17 +13,19 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.errors import SceneError
-from relume.remarks import Remark, simplified, wrong
-from relume.scene.checks import MAX_METRES
+from relume.remarks import ImportRemark, approximated, unsupported
+from relume.scene.checks import MAX_METERS
 from relume.scene.gltf.document import Document, Factor, Index, Name, Node, Number
 from relume.scene.lights import LightCollector
 
 F64 = NDArray[np.float64]
 
 EXTENSION = "KHR_lights_punctual"
-LUMENS_A_WATT = 683.0
-_MAX_DEFINED = 10_000
-_UNITS = simplified(f"the file's lights count candela and lux; {LUMENS_A_WATT:g} of them are one of relume's, watts")
+LUMENS_PER_WATT = 683.0
+_MAX_DEFINITIONS = 10_000
+_UNITS = approximated(
+    f"the file's lights count candela and lux; {LUMENS_PER_WATT:g} of them are one of relume's, watts"
+)
 
 
 class _Spot(BaseModel, frozen=True):
@@ -44,13 +46,13 @@ class _Punctual(BaseModel, frozen=True):
     spot: _Spot = _Spot()
 
 
-class _Defined(BaseModel, frozen=True):
+class _PunctualLights(BaseModel, frozen=True):
     """The extension at the document."""
 
-    lights: Annotated[list[_Punctual], Field(max_length=_MAX_DEFINED, fail_fast=True)] = []
+    lights: Annotated[list[_Punctual], Field(max_length=_MAX_DEFINITIONS, fail_fast=True)] = []
 
 
-class _Placed(BaseModel, frozen=True):
+class _LightReference(BaseModel, frozen=True):
     """The extension at a node."""
 
     light: Index
@@ -59,17 +61,17 @@ class _Placed(BaseModel, frozen=True):
 class LightReader:
     """Reads the lamps at the nodes of one file."""
 
-    def __init__(self, document: Document, collector: LightCollector, warnings: list[Remark]) -> None:
+    def __init__(self, document: Document, collector: LightCollector, warnings: list[ImportRemark]) -> None:
         self._collector = collector
         self._warnings = warnings
         try:
-            self._defined = _Defined.model_validate(document.extensions.get(EXTENSION, {})).lights
+            self._definitions = _PunctualLights.model_validate(document.extensions.get(EXTENSION, {})).lights
         except (ValidationError, RecursionError):
             raise SceneError(
-                f"{EXTENSION} of the file is not valid or lists over {_MAX_DEFINED:,} lights; export it again"
+                f"{EXTENSION} of the file is not valid or lists over {_MAX_DEFINITIONS:,} lights; export it again"
             ) from None
 
-    def place(self, node: Node, to_world: F64) -> None:
+    def add(self, node: Node, to_world: F64) -> None:
         """The light of a node, if it has one; it shines along the node's −Z.
 
         Raises:
@@ -78,14 +80,14 @@ class LightReader:
         if EXTENSION not in node.extensions:
             return
         try:
-            light = self._defined[_Placed.model_validate(node.extensions[EXTENSION]).light]
+            light = self._definitions[_LightReference.model_validate(node.extensions[EXTENSION]).light]
         except (ValidationError, IndexError, RecursionError):
             raise SceneError(f"node {node.name[:80]!r} names a light that does not exist; export it again") from None
         name = self._collector.name(light.name or node.name or light.type)
         direction, position = -to_world[:3, 2], to_world[:3, 3]
         length = float(np.linalg.norm(direction))
-        if np.abs(position).max() > MAX_METRES or (light.type != "point" and length < 1e-12):
-            self._warnings.append(wrong(f"light {name!r} is scaled to nothing or out of range; it is left out"))
+        if np.abs(position).max() > MAX_METERS or (light.type != "point" and length < 1e-12):
+            self._warnings.append(unsupported(f"light {name!r} is scaled to nothing or out of range; it is left out"))
             return
         fields: dict[str, Any] = {"kind": light.type}
         if light.type != "directional":
@@ -96,6 +98,6 @@ class LightReader:
             outer = min(np.degrees(light.spot.outerConeAngle), 90.0)
             fields["cone"] = [min(float(np.degrees(light.spot.innerConeAngle)), outer), outer]
         if light.range is not None:
-            self._warnings.append(simplified(f"the range of light {name!r} is not used; its light ends nowhere"))
+            self._warnings.append(approximated(f"the range of light {name!r} is not used; its light ends nowhere"))
         self._warnings.extend([] if _UNITS in self._warnings else [_UNITS])
-        self._collector.add(name, fields, np.array(light.color) * light.intensity / LUMENS_A_WATT)
+        self._collector.add(name, fields, np.array(light.color) * light.intensity / LUMENS_PER_WATT)

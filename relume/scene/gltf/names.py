@@ -7,23 +7,23 @@ import re
 UNREADABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
-def unique_name(wanted: str, taken: dict[str, int]) -> str:
+def unique_name(preferred: str, used_names: dict[str, int]) -> str:
     """At most 80 characters, none that JSON Pointers or terminals mind, and not taken before."""
-    plain = UNREADABLE.sub("", wanted[:1000]).replace("/", "-").replace("~", "-").strip()[:68].strip()
-    return numbered(plain or "unnamed", " ", taken)
+    plain = UNREADABLE.sub("", preferred[:1000]).replace("/", "-").replace("~", "-").strip()[:68].strip()
+    return append_number(plain or "unnamed", " ", used_names)
 
 
-def numbered(plain: str, separator: str, taken: dict[str, int]) -> str:
+def append_number(plain: str, separator: str, used_names: dict[str, int]) -> str:
     """A name that is not taken: the plain one, or it with the first free number from 2.
 
     Args:
         plain: the wanted name.
         separator: stands between the name and the number.
-        taken: the last number tried for each name; the new name is added.
+        used_names: the last number tried for each name; the new name is added.
     """
     name = plain
-    while name in taken:
-        taken[plain] += 1
-        name = f"{plain}{separator}{taken[plain]}"
-    taken[name] = 1
+    while name in used_names:
+        used_names[plain] += 1
+        name = f"{plain}{separator}{used_names[plain]}"
+    used_names[name] = 1
     return name

@@ -17,13 +17,15 @@ class Raster:
     """Images by name, all in the size and with the wrap of the first; those that are missing are white and opaque.
 
     Args:
-        images: pixels and wrap of each. at_least: height and width of those that need more than the first has.
+        images: pixels and wrap of each. min_size: height and width of those that need more than the first has.
     """
 
-    def __init__(self, images: Mapping[str, tuple[U8, Wrap]], at_least: tuple[int, int] = (0, 0)) -> None:
+    def __init__(self, images: Mapping[str, tuple[U8, Wrap]], min_size: tuple[int, int] = (0, 0)) -> None:
         self._images = {key: pixels for key, (pixels, _) in images.items()}
         first, self.wrap = next(iter(images.values()), (np.zeros((0, 0, 4), np.uint8), ("repeat", "repeat")))
-        self._height, self._width = (max(int(own), least) for own, least in zip(first.shape, at_least, strict=False))
+        self._height, self._width = (
+            max(int(extent), min_extent) for extent, min_extent in zip(first.shape, min_size, strict=False)
+        )
         self.empty = not images
         self._channels: dict[tuple[str, int], U8] = {}
 
@@ -40,8 +42,8 @@ class Raster:
         """One channel; white where there is no image. (height, width, 1); (1, 1, 1) where it varies by noise alone"""
         if (key, channel) not in self._channels:
             values = self.pixels(key)[..., channel, None]
-            alike = np.full((1, 1, 1), round(float(values.mean())), np.uint8)
-            self._channels[key, channel] = values if np.ptp(values) > NOISE else alike
+            uniform = np.full((1, 1, 1), round(float(values.mean())), np.uint8)
+            self._channels[key, channel] = values if np.ptp(values) > NOISE else uniform
         return self._channels[key, channel]
 
     def mean(self, key: str, channel: int) -> float:

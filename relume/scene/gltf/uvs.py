@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from relume.remarks import Remark, wrong
+from relume.remarks import ImportRemark, unsupported
 from relume.scene.gltf.document import Index, Number, TextureInfo
 from relume.scene.model import F32, U32
 
 U8 = NDArray[np.uint8]
 Wrap = tuple[str, str]
 Tiling = tuple[tuple[int, int], tuple[float, float]]
-_AS_IT_IS: Tiling = ((1, 1), (0.0, 0.0))
+_NO_TILING: Tiling = ((1, 1), (0.0, 0.0))
 _MAX_TILED = 8192  # texels a side
-_WHOLE = 1e-4
+_MAX_REPEAT_ERROR = 1e-4
 
 
-class Placement(BaseModel, frozen=True):
+class UvTransform(BaseModel, frozen=True):
     """KHR_texture_transform of one texture; `texCoord` overrides the set."""
 
     offset: tuple[Number, Number] = (0.0, 0.0)
@@ -31,105 +31,109 @@ class Placement(BaseModel, frozen=True):
 
 
 @dataclass(frozen=True)
-class UvUse:
+class UvSlot:
     """A set of texture coordinates and how they are moved; the same for all textures of a material."""
 
     uv_set: int = 0
-    placement: Placement = field(default_factory=Placement)
+    transform: UvTransform = field(default_factory=UvTransform)
 
     def apply(self, sets: Sequence[F32], num_vertices: int) -> F32:
         """Coordinates (num_vertices, 2): scaled, turned counter-clockwise with v down, shifted; zeros without a set."""
         if self.uv_set >= len(sets):
             return np.zeros((num_vertices, 2), np.float32)
-        p = self.placement
+        p = self.transform
         c, s = np.cos(p.rotation), np.sin(p.rotation)
-        turn = np.array([[c, s], [-s, c]])
-        moved = (sets[self.uv_set] * np.array(p.scale)) @ turn.T + np.array(p.offset)
-        return np.asarray(np.clip(moved, -1e6, 1e6), np.float32)
+        rotation = np.array([[c, s], [-s, c]])
+        transformed = (sets[self.uv_set] * np.array(p.scale)) @ rotation.T + np.array(p.offset)
+        return np.asarray(np.clip(transformed, -1e6, 1e6), np.float32)
 
 
-class Placements:
+class UvTransforms:
     """How all images of a material are brought to one placement: those that repeat more often are tiled.
 
     Attributes:
-        use: what the meshes carry.
+        candidate: what the meshes carry.
     """
 
-    def __init__(self, textures: Sequence[TextureInfo], what: str, warnings: list[Remark]) -> None:
+    def __init__(self, textures: Sequence[TextureInfo], label: str, warnings: list[ImportRemark]) -> None:
         """Choose the placement.
 
         Args:
             textures: of the material; the first one decides where none is a whole part of all others.
-            what: names the material in warnings. warnings: gets a sentence where an image cannot be placed.
+            label: names the material in warnings. warnings: gets a sentence where an image cannot be placed.
         """
-        self._what, self._warnings = what, warnings
-        uses = [_use(texture, what, warnings) for texture in textures]
-        self._uses = dict(zip(map(id, textures), uses, strict=True))
-        fitting = (use for use in uses if all(tiling(other, use) is not None for other in uses))
-        self.use = next(fitting, uses[0] if uses else UvUse())
-        self._are_told = False
+        self._label, self._warnings = label, warnings
+        slots = [_read_slot(texture, label, warnings) for texture in textures]
+        self._slots = dict(zip(map(id, textures), slots, strict=True))
+        candidates = (candidate for candidate in slots if all(tiling(slot, candidate) is not None for slot in slots))
+        self.slot = next(candidates, slots[0] if slots else UvSlot())
+        self._has_warned = False
 
-    def repeats(self, info: TextureInfo) -> bool:
+    def is_tiled(self, info: TextureInfo) -> bool:
         """Whether `placed` tiles an image. info: one of the material's textures"""
-        tiled = tiling(self._uses[id(info)], self.use)
-        return tiled is not None and tiled[0] != (1, 1)
+        layout = tiling(self._slots[id(info)], self.slot)
+        return layout is not None and layout[0] != (1, 1)
 
-    def placed(self, info: TextureInfo, pixels: U8, wrap: Wrap) -> U8:
+    def tile_image(self, info: TextureInfo, pixels: U8, wrap: Wrap) -> U8:
         """An image as it is to be sampled at the meshes' coordinates.
 
         Args:
             info: one of the material's textures. pixels: top row first. (height, width, channels). wrap: its own
         """
-        tiled = tiling(self._uses[id(info)], self.use)
-        if tiled == _AS_IT_IS or pixels.shape[:2] == (1, 1):
+        layout = tiling(self._slots[id(info)], self.slot)
+        if layout == _NO_TILING or pixels.shape[:2] == (1, 1):
             return pixels
         height, width = pixels.shape[:2]
-        if tiled is not None and wrap == ("repeat", "repeat"):
-            (across, down), (right, below) = tiled
+        if layout is not None and wrap == ("repeat", "repeat"):
+            (across, down), (right, below) = layout
             if max(width * across, height * down) <= _MAX_TILED:
                 shift = round(-below * height) % height, round(-right * width) % width
                 return np.tile(np.roll(pixels, shift, axis=(0, 1)), (down, across, 1))
-        if not self._are_told:
-            told = f"the textures of {self._what} are placed differently, one no whole number of times as often as"
-            self._warnings.append(wrong(f"{told} another, or not repeated; all are placed alike"))
-        self._are_told = True
+        if not self._has_warned:
+            message = f"the textures of {self._label} are placed differently, one no whole number of times as often as"
+            self._warnings.append(unsupported(f"{message} another, or not repeated; all are placed alike"))
+        self._has_warned = True
         return pixels
 
 
-def tiling(use: UvUse, base: UvUse) -> Tiling | None:
+def tiling(slot: UvSlot, base_slot: UvSlot) -> Tiling | None:
     """How often an image stands in another's along u and v, and where (0, 0) of that lies in it.
 
     Returns:
         None where that is no whole number of times, or one is turned.
     """
-    own, other = use.placement, base.placement
-    if use == base:
-        return _AS_IT_IS
-    if use.uv_set != base.uv_set or own.rotation != other.rotation or 0 in other.scale:
+    transform, base_transform = slot.transform, base_slot.transform
+    if slot == base_slot:
+        return _NO_TILING
+    if slot.uv_set != base_slot.uv_set or transform.rotation != base_transform.rotation or 0 in base_transform.scale:
         return None
-    times = np.array(own.scale) / other.scale
-    whole = np.rint(times)
-    if (whole < 1).any() or np.abs(times - whole).max() > _WHOLE or (own.rotation and times[0] != times[1]):
+    repeats = np.array(transform.scale) / base_transform.scale
+    whole = np.rint(repeats)
+    if (
+        (whole < 1).any()
+        or np.abs(repeats - whole).max() > _MAX_REPEAT_ERROR
+        or (transform.rotation and repeats[0] != repeats[1])
+    ):
         return None
     across, down = (int(min(number, _MAX_TILED)) for number in whole)
-    right, below = (np.array(own.offset) - whole * other.offset).tolist()
+    right, below = (np.array(transform.offset) - whole * base_transform.offset).tolist()
     return (across, down), (right, below)
 
 
-def _use(texture: TextureInfo, what: str, warnings: list[Remark]) -> UvUse:
+def _read_slot(texture: TextureInfo, label: str, warnings: list[ImportRemark]) -> UvSlot:
     extension = texture.extensions.get("KHR_texture_transform")
     if extension is None:
-        return UvUse(texture.texCoord)
+        return UvSlot(texture.texCoord)
     try:
-        placement = Placement.model_validate(extension)
+        transform = UvTransform.model_validate(extension)
     except ValidationError:
-        warnings.append(wrong(f"a texture transform of {what} is not valid; it is not used"))
-        return UvUse(texture.texCoord)
-    uv_set = texture.texCoord if placement.texCoord is None else placement.texCoord
-    return UvUse(uv_set, placement.model_copy(update={"texCoord": None}))
+        warnings.append(unsupported(f"a texture transform of {label} is not valid; it is not used"))
+        return UvSlot(texture.texCoord)
+    uv_set = texture.texCoord if transform.texCoord is None else transform.texCoord
+    return UvSlot(uv_set, transform.model_copy(update={"texCoord": None}))
 
 
-def made_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
+def compute_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
     """Tangents along u with handedness, averaged over the triangles of a vertex.
 
     The bitangent cross(normal, tangent)·w points against v, which runs down: up, as the green of a normal map means.
@@ -155,20 +159,20 @@ def made_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
     tangents -= normals * (normals * tangents).sum(1, keepdims=True)
     length = np.linalg.norm(tangents, axis=1, keepdims=True)
     tangents = np.where(length > 1e-20, tangents / np.maximum(length, 1e-20), 0)
-    mirrored = (np.cross(normals, tangents) * bitangents).sum(1) > 0
-    return np.column_stack([tangents, np.where(mirrored, -1.0, 1.0)]).astype(np.float32)
+    is_mirrored = (np.cross(normals, tangents) * bitangents).sum(1) > 0
+    return np.column_stack([tangents, np.where(is_mirrored, -1.0, 1.0)]).astype(np.float32)
 
 
-def turned_tangents(tangents: F32, normals: F32, turn: float) -> F32:
+def rotate_tangents(tangents: F32, normals: F32, angle: float) -> F32:
     """Tangents turned towards the bitangent cross(normal, tangent)·w.
 
     Args:
         tangents: unit, the handedness ±1 in w. (num_vertices, 4)
         normals: unit. (num_vertices, 3)
-        turn: radians.
+        angle: radians.
     Returns:
         (num_vertices, 4) float32
     """
-    along, hand = tangents[:, :3], tangents[:, 3:]
-    turned = np.cos(turn) * along + np.sin(turn) * np.cross(normals, along) * hand
-    return np.column_stack([turned, hand]).astype(np.float32)
+    along, handedness = tangents[:, :3], tangents[:, 3:]
+    rotated = np.cos(angle) * along + np.sin(angle) * np.cross(normals, along) * handedness
+    return np.column_stack([rotated, handedness]).astype(np.float32)

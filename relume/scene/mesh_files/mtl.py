@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from relume.errors import SceneError
 from relume.imageio.decoding import U8, Decoder
-from relume.remarks import Remark, simplified, unused, wrong
+from relume.remarks import ImportRemark, approximated, ignored, unsupported
 from relume.scene.companions import Companions
 from relume.scene.gltf.names import unique_name
 from relume.scene.gltf.raster import NOISE
-from relume.scene.mesh_files.mtl_dialects import Described, Gloss, dialect_of, gray_terms, terms_of
-from relume.scene.model import Coding, Material, Opacity, Texture
+from relume.scene.mesh_files.mtl_dialects import Gloss, MtlMaterial, detect_dialect, gray_terms, make_mtl_terms
+from relume.scene.model import Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
 
 F64 = NDArray[np.float64]
@@ -28,13 +28,13 @@ NUMBERS = {"Kd": 3, "Ks": 3, "Ke": 3, "Ns": 1, "Pr": 1, "Pm": 1, "d": 1, "Tr": 1
 MINOR_NUMBERS = {"Ka": 3, "illum": 1, "Pc": 1, "Pcr": 1, "Ps": 1, "aniso": 1}  # nothing is refused for these
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-clamp": 1}
 OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1}
-BUMPS = ("norm", "map_Bump", "map_bump", "bump")
+NORMAL_MAP_KEYWORDS = ("norm", "map_Bump", "map_bump", "bump")
 MAX_STRENGTH = 100.0
-USED_MAPS = {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", *BUMPS}
+USED_MAPS = {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", *NORMAL_MAP_KEYWORDS}
 HARMLESS_MAPS = {"map_Ka", "map_aat"}  # of ambient light, and how to smooth the edges of images
 
 
-def read_library(data: bytes, folder: str = "") -> dict[str, Described]:
+def read_library(data: bytes, folder: str = "") -> dict[str, MtlMaterial]:
     """The materials of a library by name.
 
     Args:
@@ -44,33 +44,33 @@ def read_library(data: bytes, folder: str = "") -> dict[str, Described]:
     """
     if len(data) > MAX_LIBRARY_BYTES:
         raise SceneError(f"the material file is larger than {MAX_LIBRARY_BYTES >> 20} MB; export it again")
-    materials: dict[str, Described] = {}
+    materials: dict[str, MtlMaterial] = {}
     lines = data.decode("utf-8", "replace").splitlines()
-    dialect = dialect_of(lines)
-    material = Described(dialect=dialect)
+    dialect = detect_dialect(lines)
+    material = MtlMaterial(dialect=dialect)
     for line in lines:
-        word, _, rest = line.strip().partition(" ")
-        if word == "newmtl":
-            material = materials[rest.strip()[:1_000]] = Described(folder, dialect)
+        keyword, _, arguments = line.strip().partition(" ")
+        if keyword == "newmtl":
+            material = materials[arguments.strip()[:1_000]] = MtlMaterial(folder, dialect)
             if len(materials) > MAX_MATERIALS:
                 raise SceneError(f"the material file has more than {MAX_MATERIALS:,} materials; remove some")
-        elif word in NUMBERS:
-            material.numbers[word] = _numbers(rest.split(), NUMBERS[word], word)
-        elif word in MINOR_NUMBERS:
+        elif keyword in NUMBERS:
+            material.numbers[keyword] = _numbers(arguments.split(), NUMBERS[keyword], keyword)
+        elif keyword in MINOR_NUMBERS:
             with suppress(SceneError):
-                material.numbers[word] = _numbers(rest.split(), MINOR_NUMBERS[word], word)
-        elif word.startswith("map_") or word in ("bump", "norm", "disp", "refl"):
-            material.maps[word] = _image_name(rest.split())
+                material.numbers[keyword] = _numbers(arguments.split(), MINOR_NUMBERS[keyword], keyword)
+        elif keyword.startswith("map_") or keyword in ("bump", "norm", "disp", "refl"):
+            material.maps[keyword] = _image_name(arguments.split())
             with suppress(SceneError, ValueError, IndexError):
-                words = rest.split()
-                material.strengths[word] = _numbers(words[words.index("-bm") + 1 :], 1, "-bm")[0]
+                tokens = arguments.split()
+                material.strengths[keyword] = _numbers(tokens[tokens.index("-bm") + 1 :], 1, "-bm")[0]
     return materials
 
 
-def _numbers(words: list[str], count: int, keyword: str) -> list[float]:
+def _numbers(tokens: list[str], count: int, keyword: str) -> list[float]:
     """`count` numbers; one stands for three."""
     try:
-        values = [float(word) for word in words[:count]]
+        values = [float(token) for token in tokens[:count]]
     except ValueError:
         raise SceneError(f"{keyword} of the material file is not made of numbers; export it again") from None
     if len(values) == 1:
@@ -80,17 +80,17 @@ def _numbers(words: list[str], count: int, keyword: str) -> list[float]:
     return values
 
 
-def _image_name(words: list[str]) -> str:
+def _image_name(tokens: list[str]) -> str:
     """The file name after the options; it may have spaces in it."""
-    while words and words[0] in OPTIONS:
-        words = words[1 + OPTIONS[words[0]] :]
-    return " ".join(words)[:1_000]
+    while tokens and tokens[0] in OPTIONS:
+        tokens = tokens[1 + OPTIONS[tokens[0]] :]
+    return " ".join(tokens)[:1_000]
 
 
 class MaterialMaker:
     """Turns described materials into relume's, each image decoded once."""
 
-    def __init__(self, companions: Companions, warnings: list[Remark]) -> None:
+    def __init__(self, companions: Companions, warnings: list[ImportRemark]) -> None:
         self._companions = companions
         self._warnings = warnings
         self._decoder = Decoder()
@@ -98,116 +98,128 @@ class MaterialMaker:
         self._pixels: dict[str, U8 | None] = {}
         self._glosses: dict[str, Gloss] = {}
 
-    def make(self, name: str, described: Described | None) -> Material:
+    def make(self, name: str, mtl_material: MtlMaterial | None) -> Material:
         """One material under a name of its own; grey where nothing is known of it. Raises SceneError."""
-        own_name = unique_name(name or "material", self._names)
-        what = f"material {own_name!r}"
-        if described is None:
-            return Material(own_name, gray_terms())
-        textures = self._textures(described, what)
-        self._warn_of_the_rest(described, what)
-        normal_map = self._normal_map(described, what)
-        opacity = self._opacity(described, what)
-        roughness = self._roughness(described, textures, what)
-        terms, gloss = terms_of(described, textures, roughness, has_normal_map=normal_map is not None)
+        material_name = unique_name(name or "material", self._names)
+        label = f"material {material_name!r}"
+        if mtl_material is None:
+            return Material(material_name, gray_terms())
+        textures = self._textures(mtl_material, label)
+        self._warn_unsupported(mtl_material, label)
+        normal_map = self._normal_map(mtl_material, label)
+        opacity = self._opacity(mtl_material, label)
+        roughness = self._roughness(mtl_material, textures, label)
+        terms, gloss = make_mtl_terms(mtl_material, textures, roughness, has_normal_map=normal_map is not None)
         if gloss is not None:
-            self._glosses[own_name] = gloss
-        return Material(own_name, terms, textures, normal_map, opacity=opacity)
+            self._glosses[material_name] = gloss
+        return Material(material_name, terms, textures, normal_map, opacity=opacity)
 
-    def _roughness(self, described: Described, textures: dict[str, Texture], what: str) -> float | None:
+    def _roughness(self, mtl_material: MtlMaterial, textures: dict[str, Texture], label: str) -> float | None:
         """Pr times the mean of map_Pr, which becomes a texture where it says more; None where there are neither."""
-        given = described.numbers.get("Pr", [None])[0]
-        pixels = self._decoded(described, "map_Pr", f"map_Pr of {what}")
+        factor = mtl_material.numbers.get("Pr", [None])[0]
+        pixels = self._decode(mtl_material, "map_Pr", f"map_Pr of {label}")
         if pixels is None:
-            return given
+            return factor
         mean = float(pixels[..., 0].mean()) / 255
         if mean > 0 and np.ptp(pixels[..., 0]) > NOISE:
-            share = Coding("share", (1 / mean, 1 / mean, 1 / mean))
-            textures["roughness"] = Texture(np.ascontiguousarray(pixels[..., :1]), coding=share)
-        return (given or 1.0) * mean  # exporters write zeros where they mean the image
+            encoding = TextureEncoding("share", (1 / mean, 1 / mean, 1 / mean))
+            textures["roughness"] = Texture(np.ascontiguousarray(pixels[..., :1]), encoding=encoding)
+        return (factor or 1.0) * mean  # exporters write zeros where they mean the image
 
-    def _opacity(self, described: Described, what: str) -> Opacity | None:
+    def _opacity(self, mtl_material: MtlMaterial, label: str) -> Opacity | None:
         """Where the material has holes: d, or 1 − Tr, times map_d."""
-        numbers = described.numbers
-        share = min(1.0, numbers["d"][0] if "d" in numbers else 1 - min(1.0, numbers.get("Tr", [0.0])[0]))
-        if share == 0 and "map_d" in described.maps:
-            share = 1.0  # exporters write zeros where they mean the image
-        pixels = self._decoded(described, "map_d", f"map_d of {what}")
+        numbers = mtl_material.numbers
+        alpha_factor = min(1.0, numbers["d"][0] if "d" in numbers else 1 - min(1.0, numbers.get("Tr", [0.0])[0]))
+        if alpha_factor == 0 and "map_d" in mtl_material.maps:
+            alpha_factor = 1.0  # exporters write zeros where they mean the image
+        pixels = self._decode(mtl_material, "map_d", f"map_d of {label}")
         # grey, or the picture that map_Kd names as well, with the holes in its alpha
         alpha = None if pixels is None else pixels[..., 3 if np.ptp(pixels[..., 3]) else 0]
-        return make_opacity(alpha, ("repeat", "repeat"), share, None, what, self._warnings)
+        return make_opacity(alpha, ("repeat", "repeat"), alpha_factor, None, label, self._warnings)
 
-    def emission(self, material: Material, described: Described | None) -> F64:
+    def emission(self, material: Material, mtl_material: MtlMaterial | None) -> F64:
         """Radiance of the surfaces of a material that was made, which its image multiplies: Ke. (3,)"""
-        if described is None:
+        if mtl_material is None:
             return np.zeros(3)
-        factor = np.array(described.numbers.get("Ke", [0.0, 0.0, 0.0]))
+        factor = np.array(mtl_material.numbers.get("Ke", [0.0, 0.0, 0.0]))
         # exporters write zeros where they mean the image
         return np.ones(3) if "emission" in material.textures and not factor.any() else factor
 
-    def _textures(self, described: Described, what: str) -> dict[str, Texture]:
+    def _textures(self, mtl_material: MtlMaterial, label: str) -> dict[str, Texture]:
         textures = {}
         for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular"), ("map_Ke", "emission")):
-            texture = self._image(described, keyword, f"{keyword} of {what}", Coding("srgb"))
+            texture = self._image(mtl_material, keyword, f"{keyword} of {label}", TextureEncoding("srgb"))
             if texture is not None:
                 textures[channel] = texture
         return textures
 
-    def _image(self, described: Described, keyword: str, what: str, coding: Coding) -> Texture | None:
-        pixels = self._decoded(described, keyword, what)
-        return None if pixels is None else Texture(np.ascontiguousarray(pixels[..., :3]), coding=coding)
+    def _image(self, mtl_material: MtlMaterial, keyword: str, label: str, encoding: TextureEncoding) -> Texture | None:
+        pixels = self._decode(mtl_material, keyword, label)
+        return None if pixels is None else Texture(np.ascontiguousarray(pixels[..., :3]), encoding=encoding)
 
-    def _decoded(self, described: Described, keyword: str, what: str) -> U8 | None:
+    def _decode(self, mtl_material: MtlMaterial, keyword: str, label: str) -> U8 | None:
         """The bytes of an image, RGBA. (height, width, 4)"""
-        name = described.maps.get(keyword)
+        name = mtl_material.maps.get(keyword)
         if not name:
             return None
-        path = posixpath.join(described.folder, name.replace("\\", "/"))
+        path = posixpath.join(mtl_material.folder, name.replace("\\", "/"))
         if path not in self._pixels:
-            data = self._companions.read(path, what)
-            if data is None and described.folder and not name.startswith(".."):
-                data = self._companions.read(name, what)  # some exporters name it as the scene sees it
-            self._pixels[path] = None if data is None else self._decoder.decode(data, what)
+            data = self._companions.read(path, label)
+            if data is None and mtl_material.folder and not name.startswith(".."):
+                data = self._companions.read(name, label)  # some exporters name it as the scene sees it
+            self._pixels[path] = None if data is None else self._decoder.decode(data, label)
         if self._pixels[path] is None:
-            self._warnings.append(wrong(f"{what} ({_shown(name)!r}) is not beside the scene; it is left out"))
+            self._warnings.append(
+                unsupported(f"{label} ({_printable(name)!r}) is not beside the scene; it is left out")
+            )
         return self._pixels[path]
 
-    def _normal_map(self, described: Described, what: str) -> Texture | None:
+    def _normal_map(self, mtl_material: MtlMaterial, label: str) -> Texture | None:
         """That of `norm`, or of a bump map whose image is one; heights are said to be lost."""
-        for keyword in (keyword for keyword in BUMPS if described.maps.get(keyword)):
-            called = f"the normal map of {what}" if keyword == "norm" else f"{keyword} of {what}"
-            strength = min(described.strengths.get(keyword, 1.0), MAX_STRENGTH)
+        for keyword in (keyword for keyword in NORMAL_MAP_KEYWORDS if mtl_material.maps.get(keyword)):
+            map_label = f"the normal map of {label}" if keyword == "norm" else f"{keyword} of {label}"
+            strength = min(mtl_material.strengths.get(keyword, 1.0), MAX_STRENGTH)
             try:
-                texture = self._image(described, keyword, called, Coding("normal", (strength, strength, 1.0)))
+                texture = self._image(
+                    mtl_material, keyword, map_label, TextureEncoding("normal", (strength, strength, 1.0))
+                )
             except SceneError as error:
                 if keyword == "norm":
                     raise
-                self._warnings.append(wrong(f"{error}; until then it is left out"))
+                self._warnings.append(unsupported(f"{error}; until then it is left out"))
                 continue
-            if texture is None or keyword == "norm" or holds_normals(texture.pixels):
+            if texture is None or keyword == "norm" or is_normal_map(texture.pixels):
                 return texture
-            name = _shown(described.maps[keyword])
-            self._warnings.append(wrong(f"{called} ({name!r}) is a map of heights; it is left out, give a normal map"))
+            name = _printable(mtl_material.maps[keyword])
+            self._warnings.append(
+                unsupported(f"{map_label} ({name!r}) is a map of heights; it is left out, give a normal map")
+            )
         return None
 
-    def _warn_of_the_rest(self, described: Described, what: str) -> None:
-        for keyword in sorted(described.maps.keys() - USED_MAPS):
-            say = unused if keyword in HARMLESS_MAPS else wrong
-            name = _shown(described.maps[keyword])
-            self._warnings.append(say(f"{keyword[:40]} of {what} ({name!r}) is not used"))
-        lost = [word for word in ("Ps", "aniso") if described.numbers.get(word, [0.0])[0] > 0]
-        self._warnings.extend(simplified(f"{word} of {what} is not used") for word in lost)
+    def _warn_unsupported(self, mtl_material: MtlMaterial, label: str) -> None:
+        for keyword in sorted(mtl_material.maps.keys() - USED_MAPS):
+            make_warning = ignored if keyword in HARMLESS_MAPS else unsupported
+            name = _printable(mtl_material.maps[keyword])
+            self._warnings.append(make_warning(f"{keyword[:40]} of {label} ({name!r}) is not used"))
+        unused_keywords = [
+            number_keyword
+            for number_keyword in ("Ps", "aniso")
+            if mtl_material.numbers.get(number_keyword, [0.0])[0] > 0
+        ]
+        self._warnings.extend(
+            approximated(f"{number_keyword} of {label} is not used") for number_keyword in unused_keywords
+        )
 
-    def warn_of_gloss(self) -> None:
+    def warn_gloss(self) -> None:
         """Say once for all materials that were made how Ks was read, where it was not read as it stands."""
         for gloss in Gloss:
-            names = [name for name, found in self._glosses.items() if found is gloss]
+            names = [name for name, material_gloss in self._glosses.items() if material_gloss is gloss]
             if names:
-                more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-                self._warnings.append(simplified(f"Ks of material {names[0]!r}{more} {gloss.value}"))
+                suffix = f" and {len(names) - 1} more" if len(names) > 1 else ""
+                self._warnings.append(approximated(f"Ks of material {names[0]!r}{suffix} {gloss.value}"))
 
 
-def holds_normals(pixels: U8) -> bool:
+def is_normal_map(pixels: U8) -> bool:
     """Whether an image, (height, width, 3 or 4), holds unit vectors about +z, as normal maps do and heights do not."""
     step = 1 + max(pixels.shape[:2]) // 512  # these tell it as well as all
     vectors = pixels[::step, ::step, :3].reshape(-1, 3) / np.float32(127.5) - 1
@@ -216,6 +228,6 @@ def holds_normals(pixels: U8) -> bool:
     return bool(z > 0.5 and max(abs(x), abs(y)) < 0.25 and length < 0.15)
 
 
-def _shown(name: str) -> str:
+def _printable(name: str) -> str:
     """The end of a file's name, which tells more than its beginning, in ASCII."""
     return ("…" if len(name) > 60 else "") + name[-60:].encode("ascii", "replace").decode()

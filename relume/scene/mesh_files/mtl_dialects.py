@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
-from relume.scene.gltf.terms import Over, Surface, Terms, dielectric_share, make_terms
+from relume.scene.gltf.terms import CoatLayer, PbrSurface, Terms, dielectric_reflectance, make_terms
 from relume.scene.model import Texture
 
 F64 = NDArray[np.float64]
@@ -33,8 +33,8 @@ GRAY = [0.6, 0.6, 0.6]
 PLASTIC_F0 = 0.04
 BLENDER_F0 = 0.08  # of a specular level of 1
 GRAY_SPREAD = 0.05  # between the channels of a gray, relative to the largest
-MIRRORS = (3, 8)  # illumination models with reflection and without Fresnel
-BLENDER_METALS = (3, 6)
+MIRROR_MODELS = (3, 8)  # illumination models with reflection and without Fresnel
+BLENDER_METAL_MODELS = (3, 6)
 
 
 class Dialect(Enum):
@@ -56,7 +56,7 @@ class Gloss(Enum):
 
 
 @dataclass
-class Described:
+class MtlMaterial:
     """One `newmtl`: its numbers, and the names of its images by keyword, as the file in `folder` gives them; and how
     strong its bump maps are, where that is said."""
 
@@ -67,7 +67,7 @@ class Described:
     strengths: dict[str, float] = field(default_factory=dict)
 
 
-def dialect_of(lines: Sequence[str]) -> Dialect:
+def detect_dialect(lines: Sequence[str]) -> Dialect:
     """Who wrote a library, by the comments that it begins with."""
     header = takewhile(lambda line: not line or line.startswith("#"), (line.strip() for line in lines))
     for line in header:
@@ -78,23 +78,23 @@ def dialect_of(lines: Sequence[str]) -> Dialect:
 
 def gray_terms() -> Terms:
     """What stands for a material of which nothing is known."""
-    return make_terms(_surface(np.array(GRAY), PLASTIC_F0, 0.0, 0.5, {}), Over())
+    return make_terms(_surface(np.array(GRAY), PLASTIC_F0, 0.0, 0.5, {}), CoatLayer())
 
 
-def terms_of(
-    described: Described, textures: Mapping[str, Texture], roughness: float | None, *, has_normal_map: bool
+def make_mtl_terms(
+    mtl_material: MtlMaterial, textures: Mapping[str, Texture], roughness: float | None, *, has_normal_map: bool
 ) -> tuple[Terms, Gloss | None]:
     """The terms of a material, and how its Ks was read where that is to be said.
 
     Args:
-        described: its numbers. textures: its images by channel.
+        mtl_material: its numbers. textures: its images by channel.
         roughness: of the PBR extension, its map counted in; None where there is none.
         has_normal_map: which widens its highlights where they are seen from far.
     """
-    numbers = described.numbers
+    numbers = mtl_material.numbers
     base = np.array(_color(numbers, "Kd", GRAY, textures.get("diffuse")))
     tint = np.array(_color(numbers, "Ks", [0.0, 0.0, 0.0], textures.get("specular")))
-    gloss = Gloss.BLENDER if described.dialect is not Dialect.COMMON and tint.any() else None
+    gloss = Gloss.BLENDER if mtl_material.dialect is not Dialect.COMMON and tint.any() else None
     f0 = BLENDER_F0 * min(1.0, float(tint.mean()))
     if roughness is not None or "Pm" in numbers:
         metallic = min(numbers.get("Pm", [0.0])[0], 1.0)
@@ -103,7 +103,7 @@ def terms_of(
     elif not tint.any():
         return (_diffuse(base, textures),), None
     elif gloss:
-        surface = _surface(base, f0, _metallic(numbers), _blender_roughness(described), textures)
+        surface = _surface(base, f0, _metallic(numbers), _blender_roughness(mtl_material), textures)
     elif _is_dielectric(base, tint, numbers):
         gloss = Gloss.DIELECTRIC if tint.mean() > PLASTIC_F0 else None
         width = (2 / (_exponent(numbers) + 2)) ** 0.25
@@ -117,33 +117,33 @@ def _color(
     numbers: Mapping[str, list[float]], keyword: str, default: list[float], image: Texture | None
 ) -> list[float]:
     """A color that an image multiplies; where exporters write zeros, or nothing, they mean the image."""
-    given = numbers.get(keyword, [0.0, 0.0, 0.0] if image is not None else default)
-    return given if any(given) or image is None else [1.0, 1.0, 1.0]
+    color = numbers.get(keyword, [0.0, 0.0, 0.0] if image is not None else default)
+    return color if any(color) or image is None else [1.0, 1.0, 1.0]
 
 
 def _metallic(numbers: Mapping[str, list[float]]) -> float:
     """What Blender writes as Ka of a material that reflects."""
-    is_metal = numbers.get("illum", [2.0])[0] in BLENDER_METALS
+    is_metal = numbers.get("illum", [2.0])[0] in BLENDER_METAL_MODELS
     return min(float(np.mean(numbers.get("Ka", [0.0]))), 1.0) if is_metal else 0.0
 
 
-def _blender_roughness(described: Described) -> float:
+def _blender_roughness(mtl_material: MtlMaterial) -> float:
     """The inverse of Blender's Ns; one half where that is an image."""
-    largest = float(described.dialect.value)
-    return 1 - sqrt(min(described.numbers.get("Ns", [largest / 4])[0] / largest, 1.0))
+    largest = float(mtl_material.dialect.value)
+    return 1 - sqrt(min(mtl_material.numbers.get("Ns", [largest / 4])[0] / largest, 1.0))
 
 
 def _is_dielectric(base: F64, tint: F64, numbers: Mapping[str, list[float]]) -> bool:
     is_gray = np.ptp(tint) <= GRAY_SPREAD * tint.max()
-    return bool(is_gray and base.any() and numbers.get("illum", [2.0])[0] not in MIRRORS)
+    return bool(is_gray and base.any() and numbers.get("illum", [2.0])[0] not in MIRROR_MODELS)
 
 
 def _exponent(numbers: Mapping[str, list[float]]) -> float:
     return numbers.get("Ns", [TERMS["blinn_phong"].parameter("exponent").default])[0]
 
 
-def _coat(numbers: Mapping[str, list[float]]) -> Over:
-    return Over(coat=min(numbers.get("Pc", [0.0])[0], 1.0), coat_roughness=numbers.get("Pcr", [0.0])[0])
+def _coat(numbers: Mapping[str, list[float]]) -> CoatLayer:
+    return CoatLayer(coat=min(numbers.get("Pc", [0.0])[0], 1.0), coat_roughness=numbers.get("Pcr", [0.0])[0])
 
 
 def _diffuse(base: F64, textures: Mapping[str, Texture]) -> dict[str, object]:
@@ -152,13 +152,15 @@ def _diffuse(base: F64, textures: Mapping[str, Texture]) -> dict[str, object]:
 
 def _highlight(tint: F64, numbers: Mapping[str, list[float]], textures: Mapping[str, Texture]) -> dict[str, object]:
     parameter = TERMS["blinn_phong"].parameter("exponent")
-    held = float(np.clip(_exponent(numbers), parameter.minimum, parameter.maximum))
+    exponent = float(np.clip(_exponent(numbers), parameter.minimum, parameter.maximum))
     channel = "specular" if "specular" in textures else None
     color = np.clip(tint, 0, 1).tolist()
-    return {"model": "blinn_phong", "color": color, "params": {"exponent": held}, "texture": channel}
+    return {"model": "blinn_phong", "color": color, "params": {"exponent": exponent}, "texture": channel}
 
 
-def _surface(base: F64, f0: float, metallic: float, roughness: float, textures: Mapping[str, Texture]) -> Surface:
+def _surface(base: F64, f0: float, metallic: float, roughness: float, textures: Mapping[str, Texture]) -> PbrSurface:
     """A dielectric that reflects `f0` head-on, or a metal, or between. base: (3,)"""
-    reflected = dielectric_share(f0, 1.0)
-    return Surface(base * (1 - metallic), f0 + (base - f0) * metallic, 1.0, roughness, reflected, dict(textures))
+    specular_reflectance = dielectric_reflectance(f0, 1.0)
+    return PbrSurface(
+        base * (1 - metallic), f0 + (base - f0) * metallic, 1.0, roughness, specular_reflectance, dict(textures)
+    )

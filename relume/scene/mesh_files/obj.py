@@ -22,8 +22,8 @@ from relume.scene.mesh_files.corners import Corners
 
 MAX_LINE_BYTES = 1 << 20
 MAX_GROUPS = 10_000
-_COLORED = 7  # words of a vertex that has a colour
-LEFT_OUT = {b"p", b"l", b"curv", b"curv2", b"surf"}
+_NUM_COLORED_TOKENS = 7  # words of a vertex that has a colour
+IGNORED_KEYWORDS = {b"p", b"l", b"curv", b"curv2", b"surf"}
 
 
 @dataclass
@@ -34,7 +34,7 @@ class Obj:
         colors: of positions, as scanners and sculptors write them behind the coordinates; none where some lack them.
         libraries: the material files it names.
         groups: triangles, nine numbers each, by object and material.
-        left_out: kinds of lines that were not used.
+        ignored_keywords: kinds of lines that were not used.
     """
 
     positions: array[float] = field(default_factory=lambda: array("d"))
@@ -43,7 +43,7 @@ class Obj:
     colors: array[float] = field(default_factory=lambda: array("d"))
     libraries: list[str] = field(default_factory=list)
     groups: dict[tuple[str, str], array[int]] = field(default_factory=dict)
-    left_out: set[str] = field(default_factory=set)
+    ignored_keywords: set[str] = field(default_factory=set)
 
     def vertex_colors(self) -> NDArray[np.float32] | None:
         """Linear colours of all positions, None where there are none. (num_positions, 3)"""
@@ -69,37 +69,39 @@ def read_obj(data: bytes) -> Obj:
         SceneError: a line is not what its first word says, or there are too many lines of a kind.
     """
     obj = Obj()
-    thing, material = "", ""
+    object_name, material = "", ""
     num_triangles = 0
     for number, line in enumerate(_lines(data), 1):
-        words = line.split()
-        if not words:
+        tokens = line.split()
+        if not tokens:
             continue
-        kind = words[0]
+        kind = tokens[0]
         try:
             if kind == b"v":
-                obj.positions.extend([float(words[1]), float(words[2]), float(words[3])])
-                if len(words) == _COLORED:
-                    obj.colors.extend([float(words[4]), float(words[5]), float(words[6])])
+                obj.positions.extend([float(tokens[1]), float(tokens[2]), float(tokens[3])])
+                if len(tokens) == _NUM_COLORED_TOKENS:
+                    obj.colors.extend([float(tokens[4]), float(tokens[5]), float(tokens[6])])
             elif kind == b"vn":
-                obj.normals.extend([float(words[1]), float(words[2]), float(words[3])])
+                obj.normals.extend([float(tokens[1]), float(tokens[2]), float(tokens[3])])
             elif kind == b"vt":
-                obj.uvs.extend([float(words[1]), float(words[2]) if len(words) > 2 else 0.0])
+                obj.uvs.extend([float(tokens[1]), float(tokens[2]) if len(tokens) > 2 else 0.0])
             elif kind == b"f":
-                num_triangles += _add_face(obj, _group(obj, thing, material), words[1:])
+                num_triangles += _add_face(obj, _group(obj, object_name, material), tokens[1:])
             elif kind == b"usemtl":
                 material = _text(line, kind)
             elif kind == b"o":
-                thing = _text(line, kind)
+                object_name = _text(line, kind)
             elif kind == b"mtllib":
                 obj.libraries.append(_text(line, kind))
-            elif kind in LEFT_OUT:
-                obj.left_out.add(kind.decode())
+            elif kind in IGNORED_KEYWORDS:
+                obj.ignored_keywords.add(kind.decode())
         except SceneError:
             raise
         except (ValueError, IndexError, OverflowError):
-            shown = line[:40].decode("ascii", "replace").strip()
-            raise SceneError(f"line {number:,} of the .obj file cannot be read ({shown!r}); export it again") from None
+            printable = line[:40].decode("ascii", "replace").strip()
+            raise SceneError(
+                f"line {number:,} of the .obj file cannot be read ({printable!r}); export it again"
+            ) from None
         if num_triangles > MAX_TRIANGLES:
             raise SceneError(f"the .obj file has more than {MAX_TRIANGLES:,} triangles; simplify it")
     return obj
@@ -112,19 +114,19 @@ def _lines(data: bytes) -> io.BytesIO | list[bytes]:
     return io.BytesIO(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ") if b"\\" in data else data)
 
 
-def _group(obj: Obj, thing: str, material: str) -> array[int]:
-    group = obj.groups.get((thing, material))
+def _group(obj: Obj, object_name: str, material: str) -> array[int]:
+    group = obj.groups.get((object_name, material))
     if group is None:
         if len(obj.groups) >= MAX_GROUPS:
             raise SceneError(f"the .obj file has more than {MAX_GROUPS:,} objects; join them")
-        group = obj.groups[thing, material] = array("q")
+        group = obj.groups[object_name, material] = array("q")
     return group
 
 
-def _add_face(obj: Obj, group: array[int], words: Sequence[bytes]) -> int:
+def _add_face(obj: Obj, group: array[int], tokens: Sequence[bytes]) -> int:
     """Appends a polygon as a fan; returns the number of its triangles."""
     counts = (len(obj.positions) // 3, len(obj.uvs) // 2, len(obj.normals) // 3)
-    corners = [_corner(word, counts) for word in words]
+    corners = [_corner(token, counts) for token in tokens]
     if len(corners) < 3:
         raise ValueError("a face has at least three corners")
     hub = corners[0]
@@ -133,18 +135,20 @@ def _add_face(obj: Obj, group: array[int], words: Sequence[bytes]) -> int:
     return len(corners) - 2
 
 
-def _corner(word: bytes, counts: tuple[int, int, int]) -> tuple[int, int, int]:
+def _corner(token: bytes, counts: tuple[int, int, int]) -> tuple[int, int, int]:
     """Position, uv and normal of `v/vt/vn`, from zero; -1 where one is left out."""
-    parts = word.split(b"/")
-    if len(parts) > 3 or not parts[0]:
+    index_texts = token.split(b"/")
+    if len(index_texts) > 3 or not index_texts[0]:
         raise ValueError("a corner is v, v/vt, v//vn or v/vt/vn")
-    parts += [b""] * (3 - len(parts))
-    v, vt, vn = (_index(part, count) if part else -1 for part, count in zip(parts, counts, strict=True))
+    index_texts += [b""] * (3 - len(index_texts))
+    v, vt, vn = (
+        _index(index_text, count) if index_text else -1 for index_text, count in zip(index_texts, counts, strict=True)
+    )
     return v, vt, vn
 
 
-def _index(part: bytes, count: int) -> int:
-    index = int(part)
+def _index(text: bytes, count: int) -> int:
+    index = int(text)
     if index == 0 or index < -count or index > 2**40:
         raise ValueError("numbers start at one")
     return index - 1 if index > 0 else count + index

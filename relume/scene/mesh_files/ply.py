@@ -46,10 +46,10 @@ def read_ply(data: bytes) -> tuple[Corners, F32 | None]:
     indices = _fans(*lists)
     positions = _columns(vertex, ("x", "y", "z"))
     normals = _columns(vertex, ("nx", "ny", "nz"))
-    uvs = next((found for names in UVS if len(found := _columns(vertex, names))), np.zeros((0, 2)))
+    uvs = next((candidate for names in UVS if len(candidate := _columns(vertex, names))), np.zeros((0, 2)))
     uvs = uvs * [1, -1] + [0, 1]
-    missing = np.full_like(indices, -1)
-    triangles = np.stack([indices if len(values) else missing for values in (positions, uvs, normals)], axis=-1)
+    missing_indices = np.full_like(indices, -1)
+    triangles = np.stack([indices if len(values) else missing_indices for values in (positions, uvs, normals)], axis=-1)
     return Corners(positions, uvs, normals, triangles), _colors(vertex, elements)
 
 
@@ -62,14 +62,14 @@ def read_header(data: bytes) -> tuple[str, list[Element], int]:
     order: str | None = None
     elements: list[tuple[str, int, list[Property]]] = []
     for line in lines[1:]:
-        words = line.split()
+        tokens = line.split()
         try:
-            if words[:1] == ["format"]:
-                order = FORMATS[words[1]]
-            elif words[:1] == ["element"]:
-                elements.append((words[1], _count(words[2]), []))
-            elif words[:1] == ["property"]:
-                elements[-1][2].append(_property(words[1:]))
+            if tokens[:1] == ["format"]:
+                order = FORMATS[tokens[1]]
+            elif tokens[:1] == ["element"]:
+                elements.append((tokens[1], _count(tokens[2]), []))
+            elif tokens[:1] == ["property"]:
+                elements[-1][2].append(_property(tokens[1:]))
         except (KeyError, IndexError, ValueError):
             raise SceneError(f"the .ply header has an odd line ({line[:40]!r}); export it again") from None
     if any(len(properties) > MAX_PROPERTIES for _, _, properties in elements):
@@ -79,18 +79,18 @@ def read_header(data: bytes) -> tuple[str, list[Element], int]:
     return order, [Element(name, rows, tuple(properties)) for name, rows, properties in elements], end.end()
 
 
-def _count(word: str) -> int:
-    if not re.fullmatch(r"\d{1,12}", word):
-        raise ValueError(word)
-    return int(word)
+def _count(token: str) -> int:
+    if not re.fullmatch(r"\d{1,12}", token):
+        raise ValueError(token)
+    return int(token)
 
 
-def _property(words: list[str]) -> Property:
-    if words[0] == "list":
-        if TYPES[words[1]].startswith("f"):
+def _property(tokens: list[str]) -> Property:
+    if tokens[0] == "list":
+        if TYPES[tokens[1]].startswith("f"):
             raise ValueError("a length is a whole number")
-        return Property(words[3], TYPES[words[2]], TYPES[words[1]])
-    return Property(words[1], TYPES[words[0]])
+        return Property(tokens[3], TYPES[tokens[2]], TYPES[tokens[1]])
+    return Property(tokens[1], TYPES[tokens[0]])
 
 
 def _columns(vertex: Columns, names: tuple[str, ...]) -> F64:

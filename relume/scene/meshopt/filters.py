@@ -19,8 +19,8 @@ def _octahedral(elements: U8) -> U8:
         raise MeshoptError("octahedral data has elements of 4 or 8 bytes")
     dtype = np.dtype("i1" if stride == 4 else "<i2")
     stored = elements.view(dtype)
-    one = np.maximum(stored[:, 2:3].astype(np.float64), 1)
-    xy = stored[:, :2] / one
+    unit = np.maximum(stored[:, 2:3].astype(np.float64), 1)
+    xy = stored[:, :2] / unit
     z = 1 - np.abs(xy).sum(1, keepdims=True)
     xy -= np.where(xy >= 0, 1, -1) * np.maximum(-z, 0)
     vectors = np.concatenate([xy, z], axis=1)
@@ -31,9 +31,9 @@ def _octahedral(elements: U8) -> U8:
 
 def _exponential(elements: U8) -> U8:
     """Floats from 24 bits of mantissa and 8 of exponent each. (n, a multiple of 4 bytes)"""
-    words = elements.view("<i4")
+    encoded = elements.view("<i4")
     with np.errstate(over="ignore"):
-        floats = np.ldexp(((words << 8) >> 8).astype(np.float32), words >> 24)
+        floats = np.ldexp(((encoded << 8) >> 8).astype(np.float32), encoded >> 24)
     return np.ascontiguousarray(floats, "<f4").view(np.uint8)
 
 

@@ -14,7 +14,7 @@ from relume.scene.meshopt.errors import MeshoptError
 U8 = NDArray[np.uint8]
 GROUP = 16
 MAX_BLOCK, BLOCK_BYTES = 256, 8192
-GROUPS_AT_ONCE = 1 << 16
+GROUPS_PER_BATCH = 1 << 16
 
 # Bits of a difference by the mode that a header says: version 0, and version 1 by its control mode.
 WIDTHS = {None: (0, 2, 4, 8), 0: (0, 1, 2, 4), 1: (1, 2, 4, 8)}
@@ -55,8 +55,8 @@ def decode_vertices(source: bytes, count: int, stride: int) -> U8:
     deltas = _deltas(source, end, count, stride, version)
     elements = np.empty((count, stride), np.uint8)
     for byte, channel in zip(range(0, stride, 4), channels, strict=True):
-        own = np.ascontiguousarray(deltas[byte : byte + 4, :count].T)
-        elements[:, byte : byte + 4] = _summed(own, np.ascontiguousarray(first[byte : byte + 4]), channel)
+        channel_deltas = np.ascontiguousarray(deltas[byte : byte + 4, :count].T)
+        elements[:, byte : byte + 4] = _integrate(channel_deltas, np.ascontiguousarray(first[byte : byte + 4]), channel)
     return elements
 
 
@@ -64,83 +64,92 @@ def _deltas(source: bytes, end: int, count: int, stride: int, version: int) -> U
     """Differences as they are stored. (stride, count rounded up to whole groups)"""
     padded = -(-count // GROUP) * GROUP
     deltas = np.zeros((stride, padded), np.uint8)
-    found: dict[int, tuple[list[int], list[int]]] = {bits: ([], []) for bits in (1, 2, 4, 8)}
+    groups_by_width: dict[int, tuple[list[int], list[int]]] = {bits: ([], []) for bits in (1, 2, 4, 8)}
     max_block = min((BLOCK_BYTES // stride) & ~(GROUP - 1), MAX_BLOCK)
-    at = 1
+    offset = 1
     data = np.frombuffer(source, np.uint8)
     for start in range(0, count, max_block):
         num_elements = min(count - start, max_block)
         num_groups = -(-num_elements // GROUP)
-        controls = source[at : at + stride // 4] if version else b""
-        at += len(controls)
+        controls = source[offset : offset + stride // 4] if version else b""
+        offset += len(controls)
         for byte in range(stride):
             control = (controls[byte // 4] >> 2 * (byte % 4)) & 3 if version else None
             if control == ZEROS:
                 continue
             if control == RAW:
-                if at + num_elements > end:
+                if offset + num_elements > end:
                     raise MeshoptError("the data is truncated")
-                deltas[byte, start : start + num_elements] = data[at : at + num_elements]
-                at += num_elements
+                deltas[byte, start : start + num_elements] = data[offset : offset + num_elements]
+                offset += num_elements
             else:
-                at = _walk(source, at, end, num_groups, WIDTHS[control], byte * padded + start, found)
-    if at != end:
+                offset = _index_groups(
+                    source, offset, end, num_groups, WIDTHS[control], byte * padded + start, groups_by_width
+                )
+    if offset != end:
         raise MeshoptError("the data is damaged, or holds another number of elements")
-    for bits, (starts, targets) in found.items():
+    for bits, (starts, targets) in groups_by_width.items():
         _unpack_groups(data, bits, np.array(starts, np.int64), np.array(targets, np.int64), deltas.reshape(-1))
     return deltas
 
 
-def _walk(
+def _index_groups(
     source: bytes,
-    at: int,
+    offset: int,
     end: int,
     num_groups: int,
     widths: tuple[int, ...],
     target: int,
-    found: dict[int, tuple[list[int], list[int]]],
+    groups_by_width: dict[int, tuple[list[int], list[int]]],
 ) -> int:
     """Note where the groups of one byte of a block lie and belong; returns where they end."""
-    header = source[at : at + (num_groups + 3) // 4]
-    at += (num_groups + 3) // 4
+    header = source[offset : offset + (num_groups + 3) // 4]
+    offset += (num_groups + 3) // 4
     for group in range(num_groups):
-        if at > end:
+        if offset > end:
             raise MeshoptError("the data is truncated")
         bits = widths[(header[group >> 2] >> 2 * (group & 3)) & 3]
         if bits == 0:
             continue
-        starts, targets = found[bits]
-        starts.append(at)
+        starts, targets = groups_by_width[bits]
+        starts.append(offset)
         targets.append(target + GROUP * group)
-        packed = GROUP * bits // 8
-        at += packed if bits == 8 else packed + sum(source[at : at + packed].translate(_FULL_FIELDS[bits]))
-    if at > end:
+        packed_bytes = GROUP * bits // 8
+        offset += (
+            packed_bytes
+            if bits == 8
+            else packed_bytes + sum(source[offset : offset + packed_bytes].translate(_FULL_FIELDS[bits]))
+        )
+    if offset > end:
         raise MeshoptError("the data is truncated")
-    return at
+    return offset
 
 
 def _unpack_groups(data: U8, bits: int, starts: NDArray[np.int64], targets: NDArray[np.int64], deltas: U8) -> None:
     """Put the differences of all groups of one width in their places."""
-    for some in range(0, len(starts), GROUPS_AT_ONCE):
-        start, target = starts[some : some + GROUPS_AT_ONCE, None], targets[some : some + GROUPS_AT_ONCE, None]
-        packed = GROUP * bits // 8
-        values = data[start + np.arange(packed)]
+    for batch_start in range(0, len(starts), GROUPS_PER_BATCH):
+        start, target = (
+            starts[batch_start : batch_start + GROUPS_PER_BATCH, None],
+            targets[batch_start : batch_start + GROUPS_PER_BATCH, None],
+        )
+        packed_bytes = GROUP * bits // 8
+        values = data[start + np.arange(packed_bytes)]
         if bits < 8:
             top = (1 << bits) - 1
             fields = ((values[:, :, None] >> _SHIFTS[bits]) & top).reshape(-1, GROUP).astype(np.uint8)
             is_full = fields == top
-            follows = np.minimum(start + packed + np.cumsum(is_full, axis=1) - 1, len(data) - 1)
-            values = np.where(is_full, data[follows], fields)
+            escape_index = np.minimum(start + packed_bytes + np.cumsum(is_full, axis=1) - 1, len(data) - 1)
+            values = np.where(is_full, data[escape_index], fields)
         deltas[target + np.arange(GROUP)] = values
 
 
-def _summed(deltas: U8, first: U8, channel: int) -> U8:
+def _integrate(deltas: U8, first: U8, channel: int) -> U8:
     """Differences of four bytes, added up from the first element's. (count, 4)"""
     kind = channel & 3
     if kind == 2:
-        words, turn = deltas.view("<u4")[:, 0], channel >> 4
-        turned = (words >> np.uint32(turn)) | (words << np.uint32((32 - turn) & 31))
-        total = np.bitwise_xor.accumulate(turned) ^ first.view("<u4")[0]
+        values, rotation = deltas.view("<u4")[:, 0], channel >> 4
+        rotated = (values >> np.uint32(rotation)) | (values << np.uint32((32 - rotation) & 31))
+        total = np.bitwise_xor.accumulate(rotated) ^ first.view("<u4")[0]
         return np.ascontiguousarray(total, "<u4")[:, None].view(np.uint8)
     if kind == 3:
         raise MeshoptError("the data is of an unknown kind")

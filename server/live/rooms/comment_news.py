@@ -8,16 +8,16 @@ from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Executor
 
 from server.live.rooms.rooms import Rooms
-from worker.database.faults import Complaint
+from worker.database.faults import DatabaseError
 
 log = logging.getLogger(__name__)
 
-EVERY_S = 2.0
+POLL_INTERVAL_S = 2.0
 Marks = Mapping[str, object]
 """By scene, what is another one whenever its comments are."""
 
 
-class CommentNews:
+class CommentSync:
     """Looks again and again, for as long as the server runs; the database is asked only while there are rooms.
 
     Args:
@@ -26,25 +26,25 @@ class CommentNews:
 
     def __init__(self, rooms: Rooms, marks: Callable[[Collection[str]], Marks], threads: Executor) -> None:
         self._rooms, self._marks, self._threads = rooms, marks, threads
-        self._known: Marks = {}
-        self._complaint = Complaint(log, "whether there are new comments cannot be told")
+        self._last_marks: Marks = {}
+        self._outage = DatabaseError(log, "whether there are new comments cannot be told")
 
     async def run(self) -> None:
         """Look for ever."""
         while True:
-            await asyncio.sleep(EVERY_S)
+            await asyncio.sleep(POLL_INTERVAL_S)
             try:
-                await self.look()
-                if self._known:  # else nothing was asked
-                    self._complaint.well()
+                await self.refresh()
+                if self._last_marks:  # else nothing was asked
+                    self._outage.report_recovered()
             except Exception as error:  # the database may be away for a while; the next look must come
-                self._complaint.meet(error)
+                self._outage.report_failure(error)
 
-    async def look(self) -> None:
+    async def refresh(self) -> None:
         """Tell the rooms of those scenes whose comments have changed since the last look."""
         scenes = self._rooms.scenes()
         ask = asyncio.get_running_loop().run_in_executor
-        before, self._known = self._known, await ask(self._threads, self._marks, scenes) if scenes else {}
-        for scene, mark in self._known.items():
+        before, self._last_marks = self._last_marks, await ask(self._threads, self._marks, scenes) if scenes else {}
+        for scene, mark in self._last_marks.items():
             if scene in before and before[scene] != mark:
-                self._rooms.commented(scene)
+                self._rooms.notify_comment(scene)

@@ -12,18 +12,18 @@ from server.wire.rooms import MAX_PERSON_NAME, ROOM_PREFIX
 
 
 @dataclass(frozen=True)
-class Door:
+class JoinRequest:
     """What the first message of a session says of a room.
 
     Attributes:
         room: its id; None for who has only what opens it to watch.
         watch: what opens it to watch; it follows from the id, and the id not from it.
-        seat: token of the place that somebody had. name: how they are called.
+        participant_token: token of the place that somebody had. name: how they are called.
     """
 
     room: str | None
     watch: str
-    seat: str | None
+    participant_token: str | None
     name: str | None
 
     @property
@@ -32,7 +32,7 @@ class Door:
         return self.watch[:ROOM_PREFIX]
 
 
-def door_of(opening: OpenMessage, room_prefix: str) -> Door | None:
+def parse_join_request(opening: OpenMessage, room_prefix: str) -> JoinRequest | None:
     """The door that a message names; None where it names none.
 
     Args:
@@ -42,18 +42,18 @@ def door_of(opening: OpenMessage, room_prefix: str) -> Door | None:
     """
     name = None if opening.name is None else check_person(opening.name)
     if opening.room is not None:
-        door = Door(opening.room, watch_of(opening.room), opening.seat, name)
+        join_request = JoinRequest(opening.room, derive_watch_key(opening.room), opening.seat, name)
     elif opening.watch is not None:
-        door = Door(None, opening.watch, opening.seat, name)
+        join_request = JoinRequest(None, opening.watch, opening.seat, name)
     else:
         return None
-    if room_prefix != door.prefix:
-        allowed = f"{door.prefix}, as the room's name begins"
+    if room_prefix != join_request.prefix:
+        allowed = f"{join_request.prefix}, as the room's name begins"
         raise ParameterError("room_prefix of the address", room_prefix[:80], allowed)
-    return door
+    return join_request
 
 
-def watch_of(room: str) -> str:
+def derive_watch_key(room: str) -> str:
     """What opens a room to watch: it begins as the room's name does, and the rest of the name nobody finds."""
     return room[:ROOM_PREFIX] + hashlib.sha256(b"relume watch " + room.encode()).hexdigest()[ROOM_PREFIX:32]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from server.access.roles import Caller, Role
 from server.errors import BusyError
-from server.live.rooms.door import Door
-from server.live.rooms.guest import Place
-from server.live.rooms.room import Room, seen_by
+from server.live.rooms.door import JoinRequest
+from server.live.rooms.guest import RoomEntry
+from server.live.rooms.room import Room, with_local_settings
 from server.wire.rooms import ROOM_PREFIX
 
 Key = tuple[str, str]
@@ -23,16 +23,24 @@ class Rooms:
         self._max_rooms, self._max_people, self._away_seconds = max_rooms, max_people, away_seconds
         self._rooms: dict[Key, Room] = {}
 
-    def enter(self, door: Door, scene: str, caller: Caller, begun: Mapping[str, Any], *, has_own: bool) -> Place:
+    def enter(
+        self,
+        join_request: JoinRequest,
+        scene: str,
+        caller: Caller,
+        initial_document: Mapping[str, Any],
+        *,
+        has_local_settings: bool,
+    ) -> RoomEntry:
         """A session comes in; whoever may edit and finds nobody makes the room, with the look that they bring.
 
         Args:
-            scene: id. begun: the complete look that the session would show by itself.
-            has_own: its ways of looking are the person's own, of a session that was lost.
+            scene: id. initial_document: the complete look that the session would show by itself.
+            has_local_settings: its ways of looking are the person's own, of a session that was lost.
         Raises:
             BusyError: there are as many rooms, or people in this one, as may be; or nobody has made it yet.
         """
-        key = scene, door.watch
+        key = scene, join_request.watch
         room = self._rooms.get(key)
         is_new = room is None
         if room is None:
@@ -40,10 +48,16 @@ class Rooms:
                 raise BusyError("nobody is in this room now; it opens when somebody comes who may edit in it")
             if len(self._rooms) >= self._max_rooms:
                 raise BusyError(f"{self._max_rooms} rooms are open; one of them has to be left first")
-            room = Room(dict(begun), self._max_people, self._away_seconds, partial(self._forget, key))
-        seat = room.sit(door, caller)
+            room = Room(dict(initial_document), self._max_people, self._away_seconds, partial(self._discard, key))
+        participant = room.join(join_request, caller)
         self._rooms[key] = room
-        return Place(room, seat, door, seen_by(room.document, begun if has_own else room.document), is_new)
+        return RoomEntry(
+            room,
+            participant,
+            join_request,
+            with_local_settings(room.document, initial_document if has_local_settings else room.document),
+            is_new,
+        )
 
     def scenes(self) -> set[str]:
         """Ids of the scenes that people work on together."""
@@ -58,13 +72,13 @@ class Rooms:
         for key in [key for key in self._rooms if key[1].startswith(prefix)]:
             self._rooms.pop(key).is_lost.set()
 
-    def commented(self, scene: str) -> None:
+    def notify_comment(self, scene: str) -> None:
         """Tell everybody who works on a scene together that its comments have changed."""
-        for (of, _), room in self._rooms.items():
-            if of == scene:
-                room.tell_comments()
+        for (room_scene, _), room in self._rooms.items():
+            if room_scene == scene:
+                room.notify_comments()
 
-    def _forget(self, key: Key, room: Room) -> None:
+    def _discard(self, key: Key, room: Room) -> None:
         if self._rooms.get(key) is room:
             del self._rooms[key]
 

@@ -12,13 +12,13 @@ COLORS = ("#6cb2ff", "#ffb454", "#8fd67a", "#e58ce0", "#5fd8d0", "#ff8f80", "#d9
 
 
 @dataclass
-class Seat:
+class Participant:
     """Who somebody is to the others.
 
     Attributes:
         number: from 1 on, in the order of coming. num_sessions: that are open now.
         name: that others read. owner: whose it is, as quotas name them; empty if nobody logs in.
-        leaving: takes the place away in a while, where none is.
+        removal: takes the place away in a while, where none is.
     """
 
     token: str
@@ -29,7 +29,7 @@ class Seat:
     owner: str
     material: str | None = None
     num_sessions: int = 0
-    leaving: asyncio.TimerHandle | None = field(default=None, repr=False)
+    removal: asyncio.TimerHandle | None = field(default=None, repr=False)
 
     def person(self) -> Person:
         """As it is told."""
@@ -38,6 +38,6 @@ class Seat:
             name=self.name,
             color=self.color,
             material=self.material,
-            role=self.role.word,
+            role=self.role.label,
             here=self.num_sessions > 0,
         )

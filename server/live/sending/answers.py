@@ -7,96 +7,96 @@ from typing import Any
 
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.errors import ParameterError, RelumeError
-from server.library.threads import OneAtATime
-from server.live.sending.painter import encode_brush, pack, rounded, times
+from server.library.threads import SerialExecutor
+from server.live.sending.painter import encode_highlight, pack, rounded, times
 from server.live.sending.viewport import Viewport
 from server.live.state.client_socket import ClientSocket
 from server.live.state.pointers import find_curve
 from server.live.state.target import Target
-from server.wire.protocol import BrushMessage, CurveMessage, FrameHeader, ProbeAnswer, ProbeMessage
+from server.wire.protocol import CurveMessage, FrameHeader, HighlightMessage, InspectAnswer, InspectMessage
 
 
-class Answers:
+class QueryResponder:
     """Gives them from the frame loop, between frames.
 
     Attributes:
-        touched: pointer of the curve that the user has opened.
+        open_curve: pointer of the curve that the user has opened.
     """
 
-    def __init__(self, socket: ClientSocket, work: OneAtATime) -> None:
+    def __init__(self, socket: ClientSocket, work: SerialExecutor) -> None:
         self._socket, self._work = socket, work
-        self.touched: str | None = None
-        self._curve_sent_for: dict[str, Any] | None = None
+        self.open_curve: str | None = None
+        self._last_curve_key: dict[str, Any] | None = None
 
-    def touch(self, pointer: str) -> None:
+    def set_open_curve(self, pointer: str) -> None:
         """Take note of the curve that the user has opened. It is sent anew: who closes a curve forgets it."""
-        self.touched, self._curve_sent_for = pointer, None
+        self.open_curve, self._last_curve_key = pointer, None
 
     async def send_curve(self, target: Target) -> None:
         """The touched curve in this look, where its term has changed since it was last sent."""
-        if self.touched is None:
+        if self.open_curve is None:
             return
         try:
-            term, curve = find_curve(self.touched, target.document)
+            term, curve = find_curve(self.open_curve, target.document)
         except ParameterError:  # an edit removed it
-            self.touched = None
+            self.open_curve = None
             return
-        key = {"pointer": self.touched, "term": term}
-        if key == self._curve_sent_for:
+        key = {"pointer": self.open_curve, "term": term}
+        if key == self._last_curve_key:
             return
-        displayed, generated = await self._work.quick(
+        displayed, generated = await self._work.run_short(
             lambda: (rounded(curve_bands(term, curve)), rounded(generated_bands(term, curve)))
         )
         await self._socket.send(
-            CurveMessage(curve=self.touched, revision=target.revision, bands=displayed, generated=generated)
+            CurveMessage(curve=self.open_curve, revision=target.revision, bands=displayed, generated=generated)
         )
-        self._curve_sent_for = key
+        self._last_curve_key = key
 
-    async def answer_probe(self, viewport: Viewport, probe: ProbeMessage) -> None:
+    async def answer_inspect(self, viewport: Viewport, message: InspectMessage) -> None:
         """What makes up a pixel."""
         try:
-            await self._probe(viewport, probe)
+            await self._inspect(viewport, message)
         except RelumeError as error:
             await self._socket.refuse(error)
 
-    async def answer_brush(self, viewport: Viewport, frame: int, is_focused: bool) -> bytes | None:
+    async def answer_highlight(self, viewport: Viewport, frame: int, is_focused: bool) -> bytes | None:
         """The frame for a view's brush; only the focused one says why there is none."""
-        brush, viewport.brush = viewport.brush, None
+        message, viewport.highlight = viewport.highlight, None
         try:
-            return None if brush is None else await self._brush(viewport, brush, frame)
+            return None if message is None else await self._render_highlight(viewport, message, frame)
         except RelumeError as error:
             if is_focused:
                 await self._socket.refuse(error)
             return None
 
-    async def _probe(self, viewport: Viewport, probe: ProbeMessage) -> None:
+    async def _inspect(self, viewport: Viewport, message: InspectMessage) -> None:
         width, height = viewport.size
-        if probe.x >= width or probe.y >= height:
-            raise ParameterError("pixel", [probe.x, probe.y], f"x below {width} and y below {height}")
-        found = await self._work.quick(viewport.picture.probe, probe.x, probe.y)
-        bands = found["bands"]
+        if message.x >= width or message.y >= height:
+            raise ParameterError("pixel", [message.x, message.y], f"x below {width} and y below {height}")
+        pixel = await self._work.run_short(viewport.picture.inspect, message.x, message.y)
+        bands = pixel["bands"]
         await self._socket.send(
-            ProbeAnswer(
+            InspectAnswer(
                 view=viewport.name,
-                x=probe.x,
-                y=probe.y,
-                material=found["material"],
-                position=_triple(found["position"]),
-                normal=_triple(found["normal"]),
-                radiance=_triple(found["radiance"]),
-                curve=found["curve"],
+                x=message.x,
+                y=message.y,
+                material=pixel["material"],
+                position=_triple(pixel["position"]),
+                normal=_triple(pixel["normal"]),
+                radiance=_triple(pixel["radiance"]),
+                curve=pixel["curve"],
                 bands=None if bands is None else rounded(bands),
             )
         )
 
-    async def _brush(self, viewport: Viewport, brush: BrushMessage, frame: int) -> bytes | None:
-        shown = viewport.advance
-        if viewport.target is None or shown is None:
+    async def _render_highlight(self, viewport: Viewport, message: HighlightMessage, frame: int) -> bytes | None:
+        progress = viewport.progress
+        if viewport.target is None or progress is None:
             return None
-        find_curve(brush.curve, viewport.target.document)
+        find_curve(message.curve, viewport.target.document)
         start_s = time.perf_counter()
-        payload = await self._work.quick(
-            encode_brush, viewport.picture, brush.curve, brush.from_degrees, brush.to_degrees
+        payload = await self._work.run_short(
+            encode_highlight, viewport.picture, message.curve, message.from_degrees, message.to_degrees
         )
         width, height = viewport.size
         header = FrameHeader(
@@ -109,8 +109,8 @@ class Answers:
             tiles=[(0, 0, width, height)],
             format="r8",
             exact=viewport.is_exact,
-            fidelity=shown.fidelity,
-            complete=shown.complete,
+            fidelity=progress.fidelity,
+            complete=progress.complete,
             kind="brush",
             ms=times(0.0, 0.0, (time.perf_counter() - start_s) * 1e3),
         )

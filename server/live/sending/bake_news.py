@@ -10,14 +10,14 @@ from concurrent.futures import Executor
 
 from server.live.state.client_socket import ClientSocket
 from server.wire.protocol import BakeMessage
-from worker.database.faults import AWAY, Complaint
+from worker.database.faults import DATABASE_ERRORS, DatabaseError
 from worker.status import BakeStatus
 
 log = logging.getLogger(__name__)
 POLL_S = 0.5
 
 
-class BakeNews:
+class BakeUpdates:
     """Looks into the ledger, which other processes write too: once for all sessions on a scene.
 
     Args:
@@ -26,39 +26,43 @@ class BakeNews:
 
     def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]], threads: Executor) -> None:
         self._list_bakes, self._threads = list_bakes, threads
-        self._looks: dict[str, tuple[float, asyncio.Task[Sequence[BakeStatus]]]] = {}
-        self._complaint = Complaint(log, "sessions are not told of finer bakes")
+        self._queries: dict[str, tuple[float, asyncio.Task[Sequence[BakeStatus]]]] = {}
+        self._outage = DatabaseError(log, "sessions are not told of finer bakes")
 
-    async def tell(self, socket: ClientSocket, bake: str, scene: str) -> None:
+    async def send_updates(self, socket: ClientSocket, bake: str, scene: str) -> None:
         """Run for as long as the session does; says each change once."""
-        told: dict[str, BakeMessage] = {}
+        last_messages: dict[str, BakeMessage] = {}
         while True:
-            for news in self._news(bake, await self._look_up(scene)):
-                if told.get(news.bake) != news:
-                    told[news.bake] = news
-                    await socket.send(news)
+            for message in self._messages(bake, await self._list_recent(scene)):
+                if last_messages.get(message.bake) != message:
+                    last_messages[message.bake] = message
+                    await socket.send(message)
             await asyncio.sleep(POLL_S)
 
-    async def _look_up(self, scene: str) -> Sequence[BakeStatus]:
+    async def _list_recent(self, scene: str) -> Sequence[BakeStatus]:
         """What one of the sessions has found lately, or finds now."""
         now_s = time.monotonic()
-        self._looks = {of: look for of, look in self._looks.items() if now_s < look[0] + POLL_S or not look[1].done()}
-        if scene not in self._looks:
-            self._looks[scene] = now_s, asyncio.create_task(self._ask(scene))
-        return await asyncio.shield(self._looks[scene][1])  # a session that ends does not end it for others
+        self._queries = {
+            scene_id: query
+            for scene_id, query in self._queries.items()
+            if now_s < query[0] + POLL_S or not query[1].done()
+        }
+        if scene not in self._queries:
+            self._queries[scene] = now_s, asyncio.create_task(self._ask(scene))
+        return await asyncio.shield(self._queries[scene][1])  # a session that ends does not end it for others
 
     async def _ask(self, scene: str) -> Sequence[BakeStatus]:
         try:
-            found = await asyncio.get_running_loop().run_in_executor(self._threads, self._list_bakes, scene)
-        except AWAY as error:  # for a while; the picture needs it not
-            self._complaint.meet(error)
+            statuses = await asyncio.get_running_loop().run_in_executor(self._threads, self._list_bakes, scene)
+        except DATABASE_ERRORS as error:  # for a while; the picture needs it not
+            self._outage.report_failure(error)
             return ()
-        self._complaint.well()
-        return found
+        self._outage.report_recovered()
+        return statuses
 
     @staticmethod
-    def _news(bake: str, statuses: Sequence[BakeStatus]) -> list[BakeMessage]:
-        own = next((status for status in statuses if status.id == bake), None)
+    def _messages(bake: str, statuses: Sequence[BakeStatus]) -> list[BakeMessage]:
+        current = next((status for status in statuses if status.id == bake), None)
         return [
             BakeMessage(
                 bake=status.id,
@@ -69,5 +73,5 @@ class BakeNews:
                 seconds_left=None if status.seconds_left is None else round(status.seconds_left, 1),
             )
             for status in statuses
-            if own is not None and status.state in ("running", "ready") and status.rank > own.rank
+            if current is not None and status.state in ("running", "ready") and status.rank > current.rank
         ]

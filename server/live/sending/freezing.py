@@ -19,7 +19,7 @@ from server.wire.protocol import StatusMessage
 if TYPE_CHECKING:
     from relume.picture.jobs import Job
 
-STATUS_S = 0.100
+STATUS_INTERVAL_S = 0.100
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,23 @@ class _Running:
     viewport: Viewport
     job: Job
     future: asyncio.Future[Any]
-    telling: asyncio.Task[None]
+    reporting: asyncio.Task[None]
     start_s: float
 
 
-class Freezer:
-    """Starts a job, says how far it is, and hands out what it made; `news` is set when there is something to take."""
+class Precomputer:
+    """Starts a job, says how far it is, hands out what it made; `changed` is set when there is something to take."""
 
     def __init__(
-        self, socket: ClientSocket, threads: Threads, metrics: Metrics, traces: Traces | None, news: asyncio.Event
+        self, socket: ClientSocket, threads: Threads, metrics: Metrics, traces: Traces | None, changed: asyncio.Event
     ) -> None:
-        self._socket, self._threads, self._metrics, self._traces, self._news = socket, threads, metrics, traces, news
+        self._socket, self._threads, self._metrics, self._traces, self._changed = (
+            socket,
+            threads,
+            metrics,
+            traces,
+            changed,
+        )
         self._running: _Running | None = None
         self._cancel = threading.Event()
 
@@ -51,19 +57,19 @@ class Freezer:
     @property
     def is_done(self) -> bool:
         """Whether there is something to take."""
-        return self._running is not None and self._running.telling.done()
+        return self._running is not None and self._running.reporting.done()
 
     def start(self, viewport: Viewport, job: Job) -> None:
         """Begin; nothing may be running."""
         self._cancel = cancel = threading.Event()
         progress = [0.0]
         future = asyncio.wrap_future(
-            self._threads.long.submit(job.make, lambda share: progress.__setitem__(0, share), cancel.is_set)
+            self._threads.long.submit(job.run, lambda share: progress.__setitem__(0, share), cancel.is_set)
         )
         future.add_done_callback(_note_error)
-        telling = asyncio.create_task(self._tell(future, viewport.name, job, progress))
-        telling.add_done_callback(lambda _: self._news.set())
-        self._running = _Running(viewport, job, future, telling, time.perf_counter())
+        reporting = asyncio.create_task(self._send_progress(future, viewport.name, job, progress))
+        reporting.add_done_callback(lambda _: self._changed.set())
+        self._running = _Running(viewport, job, future, reporting, time.perf_counter())
 
     def cancel(self) -> None:
         """What runs is not wanted any more: it ends soon."""
@@ -74,25 +80,25 @@ class Freezer:
         running = self._running
         if running is None:
             return None
-        await running.telling  # where the client is gone, `end` still has a thread to wait for
+        await running.reporting  # where the client is gone, `end` still has a thread to wait for
         self._running = None
         error = running.future.exception()
         if isinstance(error, CancelledError):
-            await self.say_ready(running.viewport, running.job)
+            await self.send_ready(running.viewport, running.job)
             return None
         if error is not None:
             raise error
         if running.job.state != "following":
             self._metrics.freeze.observe(time.perf_counter() - running.start_s)
         if self._traces is not None:
-            about = {"view": running.viewport.name, "what": running.job.what, "state": running.job.state}
-            self._traces.frozen(running.start_s, about)
+            attributes = {"view": running.viewport.name, "what": running.job.label, "state": running.job.state}
+            self._traces.record_freeze(running.start_s, attributes)
         return running.viewport, running.job, running.future.result()
 
-    async def say_ready(self, viewport: Viewport, job: Job) -> None:
+    async def send_ready(self, viewport: Viewport, job: Job) -> None:
         """Tell the client that this is not waited for any more: it has been handed over, or given up."""
         if job.state != "following":
-            await self._socket.send(StatusMessage(state="ready", view=viewport.name, what=job.what, progress=1.0))
+            await self._socket.send(StatusMessage(state="ready", view=viewport.name, what=job.label, progress=1.0))
 
     async def end(self) -> None:
         """Cancel what runs and wait for its thread; nobody asks for its result any more."""
@@ -100,22 +106,22 @@ class Freezer:
         if self._running is None:
             return
         running, self._running = self._running, None
-        running.telling.cancel()
-        await asyncio.wait({running.telling, running.future})
-        _note_error(running.telling)
+        running.reporting.cancel()
+        await asyncio.wait({running.reporting, running.future})
+        _note_error(running.reporting)
 
-    async def _tell(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
+    async def _send_progress(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
         """Say how far it is, each per cent once; what follows a hand is not worth a word."""
         if job.state == "following":
             await asyncio.wait({future})
             return
-        told = -1.0
+        last_fraction = -1.0
         while not future.done():
-            shown = round(min(1.0, max(0.0, progress[0])), 2)
-            if shown != told:
-                told = shown
-                await self._socket.send(StatusMessage(state=job.state, view=view, what=job.what, progress=shown))
-            await asyncio.wait({future}, timeout=STATUS_S)
+            fraction = round(min(1.0, max(0.0, progress[0])), 2)
+            if fraction != last_fraction:
+                last_fraction = fraction
+                await self._socket.send(StatusMessage(state=job.state, view=view, what=job.label, progress=fraction))
+            await asyncio.wait({future}, timeout=STATUS_INTERVAL_S)
 
 
 def _note_error(done: asyncio.Future[Any]) -> None:

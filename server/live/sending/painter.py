@@ -14,15 +14,15 @@ from PIL import Image
 
 from relume.errors import ParameterError
 from relume.imageio.files import to_bytes
-from relume.imageio.shrink import shrink
+from relume.imageio.shrink import downsample
 from relume.imageio.tonemap import tone_map
 from relume.look.model import DisplayLook
-from server.library.ports import Advance, FixedPicture, MovingPicture, Picture, Tile
-from server.live.state.target import Eye, Target
-from server.wire.protocol import ArrayInfo, FrameHeader, FrameTimes, TablesInfo
+from server.library.ports import FixedPicture, FreeCameraPicture, Picture, Progress, Tile
+from server.live.state.target import CameraState, Target
+from server.wire.protocol import ArrayInfo, FrameHeader, FrameTimes, SceneUpdate
 
 if TYPE_CHECKING:
-    from relume.moving.shader.tables import Numbers, Part
+    from relume.moving.shader.tables import ArrayBlock, ShaderConstants
     from relume.picture.jobs import Job
 
 Format = Literal["rgb9e5", "jpeg"]
@@ -36,37 +36,37 @@ class FrameRequest:
     Attributes:
         target: the look that the frame will show.
         accepting: pictures that have not got that look yet; all take it, or none.
-        lacking: tiles that the client has not got in HDR, besides those that this step changes.
+        missing_tiles: tiles that the client has not got in HDR, besides those that this step changes.
         only_exact: send nothing unless the step makes the picture exact, or first what is seen of it.
-        region: what is on the client's screen of it; None: all. is_turned: it has not been told to the picture.
-        is_moving: a hand waits for it: tiles out of sight come when it rests.
-        is_seen_exact: the client knows that what it sees is exact.
+        region: what is on the client's screen of it; None: all. has_new_region: it has not been told to the picture.
+        is_interactive: a hand waits for it: tiles out of sight come when it rests.
+        is_visible_exact: the client knows that what it sees is exact.
         is_due: there is something to send even where this step changes nothing.
-        is_told: the client knows that what it has is exact.
+        is_client_exact: the client knows that what it has is exact.
         size: of the picture. jpeg_size: of a JPEG of it, no larger.
         received_s: when the edit or the eye came in that no frame has answered yet, if there is one.
-        eye: that the picture is given before; None where it has its eye, or has none that moves.
-        shown_eye: number of the eye that the frame shows.
-        known: keys of the parts that the client's shader has, where it draws what moves; else None.
+        camera_state: that the picture is given before; None where it has its eye, or has none that moves.
+        camera_seq: number of the eye that the frame shows.
+        client_keys: keys of the parts that the client's shader has, where it draws what moves; else None.
     """
 
     target: Target
     accepting: Sequence[Picture]
     max_coefficients: int | None
-    lacking: frozenset[Tile]
+    missing_tiles: frozenset[Tile]
     form: Format
     quality: int
     only_exact: bool
     region: Tile | None
-    is_turned: bool
-    is_moving: bool
-    is_seen_exact: bool
+    has_new_region: bool
+    is_interactive: bool
+    is_visible_exact: bool
     is_due: bool
-    is_told: bool
+    is_client_exact: bool
     received_s: float | None
-    eye: Eye | None
-    shown_eye: int | None
-    known: Mapping[str, Hashable] | None
+    camera_state: CameraState | None
+    camera_seq: int | None
+    client_keys: Mapping[str, Hashable] | None
     frame: int
     view: str
     size: tuple[int, int]
@@ -79,48 +79,48 @@ class Painted:
 
     Attributes:
         job: what must be made before the picture can go on to where it should, or None.
-        advance: what the step changed, and what the picture shows since.
+        progress: what the step changed, and what the picture shows since.
         message: the packed frame, or None where none is to be sent.
         started_s: when the thread began, seconds of `time.perf_counter`.
-        known: keys of the parts that the client's shader has when it has got the message.
-        held_back: tiles that it lacks then.
+        client_keys: keys of the parts that the client's shader has when it has got the message.
+        deferred_tiles: tiles that it lacks then.
     """
 
     job: Job | None
-    advance: Advance
+    progress: Progress
     message: bytes | None
     update_ms: float
     started_s: float
     encode_ms: float = 0.0
-    known: Mapping[str, Hashable] | None = None
-    held_back: frozenset[Tile] = frozenset()
+    client_keys: Mapping[str, Hashable] | None = None
+    deferred_tiles: frozenset[Tile] = frozenset()
 
     @property
     def is_exact(self) -> bool:
         """Whether all that the client has is exact when it has got the message."""
-        return self.advance.exact and not self.held_back
+        return self.progress.exact and not self.deferred_tiles
 
 
 def accept(pictures: Iterable[Picture], target: Target) -> None:
     """Give pictures a look. Raises what they say where they cannot follow it, or where it needs too much memory."""
-    found = list(pictures)
-    for picture in found:
+    all_pictures = list(pictures)
+    for picture in all_pictures:
         picture.check(target.look)
-    for picture in found:
-        picture.set_look(target.look, hand=target.hand, solo=target.solo)
+    for picture in all_pictures:
+        picture.set_look(target.look, active_pointer=target.active_pointer, solo=target.solo)
 
 
-def touch(pictures: Iterable[Picture], pointer: str) -> list[Job | None]:
+def prepare(pictures: Iterable[Picture], pointer: str) -> list[Job | None]:
     """Tell pictures which curve or slider the user has in hand; what each of them needs now."""
-    found = list(pictures)
-    for picture in found:
-        picture.touch(pointer)
-    return [picture.next_job() for picture in found]
+    all_pictures = list(pictures)
+    for picture in all_pictures:
+        picture.prepare(pointer)
+    return [picture.next_job() for picture in all_pictures]
 
 
-def install(picture: Picture, job: Job, made: Any) -> Job | None:
+def install(picture: Picture, job: Job, result: Any) -> Job | None:
     """Hand over what was made; what the picture needs next."""
-    picture.install(job, made)
+    picture.install(job, result)
     return picture.next_job()
 
 
@@ -128,46 +128,53 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     """Advance the picture as far as it can go now, and pack the frame where there is something to show."""
     start_s = time.perf_counter()
     accept(request.accepting, request.target)
-    if request.eye is not None:
-        eye = request.eye
-        cast("MovingPicture", picture).set_eye(eye.camera, eye.size, rests=eye.rests)
-    if request.is_turned:
+    if request.camera_state is not None:
+        camera_state = request.camera_state
+        cast("FreeCameraPicture", picture).set_camera(
+            camera_state.camera, camera_state.size, is_idle=camera_state.is_idle
+        )
+    if request.has_new_region:
         cast("FixedPicture", picture).look_at(request.region)
-    advance = picture.advance(request.max_coefficients)
+    progress = picture.advance(request.max_coefficients)
     job = picture.next_job()
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
-    if request.known is not None and (found := cast("MovingPicture", picture).parts()) is not None:
-        return _tables(request, advance, job, found, start_s)
-    has_news = bool(advance.tiles) or request.is_due
-    is_held = request.only_exact and (advance.fidelity != "exact" or request.is_seen_exact)
-    is_sent = (has_news or not request.is_told) if advance.exact else (has_news and not is_held)
-    if not is_sent:
-        return Painted(job, advance, None, update_ms, start_s)
-    lacking = request.lacking.union(advance.tiles)
-    is_on_its_way = request.is_moving or (job is not None and not advance.exact)
-    held_back = _out_of_sight(lacking, request) if is_on_its_way else frozenset()
-    if lacking and lacking == held_back and request.received_s is None:  # nobody would see anything of it
-        return Painted(job, advance, None, update_ms, start_s, held_back=held_back)
-    tiles, payload, alpha = _payload(picture, request, lacking - held_back)
+    if (
+        request.client_keys is not None
+        and (shader_data := cast("FreeCameraPicture", picture).array_blocks()) is not None
+    ):
+        return _pack_scene_update(request, progress, job, shader_data, start_s)
+    has_changes = bool(progress.tiles) or request.is_due
+    must_wait = request.only_exact and (progress.fidelity != "exact" or request.is_visible_exact)
+    should_send = (has_changes or not request.is_client_exact) if progress.exact else (has_changes and not must_wait)
+    if not should_send:
+        return Painted(job, progress, None, update_ms, start_s)
+    missing_tiles = request.missing_tiles.union(progress.tiles)
+    is_in_progress = request.is_interactive or (job is not None and not progress.exact)
+    deferred_tiles = _tiles_outside_region(missing_tiles, request) if is_in_progress else frozenset()
+    if (
+        missing_tiles and missing_tiles == deferred_tiles and request.received_s is None
+    ):  # nobody would see anything of it
+        return Painted(job, progress, None, update_ms, start_s, deferred_tiles=deferred_tiles)
+    tiles, payload, alpha = _payload(picture, request, missing_tiles - deferred_tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    of_picture = {
+    picture_fields = {
         "tiles": tiles, "format": request.form, "kind": "picture", "alpha": alpha is not None,
-        "exact": advance.exact and not held_back,
+        "exact": progress.exact and not deferred_tiles,
     }  # fmt: skip
-    header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_picture)
+    header = _header(request, progress, times(_waited_ms(request, start_s), update_ms, encode_ms), picture_fields)
     message = pack(header, payload + (alpha or b""))
-    return Painted(job, advance, message, update_ms, start_s, encode_ms, held_back=held_back)
+    return Painted(job, progress, message, update_ms, start_s, encode_ms, deferred_tiles=deferred_tiles)
 
 
-def _out_of_sight(lacking: frozenset[Tile], request: FrameRequest) -> frozenset[Tile]:
+def _tiles_outside_region(missing_tiles: frozenset[Tile], request: FrameRequest) -> frozenset[Tile]:
     """Tiles that a frame can do without while its picture is on its way."""
     if request.region is None or request.form == "jpeg":
         return frozenset()
     left, top, across, down = request.region
     return frozenset(
         (x, y, width, height)
-        for x, y, width, height in lacking
+        for x, y, width, height in missing_tiles
         if x + width <= left or left + across <= x or y + height <= top or top + down <= y
     )
 
@@ -177,7 +184,7 @@ def _waited_ms(request: FrameRequest, start_s: float) -> float:
     return 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
 
 
-def _header(request: FrameRequest, advance: Advance, ms: FrameTimes, rest: Mapping[str, Any]) -> FrameHeader:
+def _header(request: FrameRequest, progress: Progress, ms: FrameTimes, fields: Mapping[str, Any]) -> FrameHeader:
     return FrameHeader(
         frame=request.frame,
         revision=request.target.revision,
@@ -185,64 +192,68 @@ def _header(request: FrameRequest, advance: Advance, ms: FrameTimes, rest: Mappi
         view=request.view,
         width=request.size[0],
         height=request.size[1],
-        fidelity=advance.fidelity,
-        complete=advance.complete,
-        eye=request.shown_eye,
-        was_off=advance.was_off,
+        fidelity=progress.fidelity,
+        complete=progress.complete,
+        eye=request.camera_seq,
+        was_off=progress.was_off,
         ms=ms,
-        **rest,
+        **fields,
     )
 
 
-def _tables(
-    request: FrameRequest, advance: Advance, job: Job | None, found: tuple[Mapping[str, Part], Numbers], start_s: float
+def _pack_scene_update(
+    request: FrameRequest,
+    progress: Progress,
+    job: Job | None,
+    shader_data: tuple[Mapping[str, ArrayBlock], ShaderConstants],
+    start_s: float,
 ) -> Painted:
     """Pack what the client's shader lacks; nothing where it has all, and has been told that the look is shown."""
-    parts, numbers = found
-    known: Mapping[str, Hashable] = request.known or {}
-    advance = replace(cast("Any", advance), tiles=[])
+    blocks, shader_arrays = shader_data
+    client_keys: Mapping[str, Hashable] = request.client_keys or {}
+    progress = replace(cast("Any", progress), tiles=[])
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
-    lacking = [part for name, part in parts.items() if known.get(name, _NOTHING) != part.key]
-    if not lacking and request.received_s is None and not request.is_due:
-        return Painted(job, advance, None, update_ms, start_s, known=known)
-    arrays = {name: array for part in lacking for name, array in part.make().items()}
+    missing_blocks = [block for name, block in blocks.items() if client_keys.get(name, _NOTHING) != block.key]
+    if not missing_blocks and request.received_s is None and not request.is_due:
+        return Painted(job, progress, None, update_ms, start_s, client_keys=client_keys)
+    arrays = {name: array for block in missing_blocks for name, array in block.make().items()}
     infos = [ArrayInfo(name=name, dtype=a.dtype.name, shape=a.shape) for name, a in arrays.items()]
-    tables = TablesInfo(**numbers._asdict(), arrays=infos)
+    scene_update = SceneUpdate(**shader_arrays._asdict(), arrays=infos)
     payload = b"".join(array.tobytes() for array in arrays.values())
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    of_tables = {"tiles": [], "format": "arrays", "kind": "tables", "tables": tables, "exact": advance.exact}
-    header = _header(request, advance, times(_waited_ms(request, start_s), update_ms, encode_ms), of_tables)
-    now_known = {**known, **{name: part.key for name, part in parts.items()}}
-    return Painted(job, advance, pack(header, payload), update_ms, start_s, encode_ms, now_known)
+    update_fields = {"tiles": [], "format": "arrays", "kind": "tables", "tables": scene_update, "exact": progress.exact}
+    header = _header(request, progress, times(_waited_ms(request, start_s), update_ms, encode_ms), update_fields)
+    new_client_keys = {**client_keys, **{name: block.key for name, block in blocks.items()}}
+    return Painted(job, progress, pack(header, payload), update_ms, start_s, encode_ms, new_client_keys)
 
 
 def _payload(
-    picture: Picture, request: FrameRequest, wanted: frozenset[Tile]
+    picture: Picture, request: FrameRequest, requested_tiles: frozenset[Tile]
 ) -> tuple[list[Tile], bytes, bytes | None]:
     """The tiles of a frame, their pixels, and their coverage where they are not opaque."""
     if request.form == "jpeg":
-        shown = jpeg_of(picture, request.target.look.display, request.jpeg_size, request.quality)
-        return [(0, 0, *request.size)], shown, None
-    tiles = sorted(wanted, key=lambda tile: (tile[1], tile[0]))
+        jpeg = encode_jpeg(picture, request.target.look.display, request.jpeg_size, request.quality)
+        return [(0, 0, *request.size)], jpeg, None
+    tiles = sorted(requested_tiles, key=lambda tile: (tile[1], tile[0]))
     return tiles, picture.encode(tiles, "rgb9e5"), picture.encode_alpha(tiles)
 
 
-def jpeg_of(picture: Picture, display: DisplayLook, size: tuple[int, int], quality: int) -> bytes:
+def encode_jpeg(picture: Picture, display: DisplayLook, size: tuple[int, int], quality: int) -> bytes:
     """A picture as it is displayed, no larger than a size."""
-    image = shrink(picture.image(), size)
+    image = downsample(picture.image(), size)
     try:
-        shown = tone_map(image, display.exposure, display.tone_map, quick=True)
+        displayed = tone_map(image, display.exposure, display.tone_map, use_table=True)
     except ParameterError:  # the server has no such view: the editor says so, and shows this
-        shown = tone_map(image, display.exposure, "agx")
+        displayed = tone_map(image, display.exposure, "agx")
     buffer = io.BytesIO()
-    Image.fromarray(to_bytes(shown)).save(buffer, "JPEG", quality=quality)
+    Image.fromarray(to_bytes(displayed)).save(buffer, "JPEG", quality=quality)
     return buffer.getvalue()
 
 
-def encode_brush(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:
+def encode_highlight(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:
     """The payload of a brush frame: how much of each pixel comes from that stretch of the curve, 0…255."""
-    return to_bytes(picture.brush(pointer, from_degrees, to_degrees)).tobytes()
+    return to_bytes(picture.highlight_pixels(pointer, from_degrees, to_degrees)).tobytes()
 
 
 def pack(header: FrameHeader, payload: bytes) -> bytes:

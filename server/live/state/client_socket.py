@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from relume.errors import ProtocolError
-from server.errors import CLOSE_NO_ACKNOWLEDGEMENT, problem_of
+from server.errors import CLOSE_NO_ACKNOWLEDGEMENT, make_problem
 from server.wire.protocol import Problem, ProblemMessage
 
 CLOSE_SECONDS = 2.0
@@ -17,22 +17,22 @@ CLOSE_SECONDS = 2.0
 class ClientSocket:
     """Sends, and gives up on a client that does not read."""
 
-    def __init__(self, websocket: WebSocket, send_seconds: float) -> None:
-        self._websocket, self._send_seconds = websocket, send_seconds
+    def __init__(self, websocket: WebSocket, send_timeout_s: float) -> None:
+        self._websocket, self._send_timeout_s = websocket, send_timeout_s
 
     async def send(self, message: BaseModel) -> None:
         """A text message."""
-        async with self._patience():
+        async with self._limit_send_time():
             await self._websocket.send_text(message.model_dump_json(by_alias=True))
 
     async def send_frame(self, frame: bytes) -> None:
         """A binary message."""
-        async with self._patience():
+        async with self._limit_send_time():
             await self._websocket.send_bytes(frame)
 
     async def refuse(self, error: Exception | Problem, revision: int | None = None) -> None:
         """Say that a message was refused."""
-        problem = error if isinstance(error, Problem) else problem_of(error)
+        problem = error if isinstance(error, Problem) else make_problem(error)
         await self.send(ProblemMessage(revision=revision, problem=problem))
 
     async def close(self, code: int, reason: str) -> None:
@@ -45,13 +45,13 @@ class ClientSocket:
         except (TimeoutError, WebSocketDisconnect, RuntimeError):
             return
 
-    def _patience(self) -> _Patience:
+    def _limit_send_time(self) -> _Backoff:
         if self._websocket.application_state is WebSocketState.DISCONNECTED:  # another task has found that out
             raise WebSocketDisconnect(1006)
-        return _Patience(self._send_seconds)
+        return _Backoff(self._send_timeout_s)
 
 
-class _Patience:
+class _Backoff:
     """A timeout that ends in the session's own words."""
 
     def __init__(self, seconds: float) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from relume.errors import ProtocolError
 from server.errors import CLOSE_NO_ACKNOWLEDGEMENT
-from server.live.state.shown_views import ShownViews
+from server.live.state.shown_views import VisibleViews
 from server.wire.protocol import MAX_FRAMES_IN_FLIGHT
 
 MEASURED_BYTES = 16 * 1024
@@ -14,7 +14,7 @@ SLOW_S, QUICK_S = 0.066, 0.040
 
 
 @dataclass(frozen=True)
-class _Sent:
+class _InFlightFrame:
     view: str
     sent_s: float
     num_bytes: int
@@ -25,21 +25,21 @@ class FrameWindow:
 
     def __init__(self, ack_seconds: float) -> None:
         self._ack_seconds = ack_seconds
-        self._in_flight: dict[int, _Sent] = {}
+        self._in_flight: dict[int, _InFlightFrame] = {}
         self._last_frame = 0
         self._last_ack_s = 0.0
         self._round_trip_s = float("inf")
         self._bytes_per_s: float | None = None
 
-    def has_room(self, view: str, shown: ShownViews) -> bool:
+    def has_room(self, view: str, visible_views: VisibleViews) -> bool:
         """Whether another frame of a view may be sent: one alone has all slots; of several, the focused one has a slot
         of its own, and the others share the rest."""
         if len(self._in_flight) >= MAX_FRAMES_IN_FLIGHT:
             return False
-        if len(shown.names) == 1:
+        if len(visible_views.names) == 1:
             return True
-        is_focused = view == shown.focus
-        num_alike = sum((sent.view == shown.focus) == is_focused for sent in self._in_flight.values())
+        is_focused = view == visible_views.focus
+        num_alike = sum((in_flight.view == visible_views.focus) == is_focused for in_flight in self._in_flight.values())
         return num_alike < (1 if is_focused else MAX_FRAMES_IN_FLIGHT - 1)
 
     @property
@@ -52,12 +52,12 @@ class FrameWindow:
         """Id of the frame to be sent next."""
         return self._last_frame + 1
 
-    def sent(self, view: str, num_bytes: int, now_s: float) -> None:
+    def on_sent(self, view: str, num_bytes: int, now_s: float) -> None:
         """A frame of a view goes out."""
         self._last_frame += 1
-        self._in_flight[self._last_frame] = _Sent(view, now_s, num_bytes)
+        self._in_flight[self._last_frame] = _InFlightFrame(view, now_s, num_bytes)
 
-    def acknowledged(self, frame: int, now_s: float) -> None:
+    def on_acknowledged(self, frame: int, now_s: float) -> None:
         """The client has this frame and so all before it.
 
         Raises:
@@ -65,20 +65,20 @@ class FrameWindow:
         """
         if frame > self._last_frame or frame < 1:
             raise ProtocolError(f"frame {frame} was never sent; acknowledge frames that arrived", 1002)
-        sent = self._in_flight.get(frame)
+        in_flight = self._in_flight.get(frame)
         for earlier in [f for f in self._in_flight if f <= frame]:
             del self._in_flight[earlier]
-        if sent is not None:
-            self._measure(sent, now_s)
+        if in_flight is not None:
+            self._measure(in_flight, now_s)
         self._last_ack_s = now_s
 
-    def _measure(self, sent: _Sent, now_s: float) -> None:
+    def _measure(self, in_flight: _InFlightFrame, now_s: float) -> None:
         """Throughput from bytes over the time beyond the quickest round trip; frames queue behind each other."""
-        taken_s = max(now_s - max(sent.sent_s, self._last_ack_s), 1e-4)
-        self._round_trip_s = min(self._round_trip_s, now_s - sent.sent_s)
-        if sent.num_bytes < MEASURED_BYTES:
+        transfer_s = max(now_s - max(in_flight.sent_s, self._last_ack_s), 1e-4)
+        self._round_trip_s = min(self._round_trip_s, now_s - in_flight.sent_s)
+        if in_flight.num_bytes < MEASURED_BYTES:
             return
-        rate = sent.num_bytes / max(taken_s - 0.5 * self._round_trip_s, 1e-4)
+        rate = in_flight.num_bytes / max(transfer_s - 0.5 * self._round_trip_s, 1e-4)
         self._bytes_per_s = rate if self._bytes_per_s is None else 0.7 * self._bytes_per_s + 0.3 * rate
 
     def is_slow_for(self, num_bytes: int, *, was_slow: bool) -> bool:

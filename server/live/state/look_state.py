@@ -8,7 +8,7 @@ from typing import Any
 from relume import look as looks
 from relume.errors import EditError
 from relume.look import Look, MaterialLook
-from server.live.state.pointers import check_hand
+from server.live.state.pointers import check_active_pointer
 from server.live.state.target import Target
 from server.wire.protocol import EditMessage
 
@@ -37,35 +37,44 @@ class LookState:
         patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
         document = looks.apply_patch(self.document, patch, self.default)
         if message.hand is not None:
-            check_hand(message.hand, document)
+            check_active_pointer(message.hand, document)
         look = self._read(document)
         self.document, self.revision = document, message.revision
-        if message.says_solo:
+        if message.changes_solo:
             self.solo = None if message.solo is None else frozenset(message.solo)
-        taken_s = time.perf_counter()
-        return Target(look, document, message.revision, received_s, message.hand, self.solo, taken_s=taken_s)
+        applied_s = time.perf_counter()
+        return Target(look, document, message.revision, received_s, message.hand, self.solo, applied_s=applied_s)
 
-    def follow(self, document: dict[str, Any], of: Target) -> Target:
+    def adopt(self, document: dict[str, Any], source: Target) -> Target:
         """Show a document that somebody else's edit led to, as they see it; the revision stays."""
         self.document = document
         look = self._read(document)
-        return Target(look, document, self.revision, of.received_s, of.hand, self.solo, of.shared, of.taken_s)
+        return Target(
+            look,
+            document,
+            self.revision,
+            source.received_s,
+            source.active_pointer,
+            self.solo,
+            source.shared,
+            source.applied_s,
+        )
 
-    def reverted(self, document: dict[str, Any], shown: Target) -> Target:
-        """What would be shown if the look became this document, and what is alone as it was when `shown` was."""
-        return Target(self._read(document), document, self.revision, None, solo=shown.solo, shared=shown.shared)
+    def reverted(self, document: dict[str, Any], previous: Target) -> Target:
+        """What would be shown if the look became this document, and what is alone as it was when `previous` was."""
+        return Target(self._read(document), document, self.revision, None, solo=previous.solo, shared=previous.shared)
 
-    def revert(self, shown: Target) -> None:
+    def revert(self, previous: Target) -> None:
         """Go back to the look that is shown; the revision stays, so that the client counts on."""
-        self.document, self.solo = shown.document, shown.solo
+        self.document, self.solo = previous.document, previous.solo
 
     def _read(self, document: dict[str, Any]) -> Look:
         """A complete document as a look; long curves of materials that did not change are not read again."""
-        known, self._materials = self._materials, {}
-        for name, part in document["materials"].items():
-            before, material = known.get(name, (None, None))
-            if material is None or before is not part:
-                material = MaterialLook.model_validate(part)
-            self._materials[name] = part, material
+        previous, self._materials = self._materials, {}
+        for name, section in document["materials"].items():
+            before, material = previous.get(name, (None, None))
+            if material is None or before is not section:
+                material = MaterialLook.model_validate(section)
+            self._materials[name] = section, material
         materials = {name: material for name, (_, material) in self._materials.items()}
         return Look.model_validate({**document, "materials": materials})

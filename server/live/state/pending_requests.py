@@ -6,8 +6,8 @@ import asyncio
 from dataclasses import dataclass, field
 from typing import Literal
 
-from server.live.state.target import Eye, Target
-from server.wire.protocol import BrushMessage, ProbeMessage
+from server.live.state.target import CameraState, Target
+from server.wire.protocol import HighlightMessage, InspectMessage
 
 
 @dataclass
@@ -17,41 +17,41 @@ class PendingRequests:
     Attributes:
         target: the newest look; it stays, each view is painted with it once.
         space: width and height that the client has for the view that it shows alone; None: as much as it is large.
-        eyes: newest eye of each view that has been given one; it stays.
+        camera_states: newest eye of each view that has been given one; it stays.
         regions: what is on the client's screen of each view, where it has said so: x, y, width, height in pixels.
         evaluator: who finds the pixels of views whose eye moves.
-        touch, hold: pointers of a curve that was opened, of a parameter whose slider is in hand.
+        prepare_curve, active_parameter: pointers of a curve that was opened, of a parameter whose slider is in hand.
     """
 
     target: Target
-    eyes: dict[str, Eye] = field(default_factory=dict)
+    camera_states: dict[str, CameraState] = field(default_factory=dict)
     regions: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
-    touch: str | None = None
-    hold: str | None = None
-    probe: ProbeMessage | None = None
-    brush: BrushMessage | None = None
+    prepare_curve: str | None = None
+    active_parameter: str | None = None
+    inspect: InspectMessage | None = None
+    highlight: HighlightMessage | None = None
     form: Literal["hdr", "jpeg", "auto"] = "auto"
     quality: int = 80
     evaluator: Literal["browser", "server"] = "server"
     space: tuple[int, int] | None = None
-    news: asyncio.Event = field(default_factory=asyncio.Event)
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def take_touch(self) -> str | None:
+    def pop_prepare(self) -> str | None:
         """Empty the touched curve's slot."""
-        taken, self.touch = self.touch, None
+        taken, self.prepare_curve = self.prepare_curve, None
         return taken
 
-    def take_hold(self) -> str | None:
+    def pop_active(self) -> str | None:
         """Empty the held parameter's slot."""
-        taken, self.hold = self.hold, None
+        taken, self.active_parameter = self.active_parameter, None
         return taken
 
-    def take_probe(self) -> ProbeMessage | None:
+    def pop_inspect(self) -> InspectMessage | None:
         """Empty the probe's slot."""
-        taken, self.probe = self.probe, None
+        taken, self.inspect = self.inspect, None
         return taken
 
-    def take_brush(self) -> BrushMessage | None:
+    def pop_highlight(self) -> HighlightMessage | None:
         """Empty the brush's slot."""
-        taken, self.brush = self.brush, None
+        taken, self.highlight = self.highlight, None
         return taken

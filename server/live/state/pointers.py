@@ -26,38 +26,38 @@ def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any
     Raises:
         ParameterError: there is no such curve in this look.
     """
-    wanted = parse_curve(pointer)
-    term = _term(wanted, document)
-    curves = {curve.name: curve for curve in TERMS[term["model"]].settled(term).curves} if term else {}
-    if term is None or wanted.name not in curves:
+    curve_pointer = parse_curve(pointer)
+    term = _term(curve_pointer, document)
+    curves = {curve.name: curve for curve in TERMS[term["model"]].normalized(term).curves} if term else {}
+    if term is None or curve_pointer.name not in curves:
         raise ParameterError("curve", pointer, "a pointer like /materials/Teapot/terms/1/curves/theta_h of this look")
-    return term, curves[wanted.name]
+    return term, curves[curve_pointer.name]
 
 
-def check_held(pointer: str, document: Mapping[str, Any]) -> None:
+def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
     """Raises ParameterError where this look has no such parameter, light or field of the environment."""
     match parse_pointer(pointer):
         case ParameterPointer() as parameter:
             term = _term(parameter, document)
-            is_there = term is not None and parameter.name in {p.name for p in TERMS[term["model"]].parameters}
+            exists = term is not None and parameter.name in {p.name for p in TERMS[term["model"]].parameters}
         case ColorPointer(material, term_index):
-            is_there = term_index < len(document["materials"].get(material, {"terms": ()})["terms"])
+            exists = term_index < len(document["materials"].get(material, {"terms": ()})["terms"])
         case LightPointer(name):
-            is_there = name in document["lights"]
+            exists = name in document["lights"]
         case EnvironmentPointer() | TransportPointer():
-            is_there = True
+            exists = True
         case CurvePointer():
-            is_there = False
-    if not is_there:
+            exists = False
+    if not exists:
         raise ParameterError("parameter", pointer, "like /materials/Teapot/terms/1/params/ior or /lights/Lamp, here")
 
 
-def check_hand(pointer: str, document: Mapping[str, Any]) -> None:
-    """Raises ParameterError where this look has neither such a curve nor what `check_held` looks for."""
+def check_active_pointer(pointer: str, document: Mapping[str, Any]) -> None:
+    """Raises ParameterError where this look has neither such a curve nor what `check_parameter` looks for."""
     if isinstance(parse_pointer(pointer), CurvePointer):
         find_curve(pointer, document)
     else:
-        check_held(pointer, document)
+        check_parameter(pointer, document)
 
 
 def _term(pointer: CurvePointer | ParameterPointer, document: Mapping[str, Any]) -> dict[str, Any] | None:

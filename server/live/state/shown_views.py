@@ -7,34 +7,34 @@ from collections.abc import Sequence
 from relume.errors import ParameterError
 
 
-class ShownViews:
+class VisibleViews:
     """Set by the receiving side, followed by the frame loop; both on the event loop.
 
     Attributes:
         names: views in the client's order. focus: the one under the pointer, served first.
-        again: views that the client has asked for since the frame loop looked, and has nothing of.
+        resend_names: views that the client has asked for since the frame loop looked, and has nothing of.
     """
 
     def __init__(self, names: Sequence[str], focus: str) -> None:
         self.names, self.focus = tuple(names), focus
-        self.again: set[str] = set()
+        self.resend_names: set[str] = set()
 
     def show(self, names: Sequence[str]) -> None:
         """Show these from now on; the focus stays where it is one of them."""
         self.names = tuple(dict.fromkeys(names))
-        self.again.update(self.names)
-        self._keep_focus()
+        self.resend_names.update(self.names)
+        self._clamp_focus()
 
     def hide(self, name: str) -> None:
         """One of several cannot be shown."""
-        self.names = tuple(other for other in self.names if other != name)
-        self._keep_focus()
+        self.names = tuple(view_name for view_name in self.names if view_name != name)
+        self._clamp_focus()
 
-    def _keep_focus(self) -> None:
+    def _clamp_focus(self) -> None:
         if self.focus not in self.names:
             self.focus = self.names[0]
 
-    def work_in(self, name: str) -> None:
+    def set_focus(self, name: str) -> None:
         """The pointer is in this view now.
 
         Raises:

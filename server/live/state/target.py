@@ -15,8 +15,8 @@ class Target:
 
     Attributes:
         look: validated. document: the same as JSON.
-        received_s: when the edit came in; None for a look that no edit asked for. taken_s: when it had been applied.
-        hand: pointer to what the hand was on that made it, where the client said so.
+        received_s: when the edit came in; None for a look that no edit asked for. applied_s: when it had been applied.
+        active_pointer: pointer to what the hand was on that made it, where the client said so.
         solo: names of sources of light that alone are shown; None: all.
         shared: how often a room's look had changed by then; 0 where nobody shares it.
     """
@@ -25,23 +25,23 @@ class Target:
     document: dict[str, Any]
     revision: int
     received_s: float | None
-    hand: str | None = None
+    active_pointer: str | None = None
     solo: frozenset[str] | None = None
     shared: int = 0
-    taken_s: float = 0.0
+    applied_s: float = 0.0
 
 
 @dataclass(frozen=True)
-class Eye:
+class CameraState:
     """Where a moving view is to be seen from.
 
     Attributes:
-        number: that frames name. size: of their pictures, pixels. received_s: when it came in.
-        rests: an exact picture is to follow when nothing else is left to do.
+        seq: that frames name. size: of their pictures, pixels. received_s: when it came in.
+        is_idle: an exact picture is to follow when nothing else is left to do.
     """
 
-    number: int
+    seq: int
     camera: Camera
     size: tuple[int, int]
     received_s: float
-    rests: bool
+    is_idle: bool

@@ -10,14 +10,14 @@ from fastapi import Path as PathPart
 from fastapi.concurrency import run_in_threadpool
 
 from relume.environments.asset_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
-from relume.environments.built_in import BUILT_IN, built_in
+from relume.environments.built_in import BUILT_IN, load_built_in
 from relume.environments.thumbnail import thumbnail
-from server.files.door import Held
+from server.files.door import ReservationDep
 from server.files.png import A_DAY, PngResponse
-from server.routes.paging import NameFilter, Paged
-from server.routes.shelves.sending import take_in
-from server.services import Shared
-from server.wire.bodies import EnvironmentBody, moment
+from server.routes.paging import NameFilter, PageDep
+from server.routes.shelves.sending import store_upload
+from server.services import ServicesDep
+from server.wire.bodies import EnvironmentBody, format_timestamp
 from server.wire.body import Id
 from worker.paths import environments_path
 
@@ -29,18 +29,18 @@ AnyId = Annotated[str, PathPart(max_length=40, description="id of an imported en
 
 @router.post("", status_code=201)
 async def import_environment(
-    environment: MapFile, services: Shared, held: Held, response: Response, name: MapName = ""
+    environment: MapFile, services: ServicesDep, reservation: ReservationDep, response: Response, name: MapName = ""
 ) -> EnvironmentBody:
     """Import an environment, in a process of its own; the body says how look documents name it."""
-    identity = await take_in(environment, name, "environment", held, services)
+    identity = await store_upload(environment, name, "environment", reservation, services)
     response.headers["Location"] = f"/api/environments/{identity}"
     return await run_in_threadpool(get_environment, identity, services)
 
 
 @router.get("")
-def list_environments(services: Shared, page: Paged, name: NameFilter = None) -> list[EnvironmentBody]:
+def list_environments(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[EnvironmentBody]:
     """The built-in ones, then the imported ones, newest first; or those of a name."""
-    listed = [((0.0, float(index), one), _built_in_body(one)) for index, one in enumerate(BUILT_IN)]
+    listed = [((0.0, float(index), example), _built_in_body(example)) for index, example in enumerate(BUILT_IN)]
     imported = records(environments_path(services.settings.data))
     listed += [((1.0, -record.created, record.id), _body(record)) for record in imported]
     named = [(key, body) for key, body in listed if name in (None, body.name)]
@@ -48,7 +48,7 @@ def list_environments(services: Shared, page: Paged, name: NameFilter = None) ->
 
 
 @router.get("/{environment}")
-def get_environment(environment: AnyId, services: Shared) -> EnvironmentBody:
+def get_environment(environment: AnyId, services: ServicesDep) -> EnvironmentBody:
     """One environment."""
     if environment in BUILT_IN:
         return _built_in_body(environment)
@@ -56,20 +56,20 @@ def get_environment(environment: AnyId, services: Shared) -> EnvironmentBody:
 
 
 @router.get("/{environment}/thumbnail.png", response_class=PngResponse, name="get_environment_thumbnail")
-async def get_thumbnail(environment: AnyId, services: Shared) -> PngResponse:
+async def get_thumbnail(environment: AnyId, services: ServicesDep) -> PngResponse:
     """A small tone-mapped picture, 192 × 96."""
 
-    def make() -> bytes:
+    def read_thumbnail() -> bytes:
         if environment in BUILT_IN:
             return _built_in_thumbnail(environment)
         return thumbnail_path(environments_path(services.settings.data), environment).read_bytes()
 
-    png = await services.pictures.make(("environment", environment), make)
+    png = await services.pictures.run(("environment", environment), read_thumbnail)
     return PngResponse(png, headers=A_DAY)
 
 
 @router.delete("/{environment}", status_code=204)
-def delete_environment(environment: Id, services: Shared) -> Response:
+def delete_environment(environment: Id, services: ServicesDep) -> Response:
     """Delete an imported environment; looks that name it are refused from then on."""
     STORE.remove(environments_path(services.settings.data), environment)
     services.access.quotas.disown("environment", environment)
@@ -78,7 +78,7 @@ def delete_environment(environment: Id, services: Shared) -> Response:
 
 @lru_cache(maxsize=len(BUILT_IN))
 def _built_in_thumbnail(name: str) -> bytes:
-    return thumbnail(built_in(name).radiance)
+    return thumbnail(load_built_in(name).radiance)
 
 
 def _built_in_body(name: str) -> EnvironmentBody:
@@ -93,7 +93,7 @@ def _body(record: EnvironmentRecord) -> EnvironmentBody:
         id=record.id,
         map=record.map,
         name=record.name,
-        created=moment(record.created),
+        created=format_timestamp(record.created),
         warnings=list(record.warnings),
         thumbnail=f"/api/environments/{record.id}/thumbnail.png",
     )

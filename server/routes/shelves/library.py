@@ -11,29 +11,29 @@ from fastapi.concurrency import run_in_threadpool
 from relume.errors import NotFoundError
 from relume.look.library import navigation_map, presets
 from server.files.png import A_DAY, PngResponse
-from server.routes.paging import Paged
+from server.routes.paging import PageDep
 from server.wire.bodies import MapPoint, MaterialBody, MaterialMapBody
 
 router = APIRouter(prefix="/api/materials", tags=["materials"])
-Part = Annotated[str, Path(max_length=100)]
+PathSegment = Annotated[str, Path(max_length=100)]
 
 
 @router.get("")
-def list_materials(page: Paged) -> list[MaterialBody]:
+def list_materials(page: PageDep) -> list[MaterialBody]:
     """The library: fitted materials under every model that was fitted to them."""
     return [MaterialBody(**asdict(preset)) for preset in page.in_order(presets())]
 
 
 @router.get("/map")
-def show_material_map() -> MaterialMapBody:
+def get_material_map() -> MaterialMapBody:
     """The library's Cook–Torrance materials in the plane of reflectance and roughness, triangulated (Sun 2007)."""
-    found = navigation_map()
+    nav_map = navigation_map()
     return MaterialMapBody(
         points=[
             MapPoint(id=preset.id, f0=f0, sigma=sigma)
-            for preset, f0, sigma in zip(found.presets, found.f0.tolist(), found.sigma.tolist(), strict=True)
+            for preset, f0, sigma in zip(nav_map.presets, nav_map.f0.tolist(), nav_map.sigma.tolist(), strict=True)
         ],
-        triangles=[(a, b, c) for a, b, c in found.triangles.tolist()],
+        triangles=[(a, b, c) for a, b, c in nav_map.triangles.tolist()],
     )
 
 
@@ -46,16 +46,16 @@ def material_at(
 
 
 @router.get("/{table}/{material}/thumbnail.png", response_class=PngResponse, name="get_material_thumbnail")
-async def thumbnail(table: Part, material: Part) -> PngResponse:
+async def thumbnail(table: PathSegment, material: PathSegment) -> PngResponse:
     """A ball of a library material."""
     png = await run_in_threadpool(_thumbnail, f"{table}/{material}")
     return PngResponse(png, headers=A_DAY)
 
 
 def _thumbnail(identity: str) -> bytes:
-    from relume.balls.library import library_ball  # loads compiled kernels
+    from relume.balls.library import library_preview_png  # loads compiled kernels
 
-    png = library_ball(identity)
+    png = library_preview_png(identity)
     if png is None:
         raise NotFoundError(f"the library has no material {identity[:80]!r}; GET /api/materials lists them")
     return png

@@ -11,13 +11,13 @@ from fastapi.concurrency import run_in_threadpool
 from relume.brdf.document import complete_term
 from relume.btf.shelf import BtfRecord
 from relume.measured.asset_store import STORE, MaterialRecord, get_record, records
-from server.files.door import Held
+from server.files.door import ReservationDep
 from server.files.png import A_DAY, PngResponse
-from server.routes.paging import NameFilter, Paged, records_page
+from server.routes.paging import NameFilter, PageDep, records_page
 from server.routes.shelves.in_use import remove_unused
-from server.routes.shelves.sending import take_in
-from server.services import Shared
-from server.wire.bodies import MeasuredBody, moment
+from server.routes.shelves.sending import store_upload
+from server.services import ServicesDep
+from server.wire.bodies import MeasuredBody, format_timestamp
 from server.wire.body import Id
 from worker.paths import materials_path
 
@@ -28,50 +28,54 @@ MaterialName = Annotated[str, Form(max_length=200)]
 
 @router.post("", status_code=201)
 async def import_measured(
-    material: MaterialFile, services: Shared, held: Held, response: Response, name: MaterialName = ""
+    material: MaterialFile,
+    services: ServicesDep,
+    reservation: ReservationDep,
+    response: Response,
+    name: MaterialName = "",
 ) -> MeasuredBody:
     """Import a MERL file, in a process of its own; the body says how look documents name it."""
-    identity = await take_in(material, name, "material", held, services)
+    identity = await store_upload(material, name, "material", reservation, services)
     response.headers["Location"] = f"/api/materials/measured/{identity}"
     return await run_in_threadpool(get_measured, identity, services)
 
 
 @router.get("")
-def list_measured(services: Shared, page: Paged, name: NameFilter = None) -> list[MeasuredBody]:
+def list_measured(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[MeasuredBody]:
     """Measured materials, newest first, or those of a name."""
     return [_body(record) for record in records_page(records(materials_path(services.settings.data)), name, page)]
 
 
 @router.get("/{material}")
-def get_measured(material: Id, services: Shared) -> MeasuredBody:
+def get_measured(material: Id, services: ServicesDep) -> MeasuredBody:
     """One measured material."""
     return _body(get_record(materials_path(services.settings.data), material))
 
 
 @router.get("/{material}/thumbnail.png", response_class=PngResponse, name="get_measured_thumbnail")
-async def get_thumbnail(material: Id, services: Shared) -> PngResponse:
+async def get_thumbnail(material: Id, services: ServicesDep) -> PngResponse:
     """A ball of the material."""
     folder = materials_path(services.settings.data)
-    png = await services.pictures.make((folder, material), lambda: thumbnail_of(get_record(folder, material)))
+    png = await services.pictures.run((folder, material), lambda: render_thumbnail(get_record(folder, material)))
     return PngResponse(png, headers=A_DAY)
 
 
 @lru_cache(maxsize=256)
-def thumbnail_of(record: MaterialRecord | BtfRecord) -> bytes:
+def render_thumbnail(record: MaterialRecord | BtfRecord) -> bytes:
     """A ball of a material, as a PNG."""
-    from relume.balls.ball import ball_png  # loads compiled kernels
+    from relume.balls.ball import preview_png  # loads compiled kernels
 
-    return ball_png(terms_of(record))
+    return preview_png(complete_terms(record))
 
 
 @router.delete("/{material}", status_code=204)
-async def delete_measured(material: Id, services: Shared) -> Response:
+async def delete_measured(material: Id, services: ServicesDep) -> Response:
     """Delete a measured material that no saved look, link, session of this server or work under way names."""
     await remove_unused(STORE, materials_path(services.settings.data), material, "material", services)
     return Response(status_code=204)
 
 
-def terms_of(record: MaterialRecord | BtfRecord) -> list[dict[str, Any]]:
+def complete_terms(record: MaterialRecord | BtfRecord) -> list[dict[str, Any]]:
     """Its terms, complete."""
     return [complete_term(("measured", k), term, None) for k, term in enumerate(record.terms())]
 
@@ -81,8 +85,8 @@ def _body(record: MaterialRecord) -> MeasuredBody:
         id=record.id,
         data=record.data,
         name=record.name,
-        created=moment(record.created),
-        terms=terms_of(record),
+        created=format_timestamp(record.created),
+        terms=complete_terms(record),
         thumbnail=f"/api/materials/measured/{record.id}/thumbnail.png",
         lobes_error=record.lobes_error,
         homomorphic_error=record.homomorphic_error,

@@ -10,11 +10,11 @@ from fastapi import UploadFile
 from relume.asset_store import check_name
 from server.access.reservations import Reservation
 from server.files.importing import ImportRequest
-from server.files.uploads import keep_upload, plain_name, plain_stem
+from server.files.uploads import plain_name, plain_stem, save_upload
 from server.services import Services
 
 
-async def take_in(
+async def store_upload(
     file: UploadFile,
     name: str,
     kind: Literal["environment", "image", "material"],
@@ -29,8 +29,8 @@ async def take_in(
     """
     called = check_name(name or plain_stem(file.filename) or kind.capitalize())
 
-    def order(folder: Path) -> ImportRequest:
-        path = keep_upload(file, folder / kind)
-        return ImportRequest.of(services.settings, kind, path, called, scene=plain_name(file.filename))
+    def make_request(folder: Path) -> ImportRequest:
+        path = save_upload(file, folder / kind)
+        return ImportRequest.create(services.settings, kind, path, called, scene=plain_name(file.filename))
 
-    return await services.intake.take(reservation, order)
+    return await services.intake.import_file(reservation, make_request)

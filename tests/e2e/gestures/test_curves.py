@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from editor_page import SETTLE, WAIT_MS, Editor, changed
+from editor_page import WAIT_FOR_FRAMES, WAIT_MS, Editor, changed
 from editor_server import Server
 from numpy.typing import NDArray
 from playwright.sync_api import Locator, expect
@@ -15,7 +15,7 @@ from playwright.sync_api import Locator, expect
 from relume import look as looks
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.memory import Memory
+from relume.memory import Cache
 from relume.methods.registry import open_transfer
 from relume.picture.picture import Picture
 
@@ -63,7 +63,7 @@ class CurvePage:
 
     def said(self) -> list[Any]:
         """What the curve became, edit by edit since it was last asked; None where it was given back."""
-        self.page.evaluate(SETTLE)
+        self.page.evaluate(WAIT_FOR_FRAMES)
         messages = [json.loads(text) for text in self.page.evaluate("window.said.splice(0)")]
         edits = [op for message in messages if message["type"] == "edit" for op in message["patch"]]
         return [op.get("value") for op in edits if "/curves" in op["path"]]
@@ -104,17 +104,17 @@ class Painter:
 
     def __init__(self, server: Server) -> None:
         (bake,) = server.call("/api/bakes")
-        self._transfer = open_transfer(server.data / "bakes" / f"{bake['id']}.zarr", Memory(1 << 30))
-        self._picture = Picture(self._transfer, "front", Memory(1 << 30))
+        self._transfer = open_transfer(server.data / "bakes" / f"{bake['id']}.zarr", Cache(1 << 30))
+        self._picture = Picture(self._transfer, "front", Cache(1 << 30))
 
     def paint(self, term: dict[str, Any]) -> NDArray[np.float64]:
         """With this highlight on the ball."""
         terms = [self._transfer.default_look["materials"]["Ball"]["terms"][0], term]
         look = looks.validate({"materials": {"Ball": {"terms": terms}}}, self._transfer.default_look)
         self._picture.set_look(look)
-        self._picture.touch("/materials/Ball/terms/1/curves/theta_h")
+        self._picture.prepare("/materials/Ball/terms/1/curves/theta_h")
         while not self._picture.advance(None).exact or self._picture.next_job() is not None:
-            self._picture.freeze(lambda share: None, lambda: False)
+            self._picture.run_next_job(lambda share: None, lambda: False)
         return self._picture.image().astype(np.float64)
 
 

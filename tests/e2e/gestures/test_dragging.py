@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import pytest
-from editor_page import SETTLE, WAIT_MS, Editor
+from editor_page import WAIT_FOR_FRAMES, WAIT_MS, Editor
 from editor_server import Server
 from playwright.sync_api import Browser, Locator, expect
 from test_lights import add_by_click
@@ -66,7 +66,7 @@ def value_of(name: str) -> Callable[[Editor, Locator], str | None]:
 
 def painted(editor: Editor, _: Locator) -> str | None:
     """What the plot shows."""
-    editor.page.evaluate(SETTLE)
+    editor.page.evaluate(WAIT_FOR_FRAMES)
     return str(editor.page.locator(".plot canvas").evaluate("canvas => canvas.toDataURL()"))
 
 
@@ -139,7 +139,7 @@ def drag(editor: Editor, it: Draggable, sign: int) -> None:
     seen = []
     for step in range(1, NUM_MOVES + 1):
         mouse.move(x + sign * step * dx, y + sign * step * dy)
-        editor.page.evaluate(SETTLE)
+        editor.page.evaluate(WAIT_FOR_FRAMES)
         seen.append(it.read(editor, thing))
     mouse.up()
     assert seen[0] != before or seen[1] != before
@@ -186,7 +186,7 @@ def lose(editor: Editor, it: Draggable) -> None:
     let_go = it.read(editor, thing)
     for step in (2, 3):
         send("mouseMoved", x + step * it.way[0], y + step * it.way[1], 0)
-    page.evaluate(SETTLE)
+    page.evaluate(WAIT_FOR_FRAMES)
     if it.read is not painted:  # there the pointer has a line of its own
         assert it.read(editor, thing) == let_go
     devtools.detach()

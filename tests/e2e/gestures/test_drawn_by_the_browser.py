@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from editor_page import SETTLE, WAIT_MS, Editor, changed, opened_page, wait_until_drawn
+from editor_page import WAIT_FOR_FRAMES, WAIT_MS, Editor, changed, opened_page, wait_until_drawn
 from editor_server import Server
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
@@ -65,14 +65,14 @@ def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[tupl
 def settled(editor: Editor) -> Pixels:
     """The picture once it has stopped changing."""
     expect(editor.page.locator("footer.status")).to_contain_text("approximate until", timeout=WAIT_MS)
-    editor.page.evaluate(SETTLE)  # what was done has become an edit
+    editor.page.evaluate(WAIT_FOR_FRAMES)  # what was done has become an edit
     editor.page.wait_for_function("() => window.relumeStats.waiting.length === 0", timeout=DRAWN_MS)
     whole = editor.page.get_by_text("Moving view, ")  # else it says that it previews
-    before, alike = editor.pixels_now(), 0
+    before, alike = editor.read_pixels(), 0
     deadline = time.monotonic() + DRAWN_MS / 1e3
     while time.monotonic() < deadline:
         editor.page.wait_for_timeout(500)
-        after = editor.pixels_now()
+        after = editor.read_pixels()
         alike = alike + 1 if whole.is_visible() and changed(before, after) == 0 else 0
         if alike == 2:  # on a busy machine what is found finely comes a while after what is found first
             return after

@@ -41,7 +41,7 @@ def wait_until(holds: Callable[[], bool], else_words: str) -> None:
 
 def differs(editor: Editor, before: NDArray[np.int16], least: float = 0.02) -> None:
     """Wait until the picture is another one, and the exact one of where the eye rests."""
-    wait_until(lambda: changed(before, editor.pixels_now()) >= least, "the picture stays as it was")
+    wait_until(lambda: changed(before, editor.read_pixels()) >= least, "the picture stays as it was")
     editor.wait_until_exact()
 
 
@@ -99,17 +99,17 @@ def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
     }
     for gesture in gestures.values():
         for _ in range(2):
-            before = moving.pixels_now()
+            before = moving.read_pixels()
             gesture()
             differs(moving, before)
 
 
 def test_the_eye_goes_back_to_where_it_began_and_a_reload_leaves_it(moving: Editor) -> None:
-    page, first = moving.page, moving.pixels_now()
+    page, first = moving.page, moving.read_pixels()
     moving.canvas.focus()
     page.keyboard.press("ArrowLeft")
     differs(moving, first)
-    aside = moving.pixels_now()
+    aside = moving.read_pixels()
     page.reload()
     wait_until_drawn(page)
     differs(moving, first)
@@ -121,11 +121,11 @@ def test_the_eye_goes_back_to_where_it_began_and_a_reload_leaves_it(moving: Edit
 
 
 def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(moving: Editor) -> None:
-    page, first = moving.page, moving.pixels_now()
+    page, first = moving.page, moving.read_pixels()
     moving.canvas.focus()
     page.keyboard.press("ArrowRight")
     differs(moving, first)
-    before, box = moving.pixels_now(), moving.canvas.bounding_box()
+    before, box = moving.read_pixels(), moving.canvas.bounding_box()
     assert box is not None
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     expect(page.locator(".inspector .card").first).to_be_visible()
@@ -134,7 +134,7 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     for _ in range(5):
         page.keyboard.press("PageUp")
     differs(moving, before)
-    edited = moving.pixels_now()
+    edited = moving.read_pixels()
     page.keyboard.press("Control+z")
     differs(moving, edited)
     moving.canvas.focus()
@@ -144,7 +144,7 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
 
 
 def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server, moving_scene: str) -> None:
-    page, first = moving.page, moving.pixels_now()
+    page, first = moving.page, moving.read_pixels()
     page.get_by_role("button", name="Camera ▾").click()
     menu = page.get_by_role("dialog", name="Camera")
     menu.get_by_role("slider", name="Angle").focus()
@@ -155,7 +155,7 @@ def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server
         page.keyboard.press("Enter")
     expect(page.get_by_role("button", name="90×160, moving")).to_be_visible()
     moving.wait_until_exact()
-    there = moving.pixels_now()
+    there = moving.read_pixels()
     menu.get_by_role("button", name="Keep this camera").click()
     menu.get_by_role("button", name="View 1: rename").click()
     page.keyboard.type("Near")
@@ -164,7 +164,7 @@ def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server
     moving.canvas.focus()
     page.keyboard.press("ArrowLeft")
     differs(moving, there)
-    aside = moving.pixels_now()
+    aside = moving.read_pixels()
     menu.get_by_role("button", name="Look from Near").click()
     differs(moving, aside)
     comes_back(moving, there, MENU_PX)
@@ -183,7 +183,7 @@ def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server
 
 @pytest.mark.slow
 def test_a_turntable_from_where_the_eye_is_is_taken_away(moving: Editor, tmp_path: Path) -> None:
-    page, first = moving.page, moving.pixels_now()
+    page, first = moving.page, moving.read_pixels()
     moving.canvas.focus()
     page.keyboard.press("ArrowUp")
     differs(moving, first)

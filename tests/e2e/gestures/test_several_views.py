@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from editor_page import SETTLE, WAIT_MS, Editor, changed
+from editor_page import WAIT_FOR_FRAMES, WAIT_MS, Editor, changed
 from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import expect
@@ -28,7 +28,7 @@ def cells(editor: Editor) -> list[NDArray[np.int16]]:
     """What each view shows."""
     editor.wait_until_exact()
     editor.page.mouse.move(2, 2)
-    editor.page.evaluate(SETTLE)
+    editor.page.evaluate(WAIT_FOR_FRAMES)
     return screenshots(editor)
 
 

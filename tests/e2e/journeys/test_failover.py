@@ -13,7 +13,7 @@ import pytest
 from editor_page import Editor, changed, opened_page
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
-from replicas_proxy import CONFIGURATION, proxied
+from replicas_proxy import CONFIGURATION, proxy_to_ports
 
 ROOM = secrets.token_hex(16)
 
@@ -62,7 +62,7 @@ def test_a_room_goes_on_when_its_server_is_killed(
     servers: tuple[Server, Server], people: tuple[Page, Page], browser: Browser, tmp_path: Path
 ) -> None:
     (scene,) = servers[0].call("/api/scenes")
-    with proxied(tmp_path, [server.port for server in servers]) as port:
+    with proxy_to_ports(tmp_path, [server.port for server in servers]) as port:
         ann, bob = (Editor(page) for page in people)
         for editor in (ann, bob):
             editor.page.goto(f"http://127.0.0.1:{port}/?scene={scene['id']}#room={ROOM}")

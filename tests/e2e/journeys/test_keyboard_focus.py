@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from editor_page import SETTLE, Editor
+from editor_page import WAIT_FOR_FRAMES, Editor
 from playwright.sync_api import Page, expect
 
 
@@ -78,6 +78,6 @@ def test_a_point_in_the_tail_moves_by_a_share_of_its_value(editor: Editor) -> No
         point.focus()
         for key, factor in (("ArrowUp", 1.02), ("ArrowUp", 1.02**2), ("ArrowDown", 1.02), ("ArrowDown", 1.0)):
             page.keyboard.press(key)
-            page.evaluate(SETTLE)
+            page.evaluate(WAIT_FOR_FRAMES)
             value = float(point.get_attribute("aria-valuenow") or "nan")
             assert value == pytest.approx(start * factor, rel=1e-3)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from editor_page import Editor
 from editor_server import Server
-from merl_files import planes_of
+from merl_files import make_planes
 from playwright.sync_api import Locator, Page, expect
 
-from relume.measured.asset_store import keep
+from relume.measured.asset_store import store_material
 from relume.measured.merl import write_merl
 from worker.paths import materials_path
 
@@ -17,8 +17,8 @@ from worker.paths import materials_path
 def measured(server: Server, tmp_path_factory: pytest.TempPathFactory) -> str:
     """Name of a measured material on the server's shelf."""
     path = tmp_path_factory.mktemp("measured") / "paint.binary"
-    write_merl(path, planes_of())
-    keep(materials_path(server.data), path, "Blue paint")
+    write_merl(path, make_planes())
+    store_material(materials_path(server.data), path, "Blue paint")
     return "Blue paint"
 
 

@@ -9,17 +9,17 @@ from editor_page import Editor, changed, opened_page
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 
-from server.access.access import Access
+from server.access.access import AuthServices
 from server.settings import Settings
 from worker.database import open_database
 from worker.ledger import Ledger
 
 
 @pytest.fixture(scope="module")
-def access(server: Server) -> Iterator[Access]:
+def access(server: Server) -> Iterator[AuthServices]:
     """Tokens and audit of the servers' database."""
     ledger = Ledger(open_database(f"sqlite:///{server.data / 'relume.db'}"))
-    yield Access(ledger.sessions, Settings())
+    yield AuthServices(ledger.sessions, Settings())
     ledger.close()
 
 
@@ -43,7 +43,7 @@ def log_in(page: Page, token: str) -> Editor:
 
 
 def test_people_log_in_and_roles_say_what_they_may_do(
-    server: Server, asking: Server, access: Access, browser: Browser
+    server: Server, asking: Server, access: AuthServices, browser: Browser
 ) -> None:
     (scene,) = server.call("/api/scenes")
     url = f"{asking.url}/?scene={scene['id']}"
@@ -83,7 +83,7 @@ def test_people_log_in_and_roles_say_what_they_may_do(
 
 @pytest.mark.slow
 def test_who_may_only_look_chooses_light_paths_and_hears_no_objection(
-    server: Server, asking: Server, access: Access, browser: Browser
+    server: Server, asking: Server, access: AuthServices, browser: Browser
 ) -> None:
     scene = str(server.call("/api/built-ins/cornell_box", {})["id"])
     server.bake({"scene": scene, "method": "gather", "size": (96, 96), "lights": 100})

@@ -20,7 +20,7 @@ def test_offline_is_said_and_edits_are_kept(editor: Editor, request: pytest.Fixt
         expect(state).to_contain_text("Offline. Edits are kept")
         roughness.press(key)
         value = roughness.get_attribute("aria-valuenow")
-        np.testing.assert_array_equal(editor.pixels_now(), before)  # the last picture stays
+        np.testing.assert_array_equal(editor.read_pixels(), before)  # the last picture stays
         page.context.set_offline(False)
         expect(state).to_have_text("Connected")
         assert changed(before, editor.pixels()) > 0.01

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from editor_page import SETTLE, WAIT_MS, Editor
+from editor_page import WAIT_FOR_FRAMES, WAIT_MS, Editor
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 
@@ -37,7 +37,7 @@ TOP_BAR = ["All scenes", "Undo", "Redo", "front", "left", "Swap", "PNG", "EXR", 
 
 
 def assert_nothing_is_cut_off(page: Page, where: str) -> None:
-    page.evaluate(SETTLE)
+    page.evaluate(WAIT_FOR_FRAMES)
     assert page.evaluate(CUT_OFF) == [], f"{where} at {page.viewport_size}"
 
 
