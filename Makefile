@@ -14,7 +14,7 @@ PROJECT_STAMP := $(VENV)/.stamp-project
 CLIENT_STAMP := client_web/node_modules/.stamp-packages
 CLIENT_BUILD := client_web/dist/index.html
 KERNEL_STAMP := $(VENV)/.stamp-kernels
-KERNEL_SOURCES := $(shell grep -rlE '^(import|from) numba' relume --include='*.py' 2>/dev/null) relume/warm.py
+KERNEL_SOURCES := $(shell grep -rlE '^(import|from) numba' relume --include='*.py' 2>/dev/null) relume/precompile.py
 TESTS_STAMP := $(VENV)/.stamp-tests
 CLIENT_SOURCES := $(shell find client_web -type f -not -path '*/node_modules/*' -not -path '*/dist/*' 2>/dev/null)
 LOCK_TOOLS := build/lock-tools
@@ -56,7 +56,7 @@ bench: setup  ## the project's own figures
 
 MINUTES ?= 120
 soak: setup  ## sessions, bakes, deletes and killed processes for MINUTES; memory, handles and disk stay flat
-	$(BIN)/python -m bench.soak --minutes $(MINUTES)
+	$(BIN)/python -m relume_bench.soak --minutes $(MINUTES)
 
 lint: $(PROJECT_STAMP)  ## style and types
 	$(BIN)/ruff check .
@@ -107,7 +107,7 @@ $(PROJECT_STAMP): $(PYTHON_STAMP) pyproject.toml
 
 $(KERNEL_STAMP): $(PROJECT_STAMP) $(KERNEL_SOURCES)
 	@echo "Compiling kernels (once, a minute or two) …"
-	@$(ONE_THREAD) $(BIN)/python -m relume.warm
+	@$(ONE_THREAD) $(BIN)/python -m relume.precompile
 	@touch $@
 
 # Processes that tests are shared out to begin at once: each would compile all sources and tests, and find no bytecode yet.

@@ -1,4 +1,4 @@
-"""relume: edit materials and lights in the finished picture. Numerics and file format; no web, no process code."""
+"""relume: edit materials and lights in the finished picture. Numerics and file formats; no web and no process code."""
 
 import os
 
@@ -6,6 +6,6 @@ import os
 # products too small to share: dividing a turned sky takes 4 ms by one thread, and 25 to 500 ms by two beside others.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from relume.kernel_cache import use_kernel_cache
+from relume.core.numba_cache import use_kernel_cache
 
 use_kernel_cache()

@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 from PIL import Image
 
-from relume.color import srgb_encode
+from relume.core.color import srgb_encode
 
 DIRECTIONS = [(0, 0), *((40, phi) for phi in (0, 90, 180, 270)), *((70, phi) for phi in (0, 72, 144, 216, 288))]
 

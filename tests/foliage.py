@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
+from relume.scene.scene_folder import make_scene
 
 _LENGTH, _WIDTH = 0.3, 0.004
 

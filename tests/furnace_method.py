@@ -2,7 +2,7 @@
 
 All surfaces glow alike, with half of the mean radiance of the environment, and the environment itself is hidden: what
 arrives at a sample is the glow along those of its gather rays that hit anything. Stages: "samples", as those of
-`relume.methods.sampled_views`, then "hits".
+`relume.methods.view_stages`, then "hits".
 
     views/<k>/links     0 where a gather ray of a sample hits anything, else NO_CELL
     views/<k>/number    of a view sample: seeds its rays
@@ -16,21 +16,21 @@ from typing import Any
 
 import numpy as np
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
-from relume.environments.equirect import texel_solid_angles
-from relume.light.gather_rays import make_pattern
-from relume.memory import Cache
-from relume.methods.opened.baked_views import BakedFixedViews, SampledTransfer
+from relume.assets.environments.equirect import texel_solid_angles
+from relume.core.cache import Cache
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.protocols import EditAxis, LightsAndPoints
 from relume.methods.opened.described import read_fields
-from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
-from relume.methods.store_io import SHARD_ROWS
-from relume.picture.light import Illumination
-from relume.picture.transfer import EditAxis, LightsAndPoints
-from relume.project.sent import OutgoingLight, isotropic
+from relume.methods.opened.fixed_views import BakedFixedViews, SampledTransfer
+from relume.methods.store_layout import SHARD_ROWS
+from relume.methods.view_stages import CHUNK_ROWS, SampledViews
+from relume.patches.gather_hits import trace_gather_rays
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.patches.patches import choose_patches
+from relume.raytrace.gather_rays import make_pattern
 from relume.scene.model import Scene
-from relume.trace.cell_tree import NO_PATCH
-from relume.trace.cells import choose_patches
-from relume.trace.links import trace_gather_rays
+from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
+from relume.transport.outgoing_patch_light import OutgoingLight, isotropic
 from relume.views.store_io import read_surface_points
 from relume.views.view import View
 

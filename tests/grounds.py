@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from tiny_scenes import make_camera, make_tiny_scene, sphere
 
-from relume.scene.ground import with_ground
 from relume.scene.model import Light, Material
+from relume.scene.shadow_catcher_ground import with_ground
 
 SIZE = (40, 30)
 CENTRE, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35

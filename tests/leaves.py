@@ -1,6 +1,6 @@
 """Pictures summed from the leaves of operators: for tests that follow a picture through its routes to the last digits.
 
-The product shades by boxes (`relume.project.shading.shader`), which agree with operators to a thousandth:
+The product shades by boxes (`relume.transport.shading.shader`), which agree with operators to a thousandth:
 `tests/project` holds them to that, and so does the contract. That would hide a coefficient forgotten on the way.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 import relume.operators.shade
-from relume.project.projector import Projector
+from relume.transport.projector import Projector
 
 
 def shade_by_subdivision(term, contraction, lights, receivers, base_radiance=None):

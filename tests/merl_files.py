@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from relume.assets.measured.merl import CHANNEL_SCALE, NOT_MEASURED, grid_directions
 from relume.brdf.evaluate import eval_brdf
-from relume.measured.merl import CHANNEL_SCALE, NOT_MEASURED, grid_directions
 
 PLASTIC = (
     {"model": "lambert", "color": [0.5, 0.2, 0.05]},

@@ -16,10 +16,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import twins
 
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.methods.registry import open_transfer
-from relume.picture.transfer import FixedViewTransfer
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 
 DERIVED_FOLDERS = ("derived", "edited")  # folders of images that sessions keep in a store
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from sessions import BUDGET, run_until_exact
 
-from relume.memory import Cache
-from relume.picture.picture import Picture
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 
 BALL, WALL = "/materials/Ball/terms/1/curves/", "/materials/Wall/terms/0/curves/"
 

@@ -7,14 +7,14 @@ import copy
 import numpy as np
 from analytic_terms import ANALYTIC
 
-from relume.bake import Recipe
 from relume.brdf.registry import TERMS
 from relume.brdf.term import VIEW
+from relume.core.cache import Cache
+from relume.live.fixed_camera.protocols import EditAxis
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.transfer import EditAxis
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 BUDGET = 1 << 28
 

@@ -9,18 +9,18 @@ import pytest
 from sessions import bake_corner_scene
 from tiny_scenes import make_camera, make_tiny_scene, quad, still_life
 
-from relume.bake import Recipe
-from relume.memory import Cache
-from relume.methods import moving_error
+from relume.core.cache import Cache
+from relume.methods import free_camera_error
 from relume.methods.registry import METHODS, open_transfer
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 
 @pytest.fixture(scope="module", autouse=True)
 def unmeasured():
     """Bakes of moving views do not measure what they are off by, a third of their time, where no test asks for it."""
-    with patch.object(moving_error, "measure_error", return_value=np.full(2, np.nan, np.float32)):
+    with patch.object(free_camera_error, "measure_error", return_value=np.full(2, np.nan, np.float32)):
         yield
 
 

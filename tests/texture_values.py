@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.scene.coding import decode_rows
 from relume.scene.model import Texture
+from relume.scene.texture_encoding import decode_rows
 
 
 def get_texture_values(texture: Texture) -> np.ndarray:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.environments.equirect import texel_directions
-from relume.environments.model import Environment
-from relume.light.local import LightTriangles
-from relume.points import SurfacePoints
-from relume.scene.archive import make_scene
+from relume.assets.environments.environment import Environment
+from relume.assets.environments.equirect import texel_directions
+from relume.lights.local_lights import LightTriangles
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import any_tangent
 from relume.scene.model import Camera, Material, Mesh, Scene, Texture
-from relume.trace.tangents import any_tangent
+from relume.scene.scene_folder import make_scene
 
 
 def make_surface_points(position, normal, first=0):

@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
-from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.methods.cells.between import solve_indirect
-from relume.methods.cells.in_lobes import outgoing_in_highlights
-from relume.methods.on_cells import DirectPatchLight
-from relume.picture.light import illumination_from_look
-from relume.picture.transfer import EditAxis
-from relume.points import SurfacePoints
-from relume.project.contraction import contract
-from relume.project.projector import Projector
-from relume.project.receivers import ShadingPoints
-from relume.project.sent import SIDE
+from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.fixed_camera.protocols import EditAxis
+from relume.methods.patch_direct_light import DirectPatchLight
+from relume.radiosity.highlight_transport import outgoing_in_highlights
+from relume.radiosity.solve_bounces import solve_indirect
+from relume.raytrace.surface_points import SurfacePoints
+from relume.transport.outgoing_patch_light import SIDE
+from relume.transport.projector import Projector
+from relume.transport.shading_points import ShadingPoints
+from relume.transport.term_contraction import contract
 from relume.views.view import View
 
 
@@ -113,7 +113,7 @@ def project(term, bands, active, lights, receivers, depth=5):
         weight = power[:, None, :] * fractions[..., None]
         band = np.zeros(fractions.shape, int)
         for curve in term.curves:
-            if curve.outgoing:
+            if curve.depends_on_view:
                 continue
             curve_band = find_bands(curve, wi, wo)
             if curve.name == active:
@@ -140,7 +140,7 @@ def project_point_lights(term, bands, lights, receivers):
         visible = visible_lights(receivers, lights.num_lights)[row]
         wi = lights.direction[visible].astype(float) @ frames(receivers)[row].T
         for curve in term.curves:
-            if not curve.outgoing:
+            if not curve.depends_on_view:
                 power = power * bands[curve.name][:, find_bands(curve, wi, wo)].T
         out[row] = power.sum(axis=0)
     return out

@@ -2,7 +2,7 @@
 
     L_j = Σ_k F_jk t_k,   F_jk = ∫∫ f(ωi, ωo) h_j(ωo) h_k(ωi) cos θi cos θo dωi dωo
 
-with one basis h for both sides (`relume.basis.zernike`; Mahajan 2008, section 3, whose out-factors it projects again).
+with one basis h for both sides (`relume.math.zernike`; Mahajan 2008, section 3, whose out-factors it projects again).
 F_00 is the reflectance ρ, whatever the directions. Where a term looks the same from all around, only functions of one
 order m are mixed, their cosine and sine parts alike; of other terms F is the mean over turns about the normal.
 """
@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.zernike import OUTGOING_DEGREE, project, recurrence
-from relume.brdf.channels import TEXTURES, Images, NormalMap, texture_slot, user_images
 from relume.brdf.evaluate import eval_brdf
-from relume.brdf.mirror import specular_albedo
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.registry import TERMS
+from relume.brdf.specular import specular_albedo
 from relume.brdf.symmetry import is_isotropic, rotational_symmetry
+from relume.brdf.texture_slots import TEXTURES, Images, NormalMap, texture_slot, user_images
+from relume.math.zernike import OUTGOING_DEGREE, project, recurrence
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -103,7 +103,7 @@ def narrow_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]
     Args:
         highlights: terms of a complete look.
     Returns:
-        Their documents, for `relume.brdf.lobe_tables`; none where functions are enough.
+        Their documents, for `relume.brdf.highlight_tables`; none where functions are enough.
     """
     if any(map(_is_textured, highlights)) or not any(map(_is_narrow, highlights)):
         return []

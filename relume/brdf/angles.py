@@ -11,9 +11,9 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.basis.arcs import acos_clamped
 from relume.brdf.term import Angle
-from relume.uncounted import UNCOUNTED
+from relume.core.numba_options import UNCOUNTED
+from relume.math.fast_math import acos_clamped
 
 _HALF_PI = np.float32(math.pi / 2)
 _ONE = np.float32(1)

@@ -22,7 +22,7 @@ from relume.brdf.curves import curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.brdf.term import F64, Angle
-from relume.uncounted import UNCOUNTED
+from relume.core.numba_options import UNCOUNTED
 
 F32 = NDArray[np.float32]
 Fixed = tuple[tuple[str, float | str], ...]  # from `Term.fixed_values`

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.asset_store import AssetStore
+from relume.assets.asset_store import AssetStore
 
 F64 = NDArray[np.float64]
 Params = Mapping[str, float]

@@ -1,2 +1,1 @@
-"""Images that looks may name in the place of a material's own: a term's `texture` or `roughness_map`, a
-material's `normal_map`; "image:<id>"."""
+"""User images that replace a material's own maps: texture, roughness, metalness or normal map, "image:<id>"."""

@@ -1,4 +1,4 @@
-"""The look: the JSON document that users edit. Documents are values: nothing here changes one, new ones share parts."""
+"""The look: the JSON document that users edit. Documents are values: no function here changes one."""
 
 from relume.look.document import complete, default_look, validate
 from relume.look.model import (

@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
-from relume import environments
-from relume.brdf.channels import check_image, check_shared
-from relume.brdf.document import complete_term
-from relume.checks import MAX_COLOR, Pointer, check_number, check_object, check_triple, invalid_value, names_text
-from relume.errors import ParameterError
-from relume.imageio.ocio.view import MAX_NAME
-from relume.look.lights import MAX_SCALE, complete_lights, default_lights
+from relume.assets import environments
+from relume.brdf.term_validation import complete_term
+from relume.brdf.texture_slots import check_image, check_shared
+from relume.core.errors import ParameterError
+from relume.core.validation import (
+    MAX_COLOR,
+    Pointer,
+    check_number,
+    check_object,
+    check_triple,
+    invalid_value,
+    names_text,
+)
+from relume.image_io.ocio.view import MAX_NAME
+from relume.look.light_validation import MAX_SCALE, complete_lights, default_lights
 from relume.look.model import BackgroundKind, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
 

@@ -10,8 +10,8 @@ from typing import Annotated, Literal, NamedTuple, NotRequired
 from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
 
-from relume.brdf.channels import NormalMap
-from relume.imageio.ocio.view import OcioView
+from relume.brdf.texture_slots import NormalMap
+from relume.image_io.ocio.view import OcioView
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
@@ -65,7 +65,7 @@ class NormalMapLook(_FrozenModel):
 class MaterialLook(_FrozenModel):
     """A material is the sum of its terms.
 
-    A `shadow_catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is
+    A `catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is
     reflected onto it. `normal_map` stands in the place of the scene's own.
     """
 
@@ -96,7 +96,7 @@ BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
 
 class EnvironmentLook(_FrozenModel):
     """The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise
-    seen from above. `map` names it, see `relume.environments`; None: the scene's own."""
+    seen from above. `map` names it, see `relume.assets.environments`; None: the scene's own."""
 
     map: str | None
     scale: float
@@ -252,7 +252,7 @@ class DisplayLook(_FrozenModel):
 class BackgroundLook(_FrozenModel):
     """The background: what the camera sees where no surface is; it lights nothing.
 
-    The map of the environment, the same `prefiltered` by that many degrees, one `color` (radiance), or nothing.
+    The map of the environment, the same `blurred` by that many degrees, one `color` (radiance), or nothing.
     """
 
     kind: BackgroundKind

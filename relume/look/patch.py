@@ -9,7 +9,7 @@ from typing import Any
 import jsonpatch
 import jsonpointer
 
-from relume.errors import EditError
+from relume.core.errors import EditError
 from relume.look.document import complete_changes
 
 MAX_OPERATIONS = 256
@@ -49,7 +49,7 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
 def rebase(document: Any, patch: Iterable[dict[str, Any]]) -> Any:
     """A look after a patch that was made for another state of it; operations that do not fit are left out.
 
-    The editor does the same (`client_web/src/document/change.ts`). Nothing is completed or checked.
+    The editor does the same (`client_web/src/state/document/jsonPatch.ts`). Nothing is completed or checked.
 
     Args:
         document: a look; it is not changed, unchanged parts are shared. patch: operations that are well formed.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from relume.bake import BakeMethod, StoreReader
-from relume.memory import Cache
-from relume.picture.transfer import OpenBake
+from relume.core.cache import Cache
+from relume.live.fixed_camera.protocols import OpenBake
+from relume.store.bake_protocol import BakeMethod, StoreReader
 
 
 class TransferMethod(BakeMethod, Protocol):

@@ -1,6 +1,6 @@
 """Method `direct`: environment light, fixed views, shadows, no bounces (Ben-Artzi 2006).
 
-A store of it holds what `relume.methods.sampled_views` bakes, and nothing else.
+A store of it holds what `relume.methods.view_stages` bakes, and nothing else.
 """
 
 from __future__ import annotations
@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
-from relume.memory import Cache
-from relume.methods import bounds
-from relume.methods.opened.baked_views import BakedFixedViews
+from relume.core.cache import Cache
+from relume.methods import plan_estimates
 from relume.methods.opened.described import read_fields
-from relume.methods.sampled_views import SampledViews
+from relume.methods.opened.fixed_views import BakedFixedViews
+from relume.methods.view_stages import SampledViews
 from relume.scene.model import Scene
+from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 
 
 class DirectMethod:
@@ -28,7 +28,7 @@ class DirectMethod:
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
-        bounds.check_gathering(recipe, 0)
+        plan_estimates.check_gathering(recipe, 0)
         return self._views.plan(scene, recipe)
 
     def prepare(self, scene: Scene) -> None:

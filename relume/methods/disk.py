@@ -22,16 +22,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import BakeMethod, Plan, Recipe
-from relume.folders import folder_bytes
-from relume.memory import get_asset
-from relume.methods import bounds
+from relume.core.cache import get_asset
+from relume.core.folder_size import folder_bytes
+from relume.live.free_camera.probes.stored_scene import MAX_TEXTURE_SIDE
+from relume.methods import plan_estimates
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod, num_patches
-from relume.methods.surface import bound_store_bytes as parts_of_surface
-from relume.moving.points.surface import MAX_TEXTURE_SIDE
+from relume.methods.probes import bound_store_bytes as parts_of_surface
 from relume.scene.model import Scene
 from relume.store import bake_in_process, open_store
+from relume.store.bake_protocol import BakeMethod, Plan, Recipe
 from relume.store.publish import array_paths
 from relume.store.writer import create_store
 
@@ -42,7 +42,7 @@ _MARGIN = 1.3
 _EDGE_EXPONENT = 1 / 3  # power with which edges are fewer for each pixel in a larger picture; a tuft of blades has 0.3
 _METADATA_BYTES = 64 << 10  # of metadata
 _SCRATCH_ROW_BYTES = 200  # of a sample while samples are sorted
-_COMPRESSION_RATIOS = (0.22, 0.6, 0.6, 0.4, 0.8, 0.8, 1.0)  # of the bound of each of `relume.methods.surface.Parts`
+_COMPRESSION_RATIOS = (0.22, 0.6, 0.6, 0.4, 0.8, 0.8, 1.0)  # of the bound of each of `relume.methods.probes.StoreBytes`
 _ROWS_PER_BLOCK, _BLOCKS_PER_TEXTURE = 16, 8  # of a texture: rows beside each other, and how often
 
 
@@ -174,7 +174,7 @@ def _probe_disk(scene: Scene, recipe: Recipe) -> DiskEstimate:
 
 def _texture_bytes(scene: Scene) -> float:
     """Of all textures, each once, by some of their rows."""
-    textures = bounds.distinct_textures(scene)
+    textures = plan_estimates.distinct_textures(scene)
     with tempfile.TemporaryDirectory() as folder:
         store, total = create_store(Path(folder) / "some.zarr", {}), 0.0
         for k, texture in enumerate(textures):

@@ -1,17 +1,17 @@
 """Method `gather`: environment light with any number of bounces, fixed views (after Nguyen 2010).
 
-What `relume.methods.sampled_views` bakes, and beside it gather cells on the surfaces, the lights that these see, and
+What `relume.methods.view_stages` bakes, and beside it gather cells on the surfaces, the lights that these see, and
 gather rays from cells and view samples, of which only the cell that each hits is kept: their directions are made again
 from a seed. Stages after those of the views: "gather cells", then "gather rays" (rows of cells, rows of each view).
 
-    cells/axis, value, children, roots          relume.trace.cell_tree.CellTree
-    cells/position, normal, material, …         relume.trace.cells.Cells
+    cells/axis, value, children, roots          relume.patches.patch_kdtree.PatchTree
+    cells/position, normal, material, …         relume.patches.patches.Patches
     cells/visibility                            lights that the points of a cell see, one point after another
     cells/links                                 cells that the rays of its points hit
     views/<k>/links                             cells that the rays of a view sample hit
     views/<k>/number                            of a view sample: seeds its rays
-    thrown/…                                    relume.methods.thrown.Thrown: bright lights, planes of flat mirrors
-    views/<k>/thrown                            which of those lights a view sample sees in flat mirrors
+    thrown/…                                    relume.methods.planar_mirror_light.MirrorLights: bright lights, planes
+    of flat mirrors views/<k>/thrown                            which of those lights a view sample sees in flat mirrors
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 from relume.brdf.albedo import scatters_diffusely
-from relume.eye.flat_mirrors import lights_visible_in_mirrors
-from relume.light.gather_rays import make_pattern
-from relume.memory import Cache
-from relume.methods import bounds
-from relume.methods.last_read import ReadCache
-from relume.methods.opened.bounced_views import BakedIndirectViews
+from relume.camera.planar_mirrors import lights_visible_in_mirrors
+from relume.core.cache import Cache
+from relume.methods import plan_estimates
 from relume.methods.opened.described import read_fields
-from relume.methods.sampled_views import CHUNK_ROWS, SampledViews
-from relume.methods.store_io import SHARD_ROWS, read_patch_points, read_patches, read_tree
-from relume.methods.thrown import make_mirror_lights, max_mirror_lights, read_mirror_lights
+from relume.methods.opened.fixed_views_indirect import BakedIndirectViews
+from relume.methods.planar_mirror_light import make_mirror_lights, max_mirror_lights, read_mirror_lights
+from relume.methods.read_cache import ReadCache
+from relume.methods.store_layout import SHARD_ROWS, read_patch_points, read_patches, read_tree
+from relume.methods.view_stages import CHUNK_ROWS, SampledViews
+from relume.patches.gather_hits import trace_gather_rays
+from relume.patches.patch_kdtree import MAX_PATCHES
+from relume.patches.patches import POINTS_PER_PATCH, choose_patches
+from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.visibility_masks import trace_visibility_masks
 from relume.scene.model import Scene
-from relume.trace.cell_tree import MAX_PATCHES
-from relume.trace.cells import POINTS_PER_PATCH, choose_patches
-from relume.trace.coherent import trace_visibility_masks
-from relume.trace.links import trace_gather_rays
+from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 from relume.views.store_io import make_material_pattern, read_ray_origins, read_surface_points, view_directions
 
 PATCHES_PER_SHARD = 4096
@@ -58,7 +58,7 @@ class GatherMethod:
 
     Args:
         rays: of a view sample. glossy: of those, where its material has a highlight.
-        num_tent_passes: how often neighbours in the picture share what these bring; see `relume.views.sharing`.
+        num_tent_passes: how often neighbours in the picture share what these bring; see `relume.views.gather_filter`.
         smooths_edges: whether pixels across edges have several samples.
     """
 
@@ -89,7 +89,7 @@ class GatherMethod:
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Upper bounds from the recipe alone."""
-        bounds.check_gathering(recipe, MAX_PATCHES)
+        plan_estimates.check_gathering(recipe, MAX_PATCHES)
         direct, patch_count, (rays, _) = self._views.plan(scene, recipe), num_patches(recipe), self._ray_counts(recipe)
         num_points, bits = POINTS_PER_PATCH * patch_count, (recipe.num_lights + 7) // 8
         num_mirror_lights = max_mirror_lights(scene, recipe)
@@ -98,8 +98,8 @@ class GatherMethod:
         return Plan(
             num_view_samples=direct.num_view_samples,
             num_rays=num_rays,
-            work_s=bounds.estimated_work(
-                scene, num_rays * bounds.supersampling_ratio(scene, recipe), _RAY_NS, _TRIANGLE_US
+            work_s=plan_estimates.estimated_work(
+                scene, num_rays * plan_estimates.supersampling_ratio(scene, recipe), _RAY_NS, _TRIANGLE_US
             ),
             store_bytes=direct.store_bytes
             + direct.num_view_samples * (2 * rays + 4 + -(-num_mirror_lights // 8))
@@ -107,7 +107,7 @@ class GatherMethod:
             + num_points * bits,
             peak_bytes=direct.peak_bytes
             + patch_count * _PATCH_BUILD_BYTES
-            + bounds.num_triangles(scene) * _NORMAL_BYTES
+            + plan_estimates.num_triangles(scene) * _NORMAL_BYTES
             + SHARD_ROWS * (3 * 2 * rays + _SHARD_ROW_BYTES + 2 * num_mirror_lights),
             lone_bytes=direct.lone_bytes,
         )

@@ -9,19 +9,25 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import StoreReader
-from relume.light.local import LightTriangles, LocalLight, emitter_geometry, make_light_strata, prepare_local_lights
-from relume.light.strata import LightStrata
+from relume.core.cache import Cache
+from relume.lights.light_sampling import LightStrata
+from relume.lights.local_lights import (
+    LightTriangles,
+    LocalLight,
+    emitter_geometry,
+    make_light_strata,
+    prepare_local_lights,
+)
+from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.look import LightGeometry
-from relume.memory import Cache
-from relume.methods.store_io import has_alpha_tested_surfaces, read_alpha_test
-from relume.picture.light import Illumination, LightSource
-from relume.points import SurfacePoints
-from relume.project.receivers import LocalRays
-from relume.trace.embree import EmbreeScene
-from relume.trace.geometry import is_front, offset_point
-from relume.trace.local_shadows import compute_irradiance, trace_light_visibility
-from relume.trace.preview_light import MovingLight, trace_moving_light
+from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test
+from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.light_visibility import compute_irradiance, trace_light_visibility
+from relume.raytrace.moving_light import MovingLight, trace_moving_light
+from relume.raytrace.scene_buffers import is_front, offset_point
+from relume.raytrace.surface_points import SurfacePoints
+from relume.store.bake_protocol import StoreReader
+from relume.transport.shading_points import LocalRays
 
 F32 = NDArray[np.float32]
 

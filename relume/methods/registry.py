@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
-from relume.errors import StoreError
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.core.errors import StoreError
+from relume.live.fixed_camera.protocols import CameraMode, FixedViewTransfer, OpenBake
 from relume.methods.base import TransferMethod
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
-from relume.methods.surface import ProbesMethod
-from relume.picture.transfer import CameraMode, FixedViewTransfer, OpenBake
+from relume.methods.probes import ProbesMethod
 from relume.store import open_store
 
 METHODS: dict[str, TransferMethod] = {

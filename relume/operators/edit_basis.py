@@ -9,12 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.daubechies import analysis
 from relume.brdf.term import Curve, Term
-from relume.light.triangles import TriangleLights
-from relume.operators.frozen import LinearOperator, precompute
-from relume.operators.packed import QuantizedOperator
-from relume.project.receivers import ShadingPoints
+from relume.lights.spherical_triangles import TriangleLights
+from relume.math.daubechies import analysis
+from relume.operators.linear_operator import LinearOperator, precompute
+from relume.operators.quantized import QuantizedOperator
+from relume.transport.shading_points import ShadingPoints
 
 F64 = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class EditBasis(Protocol):
         *,
         is_quantized: bool = False,
     ) -> LinearOperator | QuantizedOperator:
-        """The operator. See `relume.operators.frozen.freeze`."""
+        """The operator. See `relume.operators.linear_operator.precompute`."""
         ...
 
 
@@ -104,5 +104,5 @@ class CurveBasis:
         *,
         is_quantized: bool = False,
     ) -> LinearOperator | QuantizedOperator:
-        """See `relume.operators.frozen.freeze`."""
+        """See `relume.operators.linear_operator.precompute`."""
         return precompute(term, bands, self.name, lights, receivers, progress, is_canceled, is_quantized=is_quantized)

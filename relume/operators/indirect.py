@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import eye_array
 
-from relume.basis.haar import coefficient_levels, haar
 from relume.brdf.term import Term
+from relume.core.thread_pools import parallel_for_cancellable, parallel_for_chunks
+from relume.math.haar import coefficient_levels, haar
 from relume.operators.indirect_kernel import (
     BLOCK_SAMPLES,
     add_filtered,
@@ -27,12 +28,11 @@ from relume.operators.indirect_kernel import (
     sum_by_patch,
     transform,
 )
-from relume.parallel import parallel_for_cancellable, parallel_for_chunks
-from relume.project.levels import contract_levels, split_by_level
-from relume.project.ray_projector import RayProjector
-from relume.project.receivers import GatherRays, ShadingPoints
-from relume.project.sent import isotropic
-from relume.sharing import FilterWeights
+from relume.patches.neighbor_filter import FilterWeights
+from relume.transport.outgoing_patch_light import isotropic
+from relume.transport.ray_projector import RayProjector
+from relume.transport.roughness_ranges import contract_levels, split_by_level
+from relume.transport.shading_points import GatherRays, ShadingPoints
 
 F32 = NDArray[np.float32]
 

@@ -7,8 +7,8 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.trace.cell_tree import NO_PATCH
-from relume.uncounted import UNCOUNTED
+from relume.core.numba_options import UNCOUNTED
+from relume.patches.patch_kdtree import NO_PATCH
 
 BLOCK_SAMPLES = 64
 MAX_CODE = 32_767  # of 16-bit weights
@@ -17,9 +17,9 @@ _HALF = np.float32(math.sqrt(0.5))
 
 @nb.njit(nogil=True, cache=True)
 def number_patches(gather_hits, start, stop, patch_row):  # type: ignore[no-untyped-def]
-    """Number the cells that samples [start, stop) see, in their order; links: cells that their rays hit. (n, rays)
+    """Number the patches that samples [start, stop) hit, in their order; gather_hits: patches that rays hit. (n, rays)
 
-    Writes place (cells,) int32, −1 where a cell is not seen; returns the cells seen, rising.
+    Writes patch_row (patches,) int32, −1 where a patch is not hit; returns the patches hit, rising.
     """
     patch_row[:] = -1
     for p in range(start, stop):
@@ -133,7 +133,7 @@ def apply_rows(coefficients, scale, rows, light, start, stop, unfiltered):  # ty
     Args:
         coefficients, scale: (blocks, K). rows: (blocks, K, 1 or 3 channels, `BLOCK_SAMPLES`) int16.
         light: Haar coefficients. (padded cells, 3) float32
-    Writes alone (blocks · `BLOCK_SAMPLES`, 4) float32, whose last channel says nothing.
+    Writes unfiltered (blocks · `BLOCK_SAMPLES`, 4) float32, whose last channel says nothing.
     """
     num_channels = rows.shape[2]
     # arrays of their own, so that the compiler knows that they do not overlap
@@ -168,7 +168,7 @@ def add_filtered(first, neighbors, weight, unfiltered, start, stop, image):  # t
     """Add to samples [start, stop) of an image the weighted means of what samples have alone.
 
     Args:
-        first, neighbors, weight: rows of `relume.views.sharing`, compressed. unfiltered: from `apply_rows`.
+        first, neighbors, weight: rows of `relume.views.gather_filter`, compressed. unfiltered: from `apply_rows`.
         image: (tiles, 3, samples) float32
     """
     samples = image.shape[2]

@@ -2,7 +2,7 @@
 
     Σ_j c_j T_j = Σ_m V L_m Ω_m cos θi · q · Π_f mean_m(f)
 
-The sums that freezing makes, by another quadrature (`relume.project.shading.shader`); pictures differ by a thousandth
+The sums that freezing makes, by another quadrature (`relume.transport.shading.shader`); pictures differ by a thousandth
 or two.
 """
 
@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
-from relume.light.triangles import TriangleLights
-from relume.operators.frozen import tile_layout
-from relume.project.contraction import Contraction
-from relume.project.levels import contract_levels, project_levels
-from relume.project.receivers import ShadingPoints
-from relume.project.shading.shader import Shader
-from relume.project.texels import texel_rows
-from relume.steps import ResumableLoop
+from relume.core.resumable_loop import ResumableLoop
+from relume.lights.spherical_triangles import TriangleLights
+from relume.operators.linear_operator import tile_layout
+from relume.transport.btf_kernel import texel_rows
+from relume.transport.roughness_ranges import contract_levels, project_levels
+from relume.transport.shading.shader import Shader
+from relume.transport.shading_points import ShadingPoints
+from relume.transport.term_contraction import Contraction
 
 F32 = NDArray[np.float32]
 

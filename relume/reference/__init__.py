@@ -1,8 +1,8 @@
-"""Truth by brute force, for error figures: every texel of the environment, visibility traced, BRDFs at exact angles."""
+"""Reference images by brute force: every texel of the environment, traced visibility, BRDFs at exact angles."""
 
+from relume.reference.environment_samples import EnvironmentSamples, environment_texels
 from relume.reference.image import ReferenceImage, reference_image, render_reference
 from relume.reference.radiance import ReferencePoints, reference_radiance
-from relume.reference.texels import EnvironmentSamples, environment_texels
 
 __all__ = [
     "EnvironmentSamples",

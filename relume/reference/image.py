@@ -12,26 +12,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume import environments
-from relume.bake import Recipe
-from relume.environments.equirect import lookup, rotate_about_y
-from relume.environments.model import Environment
-from relume.errors import CancelledError
-from relume.eye.mirrors import is_mirror_material
-from relume.eye.view_samples import BACKGROUND, ViewSamples, sample_view
-from relume.light.tiles import MIN_LIGHTS
+from relume.assets import environments
+from relume.assets.environments.environment import Environment
+from relume.assets.environments.equirect import lookup, rotate_about_y
+from relume.camera.specular_hits import is_mirror_material
+from relume.camera.view_samples import BACKGROUND, ViewSamples, sample_view
+from relume.core.errors import CancelledError
+from relume.lights.sphere_tiles import MIN_LIGHTS
 from relume.look import LightPaths, Look
 from relume.methods.direct import DirectMethod
-from relume.points import FIXED_ALPHA_SAMPLE
-from relume.reference.images import surface_roughness, surface_textures, with_overrides
-from relume.reference.indirect import reference_indirect
-from relume.reference.kinds import roughness_classes
-from relume.reference.local import ReferenceEmitter, emitted_radiance, emitters
+from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
+from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
+from relume.reference.emitters import ReferenceEmitter, emitted_radiance, emitters
+from relume.reference.environment_samples import EnvironmentSamples, environment_texels
+from relume.reference.path_tracing import reference_indirect
 from relume.reference.paths import omitted_paths, unlimited_paths, unsupported_paths
 from relume.reference.radiance import ReferencePoints, reference_radiance
-from relume.reference.texels import EnvironmentSamples, environment_texels
+from relume.reference.roughness_classes import roughness_classes
+from relume.reference.textures import surface_roughness, surface_textures, with_overrides
 from relume.scene.model import Scene
-from relume.trace.geometry import SceneBuffers, build_scene_buffers
+from relume.store.bake_protocol import Recipe
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -10,7 +10,7 @@ import math
 import numba as nb
 
 from relume.brdf.term import Angle
-from relume.uncounted import UNCOUNTED
+from relume.core.numba_options import UNCOUNTED
 
 _THETA_I, _THETA_H, _THETA_D = int(Angle.THETA_I), int(Angle.THETA_H), int(Angle.THETA_D)
 _THETA_R, _ALPHA, _LOBE = int(Angle.THETA_R), int(Angle.ALPHA), int(Angle.LOBE)

@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.basis.bands import MAX_ANGLE
-from relume.brdf.channels import texture_channel
 from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
-from relume.memory import asset_cached
-from relume.parallel import parallel_for_cancellable
-from relume.points import FIXED_ALPHA_SAMPLE
-from relume.reference.covers import BtfSurface, sample_btf_surface
+from relume.brdf.texture_slots import texture_channel
+from relume.core.cache import asset_cached
+from relume.core.thread_pools import parallel_for_cancellable
+from relume.math.angle_bands import MAX_ANGLE
+from relume.raytrace.scene_buffers import SceneBuffers
+from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
+from relume.raytrace.visibility import trace_visibility
+from relume.reference.btf_surfaces import BtfSurface, sample_btf_surface
+from relume.reference.emitters import LocalLightSamples, ReferenceEmitter, hit_distance
+from relume.reference.environment_samples import EnvironmentSamples
 from relume.reference.kernel import add_lights, list_visible
 from relume.reference.lobes import Lobe, cosine_lobe, curve_lobe
-from relume.reference.local import LocalLightSamples, ReferenceEmitter, hit_distance
-from relume.reference.texels import EnvironmentSamples
-from relume.trace.geometry import SceneBuffers
-from relume.trace.visibility import trace_visibility
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -49,9 +49,10 @@ class ReferencePoints:
     Attributes:
         position: off the surface already. normal, tangent: shading frame. wo: towards the viewer. (n, 3) float32
         textures: what multiplies terms of a channel, "diffuse" and "specular". (n, 3) float32 each
-        roughness: see `relume.trace.stored_scene.Surface`. (n,) float32
+        roughness: see `relume.raytrace.surface_interaction.SurfaceInteraction`. (n,) float32
         uv: see there; None where what covers surfaces counts by its mean. (n, 5) float32
-        alpha_sample: of shadow rays at surfaces that blend; see `relume.points.Points`. (n,) or (1,) float32
+        alpha_sample: of shadow rays at surfaces that blend; see `relume.raytrace.surface_points.SurfacePoints`. (n,) or
+            (1,) float32
     """
 
     position: F32

@@ -1,0 +1,4 @@
+"""Scenes: meshes, materials, cameras, lights, and the folder that stores them.
+
+Read first: `model`, `scene_folder`.
+"""

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.color import luminance
-from relume.scene.coding import decode, periodic
+from relume.core.color import luminance
 from relume.scene.model import Material, Mesh, Scene, Texture, TextureEncoding
+from relume.scene.texture_encoding import decode, periodic
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.environments.model import Environment
-from relume.remarks import ImportRemark
+from relume.assets.environments.environment import Environment
+from relume.core.import_warnings import ImportRemark
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
@@ -24,7 +24,7 @@ WRAPS = ("repeat", "mirror", "clamp")
 
 @dataclass(frozen=True)
 class TextureEncoding:
-    """What the bytes of a texture stand for: see `relume.scene.encoding.decode`.
+    """What the bytes of a texture stand for: see `relume.image_io.decode`.
 
     Attributes:
         kind: "srgb", display values of colours; "normal", normals of tangent space; or "share", one number of [0, 1].

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.remarks import ImportRemark, unsupported
+from relume.core.import_warnings import ImportRemark, unsupported
 from relume.scene.model import Opacity
 
 _OPAQUE = 254  # of 255; below that lies what lossy images do to a white one

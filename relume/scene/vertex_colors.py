@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.color import srgb_encode
+from relume.core.color import srgb_encode
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]

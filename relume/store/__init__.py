@@ -1,8 +1,11 @@
-"""Transfer stores: chunked, checksummed Zarr v3 on disk. See `relume.store.schema` for the layout."""
+"""Transfer stores: chunked, checksummed Zarr v3 on disk; the bake protocol and its runner.
 
-from relume.store.fill import bake_in_process
+Read first: `schema`, `bake_protocol`.
+"""
+
 from relume.store.publish import publish
 from relume.store.reader import Reader, open_staging, open_store, read_code
+from relume.store.run_bake import bake_in_process
 from relume.store.schema import SCHEMA_VERSION
 from relume.store.writer import StoreWriter, create_store
 

@@ -11,11 +11,11 @@ from pathlib import Path
 import zarr
 from zarr.storage import LocalStore
 
-from relume.errors import ChunkDamagedError, StoreError
-from relume.replacing import UNFINISHED, atomic_write, remove_folder
-from relume.store.files import read_json
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.core.filesystem import UNFINISHED, atomic_write, remove_folder
 from relume.store.reader import Reader, open_staging, rows_per_shard
 from relume.store.schema import MANIFEST_NAME, SCHEMA_VERSION
+from relume.store.small_files import read_json
 
 
 def publish(staging: Path, target: Path, check: Callable[[], object] = lambda: None) -> int:

@@ -17,10 +17,9 @@ import zarr
 from numpy.typing import NDArray
 from zarr.storage import LocalStore
 
-from relume.bake import ArraySpec
-from relume.errors import ChunkDamagedError, StoreDeletedError, StoreError, StoreNotFoundError
-from relume.folders import folder_bytes
-from relume.store.files import read_json
+from relume.core.errors import ChunkDamagedError, StoreDeletedError, StoreError, StoreNotFoundError
+from relume.core.folder_size import folder_bytes
+from relume.store.bake_protocol import ArraySpec
 from relume.store.room import scratch_file
 from relume.store.schema import (
     MANIFEST_NAME,
@@ -29,6 +28,7 @@ from relume.store.schema import (
     num_shards,
     spec_from_metadata,
 )
+from relume.store.small_files import read_json
 
 # Zarr decodes on one event loop and a pool of threads that all readers share; the defaults (10 and 32) only make the
 # threads of a small machine wait for each other. They take effect when zarr first reads.
@@ -36,7 +36,7 @@ zarr.config.set({"async.concurrency": 4, "threading.max_workers": 4})
 
 
 class Reader:
-    """A store open for reading; implements `relume.bake.TaskStore`. Safe to use from several threads."""
+    """A store open for reading; implements `relume.store.bake_protocol.TaskStore`. Safe to use from several threads."""
 
     def __init__(self, path: Path, attributes: Mapping[str, Any]) -> None:
         self.path = path
@@ -75,7 +75,7 @@ class Reader:
             raise
 
     def scratch(self) -> IO[bytes]:
-        """A file beside the arrays, of no name that anybody would read. See `relume.bake.TaskStore`."""
+        """A file beside the arrays, of no name that anybody would read. See `relume.store.bake_protocol.TaskStore`."""
         return scratch_file(self.path)
 
     def _rows(self, path: str, start: int, stop: int | None) -> NDArray[Any]:
@@ -125,7 +125,7 @@ def open_staging(path: Path) -> Reader:
 
 
 def read_code(path: Path) -> str | None:
-    """Names the code that makes or made a store, see `relume.code_version.bake_code`; None where that is not known."""
+    """Hash of the code that wrote a store, see `relume.core.source_hash.bake_code`; None where it is unknown."""
     try:
         code = open_staging(path).attributes.get("code")
     except StoreError:

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import IO, Any, cast
 
-from relume.errors import DiskFullError
+from relume.core.errors import DiskFullError
 
 RESERVE_BYTES = 64 << 20  # left for the server's own work and for the system
 _BUFFER_BYTES = 1 << 20

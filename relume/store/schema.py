@@ -15,8 +15,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from relume.bake import ArraySpec
-from relume.errors import SchemaVersionError, StoreError
+from relume.core.errors import SchemaVersionError, StoreError
+from relume.store.bake_protocol import ArraySpec
 
 SCHEMA_VERSION = 7
 MANIFEST_NAME = "manifest.json"

@@ -18,11 +18,11 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.errors import ContainsGroupError
 from zarr.storage import LocalStore
 
-from relume.bake import ArraySpec, RowSource
-from relume.errors import StoreError
-from relume.store.files import read_json
+from relume.core.errors import StoreError
+from relume.store.bake_protocol import ArraySpec, RowSource
 from relume.store.room import check_disk_space
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
+from relume.store.small_files import read_json
 
 # Level 1 keeps up with tracing on one thread; higher levels save little on visibility bits.
 ZSTD_LEVEL = 1

@@ -9,10 +9,10 @@ import numba as nb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from relume.errors import ParameterError
-from relume.imageio.files import to_bytes
-from relume.parallel import parallel_for_chunks
-from relume.uncounted import UNCOUNTED
+from relume.core.errors import ParameterError
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.image_io.write_image import to_bytes
 from relume.views.view import Tile, View
 
 F32 = NDArray[np.float32]

@@ -8,14 +8,14 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import StoreReader
-from relume.errors import ChunkDamagedError, SceneError, StoreError
-from relume.light.gather_rays import RayPattern, make_pattern
-from relume.points import FIXED_ALPHA_SAMPLE, SurfacePoints
-from relume.project.receivers import GatherRays
-from relume.project.sent import OutgoingLight
-from relume.scene.checks import check_camera
+from relume.core.errors import ChunkDamagedError, SceneError, StoreError
+from relume.raytrace.gather_rays import RayPattern, make_pattern
+from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
 from relume.scene.model import Camera
+from relume.scene.validate import check_camera
+from relume.store.bake_protocol import StoreReader
+from relume.transport.outgoing_patch_light import OutgoingLight
+from relume.transport.shading_points import GatherRays
 
 F32 = NDArray[np.float32]
 
@@ -131,7 +131,7 @@ def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
     Args:
         store: an open store. k: number of the view. start, stop: rows of its arrays.
     Returns:
-        See `relume.trace.stored_scene.Surface`. (stop - start, 5) float32
+        See `relume.raytrace.surface_interaction.SurfaceInteraction`. (stop - start, 5) float32
     """
     try:
         store.shape(f"views/{k}/uv")
@@ -177,7 +177,7 @@ def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, mater
 
 
 def read_shortest_normals(store: StoreReader) -> list[float]:
-    """Read about the shortest of them for each material, see `relume.scene.roughness.min_mean_normal_length`.
+    """Read about the shortest of them for each material, see `relume.scene.roughness_levels.min_mean_normal_length`.
 
     Args:
         store: an open store.

@@ -12,20 +12,20 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.bake import StoreReader
-from relume.brdf.levels import RoughnessLevels
-from relume.errors import ChunkDamagedError, StoreError
-from relume.eye.view_samples import BACKGROUND
-from relume.images.shelf import load_texture
-from relume.memory import Cache
-from relume.points import SurfacePoints
-from relume.project.receivers import GatherRays, LocalRays, ShadingPoints
-from relume.project.sent import OutgoingLight
+from relume.brdf.roughness_levels import RoughnessLevels
+from relume.camera.view_samples import BACKGROUND
+from relume.core.cache import Cache
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.images.image_store import load_texture
+from relume.patches.neighbor_filter import NeighborFilter
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.texture import sample_image
 from relume.scene.model import Camera
-from relume.sharing import NeighborFilter
-from relume.trace.texture import sample_image
-from relume.views.mirrored import MirrorSamples, read_mirror_samples
-from relume.views.sharing import make_neighbor_filter
+from relume.store.bake_protocol import StoreReader
+from relume.transport.outgoing_patch_light import OutgoingLight
+from relume.transport.shading_points import GatherRays, LocalRays, ShadingPoints
+from relume.views.gather_filter import make_neighbor_filter
+from relume.views.mirror_samples import MirrorSamples, read_mirror_samples
 from relume.views.store_io import (
     RayTracing,
     TransferReader,
@@ -66,7 +66,8 @@ class View:
         textures: of each material, the images of the scene in which it is not 1 all over, by their names. (n, 3)
         cos_theta_o: of the samples on surfaces. (surface samples,) float64
         level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
-        maps: images in the place of each material's own maps, see `relume.views.worn`; none where nothing is named.
+        maps: images in the place of each material's own maps, see `relume.views.map_override`; none where nothing is
+            named.
         baked_rows: where each sample on surfaces is among those that were baked; None: in that order. (surface
             samples,)
         overridden: views of the same samples that wear such images, by these, for as long as a picture has them.

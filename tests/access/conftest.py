@@ -10,8 +10,8 @@ from fastapi.testclient import TestClient
 from server_fixtures import ack_seconds, baked, client, control, empty_ledger
 from server_fixtures import settings as open_settings
 
-from server.access.access import AuthServices
-from server.settings import Settings
+from relume_server.auth.services import AuthServices
+from relume_server.settings import Settings
 
 __all__ = ["ack_seconds", "baked", "client", "control", "empty_ledger", "open_settings"]
 

@@ -10,8 +10,8 @@ from fastapi.testclient import TestClient
 from server_fakes import SIZE
 from session_client import Baked
 
-from server.access.access import AuthServices
-from server.settings import Settings
+from relume_server.auth.services import AuthServices
+from relume_server.settings import Settings
 
 
 @pytest.fixture

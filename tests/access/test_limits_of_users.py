@@ -14,14 +14,14 @@ from server_fakes import SIZE, FakeMethod, write_tiny_scene
 from session_client import Baked
 from sqlalchemy import update
 
-from relume.bake import Recipe
-from server.access.access import AuthServices
-from server.access.audit import Audit, Change
-from server.access.buckets import TokenBuckets
-from server.errors import BusyError
-from server.settings import Settings
-from worker.database.models import BakeRow
-from worker.service import BakeService
+from relume.store.bake_protocol import Recipe
+from relume_server.auth.audit import Audit, Change
+from relume_server.auth.rate_limit import TokenBuckets
+from relume_server.auth.services import AuthServices
+from relume_server.errors import BusyError
+from relume_server.settings import Settings
+from relume_worker.database.models import BakeRow
+from relume_worker.service import BakeService
 
 Bearer = Callable[..., dict[str, str]]
 CHANGE = Change("Ann", "edit", "::1", "PUT /api/looks/Red", "/api/looks/Red", 201, "r1")
@@ -48,7 +48,7 @@ def test_buckets_fill_again() -> None:
 
 
 def test_buckets_are_of_bounded_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.access.buckets.MAX_BUCKETS", 2)
+    monkeypatch.setattr("relume_server.auth.rate_limit.MAX_BUCKETS", 2)
     buckets = TokenBuckets(1.0, 1, lambda: 0.0)
     assert [buckets.take(name) for name in "abc"] == [0, 0, 0]
     assert (buckets.take("c"), buckets.take("a")) == (1, 0)
@@ -295,7 +295,7 @@ def test_each_change_is_a_line_and_each_refusal(client: TestClient, bearer: Bear
 
 
 def test_the_audit_is_bounded(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.access.audit._TRIM_EVERY", 2)
+    monkeypatch.setattr("relume_server.auth.audit._TRIM_EVERY", 2)
     audit = Audit(client.app.state.services.looks._sessions, 5)
     for _ in range(20):
         audit.add(CHANGE)

@@ -12,12 +12,12 @@ import pytest
 from alone import run_in_thread
 from fastapi.testclient import TestClient
 
-from relume.errors import DatabaseDamagedError
-from server.access.access import AuthServices
-from server.access.roles import Caller, Role
-from server.access.rules import RULES, SOCKET
-from server.settings import Settings
-from worker.database.faults import MissingDatabase, make_unavailable_error
+from relume.core.errors import DatabaseDamagedError
+from relume_server.auth.roles import Caller, Role
+from relume_server.auth.rules import RULES, SOCKET
+from relume_server.auth.services import AuthServices
+from relume_server.settings import Settings
+from relume_worker.database.failures import MissingDatabase, make_unavailable_error
 
 Bearer = Callable[..., dict[str, str]]
 
@@ -107,7 +107,7 @@ def test_tokens_run_out_and_are_revoked(
     short, long = bearer("edit", "short", days=1), bearer("edit", "long")
     assert client.get("/api/scenes", headers=short).status_code == 200
     now = time.time()
-    monkeypatch.setattr("server.access.tokens.time.time", lambda: now + 86_401)
+    monkeypatch.setattr("relume_server.auth.tokens.time.time", lambda: now + 86_401)
     assert client.get("/api/scenes", headers=short).status_code == 401
     assert client.get("/api/scenes", headers=long).status_code == 200
     access.tokens.revoke("long")
@@ -120,7 +120,7 @@ def test_a_token_that_another_process_revokes_is_soon_refused(
     headers = bearer("edit", "Ann")
     assert client.get("/api/scenes", headers=headers).status_code == 200
     AuthServices(client.app.state.services.looks._sessions, Settings()).tokens.revoke("Ann")
-    monkeypatch.setattr("server.access.tokens.time.monotonic", lambda: time.perf_counter() + 1e9)
+    monkeypatch.setattr("relume_server.auth.tokens.time.monotonic", lambda: time.perf_counter() + 1e9)
     assert client.get("/api/scenes", headers=headers).status_code == 401
 
 
@@ -234,13 +234,13 @@ def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
     def damaged(*_: object) -> None:
         raise DatabaseDamagedError("database disk image is malformed")
 
-    monkeypatch.setattr("server.access.tokens.TokenStore._fetch", damaged)
+    monkeypatch.setattr("relume_server.auth.tokens.TokenStore._fetch", damaged)
     caplog.clear()
     answer = client.get("/api/scenes", headers=headers)
     assert answer.status_code == 503
     assert answer.json()["type"] == "urn:relume:problem:database"
     assert client.get("/livez").status_code == 200
-    (line,) = [record for record in caplog.records if record.name.startswith("server.access")]
+    (line,) = [record for record in caplog.records if record.name.startswith("relume_server.auth")]
     assert "who calls cannot be told" in line.getMessage()
     assert not line.exc_info
 
@@ -253,10 +253,12 @@ def test_a_database_that_is_away_is_said_once_however_many_call(
     def away(*_: object) -> None:
         raise make_unavailable_error("connection refused")
 
-    monkeypatch.setattr("server.access.tokens.TokenStore._fetch", away)
-    monkeypatch.setattr("worker.database.faults.MissingDatabase.report_recovered", lambda _: None)  # loops do reach it
+    monkeypatch.setattr("relume_server.auth.tokens.TokenStore._fetch", away)
     monkeypatch.setattr(
-        "server.access.gate.database_outage", MissingDatabase(logging.getLogger("away"), "the database")
+        "relume_worker.database.failures.MissingDatabase.report_recovered", lambda _: None
+    )  # loops do reach it
+    monkeypatch.setattr(
+        "relume_server.auth.middleware.database_outage", MissingDatabase(logging.getLogger("away"), "the database")
     )
     for _ in range(3):
         assert client.get("/api/scenes", headers=headers).status_code == 503

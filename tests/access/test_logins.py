@@ -7,11 +7,11 @@ from collections.abc import Callable
 import pytest
 from fastapi.testclient import TestClient
 
-from server.access.access import AuthServices
-from server.access.audit import Audit, Change
-from server.access.buckets import bucket_name
-from server.access.tokens import TokenStore
-from server.settings import Settings
+from relume_server.auth.audit import Audit, Change
+from relume_server.auth.rate_limit import bucket_name
+from relume_server.auth.services import AuthServices
+from relume_server.auth.tokens import TokenStore
+from relume_server.settings import Settings
 
 Bearer = Callable[..., dict[str, str]]
 GUESS = "relume_{:012x}_x"
@@ -56,14 +56,14 @@ def test_who_is_known_is_not_held_up_by_guesses_from_the_same_address(
     assert client.get("/api/scenes", headers=ann).status_code == 200
     for k in range(8):
         client.get("/api/scenes", headers={"Authorization": f"Bearer {GUESS.format(k)}"})
-    monkeypatch.setattr("server.access.tokens.TOKEN_CACHE_S", -1.0)  # each call is looked up
+    monkeypatch.setattr("relume_server.auth.tokens.TOKEN_CACHE_S", -1.0)  # each call is looked up
     assert [client.get("/api/scenes", headers=ann).status_code for _ in range(8)] == [200] * 8
 
 
 def test_that_there_is_no_such_token_is_remembered_for_so_many(
     access: AuthServices, looked_up: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.access.tokens.MAX_UNKNOWN_IDS", 2)
+    monkeypatch.setattr("relume_server.auth.tokens.MAX_UNKNOWN_IDS", 2)
     for k in (0, 0, 1, 2):
         assert access.tokens.authenticate(GUESS.format(k)) is None
     assert len(looked_up) == 3

@@ -13,11 +13,11 @@ from fastapi.testclient import TestClient
 from server_fakes import SIZE
 from session_client import Baked
 
-from server.access.access import AuthServices
-from server.access.openness import check_openness
-from server.access.proxies import RESOLVE_INTERVAL_S, Proxies
-from server.errors import OpennessError
-from server.settings import Settings
+from relume_server.auth.exposure import check_openness
+from relume_server.auth.proxies import RESOLVE_INTERVAL_S, Proxies
+from relume_server.auth.services import AuthServices
+from relume_server.errors import OpennessError
+from relume_server.settings import Settings
 
 Bearer = Callable[..., dict[str, str]]
 

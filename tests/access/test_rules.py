@@ -6,11 +6,11 @@ from typing import get_args
 
 from fastapi.routing import APIRoute, APIWebSocketRoute
 
-from server.access.roles import Role
-from server.access.rules import MESSAGES, RULES, SOCKET, is_change, required_role
-from server.app import ROUTE_GROUPS, create_app
-from server.settings import Settings
-from server.wire import protocol
+from relume_server.app import ROUTE_GROUPS, create_app
+from relume_server.auth.roles import Role
+from relume_server.auth.rules import MESSAGES, RULES, SOCKET, is_change, required_role
+from relume_server.schemas import protocol
+from relume_server.settings import Settings
 
 
 def operations() -> set[tuple[str, str]]:

@@ -11,13 +11,13 @@ from anyio.from_thread import start_blocking_portal
 from fastapi.testclient import TestClient
 from session_client import ROOM_FIELDS, SIGMA, THETA_H, Baked, open_session
 
-from server.access.access import AuthServices
-from server.access.audit import Entry
-from server.access.roles import Caller, Role
-from server.live.edit_notes import AuditWriter
-from server.live.rooms.door import JoinRequest
-from server.live.rooms.room import Room
-from server.settings import Settings
+from relume_server.auth.audit import Entry
+from relume_server.auth.roles import Caller, Role
+from relume_server.auth.services import AuthServices
+from relume_server.collaboration.join import JoinRequest
+from relume_server.collaboration.room import Room
+from relume_server.session.audit_edits import AuditWriter
+from relume_server.settings import Settings
 
 SEEN = {"op": "replace", "path": "/display/exposure", "value": 2.0}
 Bearer = Callable[..., dict[str, str]]
@@ -25,8 +25,8 @@ Bearer = Callable[..., dict[str, str]]
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.access.access.TOKEN_CACHE_S", 0.05)
-    monkeypatch.setattr("server.access.tokens.TOKEN_CACHE_S", 0.0)
+    monkeypatch.setattr("relume_server.auth.services.TOKEN_CACHE_S", 0.05)
+    monkeypatch.setattr("relume_server.auth.tokens.TOKEN_CACHE_S", 0.0)
 
 
 def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
@@ -55,7 +55,7 @@ def test_editors_edit_and_the_audit_says_what(
 def test_what_is_edited_is_in_the_audit_before_the_session_ends(
     client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.edit_notes.WRITE_INTERVAL_S", 0.05)
+    monkeypatch.setattr("relume_server.session.audit_edits.WRITE_INTERVAL_S", 0.05)
     with open_session(client, baked.bake, headers=bearer("edit", "Ann")) as session:
         session.text("hello")
         for k in (1, 2):

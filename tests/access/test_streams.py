@@ -12,15 +12,15 @@ import pytest
 from fastapi.testclient import TestClient
 from session_client import Baked, open_session
 
-from server.access import quotas
-from server.access.access import AuthServices
-from server.access.identity import Identity
-from server.access.quotas import Quotas
-from server.access.roles import Caller, Role
-from server.errors import QuotaError
-from server.settings import Settings
-from worker.service import BakeService
-from worker.status import BakeStatus
+from relume_server.auth import quotas
+from relume_server.auth.identity import Identity
+from relume_server.auth.quotas import Quotas
+from relume_server.auth.roles import Caller, Role
+from relume_server.auth.services import AuthServices
+from relume_server.errors import QuotaError
+from relume_server.settings import Settings
+from relume_worker.service import BakeService
+from relume_worker.status import BakeStatus
 
 Bearer = Callable[..., dict[str, str]]
 ANN = Caller("Ann", Role.EDIT, "10.0.0.1", "proxy")
@@ -28,9 +28,9 @@ ANN = Caller("Ann", Role.EDIT, "10.0.0.1", "proxy")
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.access.access.TOKEN_CACHE_S", 0.05)
-    monkeypatch.setattr("server.access.tokens.TOKEN_CACHE_S", 0.0)
-    monkeypatch.setattr("server.routes.bakes.EVENT_POLL_S", 0.05)
+    monkeypatch.setattr("relume_server.auth.services.TOKEN_CACHE_S", 0.05)
+    monkeypatch.setattr("relume_server.auth.tokens.TOKEN_CACHE_S", 0.0)
+    monkeypatch.setattr("relume_server.api.bakes.EVENT_POLL_S", 0.05)
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ def test_whom_a_proxy_named_comes_by_it_again(
     client: TestClient, baked: Baked, asked: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     named_by_a_proxy(monkeypatch)
-    monkeypatch.setattr("server.routes.bakes.PROXY_REVALIDATION_S", 0.2)
+    monkeypatch.setattr("relume_server.api.bakes.PROXY_REVALIDATION_S", 0.2)
     assert "event: bake" in client.get(f"/api/bakes/{baked.bake}/events").text
 
 
@@ -117,7 +117,7 @@ class TestSession:
         self, client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         named_by_a_proxy(monkeypatch)
-        monkeypatch.setattr("server.live.session.PROXY_REVALIDATION_S", 0.05)
+        monkeypatch.setattr("relume_server.session.session.PROXY_REVALIDATION_S", 0.05)
         with open_session(client, baked.bake) as session:
             hello = session.text("hello")
             assert session.text("leaving")["seconds"] == 0.2

@@ -14,20 +14,20 @@ from fastapi.testclient import TestClient
 from server_fakes import tiny_scene
 from starlette.types import Message, Receive, Scope, Send
 
-from relume.environments.model import Environment
-from relume.folders import folder_bytes
-from relume.scene.archive import make_scene
-from server.access import quotas as quotas_module
-from server.access.access import AuthServices
-from server.access.reservations import Reservation
-from server.access.roles import KEY, Caller, Role
-from server.errors import NearlyFullError, QuotaError
-from server.files import door
-from server.files.door import UploadMiddleware
-from server.files.importers import ImportTooLargeError
-from server.files.importing import ImportRequest, _write_scene
-from server.files.slots import Slots
-from server.settings import Settings
+from relume.assets.environments.environment import Environment
+from relume.core.folder_size import folder_bytes
+from relume.scene.scene_folder import make_scene
+from relume_server.auth import quotas as quotas_module
+from relume_server.auth.reservations import Reservation
+from relume_server.auth.roles import KEY, Caller, Role
+from relume_server.auth.services import AuthServices
+from relume_server.errors import NearlyFullError, QuotaError
+from relume_server.io import upload_middleware
+from relume_server.io.fair_slots import Slots
+from relume_server.io.import_processes import ImportTooLargeError
+from relume_server.io.import_request import ImportRequest, _write_scene
+from relume_server.io.upload_middleware import UploadMiddleware
+from relume_server.settings import Settings
 
 Bearer = Callable[..., dict[str, str]]
 SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
@@ -102,7 +102,7 @@ class TestBodies:
     def test_one_that_does_not_say_it_is_read_as_far_as_there_is_room(
         self, access: AuthServices, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(door, "STEP_BYTES", 10_000)
+        monkeypatch.setattr(upload_middleware, "STEP_BYTES", 10_000)
         body = Body(a_door(access), [b"x" * 10_000] * 50)
         assert run_in_thread(body()) == 429
         assert body.num_read <= 10
@@ -205,7 +205,7 @@ class TestDisk:
     def _disk(self, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
         settings.least_free_bytes = 1_000
         for name in ("quotas", "reservations"):
-            monkeypatch.setattr(f"server.access.{name}.free_bytes", lambda _: 10_000)
+            monkeypatch.setattr(f"relume_server.auth.{name}.free_bytes", lambda _: 10_000)
 
     def test_what_all_send_leaves_the_ledger_its_room(self, access: AuthServices) -> None:
         quotas = access.quotas

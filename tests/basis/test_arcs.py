@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from relume.basis.arcs import acos_clamped, azimuth_fraction, fast_log2
+from relume.math.fast_math import acos_clamped, azimuth_fraction, fast_log2
 
 
 def test_arc_cosine_is_that_of_numpy_and_clamps():

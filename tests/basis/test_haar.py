@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relume.basis.haar import coefficient_levels, haar, padded_length
+from relume.math.haar import coefficient_levels, haar, padded_length
 
 
 def matrix(length):

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from relume.basis.pca import decompose, joint, relative_rms, worst_relative_rms
 from relume.brdf.curves import generated_bands
+from relume.brdf.parameter_sweep import curve_at_value, curves_of_parameter, slider_values
 from relume.brdf.registry import TERMS
-from relume.brdf.sweep import curve_at_value, curves_of_parameter, slider_values
+from relume.math.pca import decompose, joint, relative_rms, worst_relative_rms
 
 BLINN_PHONG = TERMS["blinn_phong"]
 EXPONENT = replace(BLINN_PHONG.parameter("exponent"), minimum=3.0, maximum=300.0, scale="linear")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import pywt
 
-from relume.basis import daubechies, identity
 from relume.brdf.curves import generated_bands
 from relume.brdf.registry import TERMS
-from relume.errors import ShapeMismatchError
+from relume.core.errors import ShapeMismatchError
+from relume.math import daubechies, identity
 
 SIZES = [4, 8, 64, 256]
 BASES = [daubechies, identity]

@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from bench import registry, table
-from bench.figure import Figure
-from bench.machine import measure_stolen_fraction
-from bench.mitsuba import map_for_mitsuba
+from relume_bench import registry, table
+from relume_bench.figure import Figure
+from relume_bench.machine import measure_stolen_fraction
+from relume_bench.mitsuba import map_for_mitsuba
 
 FIXED_NAMES = {
     "frame.bandwidth_ratio", "frame.incremental_rmse", "session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95",
@@ -19,21 +19,21 @@ FIXED_NAMES = {
     "bake.wall_vs_rays", "bake.teatray_s", "bake.two_workers_speedup", "bake.ray_saving", "store.bytes_per_view_sample",
 }  # fmt: skip
 IN_PROCESS = [
-    "bench.bandwidth", "bench.incremental", "bench.curve_switch", "bench.accuracy", "bench.swap",
-    "bench.rays", "bench.bake", "bench.store_size", "bench.paper_fig5", "bench.accuracy_terms", "bench.pca",
-    "bench.glimpse", "bench.curve_switch_terms", "bench.shade",
-    "bench.estimators", "bench.sharp_slider", "bench.mesh_files",
-    "bench.in_out", "bench.large",
+    "bandwidth", "incremental", "curve_switch", "accuracy", "swap",
+    "rays", "bake", "store_size", "paper_fig5", "accuracy_terms", "pca",
+    "glimpse", "curve_switch_terms", "shade",
+    "estimators", "sharp_slider", "mesh_files",
+    "in_out", "large",
 ]  # fmt: skip
 LONG = [
-    "bench.workers", "bench.plan", "bench.session", "bench.demo", "bench.canvas", "bench.peer_mitsuba", "bench.truth",
-    "bench.gather_error", "bench.gather_full", "bench.gather_scenes", "bench.peer_gather", "bench.lights",
-    "bench.memory", "bench.gather_rooms", "bench.gather_lights", "bench.ray_saving", "bench.gather",
-    "bench.gather_follow", "bench.glass", "bench.rough", "bench.mirror", "bench.surface", "bench.surface_edits",
-    "bench.surface_truth", "bench.canvas_moving", "bench.btf", "bench.btf_true", "bench.btf_shown", "bench.load",
-    "bench.btf_held", "bench.many", "bench.refusal", "bench.slider_drag", "bench.resting", "bench.rotation",
-    "bench.btf_several", "bench.plan_disk", "bench.surface_live", "bench.surface_points", "bench.real_files",
-    "bench.opening", "bench.flood", "bench.slow_readers", "bench.entering",
+    "workers", "plan", "session", "demo", "canvas", "peer_mitsuba", "truth",
+    "gather_error", "gather_full", "gather_scenes", "peer_gather", "lights",
+    "memory", "gather_rooms", "gather_lights", "ray_saving", "gather",
+    "gather_follow", "glass", "rough", "mirror", "surface", "surface_edits",
+    "surface_truth", "canvas_moving", "btf", "btf_true", "btf_shown", "load",
+    "btf_held", "many", "refusal", "slider_drag", "resting", "rotation",
+    "btf_several", "plan_disk", "surface_live", "surface_points", "real_files",
+    "opening", "flood", "slow_readers", "entering",
 ]  # fmt: skip
 # of random points, or by a renderer that is noisy: they carry a standard error
 ESTIMATES = (
@@ -57,7 +57,7 @@ ESTIMATES = (
 
 
 def group_of(module: str) -> registry.Group:
-    return next(group for group in registry.GROUPS if group.module == module)
+    return next(group for group in registry.GROUPS if group.module == f"relume_bench.{module}")
 
 
 def check(group: registry.Group) -> None:
@@ -79,7 +79,7 @@ def check(group: registry.Group) -> None:
 def test_names_are_those_that_scripts_know() -> None:
     assert set(registry.names()) >= FIXED_NAMES
     assert len(registry.names()) == len(set(registry.names()))
-    assert {group.module for group in registry.GROUPS} == {*IN_PROCESS, *LONG}
+    assert {group.module for group in registry.GROUPS} == {f"relume_bench.{name}" for name in (*IN_PROCESS, *LONG)}
 
 
 @pytest.mark.parametrize("module", IN_PROCESS)
@@ -118,8 +118,8 @@ def test_unknown_name_is_one_clear_line(capsys: pytest.CaptureFixture[str]) -> N
 def test_failure_is_a_figure_and_the_others_go_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    broken = registry.Group("bench.nowhere", ("frame.broken",))
-    monkeypatch.setattr(registry, "GROUPS", (broken, group_of("bench.bandwidth")))
+    broken = registry.Group("nowhere", ("frame.broken",))
+    monkeypatch.setattr(registry, "GROUPS", (broken, group_of("bandwidth")))
     assert registry.run("frame", as_json=True, tiny=True) == 1
     first, second = json.loads(capsys.readouterr().out)
     assert first["value"] is None

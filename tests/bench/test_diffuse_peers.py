@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-from bench.indirect import ignore_glossy_reflection
 from relume.brdf.albedo import scatters_diffusely
+from relume.live.fixed_camera.illumination import Illumination, illumination_from_look
 from relume.look import validate
 from relume.look.document import default_look
-from relume.picture.light import Illumination, illumination_from_look
-from relume.scene.cornell import cornell_box
+from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Material
+from relume_bench.indirect import ignore_glossy_reflection
 
 
 def light_in(materials: list[Material]) -> Illumination:

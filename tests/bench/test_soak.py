@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bench.soak.server import Sample
-from bench.soak.verdict import trends
+from relume_bench.soak.server import Sample
+from relume_bench.soak.verdict import trends
 
 
 def samples(memory: Callable[[float], float], handles: Callable[[float], float], number: int = 60) -> list[Sample]:

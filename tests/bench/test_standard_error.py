@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.standard_error import compare_with_passes, estimate_point_error
+from relume_bench.standard_error import compare_with_passes, estimate_point_error
 
 
 def test_standard_error_over_points_is_the_spread_of_repeated_draws() -> None:

@@ -15,9 +15,9 @@ from relume.brdf.albedo import (
     unpack_normal_map,
     unpack_reflectance,
 )
-from relume.brdf.channels import NormalMap
-from relume.brdf.document import complete_term
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.term_validation import complete_term
+from relume.brdf.texture_slots import NormalMap
 
 NUM, ERRORS = 100_000, 5  # directions, and standard errors of their sums that are allowed; quadrature's own beside
 

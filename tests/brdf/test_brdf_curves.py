@@ -7,10 +7,10 @@ import pytest
 from analytic_terms import ANALYTIC
 from scipy.interpolate import PchipInterpolator
 
-from relume.basis.bands import band_averages, band_edges
 from relume.brdf.curves import channel_params, curve_bands, curve_values, generated_bands
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Angle
+from relume.math.angle_bands import band_averages, band_edges
 
 CURVES = [(t.model, c.name) for t in ANALYTIC.values() for c in t.curves]
 

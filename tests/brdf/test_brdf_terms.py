@@ -11,8 +11,8 @@ from brdf_closed_forms import CLOSED_FORMS, complex_fresnel, directions
 
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.fresnel import fresnel
+from relume.brdf.parameter_sweep import curves_of_parameter
 from relume.brdf.registry import TERMS, describe
-from relume.brdf.sweep import curves_of_parameter
 from relume.brdf.term import VIEW, Angle
 
 MODELS = sorted(ANALYTIC)

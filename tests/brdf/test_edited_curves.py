@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from relume.brdf.curve_edits import curve_edit
 from relume.brdf.curves import curve_bands, curve_values, generated_bands
-from relume.brdf.edited import curve_edit
 from relume.brdf.registry import TERMS
 
 CASES = [("cook_torrance", {"sigma": 0.01}), ("ggx", {"roughness": 0.05}), ("ggx", {"roughness": 0.245})]
 ANGLES = np.array([0.0, 0.879, 3.0, 20.0, 90.0])
-# the same numbers stand in client_web/tests/edited.test.ts
+# the same numbers stand in client_web/tests/curveEdits.test.ts
 TWIN = [12, 4.6061477767732395, 7.98575, 8.031796875, 6.723032069970845, 3.425655976676385, 1.1938775510204083, 0]
 
 

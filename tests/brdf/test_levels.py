@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from relume.brdf.curves import curve_bands, curve_values
-from relume.brdf.document import complete_term
-from relume.brdf.levels import (
+from relume.brdf.registry import TERMS
+from relume.brdf.roughness_levels import (
     NO_LEVELS,
     RoughnessLevels,
     level_bands,
@@ -15,8 +15,8 @@ from relume.brdf.levels import (
     scaled_roughness,
     uses_roughness_map,
 )
-from relume.brdf.registry import TERMS
-from relume.errors import ParameterError
+from relume.brdf.term_validation import complete_term
+from relume.core.errors import ParameterError
 
 WIDE = [term for term in TERMS.values() if term.width is not None and term.model != "ggx_multiple"]  # no highlight
 LEVELS = RoughnessLevels((0.5, 1.0, 1.5), np.array([0, 0, 1, 2, 2, 2], np.uint8))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from shared_bakes import unmeasured
 
-from relume.btf.rings import ubo_grid
-from relume.btf.shelf import STORE, BtfRecord
-from relume.btf.values import ValueFile
-from relume.synthetic.make import MESH, SyntheticBtf, synthesize_btf
-from relume.synthetic.render import TileGeometry
+from relume.assets.btf.btf_store import STORE, BtfRecord
+from relume.assets.btf.direction_rings import ubo_grid
+from relume.assets.btf.value_cache import ValueFile
+from relume.synthetic_btf.render import TileGeometry
+from relume.synthetic_btf.synthesize import MESH, SyntheticBtf, synthesize_btf
 
 __all__ = ["unmeasured"]  # a fixture
 

@@ -11,22 +11,22 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
-from cli.main import main
-from relume.brdf.document import complete_term
-from relume.btf import shelf
-from relume.btf.packing import pack
-from relume.btf.rings import ubo_grid
-from relume.btf.shelf import STORE, get_record, load_btf, records, store_btf
-from relume.btf.values import ValueFile
-from relume.errors import CancelledError, MaterialError, NotFoundError, ParameterError
-from relume.synthetic.make import SyntheticBtf, synthesize_btf
-from server.app import create_app
-from server.live.state.look_state import LookState
-from server.live.state.shown_views import VisibleViews
-from server.records.tables import RenderRow
-from server.settings import Settings
-from server.wire.renders import RenderRequest
-from worker.lease import new_owner
+from relume.assets.btf import btf_store
+from relume.assets.btf.bit_packing import pack
+from relume.assets.btf.btf_store import STORE, get_record, load_btf, records, store_btf
+from relume.assets.btf.direction_rings import ubo_grid
+from relume.assets.btf.value_cache import ValueFile
+from relume.brdf.term_validation import complete_term
+from relume.core.errors import CancelledError, MaterialError, NotFoundError, ParameterError
+from relume.synthetic_btf.synthesize import SyntheticBtf, synthesize_btf
+from relume_cli.main import main
+from relume_server.app import create_app
+from relume_server.client_state.look_state import LookState
+from relume_server.client_state.visible_views import VisibleViews
+from relume_server.persistence.tables import RenderRow
+from relume_server.schemas.renders import RenderRequest
+from relume_server.settings import Settings
+from relume_worker.lease import new_owner
 
 
 def test_what_is_kept_is_found_by_its_name(small_btf):
@@ -57,7 +57,7 @@ def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
     if how == "gone":
         path.unlink()
         if array == "height":  # older ones have none
-            assert shelf._load(path.parent).height.tolist() == [[0.0]]
+            assert btf_store._load(path.parent).height.tolist() == [[0.0]]
             return
     elif how == "cut":
         path.write_bytes(path.read_bytes()[:-5])
@@ -91,7 +91,7 @@ def test_clusters_and_weights_that_have_a_byte_each_are_read_as_before(small_btf
         changed(at / "btf.json", bits=None)
     changed(at / "btf.json", cluster_bits=None)
     assert get_record(tmp_path, small_btf.record.id).components == expected.num_components
-    found = shelf._load(at)
+    found = btf_store._load(at)
     np.testing.assert_array_equal(found.weight, expected.weight)
     np.testing.assert_array_equal(found.cluster, expected.cluster)
     assert found.bits.tolist() == (expected.bits.tolist() if are_packed else [8] * expected.num_components)
@@ -148,7 +148,7 @@ def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
     record = synthesize_btf(resumed, wanted, "Corduroy", shares.append, lambda: False)
     assert shares[0] == pytest.approx(0.8 * done / 81)
     assert record.id == whole.id
-    for array in [*shelf._ARRAYS, "packed"]:
+    for array in [*btf_store._ARRAYS, "packed"]:
         one, other = (np.load(folder / record.id / f"{array}.npy") for folder in (resumed, at_once))
         np.testing.assert_array_equal(one, other)
 
@@ -224,6 +224,6 @@ def test_clusters_are_kept_whatever_their_number(small_btf, tmp_path):
     few = load_btf(small_btf.record.data).with_components(2)
     five = replace(few, **{name: np.repeat(getattr(few, name)[:, :1], 5, axis=1) for name in ("mean", "eigen", "step")},
                    cluster=np.random.default_rng(0).integers(0, 5, few.cluster.shape).astype(np.uint8))  # fmt: skip
-    kept = shelf._load(tmp_path / store_btf(tmp_path, source, "Five", None, lambda: five).id)
+    kept = btf_store._load(tmp_path / store_btf(tmp_path, source, "Five", None, lambda: five).id)
     np.testing.assert_array_equal(kept.cluster, five.cluster)
     np.testing.assert_array_equal(kept.weight, five.weight)

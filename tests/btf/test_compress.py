@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from relume.btf.begun import PartialCompression
-from relume.btf.compress import MAX_COMPONENTS, compress, max_texels
-from relume.btf.rings import directions, make_direction_grid, ubo_grid
-from relume.errors import CancelledError, MaterialError
+from relume.assets.btf.compress import MAX_COMPONENTS, compress, max_texels
+from relume.assets.btf.direction_rings import directions, make_direction_grid, ubo_grid
+from relume.assets.btf.partial_results import PartialCompression
+from relume.core.errors import CancelledError, MaterialError
 
 RINGS = ubo_grid()
 

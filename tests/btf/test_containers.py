@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from btf_containers import ANGLES, SIZE, YUV_TO_RGB, container, encode_container, random_factors, values
 
-from cli.main import main
-from relume.btf.factored import MatrixBtf
-from relume.btf.rings import directions
-from relume.errors import MaterialError
+from relume.assets.btf.direction_rings import directions
+from relume.assets.btf.matrix_btf import MatrixBtf
+from relume.core.errors import MaterialError
+from relume_cli.main import main
 
 LAST = len(ANGLES) - 1  # files have their directions from the last to the first
 

@@ -7,20 +7,20 @@ import pytest
 from sessions import relative_rmse, run_next_job, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
-from relume.bake import Recipe
 from relume.brdf.registry import TERMS
+from relume.core.cache import Cache
+from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.fixed_camera.jobs import Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.live.fixed_camera.strategies.texel_sum import SumTexels
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.picture.jobs import Shade
-from relume.picture.light import illumination_from_look
-from relume.picture.picture import Picture
-from relume.picture.routes.preview import SparsePreview
-from relume.picture.routes.textures import SumTexels
-from relume.project.arrived import rotated_tables, texture_light_rows
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+from relume.transport.texture_light import rotated_tables, texture_light_rows
 
 GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
 
@@ -80,7 +80,7 @@ def test_a_texture_that_is_turned_follows_and_is_exact_at_rest(bake, small_btf, 
 
 def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_btf, monkeypatch):
     """As in a look that was opened with images from the disk."""
-    monkeypatch.setattr("relume.picture.arrivals._BUDGET_DIVISOR", 1 << 20)
+    monkeypatch.setattr("relume.live.fixed_camera.texel_light_cache._BUDGET_DIVISOR", 1 << 20)
     picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
     before = run_until_exact(picture).image()
@@ -98,7 +98,7 @@ def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_bt
 
 def test_no_frame_waits_for_many_texels(bake, small_btf, held, monkeypatch):
     """They are glimpsed, and summed in kept light beside the frames."""
-    monkeypatch.setattr("relume.operators.arrived._MAX_TABLE_ROWS", 0)
+    monkeypatch.setattr("relume.operators.texel_light._MAX_TABLE_ROWS", 0)
     look = covered(bake, small_btf.record, scale=2.9)
     held.set_look(look)
     assert held.advance(None).fidelity == "approximate"

@@ -12,10 +12,10 @@ import pytest
 from btf_containers import container
 from btf_zips import zipped
 
-from relume.btf.importing import open_images
-from relume.errors import MaterialError
-from server.apart.btf_images import SandboxedViewArrays
-from server.files.confining import missing_features
+from relume.assets.btf.import_btf import open_images
+from relume.core.errors import MaterialError
+from relume_server.batch.btf_images import SandboxedViewArrays
+from relume_server.io.sandbox import missing_features
 
 LIMITS = (4 << 30, 60)
 

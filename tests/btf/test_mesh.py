@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from relume.btf.rings import directions, interpolation_weights_numpy, polar, ubo_grid
-from relume.errors import ParameterError, SceneError
-from relume.synthetic.corduroy import corduroy
-from relume.synthetic.make import MESH, SyntheticBtf, synthesize_btf
-from relume.synthetic.mesh import read_tile
-from relume.synthetic.render import TileGeometry
+from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, polar, ubo_grid
+from relume.core.errors import ParameterError, SceneError
+from relume.synthetic_btf.corduroy import corduroy
+from relume.synthetic_btf.from_mesh import read_tile
+from relume.synthetic_btf.render import TileGeometry
+from relume.synthetic_btf.synthesize import MESH, SyntheticBtf, synthesize_btf
 
 LIBRARY = "newmtl red\nKd 0.6 0.1 0.1\nKs 0 0 0\nillum 1\nnewmtl green\nKd 0.1 0.5 0.2\nKs 0 0 0\nillum 1\n"
 

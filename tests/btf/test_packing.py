@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.btf.packing import max_code, pack, packed_bytes, unpack
+from relume.assets.btf.bit_packing import max_code, pack, packed_bytes, unpack
 
 
 @pytest.mark.parametrize("bits", [[8], [3], [2, 3, 4, 5, 6, 7, 8], [5, 5, 4, 3, 3], [1, 6], []])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from relume.btf.parallax import compute_shear, compute_shears, parallax_intersection, parallax_intersection_numpy
-from relume.btf.rings import directions, ubo_grid
-from relume.synthetic.render import TileGeometry
-from relume.synthetic.weave import weave
+from relume.assets.btf.direction_rings import directions, ubo_grid
+from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection, parallax_intersection_numpy
+from relume.synthetic_btf.render import TileGeometry
+from relume.synthetic_btf.weave import weave
 
 SLANTS = [(0.0, 0.0), (0.4, -0.2), (-2.5, 1.5)]
 

@@ -6,18 +6,23 @@ import numpy as np
 import pytest
 from test_texels import CAMERA, GREY, SIZE, covered, floor, opened
 
-from relume.basis.zernike import project
-from relume.btf.rings import directions, interpolation_weights_numpy, ubo_grid
-from relume.btf.shelf import load_btf
+from relume.assets.btf.btf_store import load_btf
+from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
+from relume.live.free_camera import frame
+from relume.live.free_camera.primary_visibility import trace_primary
+from relume.live.free_camera.texel_brdf import texel_tables
+from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
+from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
+from relume.live.free_camera.texel_brdf.texel_tables import (
+    BtfMaterials,
+    filtered_factors,
+    find_btf_materials,
+    pack_lanes,
+)
+from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight, node_light_numpy
 from relume.look import validate
-from relume.moving import frame
-from relume.moving.look_up import trace_primary
-from relume.moving.relief import tables
-from relume.moving.relief.light import TexelLight, node_light_numpy
-from relume.moving.relief.numbers import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
-from relume.moving.relief.show import IncidentTexelLight, TextureFootprint, shade_texels
-from relume.moving.relief.tables import BtfMaterials, filtered_factors, find_btf_materials, pack_lanes
-from relume.render.image import render_image
+from relume.math.zernike import project
+from relume.output.render_image import render_image
 
 SCALE, ROTATION, MEAN = 2.0, 40.0, np.float32(0.02)
 TO_LIGHT = np.array([0.5, 0.8, 0.2]) / np.linalg.norm([0.5, 0.8, 0.2])
@@ -144,12 +149,12 @@ def test_few_numbers_tell_out_factors(moving, small_btf):
 
 def test_the_finest_texels_of_large_tables_are_left_out(small_btf, monkeypatch):
     whole = load_btf(small_btf.record.data)
-    monkeypatch.setattr(tables, "_MAX_TABLE_BYTES", 81 * 24 * 100)
-    found = tables.compute_texel_tables(whole)
+    monkeypatch.setattr(texel_tables, "_MAX_TABLE_BYTES", 81 * 24 * 100)
+    found = texel_tables.compute_texel_tables(whole)
     assert found.levels[0].tolist() == [0, 8, 8]
     assert found.weight.shape[1] == 64 + 16 + 4 + 1
     monkeypatch.undo()
-    complete = tables.compute_texel_tables(whole)
+    complete = texel_tables.compute_texel_tables(whole)
     one, other = (t.step[:, None] * t.weight for t in (found, complete))
     np.testing.assert_allclose(one, other[:, 256:], atol=float((found.step + complete.step).max()))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.btf.rings import (
+from relume.assets.btf.direction_rings import (
     UBO_81,
     DirectionGrid,
     directions,
@@ -12,7 +12,7 @@ from relume.btf.rings import (
     make_direction_grid,
     ubo_grid,
 )
-from relume.errors import MaterialError
+from relume.core.errors import MaterialError
 
 
 def random_directions(num, seed=3):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from relume.btf.sent import outgoing_radiance, outgoing_radiance_numpy, sample_btf, sample_btf_numpy
-from relume.btf.shelf import load_btf
+from relume.assets.btf.btf_store import load_btf
+from relume.assets.btf.outgoing_radiance import outgoing_radiance, outgoing_radiance_numpy, sample_btf, sample_btf_numpy
 
 
 @pytest.mark.parametrize("components", [0, 3, 16])

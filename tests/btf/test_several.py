@@ -11,19 +11,19 @@ import pytest
 from test_texels import CAMERA, GREY, SIZE
 from tiny_scenes import make_tiny_scene, quad, studio
 
-from relume import memory as memories
-from relume.bake import Recipe
+from relume.assets.btf.btf_store import load_btf, store_btf
 from relume.brdf.terms import btf as term
-from relume.btf.shelf import load_btf, store_btf
+from relume.core import cache as memories
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.texel_brdf import texel_tables
+from relume.live.free_camera.texel_brdf.job import TablesJob
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.picture import FreeCameraPicture
-from relume.moving.relief import tables
-from relume.moving.relief.job import TablesJob
-from relume.picture.picture import Picture
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 NUM = 5
 NAMES = [f"Strip {k}" for k in range(NUM)]
@@ -92,7 +92,7 @@ def count(monkeypatch, module, name):
 def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypatch):
     is_moving = opened.camera_mode.name == "FREE"
     made = (
-        count(monkeypatch, tables, "compute_texel_tables")
+        count(monkeypatch, texel_tables, "compute_texel_tables")
         if is_moving
         else count(monkeypatch, term.LocalPcaBtf, "tables")
     )
@@ -115,7 +115,7 @@ def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkey
     picture = FreeCameraPicture(opened, "front", is_watched=True)
     picture.set_look(look_of(opened, records))
     with monkeypatch.context() as during:
-        during.setattr(tables, "compute_texel_tables", lambda whole: pytest.fail("made by a frame"))
+        during.setattr(texel_tables, "compute_texel_tables", lambda whole: pytest.fail("made by a frame"))
         picture.advance(None)
         mean = picture.image()
         while not isinstance(job := picture.next_job(), TablesJob):

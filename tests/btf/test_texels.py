@@ -7,23 +7,23 @@ import pytest
 from sessions import run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
-from relume.bake import Recipe
+from relume.assets.btf.direction_rings import interpolation_weights_numpy
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
-from relume.btf.rings import interpolation_weights_numpy
+from relume.core.cache import Cache
+from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.fixed_camera.picture import Picture
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.picture.light import illumination_from_look
-from relume.picture.picture import Picture
-from relume.project.texels import texel_numpy, texel_rows
+from relume.output.render_image import render_image
 from relume.reference import ReferencePoints, reference_image
-from relume.reference.indirect import _sample_btf_surfaces, _sample_directions
-from relume.reference.kinds import RoughnessClasses
 from relume.reference.lobes import cosine_lobe
-from relume.render.image import render_image
+from relume.reference.path_tracing import _sample_btf_surfaces, _sample_directions
+from relume.reference.roughness_classes import RoughnessClasses
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+from relume.transport.btf_kernel import texel_numpy, texel_rows
 
 CAMERA = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
 GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}

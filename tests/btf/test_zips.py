@@ -12,12 +12,12 @@ import pytest
 from btf_zips import DIRECTIONS, make_image, make_image_name, zipped
 from PIL import Image
 
-from cli.main import main
-from relume.btf.importing import import_btf
-from relume.btf.rings import make_direction_grid
-from relume.btf.zips import ZippedBtf
-from relume.errors import MaterialError
-from relume.imageio.exr import image_channels, write_scanlines
+from relume.assets.btf.bonn_zip import ZippedBtf
+from relume.assets.btf.direction_rings import make_direction_grid
+from relume.assets.btf.import_btf import import_btf
+from relume.core.errors import MaterialError
+from relume.image_io.exr_writer import image_channels, write_scanlines
+from relume_cli.main import main
 
 
 def test_images_come_in_the_order_of_the_rings_and_linear(tmp_path):
@@ -120,7 +120,7 @@ def test_large_images_are_kept_as_means_of_linear_values(tmp_path, monkeypatch):
             for light in DIRECTIONS:
                 files[make_image_name(view, light)] = make_image(view, light, (6, 4))[0]
 
-    monkeypatch.setattr("relume.btf.compress.MAX_TEXELS", 10)
+    monkeypatch.setattr("relume.assets.btf.compress.MAX_TEXELS", 10)
     found = ZippedBtf(zipped(tmp_path / "a.zip", larger))
     assert found.size == (3, 2)
     means = make_image(DIRECTIONS[4], DIRECTIONS[6], (6, 4))[1].reshape(3, 2, 2, 2, 3).mean(axis=(1, 3))

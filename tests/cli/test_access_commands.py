@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import main
-from cli.tokens import open_access
-from server.access.roles import Role
+from relume_cli.main import main
+from relume_cli.tokens import open_access
+from relume_server.auth.roles import Role
 
 
 def run(capsys: pytest.CaptureFixture[str], data: Path, *words: str) -> tuple[int, str, str]:

@@ -18,21 +18,21 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cli import background
-from cli.bake import _interrupted
-from cli.interrupts import capture_interrupts
-from cli.main import main
-from relume.environments.model import Environment
-from relume.scene.archive import make_scene
-from relume.scene.built_in import BUILT_IN, built_in
+from relume.assets.environments.environment import Environment
+from relume.scene.examples.catalog import BUILT_IN, built_in
 from relume.scene.model import Camera, Material, Mesh
-from server.settings import Settings
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.scenes import register_scene
-from worker.status import BakeStatus
+from relume.scene.scene_folder import make_scene
+from relume_cli import background
+from relume_cli.bake import _interrupted
+from relume_cli.interrupts import capture_interrupts
+from relume_cli.main import main
+from relume_server.settings import Settings
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
+from relume_worker.status import BakeStatus
 
-RELUME = [sys.executable, "-m", "cli.main"]
+RELUME = [sys.executable, "-m", "relume_cli.main"]
 TINY = ["--size", "32x24", "--lights", "100"]
 
 
@@ -71,7 +71,7 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_help_loads_nothing_heavy() -> None:
     script = (
-        "import sys; from cli.main import main; main(['--help']); "
+        "import sys; from relume_cli.main import main; main(['--help']); "
         "heavy = {'numpy', 'zarr', 'numba', 'fastapi', 'distributed', 'sqlalchemy'} & set(sys.modules); "
         "sys.exit(str(heavy) if heavy else 0)"
     )
@@ -184,7 +184,7 @@ def test_bake_without_watch_is_left_in_the_queue(data: Path, capsys: pytest.Capt
 
 
 def test_scenes_of_one_name_must_be_told_apart(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from worker.database.models import SceneRow
+    from relume_worker.database.models import SceneRow
 
     ledger = open_ledger(data)
     with ledger.sessions.begin() as session:
@@ -337,7 +337,7 @@ def test_what_a_server_writes_is_for_its_own_user_alone(
     def noted(*_: object, **__: object) -> None:
         masks.append(os.umask(0o077))
 
-    monkeypatch.setattr("server.app.serve", noted)
+    monkeypatch.setattr("relume_server.app.serve", noted)
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = str(probe.getsockname()[1])
     before = os.umask(0o022)
@@ -408,14 +408,16 @@ def test_a_bake_in_the_background_has_no_password_among_its_arguments(
     data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: dict[str, Any] = {}
-    monkeypatch.setattr("cli.bake.subprocess.Popen", lambda arguments, **more: begun.update(more, arguments=arguments))
-    monkeypatch.setattr("cli.bake.sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("cli.bake.typer.confirm", lambda *_, **__: True)
+    monkeypatch.setattr(
+        "relume_cli.bake.subprocess.Popen", lambda arguments, **more: begun.update(more, arguments=arguments)
+    )
+    monkeypatch.setattr("relume_cli.bake.sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("relume_cli.bake.typer.confirm", lambda *_, **__: True)
     settings = Settings(data=data, database="postgresql://ann:secret@db/relume")
     assert _interrupted(MagicMock(), settings, "0123456789abcdef") == 0
     assert "secret" not in " ".join(begun["arguments"])
     assert begun["env"]["RELUME_DATABASE"] == settings.database
-    monkeypatch.setattr("cli.background.BakeService", MagicMock(side_effect=[RuntimeError("begun")]))
+    monkeypatch.setattr("relume_cli.background.BakeService", MagicMock(side_effect=[RuntimeError("begun")]))
     monkeypatch.setattr("sys.argv", begun["arguments"][2:])
     monkeypatch.setenv("RELUME_DATABASE", begun["env"]["RELUME_DATABASE"])
     before = os.umask(0o022)

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from fastapi.testclient import TestClient
 
-from cli.demo import SELECTED, demo_recipes
 from relume.brdf.registry import TERMS
-from relume.scene.demo import demo_scene
-from server.app import create_app
-from server.settings import Settings
-from worker.status import bake_id
+from relume.scene.examples.still_life import demo_scene
+from relume_cli.demo import SELECTED, demo_recipes
+from relume_server.app import create_app
+from relume_server.settings import Settings
+from relume_worker.status import bake_id
 
 
 def test_the_demo_bakes_what_the_editor_asks_for_first(tmp_path: Path) -> None:

@@ -15,14 +15,14 @@ from typing import Any
 
 import pytest
 
-from cli.main import main
-from cli.tokens import open_access
-from worker.database import open_database
-from worker.database.upgrading import latest_revision
-from worker.ledger import Ledger
-from worker.paths import bake_path
+from relume_cli.main import main
+from relume_cli.tokens import open_access
+from relume_worker.database import open_database
+from relume_worker.database.upgrading import latest_revision
+from relume_worker.ledger import Ledger
+from relume_worker.paths import bake_path
 
-RELUME = [sys.executable, "-m", "cli.main"]
+RELUME = [sys.executable, "-m", "relume_cli.main"]
 BEFORE = (Path(__file__).parents[1] / "worker" / "before_revisions.sql").read_text(encoding="utf-8")
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cli.naming import match_name, pick
-from relume.errors import NotFoundError
+from relume.core.errors import NotFoundError
+from relume_cli.name_lookup import match_name, pick
 
 KNOWN = [("aaaa1111", "Still life"), ("bbbb2222", "still-life 2"), ("cccc3333", "Box"), ("dddd4444", "box")]
 

@@ -14,18 +14,18 @@ import pytest
 from PIL import Image
 from tiny_scenes import still_life
 
-from cli.follow import follow
-from cli.main import main
-from cli.tokens import open_access
-from relume.bake import Recipe
-from relume.environments.model import Environment
-from relume.errors import NotFoundError
-from relume.scene.archive import make_scene
+from relume.assets.environments.environment import Environment
+from relume.core.errors import NotFoundError
 from relume.scene.model import Camera, Material, Mesh
-from server.records.looks import LookStore
-from server.wire.bodies import BakeBody, DryRunBody, SceneBody
-from worker.scenes import register_scene
-from worker.service import BakeService
+from relume.scene.scene_folder import make_scene
+from relume.store.bake_protocol import Recipe
+from relume_cli.bake_progress import follow
+from relume_cli.main import main
+from relume_cli.tokens import open_access
+from relume_server.persistence.look_store import LookStore
+from relume_server.schemas.bodies import BakeBody, DryRunBody, SceneBody
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
 
 TINY = ["--size", "32x24", "--lights", "100"]
 RED = {"materials": {"White": {"terms": [{"model": "lambert", "color": [1.0, 0.0, 0.0]}]}}}

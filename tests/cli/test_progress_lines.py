@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from cli.keeping.transfer_bar import transfer_bar
-from cli.terminal.printing import is_quiet
-from cli.terminal.progress import MAX_INTERVAL_S, ProgressLines, progress, report_part
+from relume_cli.backup.transfer_bar import transfer_bar
+from relume_cli.terminal.printing import is_quiet
+from relume_cli.terminal.progress import MAX_INTERVAL_S, ProgressLines, progress, report_part
 
 
 class Clock:
@@ -60,7 +60,7 @@ def test_parts_of_work_are_shares_of_all() -> None:
 @pytest.fixture
 def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """No line waits for the one before."""
-    monkeypatch.setattr("cli.terminal.progress.MIN_INTERVAL_S", 0.0)
+    monkeypatch.setattr("relume_cli.terminal.progress.MIN_INTERVAL_S", 0.0)
 
 
 @pytest.mark.usefixtures("hurried")

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from tiny_scenes import still_life
 
-from cli.main import main
-from cli.truth.passes import percent
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.scenes import register_scene
+from relume_cli.main import main
+from relume_cli.reference.passes import percent
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
 
 ASKED = ["reference", "still life", "--look"]
 

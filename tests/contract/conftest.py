@@ -9,15 +9,15 @@ from furnace_method import FurnaceMethod
 from leaves import by_leaves
 from watched_bakes import Bake, Done
 
-from relume.bake import Recipe
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.fixed_camera.protocols import CameraMode, OpenBake
 from relume.methods.base import TransferMethod
 from relume.methods.registry import METHODS, open_bake
-from relume.picture.transfer import CameraMode, OpenBake
-from relume.scene.archive import make_scene
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
+from relume.scene.scene_folder import make_scene
 from relume.store import bake_in_process
-from worker.status import FREE_CAMERA_METHODS
+from relume.store.bake_protocol import Recipe
+from relume_worker.status import FREE_CAMERA_METHODS
 
 __all__ = ["by_leaves"]  # a fixture
 

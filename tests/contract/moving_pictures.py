@@ -3,8 +3,8 @@
 from looks_of_pictures import add_lights
 from sessions import make_look
 
-from relume.moving.fine_job import RefineHighlights
-from relume.moving.picture import FreeCameraPicture
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.refine_job import RefineHighlights
 
 
 def make_picture(views, *changes, camera=None, size=(48, 36)):

@@ -25,12 +25,12 @@ from oracle import exact_image
 from sessions import BUDGET, has_bounces, has_pending_job, make_look, relative_rmse, run_until_exact
 
 from relume.brdf.registry import TERMS
-from relume.errors import MemoryBudgetError, NotFoundError, ParameterError
-from relume.memory import Cache
-from relume.operators.frozen import operator_bytes
+from relume.core.cache import Cache
+from relume.core.errors import MemoryBudgetError, NotFoundError, ParameterError
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import EditAxis
+from relume.operators.linear_operator import operator_bytes
 from relume.operators.shade import shaded_bytes
-from relume.picture.picture import Picture
-from relume.picture.transfer import EditAxis
 from relume.reference import reference_image
 
 UNIT = 2.0**-24  # the relative error of one operation in float32

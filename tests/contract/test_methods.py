@@ -17,11 +17,11 @@ import pytest
 from oracle import DERIVED_FOLDERS
 from watched_bakes import Bake
 
-from relume.bake import Recipe, Task
-from relume.errors import PlanError
+from relume.core.errors import PlanError
 from relume.methods.base import TransferMethod
 from relume.scene.model import Scene
-from relume.store import fill, open_store, publish
+from relume.store import open_store, publish, run_bake
+from relume.store.bake_protocol import Recipe, Task
 from relume.store.publish import array_paths
 
 
@@ -38,7 +38,7 @@ def tree_hash(folder: Path) -> str:
 def run_elsewhere(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> None:
     """A task with a copy of the method as another process gets it."""
     copy: TransferMethod = pickle.loads(pickle.dumps(method))
-    fill.run_task(copy, scene, recipe, staging, task)
+    run_bake.run_task(copy, scene, recipe, staging, task)
 
 
 def test_plan_bounds_what_the_bake_takes(method: TransferMethod, scene: Scene, recipe: Recipe, watched: Bake) -> None:
@@ -88,9 +88,9 @@ def test_order_changes_no_byte(
     method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path
 ) -> None:
     staging = tmp_path / "staging"
-    fill.create_staging_store(method, scene, recipe, staging)
+    run_bake.create_staging_store(method, scene, recipe, staging)
     for stage in range(len(method.stages)):
-        for task in reversed(fill.create_stage(method, scene, recipe, staging, stage)):
+        for task in reversed(run_bake.create_stage(method, scene, recipe, staging, stage)):
             run_elsewhere(method, scene, recipe, staging, task)
     publish(staging, tmp_path / "store.zarr")
     assert tree_hash(tmp_path / "store.zarr") == tree_hash(baked)
@@ -102,9 +102,9 @@ def test_neither_interruption_nor_repetition_changes_a_byte(
     staging, done = tmp_path / "staging", set()
 
     def go_on(stop_after: int | None) -> None:
-        fill.create_staging_store(method, scene, recipe, staging)
+        run_bake.create_staging_store(method, scene, recipe, staging)
         for stage in range(len(method.stages)):
-            for task in fill.create_stage(method, scene, recipe, staging, stage):
+            for task in run_bake.create_stage(method, scene, recipe, staging, stage):
                 if stop_after is not None and len(done) >= stop_after:
                     return
                 if (stage, task.index) not in done:

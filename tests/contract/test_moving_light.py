@@ -16,12 +16,12 @@ from looks_of_pictures import (
 from moving_pictures import finish_lighting, finish_refinement, make_picture, make_watched_picture, run_job
 from sessions import make_look, relative_rmse
 
-from relume.errors import CancelledError, ChunkDamagedError
-from relume.memory import Cache
-from relume.methods.harmonic_light import read_harmonic_light
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, ChunkDamagedError
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.methods.registry import open_bake
-from relume.methods.store_io import read_patches
-from relume.moving.picture import FreeCameraPicture
+from relume.methods.spherical_harmonic_transfer import read_harmonic_light
+from relume.methods.store_layout import read_patches
 from relume.store import open_store
 
 ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
@@ -62,7 +62,7 @@ def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatc
         return picture.image()
 
     harmonic = rough(moving)
-    monkeypatch.setattr("relume.methods.opened.bounced_views.read_harmonic_light", lambda store, cells: None)
+    monkeypatch.setattr("relume.methods.opened.fixed_views_indirect.read_harmonic_light", lambda store, cells: None)
     plain = rough(open_bake(baked, Cache(1 << 30)))
     assert 0 < relative_rmse(harmonic, plain) < 0.04
 
@@ -143,8 +143,8 @@ def test_edits_wait_for_no_light_and_light_for_no_edits(moving, monkeypatch):
     for step in (60, 90):
         job, before = picture.next_job(), picture.image()
         with monkeypatch.context() as nothing_whole:
-            nothing_whole.setattr("relume.moving.picture.render_frame", None)
-            nothing_whole.setattr("relume.moving.vectors.live.update_reflectances", None)
+            nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
+            nothing_whole.setattr("relume.live.free_camera.probe_light.state.update_reflectances", None)
             picture.set_look(make_look(moving, add_lights(other, set_exponent(step))))
             assert picture.advance(None).changed
         edited = picture.image()

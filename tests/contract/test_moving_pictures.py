@@ -18,8 +18,8 @@ from looks_of_pictures import (
 from moving_pictures import finish_refinement, make_picture, make_watched_picture, run_job
 from sessions import make_look, relative_rmse
 
-from relume.errors import NotFoundError, ParameterError
-from relume.moving.picture import FreeCameraPicture
+from relume.core.errors import NotFoundError, ParameterError
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.reference import reference_image
 
 ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
@@ -50,7 +50,7 @@ def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch)
     picture.encode(picture.all_tiles(), "rgb9e5")
     before = picture.image()
     with monkeypatch.context() as nothing_whole:
-        nothing_whole.setattr("relume.moving.picture.render_frame", None)
+        nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
         picture.set_look(make_look(moving, add_lights(direct, change)))
         assert picture.advance(None).changed
     anew = make_watched_picture(moving, direct, change)
@@ -68,7 +68,7 @@ def test_highlights_are_found_finely_once_eye_and_light_rest(moving, aside, monk
     at_first, job = picture.image(), picture.next_job()
     for value in (40, 90):
         with monkeypatch.context() as nothing_whole:
-            nothing_whole.setattr("relume.moving.picture.render_frame", None)
+            nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
             picture.set_look(make_look(moving, add_lights(direct, set_exponent(value))))
             assert picture.advance(None).changed
         finish_refinement(picture)
@@ -184,7 +184,7 @@ def test_diffuse_light_from_elsewhere_is_that_of_brute_force(scene, moving, asid
 
 
 def _with(scene, camera):
-    from relume.scene.placed_camera import with_cameras
+    from relume.scene.custom_camera import with_cameras
 
     return with_cameras(scene, [camera])
 

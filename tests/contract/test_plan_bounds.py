@@ -11,13 +11,13 @@ import pytest
 from foliage import tuft
 from tiny_scenes import quad
 
-from bench.plan import measure_use
-from relume.bake import Recipe
 from relume.methods.base import TransferMethod
 from relume.methods.registry import METHODS
-from relume.scene.archive import make_scene
 from relume.scene.model import Environment, Material, Scene, Texture
-from worker.status import FREE_CAMERA_METHODS
+from relume.scene.scene_folder import make_scene
+from relume.store.bake_protocol import Recipe
+from relume_bench.plan import measure_use
+from relume_worker.status import FREE_CAMERA_METHODS
 
 linux = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux tells the most memory held")
 BLUE = {"model": "lambert", "color": [0.2, 0.3, 0.5], "texture": "diffuse"}

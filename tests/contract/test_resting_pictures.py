@@ -5,18 +5,18 @@ import pytest
 from looks_of_pictures import EDITS, LOBE, add_lights, draw_curve, edit_light, edit_transport, set_floor_color
 from sessions import make_look, relative_rmse, run_next_job
 
-from relume.bake import Recipe
-from relume.errors import CancelledError, ResultUnavailableError
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, ResultUnavailableError
+from relume.live.free_camera.frame import render_frame
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
+from relume.live.free_camera.refinement.refinement_jobs import SparseExactJob, StaticViewJob
 from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.stills import StaticTracing, StaticViewBuilder
-from relume.moving.frame import render_frame
-from relume.moving.picture import FreeCameraPicture
-from relume.moving.rest.resting import ProgressivePicture
-from relume.moving.rest.still_jobs import SparseExactJob, StaticViewJob
-from relume.render.image import render_image
-from relume.scene.placed_camera import with_cameras
+from relume.methods.static_view import StaticTracing, StaticViewBuilder
+from relume.output.render_image import render_image
+from relume.scene.custom_camera import with_cameras
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 SIZE = (64, 40)
 
@@ -111,7 +111,7 @@ def test_edits_go_on_in_the_still_and_those_made_meanwhile_are_kept(picture, mov
     expected = render_image(fixed, "front", make_look(moving, add_lights(set_floor_color, direct)))
     assert relative_rmse(picture.image(), expected) < 1e-5
     look = make_look(moving, add_lights(set_floor_color, draw_curve, direct))
-    picture.set_look(look, hand=LOBE)
+    picture.set_look(look, active_pointer=LOBE)
     assert picture.advance(None).changed  # at once: the curve in hand was frozen
     rested(picture)
     assert relative_rmse(picture.image(), render_image(fixed, "front", look)) < 1e-5
@@ -129,7 +129,7 @@ def test_a_still_of_another_eye_is_of_no_use(picture, moving):
 
 
 def test_it_tells_how_far_it_is_and_goes_on_from_where_it_was_given_up(picture, monkeypatch):
-    monkeypatch.setattr("relume.methods.stills._ROWS_PER_TASK", 512)
+    monkeypatch.setattr("relume.methods.static_view._ROWS_PER_TASK", 512)
     job, shares = picture.next_job(), []
     with pytest.raises(CancelledError):
         job.run(shares.append, lambda: len(shares) > 3)
@@ -184,9 +184,9 @@ def few_at_once(picture, aside, monkeypatch):
         is_hit = seen.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
         return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
 
-    for user in ("picture", "fine_job"):
-        monkeypatch.setattr(f"relume.moving.{user}.frame_of", darkened)
-    monkeypatch.setattr("relume.moving.rest.still_jobs.SAMPLE_SPACING", 4)
+    for user in ("free_camera_picture", "refine_job"):
+        monkeypatch.setattr(f"relume.live.free_camera.{user}.render_frame", darkened)
+    monkeypatch.setattr("relume.live.free_camera.refinement.refinement_jobs.SAMPLE_SPACING", 4)
     picture.set_camera(aside, (160, 100))
     picture.advance(None)
     before, job = picture.image().copy(), picture.next_job()
@@ -199,7 +199,7 @@ def test_a_few_exact_samples_correct_the_moving_picture_until_the_still_is_there
     picture, before = few_at_once
     step = picture.advance(None)
     assert (step.exact, step.fidelity, step.was_off, step.changed) == (False, "approximate", None, True)
-    assert picture.parts() is None  # no shader elsewhere knows of it
+    assert picture.array_blocks() is None  # no shader elsewhere knows of it
     first = picture.image().copy()
     assert isinstance(picture.next_job(), StaticViewJob)
     step = rested(picture)
@@ -210,7 +210,7 @@ def test_a_few_exact_samples_correct_the_moving_picture_until_the_still_is_there
 
 
 def test_where_the_moving_picture_is_right_few_samples_leave_it_alone(picture, aside, monkeypatch):
-    monkeypatch.setattr("relume.moving.rest.still_jobs.SAMPLE_SPACING", 4)
+    monkeypatch.setattr("relume.live.free_camera.refinement.refinement_jobs.SAMPLE_SPACING", 4)
     picture.set_camera(aside, (160, 100))
     picture.advance(None)
     before = picture.image().copy()
@@ -227,9 +227,9 @@ def test_what_a_few_samples_said_is_of_one_look_and_one_eye(few_at_once, moving,
     alone = FreeCameraPicture(moving, "front")
     look, eye = make_look(moving, add_lights(draw_curve)), (moving.views["front"].camera, (160, 100))
     if is_edit:
-        picture.set_look(look, hand=LOBE)
+        picture.set_look(look, active_pointer=LOBE)
         alone.set_look(look)
-        alone.set_camera(*picture._free_camera_picture.eye)
+        alone.set_camera(*picture._free_camera_picture.sized_camera)
     else:
         picture.set_camera(*eye)
         alone.set_look(make_look(moving, add_lights()))

@@ -6,10 +6,10 @@ from oracle import open_copy, render_uncached
 from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 
 import relume.operators.shade
-from relume.memory import Cache
-from relume.picture.picture import Picture
-from relume.project.projector import Projector
-from relume.project.shading.shader import Shader
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.transport.projector import Projector
+from relume.transport.shading.shader import Shader
 
 A_THOUSANDTH = 1e-3
 

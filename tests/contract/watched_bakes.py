@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from relume.bake import Task
+from relume.store.bake_protocol import Task
 
 
 class Done(NamedTuple):

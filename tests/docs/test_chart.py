@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from server.settings import Settings
+from relume_server.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 CHART = ROOT / "docker" / "helm" / "relume"

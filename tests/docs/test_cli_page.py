@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import main
-from cli.pictures.looks import MAX_LOOKS
-from worker.presets import PRESETS
+from relume_cli.main import main
+from relume_cli.pictures.looks import MAX_LOOKS
+from relume_worker.presets import PRESETS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cli.md").read_text(encoding="utf-8")
 GROUPS = ("environment", "material", "token", "ledger")

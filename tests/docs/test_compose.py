@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from server.settings import Settings
+from relume_server.settings import Settings
 
 DOCKER = Path(__file__).parents[2] / "docker"
 GIB = 1024**3

@@ -10,7 +10,7 @@ import pytest
 
 from relume.brdf.registry import TERMS
 from relume.brdf.term import VIEW
-from server.settings import Settings
+from relume_server.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("docker/*.md")])
@@ -48,7 +48,7 @@ def test_links_lead_somewhere(document: Path) -> None:
 
 
 PATH = re.compile(r"\b((?:relume|worker|server|cli|bench|tests|client_web|docker|docs)/[\w./-]*\w/?)")
-MODULE = re.compile(r"`((?:relume|worker|server|bench)(?:\.[a-z_]\w*)+)")
+MODULE = re.compile(r"`((?:relume|relume_worker|relume_server|relume_cli|relume_bench)(?:\.[a-z_]\w*)+)")
 NOT_MODULES = {"relume.v1", "relume.db"}
 EXAMPLES = {"relume/brdf/terms/your_term.py", "bench/.venv-peers", "bench/.venv-cycles", "client_web/dist"}
 

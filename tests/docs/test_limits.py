@@ -3,28 +3,29 @@
 import re
 from pathlib import Path
 
-from relume.brdf import document as terms
-from relume.brdf.channels import IMAGES
-from relume.environments import asset_store as environments
-from relume.environments import reading as environment
-from relume.eye.merged import POSITIONS_PER_PIXEL
-from relume.eye.view_samples import view_sample_limit
-from relume.eye.windows import TILE_SIZE
-from relume.imageio import decoding as images
-from relume.images import reading
-from relume.light import tiles
+from relume.assets.environments import environment_store as environments
+from relume.assets.environments import read_environment as environment
+from relume.assets.measured import measured_store as materials
+from relume.brdf import term_validation as terms
+from relume.brdf.texture_slots import IMAGES
+from relume.camera.merge_rays import POSITIONS_PER_PIXEL
+from relume.camera.tiling import TILE_SIZE
+from relume.camera.view_samples import view_sample_limit
+from relume.image_io import decode as images
+from relume.images import read_image
+from relume.lights import sphere_tiles
 from relume.look import document, patch
-from relume.measured import asset_store as materials
-from relume.methods import bounds
-from relume.methods import sampled_views as direct
-from relume.scene import checks, companions, importer, zipped
-from relume.scene.gltf.materials import MAX_TEXTURE_TEXELS
-from server.files import moments
-from server.records import comments, looks, shares
-from server.settings import Settings
-from server.wire import bodies, protocol, renders, rooms
-from server.wire import comments as wire_comments
-from worker import cameras
+from relume.methods import plan_estimates
+from relume.methods import view_stages as direct
+from relume.scene import validate
+from relume.scene_io import import_scene, referenced_files, zip_scene
+from relume.scene_io.gltf.materials import MAX_TEXTURE_TEXELS
+from relume_server.io import comment_images
+from relume_server.persistence import comment_store, look_store, share_store
+from relume_server.schemas import bodies, protocol, renders, rooms
+from relume_server.schemas import comments as wire_comments
+from relume_server.settings import Settings
+from relume_worker import cameras
 
 KIB, MIB, MILLION = 1 << 10, 1 << 20, 1_000_000
 OPERATIONS = Path(__file__).resolve().parents[2] / "docs" / "operations.md"
@@ -36,11 +37,11 @@ def most(field: str) -> int:
 
 
 ROWS = {
-    "triangles of a scene": f"{checks.MAX_TRIANGLES // MILLION} million",
-    "materials of a scene; terms of a material": f"{checks.MAX_MATERIALS:,}; {document.MAX_TERMS}",
-    "local lights of a scene": f"{checks.MAX_LIGHTS}",
+    "triangles of a scene": f"{validate.MAX_TRIANGLES // MILLION} million",
+    "materials of a scene; terms of a material": f"{validate.MAX_MATERIALS:,}; {document.MAX_TERMS}",
+    "local lights of a scene": f"{validate.MAX_LIGHTS}",
     "scene file; companions of it together; files of a `.zip`": (
-        f"{importer.MAX_FILE_BYTES // MIB} MiB; {companions.MAX_BYTES // MIB} MiB; {zipped.MAX_ENTRIES:,}"
+        f"{import_scene.MAX_FILE_BYTES // MIB} MiB; {referenced_files.MAX_BYTES // MIB} MiB; {zip_scene.MAX_ENTRIES:,}"
     ),
     "side of an image in a scene; texels of all; of what materials make of them": (
         f"{images.MAX_SIDE:,} pixels; {images.MAX_TEXELS // MILLION} million; {MAX_TEXTURE_TEXELS // MILLION} million"
@@ -51,19 +52,20 @@ ROWS = {
     ),
     "imported environments; kept at most": f"{environments.STORE.max_entries}; {environments.MAX_WIDTH:,} wide",
     "images that looks may name; each; its file": (
-        f"{IMAGES.max_entries:,}; {reading.MAX_SIDE:,} × {reading.MAX_SIDE:,}; {reading.MAX_FILE_BYTES // MILLION} MB"
+        f"{IMAGES.max_entries:,}; {read_image.MAX_SIDE:,} × {read_image.MAX_SIDE:,}; "
+        f"{read_image.MAX_FILE_BYTES // MILLION} MB"
     ),
     "imported measured materials": f"{materials.STORE.max_entries}",
-    "pixels of a baked view; light triangles of a bake": f"{direct.MAX_PIXELS:,}; {tiles.MAX_LIGHTS:,}",
+    "pixels of a baked view; light triangles of a bake": f"{direct.MAX_PIXELS:,}; {sphere_tiles.MAX_LIGHTS:,}",
     "points of a drawn curve": f"{terms.MAX_POINTS:,}",
     "operations of a patch; text message of a session": (
         f"{patch.MAX_OPERATIONS}; {protocol.MAX_MESSAGE_BYTES // KIB} KiB"
     ),
     "comments on a scene; in all; their pictures and words together": (
-        f"{comments.MAX_PER_SCENE}; {comments.MAX_COMMENTS:,}; {comments.MAX_BYTES // MIB} MiB"
+        f"{comment_store.MAX_PER_SCENE}; {comment_store.MAX_COMMENTS:,}; {comment_store.MAX_BYTES // MIB} MiB"
     ),
     "words of a comment; side of its picture as it is sent; as it is kept": (
-        f"{wire_comments.MAX_COMMENT:,} characters; {moments.MAX_SIDE:,}; {moments.STORED_SIDE} pixels"
+        f"{wire_comments.MAX_COMMENT:,} characters; {comment_images.MAX_SIDE:,}; {comment_images.STORED_SIDE} pixels"
     ),
     "name of somebody in a room; name of a room": (
         f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"
@@ -72,9 +74,9 @@ ROWS = {
         f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"
     ),
     "cameras placed in a scene": f"{cameras.MAX_CAMERAS}",
-    "saved look; number of them": f"{looks.MAX_LOOK_BYTES // KIB} KiB; {looks.MAX_LOOKS:,}",
+    "saved look; number of them": f"{look_store.MAX_LOOK_BYTES // KIB} KiB; {look_store.MAX_LOOKS:,}",
     "shared look; number of them; all together": (
-        f"{shares.MAX_SHARE_BYTES // KIB} KiB; {shares.MAX_SHARES:,}; {shares.MAX_BYTES // MIB} MiB"
+        f"{share_store.MAX_SHARE_BYTES // KIB} KiB; {share_store.MAX_SHARES:,}; {share_store.MAX_BYTES // MIB} MiB"
     ),
     "looks and cameras of one batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
     "frames whose looks are told at once; all together": f"{renders.MAX_LISTED_FRAMES}; "
@@ -96,8 +98,8 @@ def test_what_is_said_of_plans_is_what_plans_count() -> None:
     assert [view_sample_limit([], side * side) / side**2 for side in (256, 512, 1024, 4096)] == [8, 4, 2, 2]
     assert "eight view samples a pixel in pictures up to 256 × 256" in text
     assert "two from 1024 × 1024 on" in text
-    assert f"the process ({bounds.PROGRAM_BYTES // MILLION} MB)" in text
-    assert f"({bounds.LIGHT_BYTES_PER_TEXEL} bytes a texel)" in text
-    assert f"({bounds.BYTES_PER_RAY} bytes each, nine a pixel" in text
+    assert f"the process ({plan_estimates.PROGRAM_BYTES // MILLION} MB)" in text
+    assert f"({plan_estimates.LIGHT_BYTES_PER_TEXEL} bytes a texel)" in text
+    assert f"({plan_estimates.BYTES_PER_RAY} bytes each, nine a pixel" in text
     assert POSITIONS_PER_PIXEL == 8
     assert f"a window of {TILE_SIZE} × {TILE_SIZE} of them" in text

@@ -14,8 +14,8 @@ from prometheus_client.registry import CollectorRegistry
 from server_fakes import Control, InThreadBatches
 from server_fixtures import open_fake_bakes
 
-from server.app import create_app
-from server.settings import Settings
+from relume_server.app import create_app
+from relume_server.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
 MONITORING = ROOT / "docker" / "monitoring"

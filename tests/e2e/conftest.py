@@ -12,9 +12,9 @@ from editor_server import SIZE, Server
 from playwright.sync_api import Browser, Error, Page, expect, sync_playwright
 from tiny_scenes import still_life
 
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.scenes import register_scene
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
 
 NUM_LIGHTS = 200
 ARGUMENTS = [

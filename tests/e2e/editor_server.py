@@ -16,9 +16,9 @@ import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
 from relume.scene.model import Material
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.scenes import register_scene
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
 
 SIZE = (320, 240)
 START_S, BAKE_S = 240.0, 300.0
@@ -37,7 +37,7 @@ class Server:
 
     def start(self) -> None:
         """Start it and wait until it answers."""
-        command = [sys.executable, "-m", "cli.main", "serve", "--data", str(self.data), "--port", str(self.port)]
+        command = [sys.executable, "-m", "relume_cli.main", "serve", "--data", str(self.data), "--port", str(self.port)]
         with (self.data / "server.txt").open("ab") as log:
             environment = os.environ | {"RELUME_OCIO": "ocio://cg-config-latest"}
             self.process = subprocess.Popen(command, stdout=log, stderr=log, env=environment)

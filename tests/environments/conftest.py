@@ -3,7 +3,7 @@
 import pytest
 from environment_files import dusk, write_map
 
-from relume.environments.asset_store import STORE, store_environment
+from relume.assets.environments.environment_store import STORE, store_environment
 
 
 @pytest.fixture(scope="session")

@@ -9,15 +9,15 @@ import pytest
 from environment_files import dusk, write_map
 from PIL import Image
 
-from relume import environments
-from relume.color import luminance
-from relume.environments import asset_store
-from relume.environments.asset_store import STORE, get_record, records, store_environment, thumbnail_path
-from relume.environments.built_in import BUILT_IN, load_built_in
-from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.environments.thumbnail import thumbnail
-from relume.errors import NotFoundError, SceneError
-from server.files.importing import remove_strays
+from relume.assets import environments
+from relume.assets.environments import environment_store
+from relume.assets.environments.built_in import BUILT_IN, load_built_in
+from relume.assets.environments.environment_store import STORE, get_record, records, store_environment, thumbnail_path
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles
+from relume.assets.environments.thumbnail import thumbnail
+from relume.core.color import luminance
+from relume.core.errors import NotFoundError, SceneError
+from relume_server.io.import_request import remove_strays
 
 
 def test_an_import_is_listed_and_found_by_its_name(shelf):
@@ -61,7 +61,7 @@ def test_what_a_killed_import_left_is_found_by_its_name(tmp_path):
 
 
 def test_large_maps_are_kept_smaller_and_as_bright(tmp_path, monkeypatch):
-    monkeypatch.setattr(asset_store, "MAX_WIDTH", 32)
+    monkeypatch.setattr(environment_store, "MAX_WIDTH", 32)
     pixels = np.random.default_rng(1).uniform(0, 4, (48, 96, 3)).astype(np.float32)
     path = write_map(tmp_path / "large.exr", pixels)
     with STORE.with_search_folder(tmp_path / "shelf") as folder:

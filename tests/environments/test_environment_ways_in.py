@@ -12,15 +12,15 @@ from fastapi.testclient import TestClient
 from session_client import open_session
 from tiny_scenes import still_life
 
-from cli.main import main
-from relume.bake import Recipe
-from relume.environments.asset_store import records
-from relume.environments.reading import read_environment
-from relume.errors import SceneError
-from server.app import create_app
-from server.settings import Settings
-from worker.scenes import register_scene
-from worker.service import BakeService
+from relume.assets.environments.environment_store import records
+from relume.assets.environments.read_environment import read_environment
+from relume.core.errors import SceneError
+from relume.store.bake_protocol import Recipe
+from relume_cli.main import main
+from relume_server.app import create_app
+from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
 
 URL = "/api/environments"
 RECIPE = Recipe("direct", ("front",), (64, 48), 200)

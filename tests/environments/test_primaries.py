@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from environment_files import dusk, write_map
 
-from relume.environments.reading import read_environment
-from relume.errors import SceneError
-from relume.imageio.primaries import REC_709, to_rec_709
+from relume.assets.environments.read_environment import read_environment
+from relume.core.errors import SceneError
+from relume.image_io.primaries import REC_709, to_rec_709
 
 D65 = (0.3127, 0.3290)
 REC_2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *D65)

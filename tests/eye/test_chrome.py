@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, mesh, studio, torus
 
-from relume.environments.equirect import lookup
-from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.primary import Hits, camera_directions, trace_rays
-from relume.trace.surface import surface_at
+from relume.assets.environments.equirect import lookup
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.raytrace.camera_rays import Hits, camera_directions, trace_rays
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.surface_interaction import surface_at
 
 SIZE = (96, 72)
 FINE = 12

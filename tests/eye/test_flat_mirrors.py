@@ -9,18 +9,18 @@ import pytest
 from sessions import make_look, relative_rmse, run_next_job, run_until_exact
 from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad, sphere
 
-from relume.bake import Recipe
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.brdf.fresnel import schlick
-from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.eye.flat_mirrors import find_flat_mirrors, lights_visible_in_mirrors
-from relume.memory import Cache
+from relume.camera.planar_mirrors import find_flat_mirrors, lights_visible_in_mirrors
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.stills import StaticViewBuilder
-from relume.picture.picture import Picture
-from relume.render.image import render_image
+from relume.methods.static_view import StaticViewBuilder
+from relume.output.render_image import render_image
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
+from relume.store.bake_protocol import Recipe
 
 F0, COLOR, ALBEDO, ROWS = 0.7, 0.8, 0.6, 64
 MIRROR = Material("Mirror", ({"model": "ggx", "color": [COLOR] * 3, "params": {"roughness": 0.03, "f0": F0}},))

@@ -11,21 +11,21 @@ from sessions import make_look, relative_rmse
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 from twins import unit
 
-from relume.bake import Recipe
 from relume.brdf.fresnel import fresnel
-from relume.eye.glass import MAX_GLASS_HITS, dielectric
-from relume.eye.layers import trace_layers
-from relume.eye.view_samples import sample_view
-from relume.memory import Cache
+from relume.camera.refraction import MAX_GLASS_HITS, dielectric
+from relume.camera.transparency_layers import trace_layers
+from relume.camera.view_samples import sample_view
+from relume.core.cache import Cache
+from relume.live.fixed_camera.background.coverage import Coverage
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.picture import FreeCameraPicture
-from relume.picture.background.coverage import Coverage
+from relume.output.render_image import render_image
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.visibility import trace_visibility
 from relume.reference.image import reference_image
-from relume.render.image import render_image
 from relume.scene.model import Glass, Material
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.visibility import trace_visibility
+from relume.store.bake_protocol import Recipe
 
 SIZE = (64, 48)
 EVEN = np.full(1, 0.5, np.float32)

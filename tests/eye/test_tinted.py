@@ -7,19 +7,19 @@ import pytest
 from sessions import make_look, relative_rmse
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.bake import Recipe
+from relume.assets.environments.equirect import texel_directions
 from relume.brdf.fresnel import schlick
-from relume.environments.equirect import texel_directions
-from relume.eye.tinted import TintSplit
-from relume.eye.view_samples import sample_view
-from relume.memory import Cache
+from relume.camera.spectral_split import TintSplit
+from relume.camera.view_samples import sample_view
+from relume.core.cache import Cache
 from relume.methods.registry import METHODS, open_bake
+from relume.output.render_image import render_image
+from relume.raytrace.alpha_filter import PASS_TINT_GROUPS
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
-from relume.render.image import render_image
 from relume.scene.model import Glass, Material
 from relume.store import bake_in_process
-from relume.trace.cutout_filter import PASS_TINT_GROUPS
-from relume.trace.geometry import build_scene_buffers
+from relume.store.bake_protocol import Recipe
 
 SIZE = (24, 16)
 CLEAR = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.3, "f0": [0.04] * 3}}

@@ -9,13 +9,13 @@ import pytest
 from foliage import tuft
 from tiny_scenes import checker, make_camera, make_tiny_scene, mesh, quad, sphere, still_life, studio
 
-from relume.environments.equirect import direction_to_uv
-from relume.eye import view_samples, windows
-from relume.eye.view_samples import BACKGROUND, sample_view
+from relume.assets.environments.equirect import direction_to_uv
+from relume.camera import tiling, view_samples
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.raytrace.camera_rays import camera_directions
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.texture import MipMap
 from relume.scene.model import Material, Texture, TextureEncoding
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.primary import camera_directions
-from relume.trace.texture import MipMap
 
 SIZE = (64, 48)
 WHITE = ({"model": "lambert", "color": [1, 1, 1]},)
@@ -88,9 +88,9 @@ def test_samples_found_window_by_window_are_those_found_at_once(still, is_rough,
         scene = replace(scene, materials=[replace(m, textures={"roughness": rough}) for m in scene.materials])
         at_once = sampled(scene)
         assert len(np.unique(at_once.level)) > 4
-    monkeypatch.setattr(windows, "TILE_SIZE", 16)
+    monkeypatch.setattr(tiling, "TILE_SIZE", 16)
     by_window = flat(sampled(scene))
-    assert len(windows.image_tiles(SIZE)) == 12
+    assert len(tiling.image_tiles(SIZE)) == 12
     for name, values in flat(at_once).items():
         np.testing.assert_array_equal(by_window[name], values, err_msg=name)
 

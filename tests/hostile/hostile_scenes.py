@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from glb_builder import Glb
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
-from relume.scene.gltf import import_gltf
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
 from relume.scene.model import Scene
+from relume.scene_io.gltf import import_gltf
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

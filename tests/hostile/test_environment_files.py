@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relume.environments.reading import read_environment
-from relume.errors import SceneError
-from relume.imageio.linear import read_pixels
+from relume.assets.environments.read_environment import read_environment
+from relume.core.errors import SceneError
+from relume.image_io.read_linear import read_pixels
 
 
 def hdr(width: int, height: int, pixels: bytes = b"") -> bytes:

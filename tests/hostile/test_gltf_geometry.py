@@ -9,7 +9,7 @@ import pytest
 from glb_builder import QUAD, Glb, pack
 from hostile_scenes import changed, imported, refused, with_accessor
 
-from relume.scene.gltf import importer
+from relume.scene_io.gltf import importer
 
 
 @pytest.mark.parametrize(

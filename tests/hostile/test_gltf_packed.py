@@ -15,9 +15,9 @@ import pytest
 from hostile_scenes import refused
 from packed_glb import SIDE, VECTORS, Glb, draco_bytes, draco_glb, meshopt_glb
 
-from relume.errors import SceneError
-from relume.scene.gltf import import_gltf
-from relume.scene.meshopt import MeshoptError, decode_sequence, decode_triangles, decode_vertices
+from relume.core.errors import SceneError
+from relume.scene_io.gltf import import_gltf
+from relume.scene_io.meshopt import MeshoptError, decode_sequence, decode_triangles, decode_vertices
 
 HUGE = 2**31
 
@@ -75,12 +75,12 @@ def test_attributes_that_draco_has_besides_end_in_words_within_a_limit_of_memory
     besides = {number: np.zeros((len(points), 127), np.uint8) for number in range(7, 57)}
     packed = DracoPy.encode(points, face, generic_attributes=besides, **options)
     limited = (
-        "import resource, sys; from relume.scene.gltf.packed import decompress_draco; import DracoPy; "
+        "import resource, sys; from relume.scene_io.gltf.compression import decompress_draco; import DracoPy; "
         "resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30)); "
         "decompress_draco(sys.stdin.buffer.read(), 3, 60_000, 'the mesh')"
     )
     ended = subprocess.run([sys.executable, "-c", limited], input=packed, capture_output=True, check=False)
-    assert ended.stderr.splitlines()[-1].startswith(b"relume.errors.SceneError: the mesh cannot be unpacked")
+    assert ended.stderr.splitlines()[-1].startswith(b"relume.core.errors.SceneError: the mesh cannot be unpacked")
 
 
 @pytest.mark.parametrize("accessor", [0, 1, 2])

@@ -15,10 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ply_builder import binary, header, text
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
-from relume.scene.importer import import_scene
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
 from relume.scene.model import Scene
+from relume.scene_io.import_scene import import_scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 OBJ = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 3/1/1\nf -1//-1 -2 -3\n"

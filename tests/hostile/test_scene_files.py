@@ -12,9 +12,9 @@ from hostile_scenes import LIGHT, imported
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relume.errors import SceneError
-from relume.scene.importer import import_scene
+from relume.core.errors import SceneError
 from relume.scene.model import Scene
+from relume.scene_io.import_scene import import_scene
 
 
 @settings(max_examples=300)

@@ -13,8 +13,8 @@ from session_client import SIGMA, THETA_H, Baked, Session, open_session, session
 from starlette.testclient import WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
 
-from server.live.reception import MAX_BAD_MESSAGES
-from server.wire.protocol import MAX_MESSAGE_BYTES
+from relume_server.schemas.protocol import MAX_MESSAGE_BYTES
+from relume_server.session.receive import MAX_BAD_MESSAGES
 
 IDS = "0123456789abcdef"
 
@@ -257,7 +257,7 @@ def test_a_session_that_does_not_begin_with_open_is_closed(client: TestClient, b
 def test_a_client_that_says_nothing_is_closed(
     client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.reading.OPEN_SECONDS", 0.05)
+    monkeypatch.setattr("relume_server.session.reader.OPEN_SECONDS", 0.05)
     opened = client.websocket_connect(session_path(baked.bake, {}), ["relume.v1"])
     with opened as websocket, pytest.raises(ConnectionError) as closed:
         Session(websocket, acknowledges=False).receive()

@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 from shared_bakes import unmeasured
 
-from relume.brdf.channels import IMAGES
-from relume.images.shelf import store
+from relume.brdf.texture_slots import IMAGES
+from relume.images.image_store import store
 
 __all__ = ["unmeasured"]  # a fixture
 

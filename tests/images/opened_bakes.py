@@ -2,12 +2,12 @@
 
 from sessions import run_until_exact
 
-from relume.bake import Recipe
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.picture import FreeCameraPicture
-from relume.picture.picture import Picture
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 
 def open_small_bake(scene, method, folder):

@@ -9,16 +9,16 @@ from opened_bakes import open_small_bake, render_exact
 from sessions import relative_rmse
 from tiny_scenes import make_tiny_scene, mesh
 
-from relume.errors import ParameterError
-from relume.images.shelf import load_texture
+from relume.core.errors import ParameterError
+from relume.images.image_store import load_texture
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.probes.texture_overrides import ProbeMapOverrides, overridden_textures
 from relume.look import default_look, validate
-from relume.moving.picture import FreeCameraPicture
-from relume.moving.points.images import ProbeMapOverrides, overridden_textures
+from relume.raytrace.camera_rays import trace_rays
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.surface_interaction import surface_at
 from relume.reference.image import reference_image
-from relume.scene.coding import decode
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.primary import trace_rays
-from relume.trace.surface import surface_at
+from relume.scene.texture_encoding import decode
 
 
 def painted(scene, texture):

@@ -13,17 +13,17 @@ from PIL import Image
 from sessions import relative_rmse
 from tiny_scenes import corner
 
-from relume.brdf.channels import IMAGES
-from relume.brdf.document import complete_term
-from relume.environments.model import Environment
-from relume.errors import NotFoundError, ParameterError, SceneError
-from relume.images.metals import with_metalness
-from relume.images.shelf import get_record, load_texture, store
+from relume.assets.environments.environment import Environment
+from relume.brdf.term_validation import complete_term
+from relume.brdf.texture_slots import IMAGES
+from relume.core.errors import NotFoundError, ParameterError, SceneError
+from relume.images.image_store import get_record, load_texture, store
+from relume.images.metalness import with_metalness
 from relume.look import default_look, validate
-from relume.scene.archive import load_material, save_scene
-from relume.scene.coding import decode
-from relume.scene.gltf import import_gltf
 from relume.scene.model import Material
+from relume.scene.scene_folder import load_material, save_scene
+from relume.scene.texture_encoding import decode
+from relume.scene_io.gltf import import_gltf
 
 SIDE = 48
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))

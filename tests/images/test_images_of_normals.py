@@ -10,23 +10,23 @@ from PIL import Image
 from sessions import bake_corner_scene, relative_rmse, run_until_exact
 from tiny_scenes import corner
 
-from relume.brdf.channels import IMAGES, NormalMap
-from relume.errors import CancelledError, ParameterError, StoreError
-from relume.eye.view_samples import sample_view
-from relume.images.shelf import load_normal_map, store
+from relume.brdf.texture_slots import IMAGES, NormalMap
+from relume.camera.view_samples import sample_view
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, ParameterError, StoreError
+from relume.images.image_store import load_normal_map, store
+from relume.live.fixed_camera.picture import Picture
+from relume.live.free_camera.probes.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
 from relume.look import default_look, validate
-from relume.memory import Cache
 from relume.methods.gather import RAYS_PER_SAMPLE
-from relume.methods.retracing import NormalRetracer
-from relume.moving.points.images import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
-from relume.picture.picture import Picture
+from relume.methods.retrace import NormalRetracer
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
-from relume.reference.images import with_overrides
-from relume.scene.coding import decode
-from relume.scene.gltf.uvs import compute_tangents
+from relume.reference.textures import with_overrides
 from relume.scene.model import Material, Texture, TextureEncoding
-from relume.trace.geometry import build_scene_buffers
-from relume.views import worn_store
+from relume.scene.texture_encoding import decode
+from relume.scene_io.gltf.uvs import compute_tangents
+from relume.views import map_override_store
 
 SIDE = 64
 SCALE = 1.5
@@ -121,7 +121,7 @@ def test_what_surfaces_send_is_of_the_normals_that_are_seen(bakes, plain, named)
 def test_gather_rays_are_given_up_and_go_on(bakes, plain, named, monkeypatch):
     """Where a hand comes back while they are traced; what was traced is not traced again."""
     bare, _ = bakes
-    monkeypatch.setattr(worn_store, "_SAMPLES_PER_STEP", 64)
+    monkeypatch.setattr(map_override_store, "_SAMPLES_PER_STEP", 64)
     linked, traced = NormalRetracer.gather_hits, []
 
     def counted(self, points, wo, pattern):

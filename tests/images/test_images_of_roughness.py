@@ -9,14 +9,14 @@ from PIL import Image
 from sessions import bake_corner_scene, relative_rmse, run_until_exact
 from tiny_scenes import corner
 
-from relume.brdf.channels import IMAGES
-from relume.errors import NotFoundError, ParameterError
-from relume.images.shelf import get_record, load_roughness_map, mean_roughness, store
+from relume.brdf.texture_slots import IMAGES
+from relume.core.errors import NotFoundError, ParameterError
+from relume.images.image_store import get_record, load_roughness_map, mean_roughness, store
+from relume.live.fixed_camera.picture import Picture
 from relume.look import default_look, validate
-from relume.picture.picture import Picture
 from relume.reference.image import reference_image
-from relume.scene.coding import decode
 from relume.scene.model import Material, Texture, TextureEncoding
+from relume.scene.texture_encoding import decode
 
 SIDE = 64
 

@@ -11,16 +11,16 @@ from PIL import Image
 from session_client import open_session
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from relume.brdf.channels import IMAGES
-from relume.errors import SceneError
-from relume.images.reading import MAX_SIDE
-from relume.images.shelf import load_texture, records, store
-from server.app import create_app
-from server.live.state.look_state import LookState
-from server.live.state.shown_views import VisibleViews
-from server.settings import Settings
-from worker.scenes import register_scene
+from relume.brdf.texture_slots import IMAGES
+from relume.core.errors import SceneError
+from relume.images.image_store import load_texture, records, store
+from relume.images.read_image import MAX_SIDE
+from relume.store.bake_protocol import Recipe
+from relume_server.app import create_app
+from relume_server.client_state.look_state import LookState
+from relume_server.client_state.visible_views import VisibleViews
+from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
 
 URL = "/api/images"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relume.environments.equirect import lookup, texel_directions, texel_solid_angles
-from relume.light.blur import MAX_ROWS, downsampled, prefiltered
+from relume.assets.environments.equirect import lookup, texel_directions, texel_solid_angles
+from relume.lights.prefilter import MAX_ROWS, downsampled, prefiltered
 
 HEIGHT = 128
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from tiny_scenes import studio
 
-from relume.light.triangles import tessellate_environment
-from relume.methods.cells.bounces import bounces, irradiance, one_bounce, preview_bounces
-from relume.trace.cell_tree import NO_PATCH
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.radiosity.bounce import bounces, irradiance, one_bounce, preview_bounces
 
 
 def some_links(num_cells, num_rays, seed, lost=0.2):

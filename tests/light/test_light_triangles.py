@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from tiny_scenes import studio
 
-from relume.color import luminance
-from relume.environments.equirect import halve_to_width, texel_directions, texel_solid_angles
-from relume.errors import PlanError
-from relume.light.moments import LightTexels, compute_moments, compute_moments_numpy
-from relume.light.tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
-from relume.light.triangles import RotatedEnvironment, integrate_environment, tessellate_environment
+from relume.assets.environments.equirect import halve_to_width, texel_directions, texel_solid_angles
+from relume.core.color import luminance
+from relume.core.errors import PlanError
+from relume.lights.light_moments import LightTexels, compute_moments, compute_moments_numpy
+from relume.lights.sphere_tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
+from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment, tessellate_environment
 
 
 def solid_angles(corners):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from tiny_scenes import make_emissive_triangles, make_surface_points
 
-from relume.light.gather_rays import cranley_patterson_offset
-from relume.light.local import light_sample, make_light_strata, prepare_local_lights, rectangle
+from relume.lights.local_lights import light_sample, make_light_strata, prepare_local_lights, rectangle
 from relume.look import LightGeometry
-from relume.trace.local_shadows import compute_irradiance
+from relume.raytrace.gather_rays import cranley_patterson_offset
+from relume.raytrace.light_visibility import compute_irradiance
 
 RNG = np.random.default_rng(11)
 PIECES = RNG.normal(size=(5, 3, 3))

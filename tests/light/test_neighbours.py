@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tiny_scenes import studio
 
-from relume.light.neighbours import find_neighbors
-from relume.light.triangles import tessellate_environment
+from relume.lights.neighbors import find_neighbors
+from relume.lights.spherical_triangles import tessellate_environment
 
 
 def sets_of(neighbours):

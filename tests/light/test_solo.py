@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from relume.live.fixed_camera.illumination import illumination_from_look, picture_gain
 from relume.look import Look, default_look, validate
-from relume.picture.light import illumination_from_look, picture_gain
 from relume.scene.model import Material
 
 WHITE = Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.light.suns import NUM_TARGET_SETS, NUM_TARGETS, remove_sun_disks
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles
+from relume.lights.sun_disks import NUM_TARGET_SETS, NUM_TARGETS, remove_sun_disks
 
 
 def sky(*suns, size=(128, 256)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from relume.errors import ParameterError
+from relume.core.errors import ParameterError
 from relume.look import apply_patch, complete, default_look, validate
 from relume.scene.model import Material
 

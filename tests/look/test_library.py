@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from relume.brdf.document import complete_term
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.fresnel import fresnel, schlick
 from relume.brdf.registry import TERMS
-from relume.errors import ParameterError
+from relume.brdf.term_validation import complete_term
+from relume.core.errors import ParameterError
 from relume.look.library import navigation_map, presets
-from relume.look.library.fits import CONVERSIONS, GROUPS, convert_all, fit_conductor
 from relume.look.library.materials import DATA, read_presets
+from relume.look.library.merl_fits import CONVERSIONS, GROUPS, convert_all, fit_conductor
 
 # rows as the published tables have them, so that something is compared where the tables are not at hand
 EXAMPLES = {

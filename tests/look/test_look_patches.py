@@ -11,7 +11,7 @@ from example_look import CURVES, LIGHTS, MATERIALS, NAN, SIGMA, replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relume.errors import EditError, ParameterError
+from relume.core.errors import EditError, ParameterError
 from relume.look import apply_patch, complete, default_look
 
 

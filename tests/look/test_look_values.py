@@ -8,7 +8,7 @@ import jsonpatch
 import pytest
 from example_look import CURVES, INF, MATERIALS, NAN, SIGMA, make_flat_curve
 
-from relume.errors import ParameterError
+from relume.core.errors import ParameterError
 from relume.look import apply_patch, default_look, validate
 from relume.scene.model import Light, Material
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from relume.look import complete, default_look
-from relume.look.library.navigation import navigation_map
-from relume.look.morph import interpolate_looks
+from relume.look.interpolate import interpolate_looks
+from relume.look.library.navigation_map import navigation_map
 from relume.scene.model import Material
 
 LOBE = {"model": "blinn_phong", "color": [1.0, 1.0, 1.0], "params": {"exponent": 10.0}}

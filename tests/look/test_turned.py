@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from relume.light.local import rectangle
+from relume.lights.local_lights import rectangle
 from relume.look import complete, validate
-from relume.look.turned import rotated_environment, rotated_lights
+from relume.look.rotate import rotated_environment, rotated_lights
 
 MIDDLE = [1.0, 2.0, -3.0]
 PANEL = {"kind": "rectangle", "position": [2.0, 3.0, 1.0], "rotation": 25.0, "size": [0.5, 1.5]}

@@ -5,9 +5,9 @@ from leaves import by_leaves
 from merl_files import make_planes
 from shared_bakes import baked, corner, gathered, transfer
 
-from relume.measured.asset_store import STORE, records, store_material
-from relume.measured.lookup import build_table
-from relume.measured.merl import write_merl
+from relume.assets.measured.interpolate import build_table
+from relume.assets.measured.measured_store import STORE, records, store_material
+from relume.assets.measured.merl import write_merl
 
 __all__ = ["baked", "by_leaves", "corner", "gathered", "transfer"]  # fixtures
 

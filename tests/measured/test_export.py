@@ -5,14 +5,14 @@ import pytest
 from merl_files import PLASTIC, make_planes
 from test_lookup import directions
 
+from relume.assets.measured.interpolate import build_table, evaluate_measured
+from relume.assets.measured.measured_store import STORE, store_material
+from relume.assets.measured.merl import grid_directions, is_measured, read_merl, write_merl
 from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import eval_brdf
-from relume.brdf.merl_grid import sample_terms
+from relume.brdf.merl_export import sample_terms
 from relume.brdf.registry import TERMS
-from relume.errors import MaterialError
-from relume.measured.asset_store import STORE, store_material
-from relume.measured.lookup import build_table, evaluate_measured
-from relume.measured.merl import grid_directions, is_measured, read_merl, write_merl
+from relume.core.errors import MaterialError
 
 
 @pytest.fixture(scope="module")

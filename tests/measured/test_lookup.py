@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 from merl_files import PLASTIC, make_planes
 
+from relume.assets.measured.factorize import FLOOR, factorize, factorize_rank_one
+from relume.assets.measured.interpolate import (
+    NUM_KNOTS,
+    QuotientKind,
+    build_table,
+    evaluate_measured,
+    measured_over_model,
+)
+from relume.assets.measured.merl import CHANNEL_SCALE, grid_directions, is_measured
 from relume.brdf.evaluate import eval_brdf
-from relume.measured.factors import FLOOR, factorize, factorize_rank_one
-from relume.measured.lookup import NUM_KNOTS, QuotientKind, build_table, evaluate_measured, measured_over_model
-from relume.measured.merl import CHANNEL_SCALE, grid_directions, is_measured
 
 
 def directions(rng, num, lowest=0.0):

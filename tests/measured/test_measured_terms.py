@@ -8,22 +8,22 @@ from sessions import relative_rmse, run_until_exact
 from test_lookup import directions
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
+from relume.assets.measured.interpolate import evaluate_measured
+from relume.assets.measured.measured_store import STORE, store_material
+from relume.assets.measured.merl import write_merl
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.look import default_look, validate
-from relume.measured.asset_store import STORE, store_material
-from relume.measured.lookup import evaluate_measured
-from relume.measured.merl import write_merl
-from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
-from relume.picture.picture import Picture
+from relume.output.render_image import render_image
 from relume.reference import reference_image
-from relume.render.image import render_image
 from relume.store import bake_in_process
-from server.live.state.pointers import find_curve
+from relume.store.bake_protocol import Recipe
+from relume_server.client_state.pointers import find_curve
 
 LOBES, HOMOMORPHIC = ("measured_lv", "measured_hd"), ("measured_hf",)
 

@@ -6,8 +6,7 @@ import struct
 import numpy as np
 import pytest
 
-from relume.errors import MaterialError
-from relume.measured.merl import (
+from relume.assets.measured.merl import (
     CHANNEL_SCALE,
     FILE_BYTES,
     SHAPE,
@@ -17,6 +16,7 @@ from relume.measured.merl import (
     read_merl,
     write_merl,
 )
+from relume.core.errors import MaterialError
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from relume.brdf.document import complete_term
-from relume.errors import MaterialError, NotFoundError, ParameterError
-from relume.measured import asset_store as shelves
-from relume.measured.asset_store import STORE, get_record, load_material, records, store_material
-from relume.measured.merl import write_merl
+from relume.assets.measured import measured_store as shelves
+from relume.assets.measured.measured_store import STORE, get_record, load_material, records, store_material
+from relume.assets.measured.merl import write_merl
+from relume.brdf.term_validation import complete_term
+from relume.core.errors import MaterialError, NotFoundError, ParameterError
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ from fastapi.testclient import TestClient
 from merl_files import make_planes
 from PIL import Image
 
-from cli.main import main
-from relume.measured.asset_store import records
-from relume.measured.merl import is_measured, read_merl, write_merl
-from server.app import create_app
-from server.settings import Settings
+from relume.assets.measured.measured_store import records
+from relume.assets.measured.merl import is_measured, read_merl, write_merl
+from relume_cli.main import main
+from relume_server.app import create_app
+from relume_server.settings import Settings
 
 RED = ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)
 

@@ -10,14 +10,14 @@ from sessions import relative_rmse
 from shared_bakes import unmeasured
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.bake import Recipe
-from relume.errors import PlanError
+from relume.core.cache import Cache
+from relume.core.errors import PlanError
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.store import bake_in_process, open_store
-from worker.status import recipe_from_json, recipe_json
+from relume.store.bake_protocol import Recipe
+from relume_worker.status import recipe_from_json, recipe_json
 
 __all__ = ["unmeasured"]  # a fixture
 

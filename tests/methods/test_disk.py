@@ -11,20 +11,20 @@ import pytest
 from shared_bakes import unmeasured
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
-from relume import memory as memories
-from relume.bake import Recipe
-from relume.errors import DiskBudgetError, DiskFullError
-from relume.folders import folder_bytes
-from relume.memory import Cache
+from relume.core import cache as memories
+from relume.core.cache import Cache
+from relume.core.errors import DiskBudgetError, DiskFullError
+from relume.core.folder_size import folder_bytes
 from relume.methods import disk
 from relume.methods.disk import SMALL_BYTES, estimate_disk
 from relume.methods.registry import METHODS
-from relume.scene.cornell import cornell_box
+from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Glass, Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 from relume.store.room import scratch_file
 from relume.store.writer import create_store
-from worker.budget import check_budget
+from relume_worker.budget import check_budget
 
 __all__ = ["unmeasured"]  # a fixture
 

@@ -14,35 +14,35 @@ from oracle import render_uncached
 from sessions import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.basis.zernike import OUTGOING_DEGREE
+from relume.assets.environments.equirect import texel_directions
 from relume.brdf.albedo import pack_reflectance, reflectance, unpack_reflectance
 from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
-from relume.environments.equirect import texel_directions
-from relume.light.gather_rays import lattice_offsets, local_ray, make_pattern, ray_weight
-from relume.light.triangles import tessellate_environment
+from relume.core.cache import Cache
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.look import LightPaths, validate
-from relume.memory import Cache
-from relume.methods.cells.between import solve_indirect
-from relume.methods.cells.cell_light import PatchLight
-from relume.methods.cells.reflecting import IncidentLight
+from relume.math.zernike import OUTGOING_DEGREE
 from relume.methods.registry import open_transfer
-from relume.picture.light import illumination_from_look
-from relume.picture.picture import Picture
-from relume.picture.routes.preview import SparsePreview
-from relume.project.contraction import contract
-from relume.project.projector import Projector
-from relume.project.receivers import GatherRays, ShadingPoints
-from relume.project.sent import SIDE
+from relume.output.render_image import render_image
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight
+from relume.radiosity.solve_bounces import solve_indirect
+from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern, ray_weight
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference import ReferencePoints, environment_texels
-from relume.reference.indirect import reference_indirect
+from relume.reference.path_tracing import reference_indirect
 from relume.reference.radiance import material_lobes
-from relume.render.image import render_image
 from relume.scene.model import Material
-from relume.trace.cell_tree import NO_PATCH
-from relume.trace.cells import patch_sample_points
-from relume.trace.geometry import build_scene_buffers
+from relume.transport.outgoing_patch_light import SIDE
+from relume.transport.projector import Projector
+from relume.transport.shading_points import GatherRays, ShadingPoints
+from relume.transport.term_contraction import contract
 
 NUM_CELLS = 90
 CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
@@ -387,7 +387,7 @@ def test_bounces_are_counted_from_direct_light(gathered, direct):
 
 def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
     """From reflected light alone, glimpsed before there is any other, to all light."""
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 300)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
     picture = Picture(gathered, "front", Cache(BUDGET))
     for show in ("first_bounce", "all", "direct"):
 
@@ -421,7 +421,7 @@ def test_a_thinned_bake_has_the_same_light(gathered, monkeypatch):
 
 
 def test_light_that_is_turned_is_glimpsed_with_what_it_reflects(gathered, monkeypatch):
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 300)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
     picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
 
     def turn(document):

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, mesh, sphere
 
-from relume.bake import Recipe
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 WHITE = {"model": "lambert", "color": [0.8, 0.8, 0.8]}
 FRONT = make_camera("front", (0, 0, 4), (0, 0, 0), 1.0)

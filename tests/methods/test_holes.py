@@ -8,18 +8,18 @@ from sessions import make_look, relative_rmse
 from shared_bakes import unmeasured
 from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad, studio
 
-from relume.bake import Recipe
-from relume.light.local import make_light_strata, prepare_local_lights
+from relume.core.cache import Cache
+from relume.lights.local_lights import make_light_strata, prepare_local_lights
+from relume.live.free_camera.browser.geometry_arrays import constants
 from relume.look import LightGeometry
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.shader.geometry import constants
+from relume.output.render_image import render_image
+from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
-from relume.render.image import render_image
 from relume.scene.model import Material, Opacity
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.local_shadows import trace_light_visibility
+from relume.store.bake_protocol import Recipe
 
 __all__ = ["unmeasured"]  # a fixture
 

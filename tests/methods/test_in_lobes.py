@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 import twins
 
-from relume.basis.lobe_grid import (
+from relume.brdf.albedo import narrow_lobes, pack_reflectance, reflectance_matrix, unpack_lobes
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.highlight_tables import lobe_table
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.math.direction_grid import (
     NUM_FINE_BINS,
     SIDE,
     bin_index,
@@ -15,16 +19,12 @@ from relume.basis.lobe_grid import (
     fine_bin_centers,
     reflected_bins,
 )
-from relume.brdf.albedo import narrow_lobes, pack_reflectance, reflectance_matrix, unpack_lobes
-from relume.brdf.evaluate import eval_brdf
-from relume.brdf.lobe_tables import lobe_table
-from relume.light.gather_rays import make_pattern
-from relume.light.triangles import tessellate_environment
-from relume.methods.cells.cell_light import PatchLight
-from relume.methods.cells.in_lobes import DirectLobes, outgoing_in_highlights
-from relume.methods.cells.leaving import BinnedRadiance, first_bounce
-from relume.methods.cells.reflecting import IncidentLight
-from relume.trace.cells import patch_sample_points
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.highlight_transport import DirectLobes, outgoing_in_highlights
+from relume.radiosity.outgoing_radiance import BinnedRadiance, first_bounce
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight
+from relume.raytrace.gather_rays import make_pattern
 
 PLAIN = {"texture": None, "curves": {}}
 NUM_CELLS = 12

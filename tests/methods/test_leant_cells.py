@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from relume.brdf.channels import IMAGES, NormalMap
-from relume.errors import CancelledError
-from relume.images.shelf import store
-from relume.light.gather_rays import make_pattern
-from relume.methods.cells.cell_light import PatchLight
-from relume.methods.cells.leaning import normal_mapped_patches
-from relume.trace.cells import patch_sample_points
+from relume.brdf.texture_slots import IMAGES, NormalMap
+from relume.core.errors import CancelledError
+from relume.images.image_store import store
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.normal_mapped_patches import normal_mapped_patches
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.raytrace.gather_rays import make_pattern
 
 NUM_CELLS, POINTS, RAYS = 6, 4, 5
 LEAN = 0.6, -0.2, 0.77  # of a texel, about

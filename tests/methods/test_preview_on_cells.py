@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from sessions import BUDGET, make_look, relative_rmse
 
-from relume.memory import Cache
-from relume.methods.cells.between import solve_indirect
-from relume.methods.opened import baked_views as transfers
+from relume.core.cache import Cache
+from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.methods.opened import fixed_views as transfers
 from relume.methods.registry import open_transfer
-from relume.picture.light import illumination_from_look
+from relume.radiosity.solve_bounces import solve_indirect
 
 
 @pytest.fixture(scope="module")

@@ -5,18 +5,18 @@ import pytest
 import twins
 from sessions import relative_rmse
 
-from relume.basis.zernike import OUTGOING_DEGREE
 from relume.brdf.albedo import pack_reflectance
-from relume.light.gather_rays import cosine_ray, lattice_offsets, make_pattern
-from relume.light.triangles import tessellate_environment
-from relume.methods.cells.between import OutgoingRadiance, solve_indirect, solve_indirect_fast
-from relume.methods.cells.cell_light import PatchLight
-from relume.methods.cells.quick import incident_fast
-from relume.methods.cells.reflecting import IncidentLight
-from relume.project.sent import NUM_OUTGOING, bin_means, bin_of
-from relume.project.squares import incoming_bins, outgoing_bins
-from relume.trace.cell_tree import NO_PATCH
-from relume.trace.cells import patch_sample_points
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.math.zernike import OUTGOING_DEGREE
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.coarse_irradiance import incident_fast
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight
+from relume.radiosity.solve_bounces import OutgoingRadiance, solve_indirect, solve_indirect_fast
+from relume.raytrace.gather_rays import cosine_ray, lattice_offsets, make_pattern
+from relume.transport.direction_bins import incoming_bins, outgoing_bins
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, bin_means, bin_of
 
 NUM_CELLS = 60
 PLAIN = {"texture": None, "params": {}, "curves": {}}

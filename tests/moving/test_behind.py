@@ -19,12 +19,12 @@ from grounds import (
 from sessions import bake_corner_scene, make_look
 from tiny_scenes import studio
 
-from relume.bake import Recipe
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.picture import FreeCameraPicture
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 WHITE, COLOUR = background(kind="color", color=[1.0, 1.0, 1.0]), background(kind="color", color=[2.0, 1.0, 0.5])
 TRANSPARENT = background(kind="transparent")

@@ -4,23 +4,20 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, mesh, quad, sphere, studio
 
-from relume.bake import Recipe
-from relume.environments.equirect import lookup, rotate_about_y, texel_directions
-from relume.light.blur import prefiltered
-from relume.light.suns import BRIGHT_LIGHT_BOUNDS as LAMPS_OF_SKIES
-from relume.light.suns import remove_sun_disks
-from relume.look import complete, validate
-from relume.memory import Cache
-from relume.methods.registry import METHODS, open_bake
-from relume.moving import frame as frame_module
-from relume.moving.basis import lobes as lobes_module
-from relume.moving.basis.lobes import build_lobes, is_narrow
-from relume.moving.basis.out_factors import NUM_ROWS, white_coefficients
-from relume.moving.basis.rows import MIN_COSINE
-from relume.moving.evaluate import ProbeRadiance
-from relume.moving.highlights.between_points import add_environment_highlights
-from relume.moving.highlights.glances import trace_lobe_visibility
-from relume.moving.highlights.lobe_lights import (
+from relume.assets.environments.equirect import lookup, rotate_about_y, texel_directions
+from relume.core.cache import Cache
+from relume.lights.prefilter import prefiltered
+from relume.lights.sun_disks import BRIGHT_LIGHT_BOUNDS as LAMPS_OF_SKIES
+from relume.lights.sun_disks import remove_sun_disks
+from relume.live.free_camera import frame as frame_module
+from relume.live.free_camera.basis import highlight_lobes as lobes_module
+from relume.live.free_camera.basis.highlight_lobes import build_lobes, is_narrow
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS, white_coefficients
+from relume.live.free_camera.basis.table_index import MIN_COSINE
+from relume.live.free_camera.environment_lookup import build_environment_lookup, rotation_of
+from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.highlights.interpolated_highlights import add_environment_highlights
+from relume.live.free_camera.highlights.lobe_light_lists import (
     NUM_LISTED,
     NUM_WIDTHS,
     SIDE,
@@ -28,16 +25,19 @@ from relume.moving.highlights.lobe_lights import (
     lists_numpy,
     lobe_widths,
 )
-from relume.moving.highlights.looking import PrefilteredEnvironment
-from relume.moving.pixels import shade_pixels
-from relume.moving.points.density import density_from_distance
-from relume.moving.points.lattice import make_corner_grid, mesh_components, place_probes
-from relume.moving.points.sides import visible_sides
-from relume.moving.sky import build_environment_lookup, rotation_of
-from relume.render.image import render_image
+from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
+from relume.live.free_camera.probes.density import density_from_distance
+from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, mesh_components, place_probes
+from relume.live.free_camera.probes.visible_sides import visible_sides
+from relume.live.free_camera.shade_pixels import shade_pixels
+from relume.live.free_camera.shade_probes import ProbeRadiance
+from relume.look import complete, validate
+from relume.methods.registry import METHODS, open_bake
+from relume.output.render_image import render_image
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
+from relume.store.bake_protocol import Recipe
 
 GLOSSY = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 30.0}}
 TOLD = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}
@@ -87,7 +87,7 @@ def test_points_take_no_more_than_half_of_what_a_pixel_finds_in_its_lobe(shiny_b
     def shown_beside(broad):
         def changed(surface, seen, pixel_angle, sent, *others):
             return shade_pixels(
-                surface, seen, pixel_angle, sent._replace(broad=np.full_like(sent.radiance, broad)), *others
+                surface, seen, pixel_angle, sent._replace(radiance=np.full_like(sent.radiance, broad)), *others
             )
 
         monkeypatch.setattr(frame_module, "shade_pixels", changed)
@@ -146,15 +146,15 @@ def sky_numpy(directions, shares, sigma, light, glance):
 
 def one_sky_numpy(direction, sigma, light, glance):
     """What one lobe shows of it."""
-    level = np.clip(2 * np.log2(np.degrees(sigma) / 2) + 1, 0, len(light.sky.levels) - 1)
-    rotated = rotate_about_y(direction[None], 360 * (0.5 - float(light.turn)))
+    level = np.clip(2 * np.log2(np.degrees(sigma) / 2) + 1, 0, len(light.environment.levels) - 1)
+    rotated = rotate_about_y(direction[None], 360 * (0.5 - float(light.rotation)))
     found = np.zeros(3)
     for k, share in ((int(level), 1 - level % 1), (int(np.ceil(level)), level % 1)):
-        first, height, width = light.sky.levels[k]
-        radiance = light.sky.texels[first : first + height * width].reshape(height, width, 3)
+        first, height, width = light.environment.levels[k]
+        radiance = light.environment.texels[first : first + height * width].reshape(height, width, 3)
         found += share * lookup(radiance, rotated.astype(np.float32))[0]
     shown = glance[0] * found
-    for k, lamp in enumerate(light.lamps.astype(np.float64)):
+    for k, lamp in enumerate(light.bright_lights.astype(np.float64)):
         towards, power, per = lamp[:3], lamp[3:6], 1 / (sigma**2 + lamp[6])
         density = np.exp(per * (direction @ towards - 1)) * per / (2 * np.pi) / (1 - np.exp(-2 * per))
         shown = shown + glance[1 + k] * min(level, 1) * density * power

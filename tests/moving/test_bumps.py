@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
-from relume.bake import Recipe
-from relume.basis.zernike import NUM_FUNCTIONS, project
+from relume.core.cache import Cache
+from relume.live.free_camera.normal_mapping import basis_gradients, light_gradient, light_gradient_numpy
 from relume.look import complete, validate
-from relume.memory import Cache
+from relume.math.zernike import NUM_FUNCTIONS, project
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.bumps import basis_gradients, light_gradient, light_gradient_numpy
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.scene.model import Material, Texture
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 WAVES = 4
 LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)

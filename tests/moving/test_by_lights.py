@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, sphere, studio
 
-from relume.bake import Recipe
 from relume.brdf.evaluate import eval_brdf
-from relume.light.tiles import Tiles
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.lights.sphere_tiles import Tiles
+from relume.live.free_camera.basis.highlight_lobes import build_lobes
+from relume.live.free_camera.basis.outgoing_coefficients import cosines
+from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights, sum_lights, sum_lights_numpy
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.basis.lobes import build_lobes
-from relume.moving.basis.out_factors import cosines
-from relume.moving.highlights.by_lights import EnvironmentLights, sum_lights, sum_lights_numpy
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 EYE = np.array([0.4, 1.5, 3.0], np.float32)

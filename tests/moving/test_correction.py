@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.moving.correction import CorrectionSamples, apply_residual, residual
+from relume.live.free_camera.residual_correction import CorrectionSamples, apply_residual, residual
 
 STEP, WIDTH, HEIGHT = 4, 48, 32
 

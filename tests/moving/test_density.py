@@ -5,20 +5,20 @@ import pytest
 from sessions import relative_rmse
 from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
-from relume.bake import Recipe
-from relume.light.triangles import tessellate_environment
+from relume.core.cache import Cache
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.live.free_camera.probes.density import density_from_distance, density_from_shadows
+from relume.live.free_camera.probes.interpolation_weights import make_weights_linear
+from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, place_probes
+from relume.live.free_camera.probes.triangle_grids import enumerate_nodes
+from relume.live.free_camera.probes.visible_sides import visible_sides
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.points.density import density_from_distance, density_from_shadows
-from relume.moving.points.following import make_weights_linear
-from relume.moving.points.grids import enumerate_nodes
-from relume.moving.points.lattice import make_corner_grid, place_probes
-from relume.moving.points.sides import visible_sides
-from relume.render.image import render_image
+from relume.output.render_image import render_image
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
+from relume.store.bake_protocol import Recipe
 
 EYE = np.array([[0.0, 3.0, 4.0]])
 
@@ -110,7 +110,7 @@ def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
 
     truth, now = shown("direct", "truth"), shown("surface", "now")
     alike = lambda geometry, placed, eyes, lights: density_from_distance(geometry, eyes, placed.probe_grid)  # noqa: E731
-    monkeypatch.setattr("relume.methods.surface.density_from_shadows", alike)
+    monkeypatch.setattr("relume.methods.probes.density_from_shadows", alike)
     assert relative_rmse(now, truth) < 0.7 * relative_rmse(shown("surface", "before"), truth)
 
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
-from relume.bake import Recipe
+from relume.core.cache import Cache
+from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, resolve, samples_per_edge
+from relume.live.free_camera.primary_visibility import trace_primary
 from relume.look import complete, validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.edges import EDGE_SAMPLE_POSITIONS, resolve, samples_per_edge
-from relume.moving.look_up import trace_primary
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 CAMERA = make_camera("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
 SIZE = (48, 36)

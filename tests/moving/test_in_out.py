@@ -5,10 +5,10 @@ import pytest
 from test_out_factors import document
 from test_zernike import hemisphere
 
-from relume.basis.zernike import NUM_FUNCTIONS, num_functions, project
 from relume.brdf.evaluate import eval_brdf
-from relume.moving.basis.in_out import BOUND, factorization_error
-from relume.moving.basis.out_factors import cosines, outgoing_coefficients
+from relume.live.free_camera.basis.factorization_error import BOUND, factorization_error
+from relume.live.free_camera.basis.outgoing_coefficients import cosines, outgoing_coefficients
+from relume.math.zernike import NUM_FUNCTIONS, num_functions, project
 
 
 def test_one_function_is_enough_for_a_diffuse_surface():

@@ -5,19 +5,19 @@ import pytest
 from analytic_terms import ANALYTIC
 from test_zernike import hemisphere
 
-from relume.basis.zernike import NUM_FUNCTIONS, project
 from relume.brdf.evaluate import eval_brdf
-from relume.moving.basis import lobes as lobes_module
-from relume.moving.basis.lobes import build_lobes, is_narrow
-from relume.moving.basis.out_factors import (
+from relume.live.free_camera.basis import highlight_lobes as lobes_module
+from relume.live.free_camera.basis.highlight_lobes import build_lobes, is_narrow
+from relume.live.free_camera.basis.material_tables import build_tables
+from relume.live.free_camera.basis.outgoing_coefficients import (
     NUM_ROWS,
     cosines,
     outgoing_coefficients,
     rotate_coefficients,
     white_coefficients,
 )
-from relume.moving.basis.tables import build_tables
-from relume.moving.basis.two_lobes import fit_two_lobes, fit_two_lobes_numpy
+from relume.live.free_camera.basis.two_lobes import fit_two_lobes, fit_two_lobes_numpy
+from relume.math.zernike import NUM_FUNCTIONS, project
 
 
 def document(model, **fields):

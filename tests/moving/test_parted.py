@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 
-from relume.bake import Recipe
-from relume.environments.equirect import texel_directions
+from relume.assets.environments.equirect import texel_directions
+from relume.core.cache import Cache
+from relume.live.free_camera import free_camera_picture as picture_module
+from relume.live.free_camera.occluded_probes import reweight
+from relume.live.free_camera.primary_visibility import trace_primary
 from relume.look import complete, validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving import picture as picture_module
-from relume.moving.has_occluded_neighbor import reweight
-from relume.moving.look_up import trace_primary
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 SIZE = (64, 48)
 CAMERA = make_camera("front", [0.9, 1.4, 2.4], [0, 0.1, 0], 0.6)

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from relume.moving.paths import interpolate_cameras, pivot_of, turntable
+from relume.live.free_camera.camera_paths import interpolate_cameras, pivot_of, turntable
+from relume.raytrace.embree import EmbreeScene
 from relume.scene.model import Camera
-from relume.trace.embree import EmbreeScene
 
 
 def camera(place, turn=0.0, yfov=0.7):

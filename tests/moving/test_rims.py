@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, sphere
 
-from relume.bake import Recipe
-from relume.color import LUMINANCE
+from relume.core.cache import Cache
+from relume.core.color import LUMINANCE
+from relume.live.free_camera import highlight_edges
+from relume.live.free_camera.highlight_edges import RAY_POSITIONS, find_highlight_edges
 from relume.look import complete, validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving import rims
-from relume.moving.rims import RAY_POSITIONS, find_highlight_edges
-from relume.render.image import render_image
+from relume.output.render_image import render_image
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 CAMERA = make_camera("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
 SIZE, FINER = (32, 24), 6
@@ -28,7 +28,7 @@ def beside(luminance, y, x):
 
 @pytest.mark.parametrize("share", [1.0, 0.05])
 def test_rims_are_the_pixels_that_differ_most_from_one_beside_them(monkeypatch, share):
-    monkeypatch.setattr(rims, "_MAX_EDGE_FRACTION", share)
+    monkeypatch.setattr(highlight_edges, "_MAX_EDGE_FRACTION", share)
     rng = np.random.default_rng(1)
     image = rng.exponential(size=(13, 17, 3)).astype(np.float32) ** 3
     is_asked = rng.random(13 * 17) > 0.2
@@ -68,7 +68,7 @@ def shown(opened, scale):
 
 def test_rims_show_what_their_pixels_see(shiny, monkeypatch):
     found = shown(shiny, 1)
-    monkeypatch.setattr(rims, "_MAX_EDGE_FRACTION", 0.0)
+    monkeypatch.setattr(highlight_edges, "_MAX_EDGE_FRACTION", 0.0)
     without, truth = shown(shiny, 1), shown(shiny, FINER)
     changed = (found != without).any(axis=2)
     assert 0 < changed.sum() <= 0.02 * changed.size

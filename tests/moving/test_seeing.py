@@ -6,27 +6,27 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, mesh, sphere, still_life
 
-from relume.bake import Recipe
-from relume.environments.equirect import lookup, rotate_about_y
-from relume.errors import PlanError
+from relume.assets.environments.equirect import lookup, rotate_about_y
+from relume.core.cache import Cache
+from relume.core.errors import PlanError
+from relume.live.free_camera.basis.highlight_lobes import build_lobes
+from relume.live.free_camera.basis.material_tables import build_tables
+from relume.live.free_camera.environment_lookup import rotation_of, sample
+from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.primary_visibility import interpolate_to_nodes, trace_primary
+from relume.live.free_camera.probes.density import density_from_distance
+from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, place_probes
+from relume.live.free_camera.probes.triangle_grids import ProbeDensity, node_index, num_nodes
+from relume.live.free_camera.probes.visible_sides import visible_sides
+from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
+from relume.live.free_camera.shade_probes import shade_probes, shade_probes_numpy
 from relume.look import EnvironmentKey
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.basis.lobes import build_lobes
-from relume.moving.basis.tables import build_tables
-from relume.moving.evaluate import shade_probes, shade_probes_numpy
-from relume.moving.highlights.looking import PrefilteredEnvironment
-from relume.moving.look_up import interpolate_to_nodes, trace_primary
-from relume.moving.pixels import InterpolatedProbes, MirrorData, shade_pixels
-from relume.moving.points.density import density_from_distance
-from relume.moving.points.grids import ProbeDensity, node_index, num_nodes
-from relume.moving.points.lattice import make_corner_grid, place_probes
-from relume.moving.points.sides import visible_sides
-from relume.moving.sky import rotation_of, sample
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.texture import MipMap
 from relume.scene.model import Camera
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.texture import MipMap
+from relume.store.bake_protocol import Recipe
 
 TOLD = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells from around
 

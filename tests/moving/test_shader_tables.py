@@ -5,12 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from relume.basis.zernike import DEGREE, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
-from relume.moving.basis.tables import build_tables
-from relume.moving.frame import MaterialState
-from relume.moving.points.grids import ProbeGrid, node_index, num_nodes
-from relume.moving.points.surface import Textures
-from relume.moving.shader import geometry, tables
+from relume.live.free_camera.basis.material_tables import build_tables
+from relume.live.free_camera.browser import geometry_arrays, material_arrays
+from relume.live.free_camera.frame import MaterialState
+from relume.live.free_camera.probes.stored_scene import Textures
+from relume.live.free_camera.probes.triangle_grids import ProbeGrid, node_index, num_nodes
+from relume.math.zernike import DEGREE, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
 
 SEED = 11
 LAMBERT = {"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "curves": {}, "texture": None}
@@ -20,7 +20,7 @@ GLOSSY = {**LAMBERT, "model": "blinn_phong", "params": {"exponent": 20.0}}
 def degrees_of(term: dict[str, object]) -> int:
     even = build_tables([[term]]).isotropic
     of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
-    return int(tables._degrees(even, of_function[recurrence().cosine])[0])
+    return int(material_arrays._degrees(even, of_function[recurrence().cosine])[0])
 
 
 def test_a_diffuse_table_needs_one_function_and_a_shiny_one_all() -> None:
@@ -34,14 +34,14 @@ def test_a_degree_below_the_bound_is_left_out() -> None:
     table[:, ..., 0] = 1
     table[0, ..., NUM_FUNCTIONS - 1] = 0.5e-3
     table[1, ..., NUM_FUNCTIONS - 1] = 2e-3
-    assert tables._degrees(table, of_function).tolist() == [0, DEGREE]
+    assert material_arrays._degrees(table, of_function).tolist() == [0, DEGREE]
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
 @pytest.mark.parametrize("num", [1, 15, NUM_FUNCTIONS])
 def test_light_vectors_survive_half_precision_whatever_their_size(size: float, num: int) -> None:
     truth = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
-    sent = tables._vector_arrays("vectors/4", truth, num)
+    sent = material_arrays._vector_arrays("vectors/4", truth, num)
     scale, told = sent["vectors/4/scale"][0]
     assert told == num
     numbers = sent["vectors/4"].astype(np.float64).reshape(50, -1)
@@ -53,13 +53,13 @@ def test_light_vectors_survive_half_precision_whatever_their_size(size: float, n
 def test_materials_get_the_functions_that_they_know() -> None:
     bump, narrow = np.array([False, True, False, False]), {**LAMBERT, "model": "ggx", "params": {"alpha": 0.02}}
     materials = MaterialState.from_terms([[LAMBERT], [LAMBERT], [LAMBERT, GLOSSY], [narrow]])
-    total, others = tables.needed_function_counts(materials, bump)
+    total, others = material_arrays.needed_function_counts(materials, bump)
     assert total.tolist() == [1, NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
     assert others.tolist() == [0, 0, NUM_FUNCTIONS, NUM_FUNCTIONS]
     even = materials.tables.isotropic.copy()
     even[0, ..., np.flatnonzero(recurrence().order == 2)[0]] = 0.1  # of degree 2
     materials = materials._replace(tables=materials.tables._replace(isotropic=even))
-    total, _ = tables.needed_function_counts(materials, bump)
+    total, _ = material_arrays.needed_function_counts(materials, bump)
     assert total.tolist() == [num_functions(FAST_DEGREE), NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
 
 
@@ -68,7 +68,7 @@ def test_slots_are_the_vertices_of_the_lattice() -> None:
     counts = num_nodes(rows).ravel()
     first = (np.cumsum(counts) - counts).reshape(rows.shape).astype(np.uint32)
     node = np.random.default_rng(SEED).integers(0, 9, int(counts.sum())).astype(np.uint32)
-    slots = geometry.node_arrays(ProbeGrid(rows, first, node))
+    slots = geometry_arrays.node_arrays(ProbeGrid(rows, first, node))
     narrow = node[[0, 1, 2, *(first[2, 0] + np.arange(3))]]
     assert len(slots.lattice_node) == 10 + 6 + len(np.unique(narrow))
     for face, side in np.argwhere(rows > 0):
@@ -96,8 +96,8 @@ def test_the_finest_level_of_the_largest_texture_goes_first(monkeypatch: pytest.
     textures = Textures(
         texels, np.array(levels), np.array(first), np.zeros((2, 2), np.int64), np.zeros((1, 3), np.int64)
     )
-    kept, begins = geometry._select_levels(textures)
+    kept, begins = geometry_arrays._select_levels(textures)
     assert kept.tolist() == [0, 1, 2, 3, 4, 5, 6]
-    monkeypatch.setattr(geometry, "MAX_TEXELS", 50)
-    kept, begins = geometry._select_levels(textures)
+    monkeypatch.setattr(geometry_arrays, "MAX_TEXELS", 50)
+    kept, begins = geometry_arrays._select_levels(textures)
     assert (kept.tolist(), begins.tolist()) == ([1, 2, 3, 4, 5, 6], [0, 3, 6])

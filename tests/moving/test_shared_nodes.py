@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from relume.moving.points.vertices import (
+from relume.live.free_camera.probes.lattice_nodes import (
     NodeTable,
     _keys,
     bounding_cube,
@@ -10,7 +10,7 @@ from relume.moving.points.vertices import (
     num_representatives,
     representative_nodes,
 )
-from relume.points import SurfacePoints
+from relume.raytrace.surface_points import SurfacePoints
 
 
 def nodes(num, seed=3):

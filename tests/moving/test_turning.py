@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, sphere, studio
 
-from relume.bake import Recipe
-from relume.basis.zernike import DEGREES, WINDOW_DECAY, project
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.free_camera.basis.highlight_lobes import build_lobes
+from relume.live.free_camera.basis.material_tables import build_tables, window
+from relume.live.free_camera.environment_lookup import rotation_of
+from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.highlights.lobe_gradients import gradients_along_lobe, gradients_along_lobe_numpy
+from relume.live.free_camera.primary_visibility import interpolate_to_nodes, trace_primary
+from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
+from relume.live.free_camera.shade_probes import shade_probes
+from relume.math.zernike import DEGREES, WINDOW_DECAY, project
 from relume.methods.registry import METHODS, open_bake
-from relume.moving.basis.lobes import build_lobes
-from relume.moving.basis.tables import build_tables, window
-from relume.moving.evaluate import shade_probes
-from relume.moving.highlights.looking import PrefilteredEnvironment
-from relume.moving.highlights.turning import gradients_along_lobe, gradients_along_lobe_numpy
-from relume.moving.look_up import interpolate_to_nodes, trace_primary
-from relume.moving.pixels import InterpolatedProbes, MirrorData, shade_pixels
-from relume.moving.sky import rotation_of
-from relume.points import SurfacePoints
+from relume.raytrace.surface_points import SurfacePoints
 from relume.scene.model import Material
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 CAMERA, SIZE = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75), (64, 48)
 EYE = CAMERA.to_world[:3, 3].astype(np.float32)

@@ -4,11 +4,11 @@ import numba as nb
 import numpy as np
 import pytest
 
-from relume.basis.zernike import DEGREE, NUM_FUNCTIONS, evaluate_basis_along, num_functions, project, recurrence
-from relume.light.triangles import TriangleLights
-from relume.points import SurfacePoints
-from relume.project.light_vectors import incident_coefficients, incident_coefficients_numpy
-from relume.trace.tangents import any_tangent
+from relume.lights.spherical_triangles import TriangleLights
+from relume.math.zernike import DEGREE, NUM_FUNCTIONS, evaluate_basis_along, num_functions, project, recurrence
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import any_tangent
+from relume.transport.incident_coefficients import incident_coefficients, incident_coefficients_numpy
 
 
 def hemisphere(radii=24, turns=48):

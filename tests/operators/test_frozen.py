@@ -10,16 +10,16 @@ import pytest
 import twins
 from tiny_scenes import studio
 
-from relume.basis.daubechies import analysis, matrix, synthesis
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.errors import CancelledError, MemoryBudgetError
-from relume.light.triangles import tessellate_environment
-from relume.memory import Cache
-from relume.operators.frozen import LinearOperator, operator_bytes, precompute
-from relume.operators.stream import changed_columns, stream
-from relume.project.contraction import contract
-from relume.project.projector import Projector
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, MemoryBudgetError
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.math.daubechies import analysis, matrix, synthesis
+from relume.operators.linear_operator import LinearOperator, operator_bytes, precompute
+from relume.operators.update_kernel import changed_columns, stream
+from relume.transport.projector import Projector
+from relume.transport.term_contraction import contract
 
 RNG = np.random.default_rng(0)
 
@@ -73,7 +73,7 @@ def frozen_of(model, active, lights, receivers, **options):
     document = {"model": model, "params": {}}
     bands = {curve.name: curve_bands(document, curve) for curve in TERMS[model].curves}
     progress = options.get("progress", lambda share: None)
-    is_canceled = options.get("cancelled", lambda: False)
+    is_canceled = options.get("is_canceled", lambda: False)
     return bands, precompute(TERMS[model], bands, active, lights, receivers, progress, is_canceled)
 
 
@@ -105,7 +105,7 @@ def test_frozen_transport_is_the_projection_times_the_wavelet_matrix(count, mode
 
 
 def test_more_samples_than_a_tile_holds(monkeypatch, lights):
-    monkeypatch.setattr("relume.operators.frozen.TILE_SAMPLES", 128)
+    monkeypatch.setattr("relume.operators.linear_operator.TILE_SAMPLES", 128)
     receivers = twins.only_above(twins.make_random_receivers(700, lights.num_lights, seed=9), lights)
     bands, frozen = frozen_of("blinn_phong", "theta_h", lights, receivers)
     assert len(frozen.transport) > 1

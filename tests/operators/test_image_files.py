@@ -11,12 +11,12 @@ from oracle import DERIVED_FOLDERS
 from pictures import open_exact_picture, set_sigma
 from sessions import BUDGET, make_look
 
-from relume.memory import Cache
-from relume.methods.opened import baked_views as transfer_module
+from relume.core.cache import Cache
+from relume.live.fixed_camera.jobs import Shade
+from relume.methods.opened import fixed_views as transfer_module
 from relume.methods.registry import open_transfer
-from relume.operators.image_files import ImageFiles
+from relume.operators.image_cache import ImageFiles
 from relume.operators.shade import ShadedTerm
-from relume.picture.jobs import Shade
 
 SHAPE = (1, 3, 64)
 FILE_BYTES = 128 + 4 * 3 * 64

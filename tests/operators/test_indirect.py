@@ -10,22 +10,22 @@ import twins
 from analytic_terms import ANALYTIC
 from scipy.sparse import csr_array
 
-from relume.basis.haar import haar
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.errors import CancelledError
-from relume.light.gather_rays import make_pattern
-from relume.light.triangles import tessellate_environment
+from relume.core.errors import CancelledError
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.math.haar import haar
 from relume.operators import indirect as rows_module
-from relume.operators.frozen import tile_layout
 from relume.operators.indirect import expected_light, num_channels, precompute_rows, row_bytes
 from relume.operators.indirect_kernel import select_coefficients, transform
-from relume.project.contraction import contract
-from relume.project.projector import Projector
-from relume.project.receivers import GatherRays, ShadingPoints
-from relume.project.sent import isotropic
-from relume.sharing import FilterWeights, NeighborFilter
-from relume.trace.cell_tree import NO_PATCH
+from relume.operators.linear_operator import tile_layout
+from relume.patches.neighbor_filter import FilterWeights, NeighborFilter
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.raytrace.gather_rays import make_pattern
+from relume.transport.outgoing_patch_light import isotropic
+from relume.transport.projector import Projector
+from relume.transport.shading_points import GatherRays, ShadingPoints
+from relume.transport.term_contraction import contract
 
 NUM_CELLS, NUM_POINTS, NUM_RAYS = 90, 150, 33
 NONE = tessellate_environment(np.ones((8, 16, 3), np.float32), 40).empty()

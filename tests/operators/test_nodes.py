@@ -7,17 +7,17 @@ import pytest
 import twins
 from tiny_scenes import studio
 
-from relume.basis.nodes import choose_nodes
-from relume.basis.pca import joint
 from relume.brdf.curves import curve_bands
+from relume.brdf.parameter_sweep import curves_of_parameter, slider_values, solid_angles
 from relume.brdf.registry import TERMS
-from relume.brdf.sweep import curves_of_parameter, slider_values, solid_angles
-from relume.errors import CancelledError
-from relume.light.triangles import tessellate_environment
-from relume.operators.nodes import MAX_ERROR, MAX_NODES, linearize
-from relume.operators.stream import changed_columns, stream
-from relume.project.contraction import contract
-from relume.project.projector import Projector
+from relume.core.errors import CancelledError
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.math.curve_nodes import choose_nodes
+from relume.math.pca import joint
+from relume.operators.parameter_operator import MAX_ERROR, MAX_NODES, linearize
+from relume.operators.update_kernel import changed_columns, stream
+from relume.transport.projector import Projector
+from relume.transport.term_contraction import contract
 
 SLIDERS = [("blinn_phong", "exponent"), ("cook_torrance", "ior"), ("cook_torrance", "sigma"), ("ggx", "roughness")]
 ALL = [(model, p.name) for model, term in TERMS.items() for p in term.parameters if curves_of_parameter(term, p.name)]

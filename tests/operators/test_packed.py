@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import twins
 
-from relume.operators.frozen import LinearOperator, quantized_bytes, tile_layout
-from relume.operators.packed import BLOCK_SAMPLES, QuantizedOperator, quantize, stream_quantized
-from relume.operators.stream import changed_columns, stream
-from relume.operators.thin import SubsampledOperator, interpolate, subsampled_bytes
+from relume.operators.linear_operator import LinearOperator, quantized_bytes, tile_layout
+from relume.operators.quantized import BLOCK_SAMPLES, QuantizedOperator, quantize, stream_quantized
+from relume.operators.subsampled import SubsampledOperator, interpolate, subsampled_bytes
+from relume.operators.update_kernel import changed_columns, stream
 
 RNG = np.random.default_rng(4)
 

@@ -24,14 +24,14 @@ from grounds import (
 from sessions import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
 from tiny_scenes import make_tiny_scene, quad, studio
 
-from relume.color import srgb_encode
-from relume.environments.equirect import lookup, rotate_about_y, texel_directions, texel_solid_angles
-from relume.imageio.files import to_bytes
-from relume.light.blur import downsampled, prefiltered
-from relume.memory import Cache
-from relume.picture.background.backdrop import MAX_CATCHER_RATIO, Background
-from relume.picture.picture import Picture
-from relume.render.image import render_image
+from relume.assets.environments.equirect import lookup, rotate_about_y, texel_directions, texel_solid_angles
+from relume.core.cache import Cache
+from relume.core.color import srgb_encode
+from relume.image_io.write_image import to_bytes
+from relume.lights.prefilter import downsampled, prefiltered
+from relume.live.fixed_camera.background.background import MAX_CATCHER_RATIO, Background
+from relume.live.fixed_camera.picture import Picture
+from relume.output.render_image import render_image
 from relume.scene.model import Material
 
 

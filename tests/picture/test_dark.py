@@ -8,11 +8,11 @@ from pictures import BALL, find_pure_ball_pixels, open_exact_picture
 from sessions import make_look, relative_rmse, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, sphere
 
-from relume.bake import Recipe
 from relume.brdf.registry import TERMS
-from relume.memory import Cache
+from relume.core.cache import Cache
 from relume.methods.registry import METHODS, open_transfer
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 
 def test_no_light_is_black(transfer):

@@ -7,12 +7,12 @@ import pytest
 from oracle import exact_image
 from sessions import BUDGET, bake_corner_scene, make_look, relative_rmse, run_next_job, run_until_exact
 
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.fixed_camera.jobs import Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.incremental_light import PrecomputeRows
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.operators.shade import PartialImage
-from relume.picture.jobs import Shade
-from relume.picture.picture import Picture
-from relume.picture.routes.follow import PrecomputeRows
-from relume.picture.routes.preview import SparsePreview
 
 RED = "/materials/Red/terms/0/color"
 
@@ -102,7 +102,7 @@ def test_from_no_bounces_reflected_light_comes_in(gathered):
 def test_the_first_edit_freezes_rows_and_all_terms_follow_together(gathered):
     picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
     look = colored(gathered, [0.1, 0.1, 0.8])
-    picture.set_look(look, hand=RED)
+    picture.set_look(look, active_pointer=RED)
     picture.advance(32)
     exact, errors = exact_image(gathered, look), []
     while isinstance(picture.next_job(), PrecomputeRows):
@@ -252,7 +252,7 @@ def test_only_the_part_of_light_that_an_edit_changes_is_shaded(gathered, monkeyp
             super().shade(term, bands, lights, receivers, *watched)
 
     calls = []
-    monkeypatch.setattr("relume.picture.jobs.PartialImage", Recorded)
+    monkeypatch.setattr("relume.live.fixed_camera.jobs.PartialImage", Recorded)
     picture = Picture(gathered, "front", Cache(BUDGET))
     environment, local, reflected = (True,), (False, "LocalRays"), (False, "GatherRays")
     assert shaded(shown()) == {environment, local, reflected}

@@ -7,11 +7,11 @@ import pytest
 import twins
 from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 
-from relume.errors import ParameterError
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.picture import Picture
 from relume.operators.edit_basis import CurveBasis
-from relume.operators.nodes import MAX_ERROR, ParameterOperator
-from relume.picture.picture import Picture
+from relume.operators.parameter_operator import MAX_ERROR, ParameterOperator
 
 TERM = "/materials/Ball/terms/1"
 ROUGHNESS, THETA_H = f"{TERM}/params/roughness", f"{TERM}/curves/theta_h"
@@ -93,19 +93,19 @@ def test_shading_of_a_look_that_the_hand_has_left_is_not_shown(transfer, picture
 
 @pytest.mark.parametrize("hand", [None, THETA_H, "/lights/Lamp"])
 def test_what_the_hand_is_on_is_never_guessed_from_looks(transfer, picture, hand):
-    picture.set_look(make_look(transfer, shiny(0.3)), hand=hand)
+    picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=hand)
     assert isinstance(picture.next_job().basis, CurveBasis)
 
 
 def test_pointer_to_nothing_that_a_hand_may_hold_is_refused_and_the_look_stays(transfer, picture):
     with pytest.raises(ParameterError):
-        picture.set_look(make_look(transfer, shiny(0.3)), hand="/display/exposure")
+        picture.set_look(make_look(transfer, shiny(0.3)), active_pointer="/display/exposure")
     assert picture.next_job() is None
     assert picture.advance(None).exact
 
 
 def test_a_hand_that_took_hold_of_nothing_is_known_from_its_edits(transfer, picture):
-    picture.set_look(make_look(transfer, shiny(0.3)), hand=ROUGHNESS)
+    picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=ROUGHNESS)
     need = picture.next_job()
     assert isinstance(need.basis, ParameterOperator)
     assert need.basis.parameter == "roughness"

@@ -9,20 +9,20 @@ import pytest
 import twins
 from sessions import BUDGET, apply_random_edit, make_look, relative_rmse, run_until_exact
 
-from relume.basis import identity
-from relume.basis.daubechies import analysis, synthesis
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
+from relume.core.cache import Cache
+from relume.live.fixed_camera.displayed import DisplayedImage
+from relume.live.fixed_camera.fidelity import Fidelity
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.jobs import Resum
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.operator import advance
 from relume.look import BAKED_ENVIRONMENT, LightPaths, validate
-from relume.memory import Cache
+from relume.math import identity
+from relume.math.daubechies import analysis, synthesis
 from relume.operators.edit_basis import CurveBasis
-from relume.operators.frozen import LinearOperator, precompute
-from relume.picture.fidelity import Fidelity
-from relume.picture.jobs import Resum
-from relume.picture.light import Illumination
-from relume.picture.picture import Picture
-from relume.picture.routes.operator import advance
-from relume.picture.shown import DisplayedImage
+from relume.operators.linear_operator import LinearOperator, precompute
 
 BALL = "/materials/Ball/terms/1/curves/"
 

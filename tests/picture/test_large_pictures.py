@@ -11,13 +11,13 @@ import twins
 from pictures import open_exact_picture
 from sessions import make_look, relative_rmse, run_until_exact
 
-from relume.basis.daubechies import analysis
-from relume.memory import Cache
-from relume.operators.frozen import operator_bytes, quantized_bytes
-from relume.operators.thin import SubsampledOperator
-from relume.picture import thinning
-from relume.picture.jobs import PrecomputeOperator, Shade
-from relume.picture.picture import Picture
+from relume.core.cache import Cache
+from relume.live.fixed_camera import operator_budget
+from relume.live.fixed_camera.jobs import PrecomputeOperator, Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.math.daubechies import analysis
+from relume.operators.linear_operator import operator_bytes, quantized_bytes
+from relume.operators.subsampled import SubsampledOperator
 
 FLOOR, WALL = "/materials/Floor/terms/1/", "/materials/Wall/terms/1/"
 IMAGES = 400_000  # the still life's, and what else its pictures need
@@ -59,7 +59,7 @@ def small(transfer):
 
 
 def drag(picture, transfer, change, hand, max_coefficients=None):
-    picture.set_look(make_look(transfer, change), hand=hand)
+    picture.set_look(make_look(transfer, change), active_pointer=hand)
     assert picture.next_job() is None or picture.next_job().is_refinement
     return picture.advance(max_coefficients)
 
@@ -98,7 +98,7 @@ def test_a_hundred_drags_in_sixteen_bits_leave_no_trace(transfer, half):
 def test_where_that_is_too_much_some_samples_say_what_changes(transfer, small, monkeypatch, held):
     if held == "params/roughness":  # its few nodes would fit
         small._state.budget_bytes = quantized_bytes(num_samples(transfer, "Floor"), 12)
-        monkeypatch.setattr(thinning, "_SUBSAMPLED_BUDGET_DIVISOR", 1)
+        monkeypatch.setattr(operator_budget, "_SUBSAMPLED_BUDGET_DIVISOR", 1)
     picture = open_exact_picture(transfer, cache=small)
     before = picture.image()
     picture.prepare(FLOOR + held)
@@ -137,7 +137,7 @@ def test_a_look_that_moves_on_while_its_operator_is_made_is_caught_up_with(trans
     picture.prepare(FLOOR + "curves/theta_h")
     job = picture.next_job()
     look = bent([[0, 3.0], [20, 0.5], [90, 0]])
-    picture.set_look(make_look(transfer, look), hand=FLOOR + "curves/theta_h")
+    picture.set_look(make_look(transfer, look), active_pointer=FLOOR + "curves/theta_h")
     picture.install(job, job.run(lambda share: None, lambda: False))
     assert picture.advance(None).fidelity == "followed"
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, look)) < 1e-6
@@ -174,28 +174,28 @@ def test_a_second_curve_of_the_same_term_waits_until_the_first_is_known(transfer
         bent([[0, 3.0], [20, 0.5], [90, 0]])(document)
         document["materials"]["Floor"]["terms"][1]["curves"]["theta_d"] = {"points": [[0, 0.3], [90, 1]]}
 
-    picture.set_look(make_look(transfer, both), hand=FLOOR + "curves/theta_d")
+    picture.set_look(make_look(transfer, both), active_pointer=FLOOR + "curves/theta_d")
     for _ in range(3):
         picture.advance(5)
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, both)) < 1e-6
 
 
 def test_light_between_surfaces_is_in_it_as_well(gathered, monkeypatch):
-    monkeypatch.setattr(thinning, "_MIN_SAMPLES", 64)
+    monkeypatch.setattr(operator_budget, "_MIN_SAMPLES", 64)
     memory = Cache(quantized_bytes(num_samples(gathered, "Floor"), 256) - 200_000)
     picture = run_until_exact(Picture(gathered, "front", memory))
     before = picture.image()
     picture.prepare(FLOOR + "curves/theta_h")
     job = picture.next_job()
     assert job.form.step > 1
-    change, images = 1e-2 * np.ones((3, 256)), np.zeros((2, *job.place.live.ready.image.shape), np.float32)
-    for form, image in zip((job.form, thinning.EXACT), images, strict=True):
-        some = replace(job, form=form, key=form, place=job.place._replace(images=with_room(picture._images)))
+    change, images = 1e-2 * np.ones((3, 256)), np.zeros((2, *job.target.live.ready.image.shape), np.float32)
+    for form, image in zip((job.form, operator_budget.EXACT), images, strict=True):
+        some = replace(job, form=form, key=form, target=job.target._replace(images=with_room(picture._images)))
         some.run(lambda share: None, lambda: False).add(analysis(change), image)
     assert relative_rmse(images[0], images[1]) < 0.05
     look = bent([[0, 9.0], [25, 1.5], [90, 0]])
     picture.install(job, job.run(lambda share: None, lambda: False))
-    picture.set_look(make_look(gathered, look), hand=FLOOR + "curves/theta_h")
+    picture.set_look(make_look(gathered, look), active_pointer=FLOOR + "curves/theta_h")
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(gathered, look)) < 1e-6
     picture.set_look(make_look(gathered))
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)

@@ -8,16 +8,16 @@ from oracle import exact_image, render_uncached
 from sessions import BUDGET, make_look, run_until_exact
 from tiny_scenes import make_camera, mesh, quad
 
-from relume.bake import Recipe
-from relume.environments.model import Environment
+from relume.assets.environments.environment import Environment
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.look import LightGeometry
-from relume.memory import Cache
-from relume.methods.on_cells import SAMPLES_PER_PATCH_POINT, LocalPatchLight
+from relume.methods.patch_direct_light import SAMPLES_PER_PATCH_POINT, LocalPatchLight
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
-from relume.scene.archive import make_scene
 from relume.scene.model import Light, Material
+from relume.scene.scene_folder import make_scene
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 LAMP = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {

@@ -10,16 +10,16 @@ from sessions import make_look, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 from twins import unit
 
-from relume.bake import Recipe
+from relume.assets.environments.equirect import lookup, texel_directions
 from relume.brdf.fresnel import schlick
-from relume.environments.equirect import lookup, texel_directions
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
-from relume.render.image import render_image
+from relume.output.render_image import render_image
+from relume.raytrace.camera_rays import camera_directions
 from relume.scene.model import Material
 from relume.store import bake_in_process
-from relume.trace.primary import camera_directions
+from relume.store.bake_protocol import Recipe
 
 SIZE = (64, 48)
 F0 = [0.9, 0.6, 0.3]

@@ -7,9 +7,9 @@ import pytest
 from oracle import exact_image
 from sessions import BUDGET, make_look, run_until_exact
 
-from relume.memory import Cache
-from relume.picture.picture import Picture
-from relume.picture.routes.preview import SparsePreview
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 
 LAMP = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {

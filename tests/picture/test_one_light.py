@@ -8,11 +8,11 @@ from environment_files import dusk, write_map
 from oracle import exact_image
 from sessions import BUDGET, make_look, relative_rmse, run_next_job, run_until_exact
 
-from relume.environments.asset_store import STORE, store_environment
-from relume.memory import Cache
-from relume.picture.picture import Picture
-from relume.picture.routes.preview import SparsePreview
-from relume.picture.view_images import ViewImages
+from relume.assets.environments.environment_store import STORE, store_environment
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.live.fixed_camera.view_images import ViewImages
 from relume.views.view import View
 
 COLOURS = np.eye(3)
@@ -37,7 +37,7 @@ def opened(request):
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
     """Glimpses are of few samples, as those of large pictures are."""
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 300)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
 
 
 def lit_by(maps, number, *, lamp=None, sigma=None, **environment):
@@ -156,7 +156,7 @@ def test_hand_that_never_waits_sees_one_light_at_a_time(opened, maps, seed):
 
 def test_opened_picture_is_whole_at_once_and_then_shaded(opened, maps, monkeypatch):
     look = make_look(opened, lit_by(maps, 1, rotation=77.0))
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED_AT_ONCE", 100)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     picture = start(opened, look, is_watched=True)
     nothing = picture.advance(None)
     assert (nothing.complete, nothing.fidelity) == (False, "preview")
@@ -173,7 +173,7 @@ def test_opened_picture_is_whole_at_once_and_then_shaded(opened, maps, monkeypat
 
 
 def test_what_comes_straight_is_seen_before_light_between_surfaces_is_found(gathered, maps, monkeypatch):
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED_AT_ONCE", 100)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     lit = lit_by(maps, 1, rotation=33.0)
 
     def straight(document):
@@ -199,7 +199,7 @@ def test_what_comes_straight_is_seen_before_light_between_surfaces_is_found(gath
 
 
 def test_curve_that_moves_meanwhile_does_not_wait_for_the_hand_to_rest(transfer, maps, monkeypatch):
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED_AT_ONCE", 100)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     picture = start(transfer, make_look(transfer, lit_by(maps, 1)), is_watched=True)
     run_next_job(picture)
     picture.prepare("/materials/Ball/terms/1/curves/theta_h")
@@ -208,7 +208,7 @@ def test_curve_that_moves_meanwhile_does_not_wait_for_the_hand_to_rest(transfer,
 
 
 def test_picture_whose_images_were_kept_is_opened_without_a_preview(transfer, maps, monkeypatch):
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED_AT_ONCE", 100)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     look = make_look(transfer, lit_by(maps, 2))
     run_until_exact(start(transfer, look))
     assert not isinstance(start(transfer, look, is_watched=True).next_job(), SparsePreview)

@@ -8,8 +8,8 @@ from oracle import exact_image, open_copy
 from pictures import open_exact_picture, set_sigma
 from sessions import make_look, relative_rmse
 
+from relume.live.fixed_camera.jobs import Shade
 from relume.operators.shade import ShadedTerm
-from relume.picture.jobs import Shade
 
 shaded = Shade._complete_image
 

@@ -9,7 +9,7 @@ from oracle import exact_image, render_uncached
 from pictures import BALL, WALL, find_pure_ball_pixels, open_exact_picture, set_sigma, set_single_term_ball
 from sessions import make_look, relative_rmse, run_until_exact
 
-from relume.color import rgb9e5_pack
+from relume.core.color import rgb9e5_pack
 from relume.look import validate
 
 

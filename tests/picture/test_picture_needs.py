@@ -10,12 +10,12 @@ import twins
 from pictures import BALL, WALL, ignore_progress, open_exact_picture, set_sigma, set_single_term_ball
 from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 
-from relume.errors import CancelledError, MemoryBudgetError
-from relume.memory import Cache
-from relume.operators.frozen import operator_bytes
-from relume.picture.jobs import Resum, Shade
-from relume.picture.picture import Picture
-from relume.picture.routes.preview import SparsePreview
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, MemoryBudgetError
+from relume.live.fixed_camera.jobs import Resum, Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.operators.linear_operator import operator_bytes
 
 
 def test_evicted_in_mid_drag_recovers(transfer):
@@ -79,7 +79,7 @@ def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
     picture.prepare(BALL + "theta_h")
     assert picture.next_job() is None
     look = make_look(transfer, drawn)
-    picture.set_look(look, hand=BALL + "theta_h")
+    picture.set_look(look, active_pointer=BALL + "theta_h")
     advance = picture.advance(None)
     assert advance.fidelity == "approximate"
     np.testing.assert_array_equal(picture.image(), before)
@@ -88,7 +88,7 @@ def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
     assert job.is_refinement
     expected = twins.full_evaluation(transfer, "front", look)
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
-    picture.set_look(make_look(transfer), hand=BALL + "theta_h")
+    picture.set_look(make_look(transfer), active_pointer=BALL + "theta_h")
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from relume.errors import ParameterError
-from relume.picture.pointer import (
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.edit_pointers import (
     CurvePointer,
     EnvironmentPointer,
     LightPointer,

@@ -7,9 +7,9 @@ import pytest
 import twins
 from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 
-from relume.memory import Cache
-from relume.picture.picture import Picture
-from relume.picture.routes.preview import SparsePreview, choose_samples
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview, choose_samples
 
 
 def turned(degrees):
@@ -31,7 +31,7 @@ def make(picture, need):
 @pytest.fixture
 def few(monkeypatch):
     """As few samples as a picture of 200 × 150 would have shaded."""
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 600)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 600)
 
 
 @pytest.mark.usefixtures("few")

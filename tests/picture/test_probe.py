@@ -9,7 +9,7 @@ import pytest
 from pictures import BALL, find_pure_ball_pixels, open_exact_picture, set_single_term_ball
 from sessions import make_look
 
-from relume.errors import NotPrecomputedError, ParameterError
+from relume.core.errors import NotPrecomputedError, ParameterError
 
 
 def test_probe_shares_sum_to_the_terms_radiance(transfer):

@@ -9,13 +9,13 @@ import pytest
 import twins
 from sessions import BUDGET, make_look, run_next_job, run_until_exact
 
-from relume.errors import CancelledError
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError
+from relume.live.fixed_camera.jobs import Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.priority_region import ShadeRegion
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.operators.shade import shade_rows
-from relume.picture.jobs import Shade
-from relume.picture.picture import Picture
-from relume.picture.region import ShadeRegion
-from relume.picture.routes.preview import SparsePreview
 
 REGION = (4, 6, 16, 12)
 
@@ -24,11 +24,11 @@ REGION = (4, 6, 16, 12)
 def large(monkeypatch):
     """Small pictures are treated as large ones are; steps are as small as what is seen of them."""
     for name, value in {
-        "region._WORTH": 0,
-        "routes.preview._FEW_TO_SHADE": 0,
-        "routes.preview._MOST_SHADED": 40,
+        "priority_region._MIN_HIDDEN_SAMPLES": 0,
+        "strategies.sparse_preview._MAX_SHADED_AT_ONCE": 0,
+        "strategies.sparse_preview._MAX_SHADED": 40,
     }.items():
-        monkeypatch.setattr(f"relume.picture.{name}", value)
+        monkeypatch.setattr(f"relume.live.fixed_camera.{name}", value)
     monkeypatch.setattr("relume.operators.shade._MIN_ROWS_PER_STEP", 16)
 
 
@@ -86,7 +86,7 @@ def test_somewhere_else_is_exact_when_that_is_looked_at(transfer):
 
 def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
     picture = opened(transfer, None)
-    while isinstance(job := picture.next_job(), SparsePreview) or job.place.material.num_samples < 100:
+    while isinstance(job := picture.next_job(), SparsePreview) or job.target.material.num_samples < 100:
         run_next_job(picture)
     shaded, asked = [], []
     monkeypatch.setattr("relume.operators.shade.shade_rows", lambda *of: shaded.append(of[4:6]) or shade_rows(*of))
@@ -100,8 +100,8 @@ def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
 
 
 def test_a_large_picture_is_seen_finer_and_finer(transfer, monkeypatch):
-    monkeypatch.setattr("relume.picture.routes.preview._MAX_SHADED", 4)
-    monkeypatch.setattr("relume.picture.routes.preview._MIN_FINER_RATIO", 1)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 4)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MIN_FINER_RATIO", 1)
     picture, images = opened(transfer, None), []
     while not picture.advance(None).exact:
         if isinstance(run_next_job(picture), SparsePreview):

@@ -1,7 +1,7 @@
 """Operators of merged lights: there soon, near, and gone when the exact one is there.
 
 The bake has 149 lights, large ones, over which a rough operator divides too little: others are nearer
-(`bench/curve_switch.py`).
+(`bench/relume_bench/curve_switch.py`).
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import twins
 from pictures import open_exact_picture
 from sessions import make_look, relative_rmse, run_next_job, run_until_exact
 
-from relume.color import luminance
-from relume.light.merged import cluster_lights, visible_fraction, visible_fraction_numpy
-from relume.memory import Cache
-from relume.operators.frozen import LinearOperator, MergedLightOperator
-from relume.picture import thinning
+from relume.core.cache import Cache
+from relume.core.color import luminance
+from relume.lights.light_clusters import cluster_lights, visible_fraction, visible_fraction_numpy
+from relume.live.fixed_camera import operator_budget
+from relume.operators.linear_operator import LinearOperator, MergedLightOperator
 
 FLOOR = "/materials/Floor/terms/1/"
 
@@ -39,8 +39,8 @@ def bent(value):
 @pytest.fixture
 def patience(monkeypatch):
     """None: no operator is made fast enough."""
-    monkeypatch.setattr(thinning, "_SLOW_PAIRS_PER_THREAD", 0)
-    monkeypatch.setattr(thinning, "_MIN_LIGHTS_TO_MERGE", 0)
+    monkeypatch.setattr(operator_budget, "_SLOW_PAIRS_PER_THREAD", 0)
+    monkeypatch.setattr(operator_budget, "_MIN_LIGHTS_TO_MERGE", 0)
 
 
 def test_merged_lights_bring_the_same_light_from_nearly_the_same_directions(transfer):
@@ -81,12 +81,12 @@ def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, 
     picture = open_exact_picture(transfer, cache=memory)
     before = picture.image()
     picture.prepare(FLOOR + held)
-    assert run_next_job(picture).form == thinning.MERGED_LIGHT
+    assert run_next_job(picture).form == operator_budget.MERGED_LIGHT
     exact = picture.next_job()
-    assert exact.form == thinning.EXACT
+    assert exact.form == operator_budget.EXACT
     assert not exact.is_refinement
     for change in drags:
-        picture.set_look(make_look(transfer, change), hand=FLOOR + held)
+        picture.set_look(make_look(transfer, change), active_pointer=FLOOR + held)
         assert picture.advance(None).fidelity == "followed"
         assert picture.next_job().key == exact.key, "the hand does not stop it"
         expected = twins.full_evaluation(transfer, "front", make_look(transfer, change))
@@ -97,7 +97,7 @@ def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, 
     assert isinstance(memory.get_cached(exact.key, LinearOperator), LinearOperator)
     assert picture.advance(None).exact == (held == "curves/theta_h")
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
-    picture.set_look(make_look(transfer), hand=FLOOR + held)
+    picture.set_look(make_look(transfer), active_pointer=FLOOR + held)
     assert relative_rmse(run_until_exact(picture).image(), before) < 1e-6
 
 
@@ -106,4 +106,4 @@ def test_where_it_is_there_or_nothing_is_shown_yet_the_exact_one_is_made(transfe
     open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=memory)
     again = open_exact_picture(transfer, cache=memory)
     again.prepare(FLOOR + "curves/theta_h")
-    assert again.next_job().form == thinning.EXACT
+    assert again.next_job().form == operator_budget.EXACT

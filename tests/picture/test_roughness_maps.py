@@ -9,16 +9,16 @@ from oracle import exact_image
 from sessions import BUDGET, bake_corner_scene, make_look, relative_rmse, run_next_job, run_until_exact
 from tiny_scenes import corner
 
-from relume.bake import Recipe
-from relume.errors import ChunkDamagedError
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.core.errors import ChunkDamagedError
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.incremental_light import PrecomputeRows
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
-from relume.picture.routes.follow import PrecomputeRows
-from relume.picture.routes.preview import SparsePreview
 from relume.reference import reference_image
 from relume.scene.model import Material, Texture, TextureEncoding
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 from relume.views.view import open_view
 
 FLOOR = "/materials/Floor/terms/1/"
@@ -169,7 +169,7 @@ def test_a_material_without_a_map_has_none_to_follow(direct) -> None:
 
 def test_turned_light_is_previewed_and_exact_at_rest(direct) -> None:
     picture, look = shown(direct), changed(direct, turn=40.0)
-    picture.set_look(look, hand="/environment/rotation")
+    picture.set_look(look, active_pointer="/environment/rotation")
     assert isinstance(run_next_job(picture), SparsePreview)
     picture.advance(None)
     exact = exact_image(direct, look)
@@ -186,7 +186,7 @@ def test_moved_lamp_is_followed(gather) -> None:
         made.append(run_next_job(picture))
     assert any(isinstance(job, PrecomputeRows) for job in made)
     look = changed(gather, lamp=[0.0, 0.9, 0.5])
-    picture.set_look(look, hand="/lights/lamp")
+    picture.set_look(look, active_pointer="/lights/lamp")
     assert not picture.advance(8).exact
     exact = exact_image(gather, look)
     assert relative_rmse(picture.image(), exact) < 0.05  # 0.025 without the map, whose smooth texels are sharper

@@ -8,10 +8,10 @@ import pytest
 from pictures import open_exact_picture
 from sessions import BUDGET, make_look
 
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.core.memory_usage import live_bytes
 from relume.methods.registry import open_transfer
-from relume.render.image import render_image
-from relume.resident import live_bytes
+from relume.output.render_image import render_image
 
 LAMP = {"kind": "point", "position": [0.3, 1.0, 0.4]}
 CURVE = "/materials/Floor/terms/1/curves/theta_h"
@@ -40,7 +40,7 @@ def test_nothing_that_grows_is_outside(gathered):
     assert memory.used_bytes > inside
     kinds = {holder.kind for holder in memory.bytes_by_owner()}
     lights = {"lights", "environment on cells", "light on cells", "local light", "reflected light", "reflectance"}
-    assert lights | {"shaded", "shadows", "sharing", "behind surfaces", "blurred environment"} <= kinds
+    assert lights | {"shaded term", "shadow cache", "sharing", "behind surfaces", "blurred environment"} <= kinds
     entries = [*memory._state.persistent.values(), *memory._state.transient.values()]
     told = [entry.num_bytes for entry in entries]  # lights find out later how wide they are, a number each
     assert [live_bytes(getattr(entry, "value", entry)) for entry in entries] == pytest.approx(told, rel=0.05)
@@ -60,7 +60,7 @@ def test_renders_push_nothing_out_that_a_session_looks_at(gathered):
         render_image(for_renders, "front", make_look(for_renders, lit(number)))
     assert memory.used_bytes <= memory.budget_bytes
     after = memory.bytes_by_owner()
-    frozen = {holder: num_bytes for holder, num_bytes in before.items() if holder.kind == "frozen"}
+    frozen = {holder: num_bytes for holder, num_bytes in before.items() if holder.kind == "linear operator"}
     assert frozen
     assert {holder: after[holder] for holder in frozen} == frozen
     material, term = picture._images.material_term(picture._prepared_pointer)

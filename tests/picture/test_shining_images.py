@@ -8,16 +8,16 @@ import twins
 from sessions import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 
-from relume.bake import Recipe
-from relume.color import luminance
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.core.color import luminance
+from relume.live.fixed_camera.picture import Picture
 from relume.methods.registry import METHODS, open_bake
-from relume.picture.picture import Picture
+from relume.output.render_image import render_image
 from relume.reference import reference_image
-from relume.render.image import render_image
 from relume.scene.emission import normalize_emission
 from relume.scene.model import Light, Material, Texture, TextureEncoding
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 SIZE = 40, 30
 

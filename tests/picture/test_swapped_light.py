@@ -9,17 +9,17 @@ from environment_files import dusk, write_map
 from sessions import BUDGET, make_look, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from relume.environments.asset_store import STORE, store_environment
-from relume.errors import NotFoundError
+from relume.assets.environments.environment_store import STORE, store_environment
+from relume.core.cache import Cache
+from relume.core.errors import NotFoundError
+from relume.live.fixed_camera.picture import Picture
 from relume.look import default_look, validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
+from relume.output.render_image import render_image
 from relume.reference import reference_image
-from relume.render.image import render_image
-from relume.scene.archive import make_scene
+from relume.scene.scene_folder import make_scene
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 SIZE = (48, 36)
 

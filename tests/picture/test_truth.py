@@ -12,17 +12,17 @@ from embreex.mesh_construction import TriangleMesh
 from sessions import BUDGET, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
+from relume.assets.environments.equirect import texel_directions
 from relume.brdf.curves import curve_values
 from relume.brdf.registry import TERMS
-from relume.environments.equirect import texel_directions
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
-from relume.scene.archive import load_scene, save_scene
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.scene.scene_folder import load_scene, save_scene
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
+from relume.store.bake_protocol import Recipe
 
 EDITED = {
     "materials": {

@@ -7,13 +7,13 @@ from analytic_terms import ANALYTIC
 from sessions import BUDGET, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.look import validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
 from relume.reference import reference_image
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 SIZE, NUM_LIGHTS = (32, 24), 1500
 # What 1,500 triangles with one shadow ray each leave over: shadow edges move by up to a triangle, for all terms alike

@@ -11,12 +11,12 @@ from pictures import BALL, open_exact_picture, rotate_environment
 from sessions import make_look, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from relume.memory import Cache
+from relume.core.cache import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.render.image import render_image
-from relume.scene.archive import make_scene
+from relume.output.render_image import render_image
+from relume.scene.scene_folder import make_scene
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 
 @pytest.mark.parametrize("degrees", [30.0, -90.0])

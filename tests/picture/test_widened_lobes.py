@@ -8,15 +8,15 @@ from scipy.ndimage import gaussian_filter
 from sessions import relative_rmse, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.bake import Recipe
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.look import default_look, validate
-from relume.memory import Cache
 from relume.methods.registry import METHODS, open_transfer
-from relume.picture.picture import Picture
 from relume.reference.image import reference_image
 from relume.scene.model import Material, Texture, TextureEncoding
-from relume.scene.roughness import levels_of_material, rougher
+from relume.scene.roughness_levels import levels_of_material, rougher
 from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
 
 SIZE, FINER, BLOCK = (24, 16), 8, 4
 SLOPES = 0.12

@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 from sessions import relative_rmse
 
-from relume.basis.harmonics import NUM_HARMONICS, harmonics
-from relume.basis.local_pca import leading_components
-from relume.basis.zernike import num_functions
-from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.light.gather_rays import make_pattern
-from relume.light.smooth import split_frequencies
-from relume.light.tiles import choose_tiles
-from relume.light.triangles import RotatedEnvironment, integrate_environment
-from relume.points import SurfacePoints
-from relume.project.alike_rays import shared_direction_coefficients, weighted_basis
-from relume.project.harmonic_transfer import ClusteredTransfer, transfer_matrices, transfer_matrices_numpy
-from relume.project.light_vectors import incident_coefficients, ray_incident_coefficients
-from relume.project.receivers import GatherRays
-from relume.project.sent import NUM_OUTGOING, isotropic, radiance_from_patch
-from relume.project.squares import outgoing_bins
-from relume.trace.cell_tree import NO_PATCH
-from relume.trace.tangents import any_tangent
-from relume.trace.visibility import select_visibility
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles
+from relume.lights.frequency_split import split_frequencies
+from relume.lights.sphere_tiles import choose_tiles
+from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment
+from relume.math.local_pca import leading_components
+from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
+from relume.math.zernike import num_functions
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import any_tangent
+from relume.raytrace.visibility import select_visibility
+from relume.transport.clustered_rays import shared_direction_coefficients, weighted_basis
+from relume.transport.direction_bins import outgoing_bins
+from relume.transport.incident_coefficients import incident_coefficients, ray_incident_coefficients
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, isotropic, radiance_from_patch
+from relume.transport.sh_transfer import ClusteredTransfer, transfer_matrices, transfer_matrices_numpy
+from relume.transport.shading_points import GatherRays
 
 DEGREE = 4
 SKY = np.ones((128, 256, 3), np.float32)
@@ -105,8 +105,8 @@ def test_no_light_is_divided_into_nothing():
 
 
 def test_clusters_keep_matrices_of_points_that_they_were_not_found_from(monkeypatch):
-    monkeypatch.setattr("relume.project.harmonic_transfer._MAX_FITTED_POINTS", 1500)
-    monkeypatch.setattr("relume.project.harmonic_transfer._POINTS_PER_BATCH", 700)
+    monkeypatch.setattr("relume.transport.sh_transfer._MAX_FITTED_POINTS", 1500)
+    monkeypatch.setattr("relume.transport.sh_transfer._POINTS_PER_BATCH", 700)
     points, _ = points_on_a_ball(3000)
     seen = TILES.centroids[:, 1] > 0.3 * points.normal[:, :1]  # shadows that change slowly from point to point
     matrices = matrices_of(points, np.packbits(seen, axis=1, bitorder="little"))

@@ -10,20 +10,20 @@ import twins
 from tiny_scenes import make_emissive_triangles
 
 from relume.brdf.curves import curve_bands
-from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
-from relume.light.local import make_emitter_parts, make_light_strata, prepare_local_lights, rectangle
-from relume.light.strata import NOT_FLAT_RADIUS, make_strata, split_axes
-from relume.light.triangles import NO_LIGHTS
+from relume.brdf.term_validation import complete_term
+from relume.lights.light_sampling import NOT_FLAT_RADIUS, make_strata, split_axes
+from relume.lights.local_lights import make_emitter_parts, make_light_strata, prepare_local_lights, rectangle
+from relume.lights.spherical_triangles import NO_LIGHTS
 from relume.look import LightGeometry
 from relume.methods.local_lights import MESH_SAMPLE_FACTOR, SAMPLES
-from relume.points import SurfacePoints
-from relume.project.contraction import contract
-from relume.project.projector import Projector
-from relume.project.receivers import LocalRays, ShadingPoints
-from relume.project.shading.shader import Shader
-from relume.trace.embree import EmbreeScene
-from relume.trace.local_shadows import trace_light_visibility
+from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.surface_points import SurfacePoints
+from relume.transport.projector import Projector
+from relume.transport.shading.shader import Shader
+from relume.transport.shading_points import LocalRays, ShadingPoints
+from relume.transport.term_contraction import contract
 
 PANEL = LightGeometry("rectangle", (0.1, 1.4, -0.8), (0.1, -1.0, 0.3), rotation=20.0, size=(0.9, 0.5))
 MESH = LightGeometry("mesh", material="Lamp")
@@ -65,7 +65,7 @@ def by_quadrature(term, bands, receivers, fine):
         weight = np.maximum(-twins.unit(away) @ normal, 0) / squared / fine**2 * y
         value = weight[:, None] * term.quotients(*wi.T, *(np.full(len(wi), c) for c in o)).T
         for curve in term.curves:
-            if not curve.outgoing:
+            if not curve.depends_on_view:
                 value = value * bands[curve.name][:, twins.find_bands(curve, wi, o)].T
         out.append(value.sum(axis=0))
     return np.array(out)

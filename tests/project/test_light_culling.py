@@ -9,9 +9,9 @@ from tiny_scenes import studio
 
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.term import Angle
-from relume.light.triangles import tessellate_environment
-from relume.project.light_culling import angle_lower_bounds, list_lights
-from relume.project.listed_lights import with_half_angle
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.transport.light_culling import angle_lower_bounds, list_lights
+from relume.transport.light_lists import with_half_angle
 
 RNG = np.random.default_rng(9)
 

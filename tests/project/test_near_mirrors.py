@@ -8,10 +8,10 @@ import twins
 
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.registry import TERMS
-from relume.light.triangles import tessellate_environment
-from relume.project.contraction import contract
-from relume.project.projector import Projector
-from relume.trace.tangents import any_tangent
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.raytrace.tangents import any_tangent
+from relume.transport.projector import Projector
+from relume.transport.term_contraction import contract
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import numba as nb
 import numpy as np
 import pytest
 
-from relume.project.eight_bands import deposit, mean_over_bands, overlap
-from relume.vector_code import NUM
+from relume.core.simd import NUM
+from relume.transport.band_overlap import deposit, mean_over_bands, overlap
 
 FINE = 250
 NUM_BANDS = 256

@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 import twins
 
+from relume.assets.environments.equirect import texel_directions
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.environments.equirect import texel_directions
-from relume.light.triangles import tessellate_environment
-from relume.project.contraction import contract
-from relume.project.projector import Projector
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.transport.projector import Projector
+from relume.transport.term_contraction import contract
 
 DOCUMENT = {"model": "cook_torrance", "params": {"sigma": 0.05}}
 TERM = TERMS["cook_torrance"]

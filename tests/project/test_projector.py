@@ -14,9 +14,9 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Angle
-from relume.light.triangles import tessellate_environment
-from relume.project.contraction import contract
-from relume.project.projector import Projector
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.transport.projector import Projector
+from relume.transport.term_contraction import contract
 
 NUM_POINTS = 40
 # every curve that enters the transport, and every pair of a term's

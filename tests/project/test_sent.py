@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import twins
 
-from relume.basis.zernike import OUTGOING_DEGREE, WINDOW_DECAY, project, recurrence
 from relume.brdf.albedo import PAIRS, pack_reflectance, reflectance_matrix
 from relume.brdf.evaluate import eval_brdf
-from relume.methods.cells.reflecting import IncidentLight, ReflectanceOperator
-from relume.project.sent import NUM_OUTGOING, bin_means, decay_of, isotropic, radiance_from_patch
-from relume.trace.cell_tree import NO_PATCH
+from relume.math.zernike import OUTGOING_DEGREE, WINDOW_DECAY, project, recurrence
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, bin_means, decay_of, isotropic, radiance_from_patch
 
 NUM_PAIRS = 200_000
 PLAIN = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}

@@ -11,13 +11,13 @@ from analytic_terms import ANALYTIC
 from tiny_scenes import studio
 
 from relume.brdf.curves import curve_bands
-from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
-from relume.light.triangles import tessellate_environment
-from relume.project.contraction import contract
-from relume.project.projector import Projector
-from relume.project.shading import shader
-from relume.project.shading.shader import Shader
+from relume.brdf.term_validation import complete_term
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.transport.projector import Projector
+from relume.transport.shading import shader
+from relume.transport.shading.shader import Shader
+from relume.transport.term_contraction import contract
 
 NUM_POINTS = 24
 SHARP = [("ggx", {"roughness": 0.2}), ("ggx", {"roughness": 0.4, "f0": [0.9, 0.5, 0.1]}), ("ward", {"alpha": 0.08})]

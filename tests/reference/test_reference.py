@@ -8,16 +8,17 @@ from analytic_terms import ANALYTIC
 from sessions import relative_rmse
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, still_life, studio
 
-from relume.bake import Recipe
+from relume.assets.environments.environment import Environment
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles, uv_to_direction
 from relume.brdf.evaluate import eval_brdf
-from relume.environments.equirect import texel_directions, texel_solid_angles, uv_to_direction
-from relume.environments.model import Environment
-from relume.errors import CancelledError, PlanError
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, PlanError
+from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.look import default_look, validate
-from relume.memory import Cache
 from relume.methods.direct import DirectMethod
 from relume.methods.registry import open_transfer
-from relume.picture.transfer import FixedViewTransfer
+from relume.output.render_image import render_image
+from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference import (
     ReferenceImage,
     ReferencePoints,
@@ -26,11 +27,10 @@ from relume.reference import (
     reference_radiance,
     render_reference,
 )
-from relume.render.image import render_image
-from relume.scene.archive import make_scene
 from relume.scene.model import Light, Material, Scene
+from relume.scene.scene_folder import make_scene
 from relume.store import bake_in_process
-from relume.trace.geometry import build_scene_buffers
+from relume.store.bake_protocol import Recipe
 
 WHITE = {"model": "lambert", "color": [1.0, 1.0, 1.0], "params": {}, "curves": {}, "texture": None}
 

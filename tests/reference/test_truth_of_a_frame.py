@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
-from relume.color import luminance
-from relume.environments.equirect import texel_directions
+from relume.assets.environments.equirect import texel_directions
+from relume.core.color import luminance
 from relume.look import default_look, validate
 from relume.reference import reference_image
-from relume.reference.truth import FALSE_DISCOVERY_RATE, Comparison, Estimate, compare, error_map
+from relume.reference.comparison import FALSE_DISCOVERY_RATE, Comparison, Estimate, compare, error_map
 from relume.scene.model import Material
 
 SHAPE = (60, 80, 3)

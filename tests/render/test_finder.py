@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from tiny_scenes import quad
 
-from relume.color import srgb_decode
-from relume.environments.model import Environment
-from relume.render.finder import Viewport
-from relume.scene.archive import make_scene
-from relume.scene.built_in import BUILT_IN, built_in
+from relume.assets.environments.environment import Environment
+from relume.core.color import srgb_decode
+from relume.output.viewport import Viewport
+from relume.scene.examples.catalog import BUILT_IN, built_in
 from relume.scene.model import Camera, Material, Texture
+from relume.scene.scene_folder import make_scene
 
 SIZE = (64, 48)
 

@@ -8,9 +8,9 @@ import pytest
 from oracle import open_copy
 from sessions import make_look
 
-from relume.exr.layers import make_layers
-from relume.exr.picture import export_exr
-from relume.render.image import render_image
+from relume.output.exr.export import export_exr
+from relume.output.exr.layers import make_layers
+from relume.output.render_image import render_image
 
 LIGHTS = {
     "Key": {"kind": "point", "position": [0.5, 1.3, 0.5], "emission": [2.0, 1.5, 1.0]},

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from sessions import make_look
 
-from relume.memory import Cache
+from relume.core.cache import Cache
 from relume.methods.registry import open_transfer
-from relume.render.image import render_image, render_small
-from relume.views.thinned import DownsampledStore
+from relume.output.render_image import render_image, render_small
+from relume.views.downsampled import DownsampledStore
 
 
 @pytest.mark.parametrize("step", [2, 3, 7])

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
-from relume.remarks import approximated
-from relume.scene.archive import load_cameras, load_scene, make_scene, save_scene
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
+from relume.core.import_warnings import approximated
 from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture, TextureEncoding
+from relume.scene.scene_folder import load_cameras, load_scene, make_scene, save_scene
 
 
 def test_another_scene_of_the_same_id_is_not_written_over_the_first(tmp_path: Path) -> None:

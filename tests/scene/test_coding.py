@@ -10,11 +10,11 @@ import pytest
 from texture_values import get_texture_values
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.errors import SceneError
-from relume.scene.archive import load_scene, save_scene
-from relume.scene.coding import ROWS_PER_BATCH, decode, encode_rows, mean_value
+from relume.core.errors import SceneError
+from relume.raytrace.texture import MipMap
 from relume.scene.model import Material, Scene, Texture, TextureEncoding
-from relume.trace.texture import MipMap
+from relume.scene.scene_folder import load_scene, save_scene
+from relume.scene.texture_encoding import ROWS_PER_BATCH, decode, encode_rows, mean_value
 
 
 def random_bytes(height: int = 9, width: int = 7, seed: int = 1) -> np.ndarray:

@@ -9,14 +9,14 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles
+from relume.assets.environments.studio import studio
 from relume.brdf.registry import TERMS
-from relume.environments.equirect import texel_directions, texel_solid_angles
-from relume.environments.studio import studio
-from relume.scene.archive import make_scene
-from relume.scene.demo import demo_scene, still_life
-from relume.scene.demo.materials import materials
-from relume.scene.demo.teapot import patches, teapot, tessellate
+from relume.scene.examples.still_life import demo_scene, still_life
+from relume.scene.examples.still_life.palette import materials
+from relume.scene.examples.still_life.teapot import patches, teapot, tessellate
 from relume.scene.model import Mesh, Scene
+from relume.scene.scene_folder import make_scene
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
 
-from relume.environments.equirect import direction_to_uv, texel_directions, texel_solid_angles, uv_to_direction
-from relume.environments.reading import read_environment
-from relume.errors import SceneError
+from relume.assets.environments.equirect import direction_to_uv, texel_directions, texel_solid_angles, uv_to_direction
+from relume.assets.environments.read_environment import read_environment
+from relume.core.errors import SceneError
 
 
 def written(path: Path, pixels: np.ndarray) -> Path:

@@ -11,11 +11,11 @@ import pytest
 from glb_builder import DIELECTRIC_TRANSMISSION, QUAD, QUAD_NORMALS, QUAD_UVS, Glb, self_contained
 from texture_values import get_texture_values
 
+from relume.assets.environments.environment import Environment
 from relume.brdf.registry import TERMS
-from relume.environments.model import Environment
-from relume.scene.coding import mean_value
-from relume.scene.gltf import import_gltf
 from relume.scene.model import Material, Mesh, Scene
+from relume.scene.texture_encoding import mean_value
+from relume.scene_io.gltf import import_gltf
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

@@ -9,11 +9,11 @@ import pytest
 from glb_builder import Glb
 from texture_values import get_texture_values
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
 from relume.look import default_look
-from relume.scene.gltf import import_gltf
 from relume.scene.model import Scene
+from relume.scene_io.gltf import import_gltf
 
 LIGHT = Environment("gray", np.ones((4, 8, 3), np.float32))
 

@@ -9,11 +9,11 @@ import pytest
 from glb_builder import DIELECTRIC_TRANSMISSION, Glb
 from texture_values import get_texture_values
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
-from relume.scene.archive import load_scene, save_scene
-from relume.scene.gltf import import_gltf
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
 from relume.scene.model import Scene
+from relume.scene.scene_folder import load_scene, save_scene
+from relume.scene_io.gltf import import_gltf
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, still_life
 
-from relume.errors import SceneError
-from relume.scene.archive import load_scene, save_scene
-from relume.scene.ground import with_ground
+from relume.core.errors import SceneError
+from relume.scene.scene_folder import load_scene, save_scene
+from relume.scene.shadow_catcher_ground import with_ground
 
 CAMERA = make_camera("front", (0, 2, 5), (0, 1, 0), 0.6)
 

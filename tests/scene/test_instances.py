@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from glb_builder import QUAD, Glb
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
-from relume.scene.gltf import import_gltf, importer
-from relume.scene.gltf.flattened import cofactors, count_dimensions
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
 from relume.scene.model import Scene
+from relume.scene_io.gltf import import_gltf, importer
+from relume.scene_io.gltf.degenerate_transforms import cofactors, count_dimensions
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

@@ -10,9 +10,9 @@ import numpy as np
 import PIL.Image
 import pytest
 
-from relume.environments.model import Environment
-from relume.scene.importer import import_scene
+from relume.assets.environments.environment import Environment
 from relume.scene.model import Material, Scene, TextureEncoding
+from relume.scene_io.import_scene import import_scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"

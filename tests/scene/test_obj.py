@@ -11,11 +11,11 @@ import PIL.Image
 import pytest
 from texture_values import get_texture_values
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
-from relume.scene.importer import import_scene
-from relume.scene.mesh_files.corners import creased_normals
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
 from relume.scene.model import Light, Mesh, Scene
+from relume.scene_io.import_scene import import_scene
+from relume.scene_io.obj_ply.weld import creased_normals
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

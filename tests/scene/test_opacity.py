@@ -11,10 +11,10 @@ import PIL.Image
 import pytest
 from glb_builder import Glb
 
-from relume.environments.model import Environment
-from relume.scene.gltf import import_gltf
-from relume.scene.importer import import_scene
+from relume.assets.environments.environment import Environment
 from relume.scene.model import Opacity, Scene
+from relume.scene_io.gltf import import_gltf
+from relume.scene_io.import_scene import import_scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 HALVES = np.array([[[9, 9, 9, 0], [9, 9, 9, 200]]], np.uint8)

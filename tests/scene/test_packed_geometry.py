@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from packed_glb import GRID_FACES, VECTORS, draco_glb, grid, meshopt_glb
 
-from relume.environments.model import Environment
-from relume.scene.gltf import import_gltf
-from relume.scene.meshopt import FILTERS, decode_sequence, decode_triangles, decode_vertices
+from relume.assets.environments.environment import Environment
 from relume.scene.model import Mesh
+from relume.scene_io.gltf import import_gltf
+from relume.scene_io.meshopt import FILTERS, decode_sequence, decode_triangles, decode_vertices
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from relume.errors import ParameterError
-from relume.scene.built_in import built_in
-from relume.scene.placed_camera import MAX_DISTANCE_M, make_custom_camera, read_custom_camera, with_cameras
+from relume.core.errors import ParameterError
+from relume.scene.custom_camera import MAX_DISTANCE_M, make_custom_camera, read_custom_camera, with_cameras
+from relume.scene.examples.catalog import built_in
 
 EYE = [1, 0, 0, 3, 0, 1, 0, 2, 0, 0, 1, 9, 0, 0, 0, 1]
 

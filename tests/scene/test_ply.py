@@ -9,9 +9,9 @@ import pytest
 from glb_builder import DIELECTRIC_TRANSMISSION
 from ply_builder import POSITIONS, binary, text
 
-from relume.environments.model import Environment
-from relume.scene.importer import import_scene
+from relume.assets.environments.environment import Environment
 from relume.scene.model import Scene
+from relume.scene_io.import_scene import import_scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
-from relume.scene.projected import find_triplanar
+from relume.scene.triplanar import find_triplanar
 
 CORNERS = [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]]
 CAMERA = make_camera("front", [0, 2, 2], [0, 0, 0], 0.8)

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from relume.environments.model import Environment
-from relume.remarks import approximated, ignored, unsupported, warning_of
-from relume.scene.archive import load_scene, save_scene
-from relume.scene.finish import MAX_WARNINGS, finalize
-from relume.scene.importer import import_scene
+from relume.assets.environments.environment import Environment
+from relume.core.import_warnings import approximated, ignored, unsupported, warning_of
+from relume.scene.finalize import MAX_WARNINGS, finalize
 from relume.scene.model import Scene
+from relume.scene.scene_folder import load_scene, save_scene
+from relume.scene_io.import_scene import import_scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nmtllib none.mtl\nf 1 2 3\n"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.scene.cornell import cornell_box, lamplit_cornell_box
-from relume.scene.interior import interior
-from relume.scene.tableau import tableau
-from relume.trace.geometry import build_scene_buffers
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.scene.examples.cornell import cornell_box, lamplit_cornell_box
+from relume.scene.examples.interior import interior
+from relume.scene.examples.tableau import tableau
 
 SCENES = {"cornell": cornell_box, "lamplit": lamplit_cornell_box, "interior": interior, "tableau": tableau}
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from relume.scene.model import Material, Texture, TextureEncoding
-from relume.scene.roughness import MAX_LEVELS, levels_of_material, select_level
+from relume.scene.roughness_levels import MAX_LEVELS, levels_of_material, select_level
 
 
 def material_of(pixels: object, most: float = 1.0) -> Material:

@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 from texture_values import get_texture_values
 
-from relume.environments.model import Environment
-from relume.errors import SceneError
-from relume.scene import companions
-from relume.scene.companions import UploadedFiles
-from relume.scene.importer import import_scene
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
+from relume.scene_io import referenced_files
+from relume.scene_io.import_scene import import_scene
+from relume.scene_io.referenced_files import UploadedFiles
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = b"mtllib ../looks/red.mtl\nusemtl Red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -56,7 +56,7 @@ def test_images_lie_where_the_material_file_says_or_else_where_the_scene_would(t
 
 
 def test_together_they_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(companions, "MAX_BYTES", 5)
+    monkeypatch.setattr(referenced_files, "MAX_BYTES", 5)
     files = kept(tmp_path, a=b"1234", b=b"12")
     with pytest.raises(SceneError, match="scale them down"):
         UploadedFiles(files, "scene.obj")

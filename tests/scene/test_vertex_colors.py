@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from glb_builder import Glb
 
-from relume.environments.model import Environment
-from relume.scene.companions import NoFiles
-from relume.scene.gltf import import_gltf
-from relume.scene.mesh_files import import_obj, import_ply
+from relume.assets.environments.environment import Environment
+from relume.raytrace.texture import MipMap
 from relume.scene.model import Scene, Texture, TextureEncoding
 from relume.scene.vertex_colors import WRAP, draw_color_image
-from relume.trace.texture import MipMap
+from relume.scene_io.gltf import import_gltf
+from relume.scene_io.obj_ply import import_obj, import_ply
+from relume.scene_io.referenced_files import NoFiles
 
 LIGHT = Environment("grey", np.ones((2, 4, 3), np.float32))
 

@@ -15,11 +15,11 @@ from server_fixtures import open_fake_bakes
 from websockets import Subprotocol
 from websockets.sync.client import ClientConnection, connect
 
-from relume.bake import Recipe
-from server.app import create_app, create_server
-from server.running.process import ServerProcess
-from server.settings import Settings
-from worker.scenes import register_scene
+from relume.store.bake_protocol import Recipe
+from relume_server.app import create_app, create_server
+from relume_server.lifecycle.server import ServerProcess
+from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
 
 
 @dataclass(frozen=True)

@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
-from relume.environments.model import Environment
-from relume.errors import CancelledError, EditNotSupportedError, MemoryBudgetError
+from relume.assets.environments.environment import Environment
+from relume.core.cache import CacheOwner
+from relume.core.errors import CancelledError, EditNotSupportedError, MemoryBudgetError
+from relume.live.fixed_camera.protocols import CameraMode, EditAxis
 from relume.look import default_look
-from relume.memory import CacheOwner
-from relume.picture.transfer import CameraMode, EditAxis
+from relume.output.viewport import Viewport
 from relume.reference import ReferenceImage
-from relume.render.finder import Viewport
-from relume.scene.archive import load_scene, make_scene
 from relume.scene.model import Camera, Material, Mesh, Scene
+from relume.scene.scene_folder import load_scene, make_scene
 from relume.store import open_store
-from server.apart.step import IsNeeded, ProgressCallback, Step
-from server.apart.steps import do_step
-from server.apart.workshop import BatchContext
-from server.files.importing import ImportRequest, _write_scene
-from server.library.ports import Library
-from server.settings import Settings
+from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
+from relume_server.batch.context import BatchContext
+from relume_server.batch.step import IsNeeded, ProgressCallback, Step
+from relume_server.batch.step_registry import do_step
+from relume_server.io.import_request import ImportRequest, _write_scene
+from relume_server.runtime.protocols import Library
+from relume_server.settings import Settings
 
 THETA_H, THETA_D = (f"/materials/Paper/terms/1/curves/{name}" for name in ("theta_h", "theta_d"))
 TILE = 64
@@ -285,7 +285,7 @@ class Control:
             *openers_and_renderers,
             lambda folder: Viewport.from_scene(load_scene(folder)),
             lambda transfer: ({}, {}),
-            lambda: {CacheOwner("frozen", "0123"): 100},
+            lambda: {CacheOwner("linear operator", "0123"): 100},
             lambda: 123,
             lambda stores: self.stores_in_use.append(set(stores)),
         )

@@ -15,12 +15,12 @@ from server_fakes import SIZE, Control, FakeMethod, InThreadBatches, tiny_scene
 from session_client import Baked
 from sqlalchemy import Engine, event
 
-from relume.bake import Recipe
-from server.app import create_app
-from server.settings import Settings
-from worker.database import open_database
-from worker.scenes import register_scene
-from worker.service import BakeService
+from relume.store.bake_protocol import Recipe
+from relume_server.app import create_app
+from relume_server.settings import Settings
+from relume_worker.database import open_database
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
 
 impatient = pytest.mark.parametrize("ack_seconds", [1.5])  # for tests of what happens then
 
@@ -92,8 +92,10 @@ def no_database_on_the_loop() -> Iterator[None]:
 
 @pytest.fixture
 def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    monkeypatch.setattr("server.live.state.frame_window.SLOW_S", math.inf)  # a busy machine is no slow link
-    monkeypatch.setattr("server.live.sending.coefficient_budget.MIN_COEFFICIENTS", 512)  # nor does it take more steps
+    monkeypatch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is no slow link
+    monkeypatch.setattr(
+        "relume_server.session.frames.coefficient_budget.MIN_COEFFICIENTS", 512
+    )  # nor does it take more steps
     app = create_app(
         settings, open_library=control.open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
     )

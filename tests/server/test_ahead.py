@@ -16,21 +16,21 @@ from server_fakes import InThreadBatches
 from sqlalchemy.exc import OperationalError
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.methods.registry import open_bake
-from relume.picture.picture import Picture
-from server.apart import ahead as module
-from server.apart.ahead import Prewarmer
-from server.apart.step import IsNeeded, ProgressCallback, Step
-from server.apart.thumbnails import Thumbnails
-from server.library.opening import open_library
-from server.settings import Settings
-from worker.database.faults import DatabaseError, database_outage
-from worker.paths import bake_path
-from worker.scenes import register_scene
-from worker.service import BakeService
-from worker.storage.locks import open_lock_file
+from relume.store.bake_protocol import Recipe
+from relume_server.batch import prewarm as module
+from relume_server.batch.prewarm import Prewarmer
+from relume_server.batch.step import IsNeeded, ProgressCallback, Step
+from relume_server.batch.thumbnails import Thumbnails
+from relume_server.runtime.library import open_library
+from relume_server.settings import Settings
+from relume_worker.database.failures import DatabaseError, database_outage
+from relume_worker.paths import bake_path
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
+from relume_worker.storage.locks import open_lock_file
 
 SIZE = (24, 16)
 AWAY = pg8000.InterfaceError("refused")
@@ -158,7 +158,7 @@ def test_who_has_not_the_turn_says_nothing_of_the_database(
             yield is_ours
 
     ahead._try_lock = counted  # type: ignore[method-assign]
-    with caplog.at_level(logging.WARNING, "worker.database.faults"):
+    with caplog.at_level(logging.WARNING, "relume_worker.database.failures"):
         DatabaseError(logging.getLogger("loop"), "it cannot be read").report_failure(
             OperationalError("SELECT 1", {}, AWAY)
         )

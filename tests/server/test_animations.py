@@ -15,8 +15,8 @@ from shared_bakes import unmeasured
 from test_end_to_end import wait_until_done
 from test_moving_eyes import SIZE, bake, client, eye, scene
 
-from relume.errors import RelumeError
-from server.files.video import write_video
+from relume.core.errors import RelumeError
+from relume_server.io.video import write_video
 
 __all__ = ["bake", "client", "scene", "unmeasured"]  # fixtures
 

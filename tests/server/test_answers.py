@@ -16,10 +16,10 @@ from alone import run_in_thread
 from fastapi.testclient import TestClient
 from session_client import Baked
 
-from relume.memory import Cache
-from server.files import answers as answers_module
-from server.files.answers import Answers
-from server.library.once import SingleFlight
+from relume.core.cache import Cache
+from relume_server.io import streamed_responses as answers_module
+from relume_server.io.streamed_responses import Answers
+from relume_server.runtime.single_flight import SingleFlight
 
 T = TypeVar("T")
 

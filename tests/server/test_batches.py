@@ -10,20 +10,20 @@ from typing import Any
 import pytest
 from sqlalchemy import select, update
 
-from relume.errors import CancelledError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
-from relume.resident import resident_bytes
-from server.apart import process as processes
-from server.apart.pool import ProcessPool
-from server.apart.step import Step
-from server.errors import BusyError, QuotaError
-from server.queues.work import Quota
-from server.queues.work_queue import JobQueue
-from server.records.tables import RenderRow
-from server.wire.renders import RenderRequest
-from worker.database import open_database
-from worker.lease import new_owner
-from worker.ledger import Ledger
-from worker.turns import FairShare, WaitingBake
+from relume.core.errors import CancelledError, NotFoundError, RelumeError, StoreError, StoreNotFoundError
+from relume.core.memory_usage import resident_bytes
+from relume_server.batch import process as processes
+from relume_server.batch.pool import ProcessPool
+from relume_server.batch.step import Step
+from relume_server.errors import BusyError, QuotaError
+from relume_server.jobs.job import Quota
+from relume_server.jobs.queue import JobQueue
+from relume_server.persistence.tables import RenderRow
+from relume_server.schemas.renders import RenderRequest
+from relume_worker.database import open_database
+from relume_worker.fair_share import FairShare, WaitingBake
+from relume_worker.lease import new_owner
+from relume_worker.ledger import Ledger
 
 STAND_IN = """
 import json, os, sys, time
@@ -45,7 +45,7 @@ for line in sys.stdin:
         os._exit(9)
     print(json.dumps({"answer": {"pid": os.getpid()}}), flush=True)
 """
-"""A process that speaks as `server.apart.main` does, and starts at once."""
+"""A process that speaks as `relume_server.batch.process_main` does, and starts at once."""
 
 
 def ignore(share: float) -> None:
@@ -127,7 +127,7 @@ def test_a_step_that_does_not_listen_is_ended_with_its_process(
 
 
 def test_a_process_that_has_grown_is_exchanged(pool: ProcessPool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.apart.pool._PROGRAM_BYTES", 1 << 27)
+    monkeypatch.setattr("relume_server.batch.pool._PROGRAM_BYTES", 1 << 27)
     small = pool.run(Step("work"), ignore, always)["pid"]
     assert pool.run(Step("grow"), ignore, always)["pid"] == small
     assert pool.pids() == []

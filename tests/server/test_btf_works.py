@@ -12,10 +12,10 @@ from btf_zips import zipped
 from fastapi.testclient import TestClient
 from server_fakes import Control
 
-from relume.btf.compress import ViewArrays
-from relume.btf.importing import import_btf
-from relume.errors import CancelledError
-from server.settings import Settings
+from relume.assets.btf.compress import ViewArrays
+from relume.assets.btf.import_btf import import_btf
+from relume.core.errors import CancelledError
+from relume_server.settings import Settings
 
 WORKS = "/api/materials/btf-works"
 WAIT_S = 60.0
@@ -78,7 +78,7 @@ def test_a_container_becomes_a_material_whatever_it_is_called(
 
 @pytest.mark.slow
 def test_a_small_geometry_is_rendered(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.apart.btfs._GRID", 1)
+    monkeypatch.setattr("relume_server.batch.btf_steps._GRID", 1)
     answer = client.post(f"{WORKS}/synthetic", json={"geometry": "corduroy", "size": 8, "error": 0.3})
     assert answer.status_code == 202
     body = wait_for(client, answer.headers["location"], "ready", "failed")
@@ -97,7 +97,7 @@ def test_a_mesh_that_is_sent_is_rendered_with_its_period(
         return import_btf(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
 
     made: list[Any] = []
-    monkeypatch.setattr("server.apart.btfs.synthesize_btf", render)
+    monkeypatch.setattr("relume_server.batch.btf_steps.synthesize_btf", render)
     form = {"size": 16, "period": 2.5}
     answer = client.post(f"{WORKS}/geometry", files={"geometry": ("Roof.obj", SQUARE)}, data=form)
     assert answer.status_code == 202
@@ -162,7 +162,7 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
             raise CancelledError("stopped")
         return import_btf(folder, file, name, bound, tell, is_canceled, making, images)
 
-    monkeypatch.setattr("server.apart.btfs.import_btf", slow)
+    monkeypatch.setattr("relume_server.batch.btf_steps.import_btf", slow)
     url = send(client, zipped(tmp_path / "a.zip"))
     assert has_begun.wait(WAIT_S)
     assert client.get(url).json()["progress"] == 0.5
@@ -177,7 +177,7 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
 def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
     client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.apart.btfs.SLICE_S", 0.0)
+    monkeypatch.setattr("relume_server.batch.btf_steps.SLICE_S", 0.0)
     done: list[float] = []
 
     def render(shelf: Path, wanted: Any, name: str, tell: Callable[[float], object],
@@ -192,7 +192,7 @@ def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
         raise CancelledError("for now")
 
     images: list[str] = []
-    monkeypatch.setattr("server.apart.btfs.synthesize_btf", render)
+    monkeypatch.setattr("relume_server.batch.btf_steps.synthesize_btf", render)
     url = client.post(f"{WORKS}/synthetic", json={"geometry": "weave"}).headers["location"]
     assert wait_for(client, url, "ready", "failed")["state"] == "ready"
     assert len(done) == 7

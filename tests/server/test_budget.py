@@ -10,10 +10,10 @@ from server_fakes import Control
 from session_client import IOR, SIGMA, Baked, Session, open_session
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from server.app import create_app
-from server.settings import Settings
-from worker.scenes import register_scene
+from relume.store.bake_protocol import Recipe
+from relume_server.app import create_app
+from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
 
 BALL = "/materials/Ball/terms/1"
 DRAWN = {"points": [[0, 1], [90, 0]]}

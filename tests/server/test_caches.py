@@ -8,8 +8,8 @@ import pytest
 from fastapi.testclient import TestClient
 from session_client import Baked
 
-from server.access.rules import RULES, SOCKET
-from server.settings import Settings
+from relume_server.auth.rules import RULES, SOCKET
+from relume_server.settings import Settings
 
 
 @pytest.fixture

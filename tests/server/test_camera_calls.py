@@ -10,9 +10,9 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from tiny_scenes import still_life
 
-from server.app import create_app
-from server.settings import Settings
-from worker.scenes import register_scene
+from relume_server.app import create_app
+from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
 
 
 @pytest.fixture

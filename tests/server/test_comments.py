@@ -18,10 +18,10 @@ from problems import parse_problem
 from server_fakes import SIZE
 from session_client import ROOM_FIELDS, Baked, open_session
 
-from server.live.rooms.comment_news import CommentSync
-from server.live.rooms.rooms import Rooms
-from server.records import comments
-from worker.database.faults import MissingDatabase, make_unavailable_error
+from relume_server.collaboration.comment_sync import CommentSync
+from relume_server.collaboration.rooms import Rooms
+from relume_server.persistence import comment_store
+from relume_worker.database.failures import MissingDatabase, make_unavailable_error
 
 
 def image(size: tuple[int, int] = (640, 384), form: str = "JPEG") -> str:
@@ -110,7 +110,7 @@ def test_what_is_wrong_is_said(client: TestClient, path: str, pin: dict[str, Any
 def test_a_scene_has_so_many_comments(
     client: TestClient, path: str, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(comments, "MAX_PER_SCENE", 1)
+    monkeypatch.setattr(comment_store, "MAX_PER_SCENE", 1)
     client.post(path, json=pin)
     assert parse_problem(client.post(path, json=pin))["status"] == 503
 
@@ -127,9 +127,9 @@ def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path
 def test_where_nothing_is_asked_nothing_is_said_of_the_database(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.rooms.comment_news.POLL_INTERVAL_S", 0.001)
+    monkeypatch.setattr("relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 0.001)
     away = MissingDatabase(logging.getLogger("away"), "the database")
-    monkeypatch.setattr("worker.database.faults.database_outage", away)
+    monkeypatch.setattr("relume_worker.database.failures.database_outage", away)
     away.report_failure(make_unavailable_error("connection refused"))
     caplog.clear()
 
@@ -150,13 +150,15 @@ def test_rooms_are_told_of_what_another_server_took(
     def look() -> None:
         client.portal.call(news.refresh)  # type: ignore[union-attr]
 
-    monkeypatch.setattr("server.live.rooms.comment_news.POLL_INTERVAL_S", 1e9)  # the server's own looks once at most
+    monkeypatch.setattr(
+        "relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 1e9
+    )  # the server's own looks once at most
     told: list[str] = []
-    monkeypatch.setattr(services.live.rooms, "commented", told.append)
+    monkeypatch.setattr(services.live.rooms, "notify_comment", told.append)
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         look()
-        other = comments.CommentStore(services.comments._sessions)
+        other = comment_store.CommentStore(services.comments._sessions)
         made = other.add(baked.scene, pin, "There", "Bob", None)
         look()
         look()

@@ -13,12 +13,12 @@ from PIL import Image
 from server_fakes import SIZE, Control, FakeTransfer, InThreadBatches
 from session_client import Baked
 
-from relume.errors import CancelledError
-from relume.picture.transfer import CameraMode
-from server.apart.steps import STEPS
-from server.app import create_app
-from server.queues.comparisons import DEFAULT_PIXEL_S
-from server.settings import Settings
+from relume.core.errors import CancelledError
+from relume.live.fixed_camera.protocols import CameraMode
+from relume_server.app import create_app
+from relume_server.batch.step_registry import STEPS
+from relume_server.jobs.comparison_jobs import DEFAULT_PIXEL_S
+from relume_server.settings import Settings
 
 WAIT_S = 60.0
 
@@ -103,7 +103,7 @@ def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     # as a kill after three passes leaves it
     queue._update(identity, ("ready",), state="running", request=request)
     if is_upgraded:
-        monkeypatch.setattr("server.apart.passes.comparison_code", lambda: "0123456789abcdef")
+        monkeypatch.setattr("relume_server.batch.reference_passes.comparison_code", lambda: "0123456789abcdef")
     later = Control()
     later.trace_gate.set()
     with TestClient(create_app(settings, open_library=later.open_library, open_batches=InThreadBatches)) as restarted:
@@ -200,7 +200,9 @@ def _baked_by(method: str, init: Callable[..., None], **also: Any) -> Callable[.
 def test_a_moving_view_is_compared_from_where_its_eye_is(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(FakeTransfer, "__init__", _baked_by("surface", FakeTransfer.__init__, eyes=CameraMode.FREE))
+    monkeypatch.setattr(
+        FakeTransfer, "__init__", _baked_by("surface", FakeTransfer.__init__, camera_mode=CameraMode.FREE)
+    )
     control.trace_gate.set()
     to_world = np.array([[0, 0, 1, 4], [0, 1, 0, 2], [-1, 0, 0, 3], [0, 0, 0, 1]], float)
     camera = {"to_world": to_world.ravel().tolist(), "yfov": 40.0}
@@ -225,7 +227,7 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
 def test_an_estimate_waits_for_no_other_and_is_judged_by_other_views_until_it_is_timed(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.queues.comparisons.ANSWER_S", 0.01)
+    monkeypatch.setattr("relume_server.jobs.comparison_jobs.ANSWER_S", 0.01)
     question = {"bake": baked.bake, "view": "front", "passes": 4, "dry_run": True}
     guessed = client.post("/api/truths", json=question)  # nothing may be traced
     assert (guessed.status_code, guessed.json()["is_measured"]) == (200, False)

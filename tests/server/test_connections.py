@@ -12,9 +12,9 @@ from fastapi.testclient import TestClient
 from running_server import Running, running_server
 from server_fakes import Control
 
-from server.guard import MAX_JSON_BYTES, MAX_LOGIN_BYTES
-from server.running import connection
-from server.settings import Settings
+from relume_server.lifecycle import connection
+from relume_server.request_limits import MAX_JSON_BYTES, MAX_LOGIN_BYTES
+from relume_server.settings import Settings
 
 HEAD = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 BODY = (

@@ -13,14 +13,14 @@ from PIL import Image
 from session_client import Baked
 from test_comparisons import is_done, wait_until
 
-from relume.imageio.files import to_bytes
-from relume.imageio.ocio.config import Config
-from relume.imageio.ocio.current import using_config
-from relume.imageio.ocio.lut import SIZE
-from relume.imageio.ocio.view import OcioView
-from relume.imageio.primaries import INTEROP_SPACES
-from server.apart.process import BatchProcess
-from server.settings import Settings
+from relume.image_io.ocio.active_config import using_config
+from relume.image_io.ocio.config import Config
+from relume.image_io.ocio.lut import SIZE
+from relume.image_io.ocio.view import OcioView
+from relume.image_io.primaries import INTEROP_SPACES
+from relume.image_io.write_image import to_bytes
+from relume_server.batch.process import BatchProcess
+from relume_server.settings import Settings
 
 CONFIG = "ocio://cg-config-latest"
 VIEW = {"display": "sRGB - Display", "view": "ACES 2.0 - SDR 100 nits (Rec.709)"}

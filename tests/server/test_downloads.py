@@ -11,9 +11,9 @@ from anyio.from_thread import start_blocking_portal
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from server import errors
-from server.files.downloads import Download
-from server.routes.session import _accept
+from relume_server import errors
+from relume_server.api.session import _accept
+from relume_server.io.downloads import Download
 
 DATA = bytes(range(100))
 

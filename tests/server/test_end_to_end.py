@@ -13,12 +13,12 @@ from fastapi.testclient import TestClient
 from session_client import Frame, open_session
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from relume.scene.ground import with_ground
-from server.app import create_app
-from server.settings import Settings
-from worker.scenes import register_scene
-from worker.service import BakeService
+from relume.scene.shadow_catcher_ground import with_ground
+from relume.store.bake_protocol import Recipe
+from relume_server.app import create_app
+from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
 
 WIDTH, HEIGHT = 80, 60
 

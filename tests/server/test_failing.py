@@ -9,13 +9,13 @@ import pytest
 from fastapi.testclient import TestClient
 from server_fakes import write_tiny_scene
 
-from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
-from server.apart.process import _answer
-from server.errors import make_problem
-from server.files import importing
-from server.files.importing import ImportRequest, run_import
-from server.settings import Settings
-from worker.database.faults import make_unavailable_error
+from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
+from relume_server.batch.process import _answer
+from relume_server.errors import make_problem
+from relume_server.io import import_request
+from relume_server.io.import_request import ImportRequest, run_import
+from relume_server.settings import Settings
+from relume_worker.database.failures import make_unavailable_error
 
 
 class Usage(NamedTuple):
@@ -40,7 +40,7 @@ def test_a_damaged_database_is_said_in_one_sentence_and_one_line(
             assert answer.status_code == 503
             assert answer.json()["type"] == "urn:relume:problem:database"
             assert "put a backup of relume.db in its place" in answer.json()["detail"]
-    said = [record for record in caplog.records if record.name == "server.errors"]
+    said = [record for record in caplog.records if record.name == "relume_server.errors"]
     assert len(said) == 2
     assert not any(record.exc_info or "\n" in record.getMessage() for record in caplog.records)
 
@@ -71,7 +71,7 @@ def test_a_disk_that_a_step_finds_full_is_no_failure_of_its_process(error: Excep
 
 
 def test_probes_of_a_server_that_is_stopped_are_no_lines(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:
-    client.app.state.leave.take()  # type: ignore[attr-defined]
+    client.app.state.drain.start()  # type: ignore[attr-defined]
     assert [client.get("/readyz").status_code for _ in range(2)] == [503, 503]
     assert [record for record in caplog.records if record.levelno >= logging.WARNING] == []
 
@@ -83,7 +83,7 @@ def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     request = ImportRequest.create(settings, "built_in", None, "cornell_box")
-    monkeypatch.setattr(importing, "_import", full)
+    monkeypatch.setattr(import_request, "_import", full)
     assert run_import(request).keys() == {"full"}
 
 
@@ -103,7 +103,7 @@ def test_the_process_of_an_import_tells_faults_of_the_service_from_those_of_the_
     def fail(_: object) -> str:
         raise failure
 
-    monkeypatch.setattr(importing, "_import", fail)
+    monkeypatch.setattr(import_request, "_import", fail)
     assert run_import(ImportRequest.create(settings, "built_in", None, "cornell_box")).keys() == {key}
 
 
@@ -113,7 +113,7 @@ def test_an_import_whose_scene_cannot_be_listed_says_why_and_leaves_nothing_half
     def fail(*_: object) -> None:
         raise make_unavailable_error("refused")
 
-    monkeypatch.setattr("server.files.intake.insert_scene", fail)
+    monkeypatch.setattr("relume_server.io.import_queue.insert_scene", fail)
     monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)  # type: ignore[attr-defined]
     refused = client.post("/api/scenes", files={"scene": ("triangle.glb", b"which nobody reads")})
     assert refused.status_code == 503

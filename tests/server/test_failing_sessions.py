@@ -44,7 +44,7 @@ def test_a_disk_that_fails_is_one_line_and_one_sentence(
             session.text("never")
     assert ended.value.args[0] == code
     assert ended.value.args[1].startswith(sentence)
-    (line,) = [record for record in caplog.records if record.name.startswith("server.live")]
+    (line,) = [record for record in caplog.records if record.name.startswith("relume_server.session")]
     assert line.levelno == logging.ERROR
     assert not line.exc_info
     assert "\n" not in line.getMessage()

@@ -10,10 +10,10 @@ import pytest
 from alone import run_in_thread
 from server_fakes import Control, FakeJob
 
-from relume.errors import ProtocolError, StoreError
-from server.library.threads import Threads
-from server.live.sending.freezing import Precomputer
-from server.metrics import Metrics
+from relume.core.errors import ProtocolError, StoreError
+from relume_server.runtime.executors import Threads
+from relume_server.session.frames.precompute import Precomputer
+from relume_server.telemetry.metrics import Metrics
 
 
 class Told:

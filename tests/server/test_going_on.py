@@ -11,8 +11,8 @@ from problems import parse_problem
 from session_client import Baked
 from test_comparisons import is_done, wait_until
 
-from relume.errors import RelumeError
-from relume.imageio.files import write_image
+from relume.core.errors import RelumeError
+from relume.image_io.write_image import write_image
 
 
 class Painting:
@@ -32,7 +32,7 @@ class Painting:
 @pytest.fixture
 def painting(monkeypatch: pytest.MonkeyPatch) -> Painting:
     found = Painting()
-    monkeypatch.setattr("server.apart.frames.write_image", found.write)
+    monkeypatch.setattr("relume_server.batch.frames.write_image", found.write)
     return found
 
 

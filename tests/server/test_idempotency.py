@@ -9,12 +9,12 @@ from problems import parse_problem
 from session_client import Baked
 from sqlalchemy import func, select, update
 
-from server.access.tables import AuditRow
-from server.idempotency import _Digest
-from server.records import idempotency
-from server.records.idempotency import Answer, IdempotencyStore
-from server.records.tables import IdempotencyRow
-from worker.database.clock import epoch_s
+from relume_server.auth.tables import AuditRow
+from relume_server.idempotency import _Digest
+from relume_server.persistence import idempotency
+from relume_server.persistence.idempotency import Answer, IdempotencyStore
+from relume_server.persistence.tables import IdempotencyRow
+from relume_worker.database.clock import epoch_s
 
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -148,7 +148,7 @@ def test_keys_are_each_clients_own_and_run_out(client: TestClient, store: Idempo
 def test_a_call_whose_server_has_died_is_made_again(client: TestClient, store: IdempotencyStore) -> None:
     assert store.claim("ann", "one", "a") is None
     with client.app.state.services.bakes.ledger.sessions.begin() as session:
-        place, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).load().split("/")
+        place, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).one().split("/")
         session.execute(update(IdempotencyRow).values(owner=f"{place}/{2**22 + 1}/{nonce}/{number}"))
     assert store.claim("ann", "one", "a") is None
     with client.app.state.services.bakes.ledger.sessions.begin() as session:

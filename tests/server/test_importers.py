@@ -15,17 +15,17 @@ from pathlib import Path
 
 import pytest
 
-from relume.errors import DiskFullError, MaterialError, RelumeError, SceneError
-from relume.resident import resident_bytes
-from server.errors import make_problem
-from server.files import importers
-from server.files.confining import missing_features
-from server.files.importers import Importers, ImportTooLargeError
-from server.files.importing import ImportRequest
+from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
+from relume.core.memory_usage import resident_bytes
+from relume_server.errors import make_problem
+from relume_server.io import import_processes
+from relume_server.io.import_processes import Importers, ImportTooLargeError
+from relume_server.io.import_request import ImportRequest
+from relume_server.io.sandbox import missing_features
 
 STAND_IN = """
 import importlib, os, signal, time
-from server.files import confining, forking, importing
+from relume_server.io import import_request, importer_zygote, sandbox
 
 def reached(request):
     import socket, subprocess
@@ -76,10 +76,13 @@ def answer_of(request):
         raise ValueError("of nobody's file")
     return {"id": f"{os.getpid()} {os.getppid()}"} if name == "it" else {name: "no."}
 
-importing._import = lambda request: answer_of(request)["id"]
-forking._load = lambda: (importlib.import_module("numba.core.caching"), confining.missing())
-forking.answer_of = lambda request: importing.answer_of(request) if request.name == "write" else answer_of(request)
-forking.main()
+import_request._import = lambda request: answer_of(request)["id"]
+importer_zygote._load = lambda: (importlib.import_module("numba.core.caching"), sandbox.missing_features())
+def answer(request):
+    return import_request.run_import(request) if request.name == "write" else answer_of(request)
+
+importer_zygote.run_import = answer
+importer_zygote.main()
 """
 
 
@@ -89,7 +92,7 @@ def asked(name: str, seconds: int = 60) -> ImportRequest:
 
 @pytest.fixture
 def waiting(monkeypatch: pytest.MonkeyPatch) -> Iterator[Importers]:
-    monkeypatch.setattr(importers, "_COMMAND", [sys.executable, "-c", STAND_IN])
+    monkeypatch.setattr(import_processes, "_COMMAND", [sys.executable, "-c", STAND_IN])
     with closing(Importers()) as found:
         yield found
 
@@ -218,8 +221,8 @@ def test_a_file_that_unpacks_to_more_than_it_may_is_stopped_while_it_does(waitin
 def test_a_machine_that_cannot_confine_says_so_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(importers, "_COMMAND", [sys.executable, "-c", STAND_IN])
-    monkeypatch.setattr(importers, "missing_features", lambda: ("Landlock",))
+    monkeypatch.setattr(import_processes, "_COMMAND", [sys.executable, "-c", STAND_IN])
+    monkeypatch.setattr(import_processes, "missing_features", lambda: ("Landlock",))
     with closing(Importers()) as found:
         found.start()
         found.start()

@@ -20,9 +20,9 @@ from sse_starlette.sse import AppStatus
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
-from server.running.leave import DrainState
-from server.running.process import ServerProcess
-from server.settings import Settings
+from relume_server.lifecycle.drain import DrainState
+from relume_server.lifecycle.server import ServerProcess
+from relume_server.settings import Settings
 
 
 @pytest.fixture(autouse=True)

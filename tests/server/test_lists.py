@@ -10,9 +10,9 @@ from server_fakes import SIZE, tiny_scene
 from session_client import Baked
 from test_comparisons import is_done, wait_until
 
-from relume.bake import Recipe
-from server.app import ROUTE_GROUPS
-from worker.scenes import register_scene
+from relume.store.bake_protocol import Recipe
+from relume_server.app import ROUTE_GROUPS
+from relume_worker.scenes import register_scene
 
 LOOK = {"display": {"exposure": 1.0}}
 

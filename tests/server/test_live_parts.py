@@ -9,16 +9,21 @@ from typing import Any
 import pytest
 from alone import run_in_thread
 
-from relume.errors import ParameterError, ProtocolError, StoreError
-from server.library.transfers import MAX_IDLE, TransferPool
-from server.live.sending.bake_news import POLL_S, BakeUpdates
-from server.live.sending.coefficient_budget import MAX_COEFFICIENTS, MIN_COEFFICIENTS, TARGET_MS, CoefficientBudget
-from server.live.state.frame_window import FrameWindow
-from server.live.state.look_state import LookState
-from server.live.state.pointers import check_active_pointer, check_parameter, find_curve
-from server.live.state.resume import MAX_SAVED, ResumeStore
-from server.live.state.shown_views import VisibleViews
-from worker.status import BakeStatus
+from relume.core.errors import ParameterError, ProtocolError, StoreError
+from relume_server.client_state.flow_control import FrameWindow
+from relume_server.client_state.look_state import LookState
+from relume_server.client_state.pointers import check_active_pointer, check_parameter, find_curve
+from relume_server.client_state.resume import MAX_SAVED, ResumeStore
+from relume_server.client_state.visible_views import VisibleViews
+from relume_server.runtime.bake_pool import MAX_IDLE, TransferPool
+from relume_server.session.frames.bake_updates import POLL_S, BakeUpdates
+from relume_server.session.frames.coefficient_budget import (
+    MAX_COEFFICIENTS,
+    MIN_COEFFICIENTS,
+    TARGET_MS,
+    CoefficientBudget,
+)
+from relume_worker.status import BakeStatus
 
 DOCUMENT: dict[str, Any] = {
     "materials": {"a/b": {"terms": [{"model": "lambert"}, {"model": "cook_torrance"}, {"model": "ashikhmin_shirley"}]}}

@@ -18,10 +18,10 @@ from server_fakes import Control
 from session_client import Baked, open_session
 from websockets.sync.client import connect
 
-from cli.serve import announce
-from server.logs.context import BAKE, REQUEST, USER
-from server.logs.setting_up import Format, set_up
-from server.settings import Settings
+from relume_cli.serve import announce
+from relume_server.settings import Settings
+from relume_server.telemetry.logs.context import BAKE, REQUEST, USER
+from relume_server.telemetry.logs.setup import Format, set_up
 
 log = logging.getLogger("server.somewhere")
 
@@ -113,7 +113,9 @@ def test_requests_and_sessions_are_lines_without_their_tokens(
     with open_session(client, baked.bake, opening={"resume": "secret"}, headers={"X-Request-ID": "r8"}) as session:
         hello = session.text("hello")
         session.exact(0)
-    said = [line for line in capsys.readouterr().err.splitlines() if '"server.' in line]  # not the test client's own
+    said = [
+        line for line in capsys.readouterr().err.splitlines() if '"relume_server.' in line
+    ]  # not the test client's own
     assert "secret" not in "".join(said)
     lines = {line["request"]: line for line in map(json.loads, said)}
     assert (lines["r7"]["method"], lines["r7"]["path"], lines["r7"]["status"]) == ("GET", "/livez", 200)

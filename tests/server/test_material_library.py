@@ -7,8 +7,8 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
-from relume.balls.library import library_preview_png, render
 from relume.look.library import presets
+from relume.output.material_previews.library_sheet import library_preview_png, render
 
 
 def test_thumbnail_shows_a_ball(client: TestClient) -> None:

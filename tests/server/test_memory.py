@@ -19,13 +19,13 @@ from prometheus_client.parser import text_string_to_metric_families
 from session_client import open_session
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from relume.resident import live_bytes
-from relume.scene.archive import make_scene
-from server.app import create_app
-from server.library.transfers import TransferPool
-from server.settings import Settings
-from worker.scenes import register_scene
+from relume.core.memory_usage import live_bytes
+from relume.scene.scene_folder import make_scene
+from relume.store.bake_protocol import Recipe
+from relume_server.app import create_app
+from relume_server.runtime.bake_pool import TransferPool
+from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
 
 SIGMA = "/materials/Ball/terms/1/params/sigma"
 IDLE_S, FLOOR_BYTES = 60.0, 2_000_000  # room for one operator: whichever entry was used last stays
@@ -102,7 +102,7 @@ def test_metrics_tell_who_holds_what(real: TestClient) -> None:
     for bake in bakes:
         look_at(real, bake)
     found = held(real)
-    assert {(kind, bake) for kind in ("frozen", "shaded") for bake in bakes} <= set(found)
+    assert {(kind, bake) for kind in ("linear operator", "shaded term") for bake in bakes} <= set(found)
     assert all(num_bytes > 0 for num_bytes in found.values())
     assert sum(found.values()) == gauges(real)["frozen_cache"]
 
@@ -114,7 +114,7 @@ def test_a_thumbnail_of_other_code_is_painted_again(
     address = real.get("/api/scenes").json()[0]["thumbnail"]
     assert real.get(address).status_code == 200
     (before,) = (tmp_path / "thumbnails").iterdir()
-    monkeypatch.setattr("server.apart.thumbnails.image_code", lambda: "0123456789abcdef")
+    monkeypatch.setattr("relume_server.batch.thumbnails.image_code", lambda: "0123456789abcdef")
     assert real.get(address).status_code == 200
     (after,) = (tmp_path / "thumbnails").iterdir()
     assert after != before
@@ -125,7 +125,7 @@ def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -
     bakes = bake_scenes(real)
     pictures = [look_at(real, bake) for bake in bakes]
     go_round(real)
-    kept = [weakref.ref(transfer) for transfer in pool.opened]
+    kept = [weakref.ref(transfer) for transfer in pool.open_bakes]
     before = gauges(real)
     assert kept
     assert before["open_bakes"] > 0

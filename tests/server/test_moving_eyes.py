@@ -11,9 +11,9 @@ from fastapi.testclient import TestClient
 from session_client import Frame, Session, open_session
 from test_end_to_end import decode_rgb9e5, rendered_by, wait_until_done
 
-from server.app import create_app
-from server.live.state.frame_window import FrameWindow
-from server.settings import Settings
+from relume_server.app import create_app
+from relume_server.client_state.flow_control import FrameWindow
+from relume_server.settings import Settings
 
 SIZE = (64, 48)
 LEVEL = np.eye(4)
@@ -22,7 +22,7 @@ LEVEL = np.eye(4)
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("server.live.state.frame_window.SLOW_S", math.inf)  # a busy machine is no slow link
+        patch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is no slow link
         settings = Settings(data=tmp_path_factory.mktemp("moving"), allowed_hosts=["testserver"])
         with TestClient(create_app(settings)) as client:
             yield client

@@ -12,9 +12,9 @@ from server_fakes import Control
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from server.logs.setting_up import set_up
-from server.settings import Settings
-from server.wire.protocol import MAX_MESSAGE_BYTES
+from relume_server.schemas.protocol import MAX_MESSAGE_BYTES
+from relume_server.settings import Settings
+from relume_server.telemetry.logs.setup import set_up
 
 
 @pytest.fixture

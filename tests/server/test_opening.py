@@ -7,8 +7,8 @@ from fastapi.testclient import TestClient
 from server_fakes import Control
 from server_fixtures import open_fake_bakes
 
-from server.app import create_app
-from server.settings import Settings
+from relume_server.app import create_app
+from relume_server.settings import Settings
 
 
 def test_what_was_opened_is_closed_where_something_cannot_be(tmp_path):

@@ -15,8 +15,8 @@ from replicas_proxy import proxy_to_ports, proxy_to_shared_name
 from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
-from server.live.rooms.door import derive_watch_key
-from server.wire.rooms import MIN_ROOM, ROOM_PREFIX
+from relume_server.collaboration.join import derive_watch_key
+from relume_server.schemas.rooms import MIN_ROOM, ROOM_PREFIX
 
 NUM_SERVERS = 3
 

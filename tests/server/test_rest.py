@@ -18,9 +18,9 @@ from server_fakes import SIZE, Control, InThreadBatches
 from session_client import Baked
 
 from relume.look import Look
-from server.app import create_app
-from server.settings import Settings
-from worker.paths import bake_path
+from relume_server.app import create_app
+from relume_server.settings import Settings
+from relume_worker.paths import bake_path
 
 WIDTH, HEIGHT = SIZE
 

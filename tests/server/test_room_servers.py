@@ -14,10 +14,10 @@ from session_client import ROOM_FIELDS, SIGMA, Baked, Session, open_session
 from sqlalchemy import select, update
 from starlette.testclient import WebSocketDenialResponse
 
-from server.app import create_app
-from server.live.rooms.door import derive_watch_key
-from server.records.tables import RoomRow
-from server.settings import Settings
+from relume_server.app import create_app
+from relume_server.collaboration.join import derive_watch_key
+from relume_server.persistence.tables import RoomRow
+from relume_server.settings import Settings
 
 WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
 RESTART = 1012
@@ -26,8 +26,8 @@ LEASE_S = 600.0  # rounds are made by tests, however long those take
 
 @pytest.fixture(autouse=True)
 def _no_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.live.rooms.keeper.RENEW_INTERVAL_S", LEASE_S)
-    monkeypatch.setattr("server.records.room_leases.ROOM_LEASE_S", LEASE_S)
+    monkeypatch.setattr("relume_server.collaboration.room_lease.RENEW_INTERVAL_S", LEASE_S)
+    monkeypatch.setattr("relume_server.persistence.leases.ROOM_LEASE_S", LEASE_S)
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def services(server: TestClient) -> Any:
 def look_around(server: TestClient) -> None:
     """A round of what keeps rooms, at once."""
     assert server.portal is not None
-    server.portal.call(services(server).live.room_lease.look)
+    server.portal.call(services(server).live.room_lease.refresh)
 
 
 def refusal(server: TestClient, baked: Baked, opening: Mapping[str, str]) -> tuple[int, str]:
@@ -135,7 +135,7 @@ def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         assert client.portal is not None
-        client.portal.call(services(client).leave.take)
+        client.portal.call(services(client).drain.start)
         ann.text("leaving")
         assert refusal(client, baked, ROOM_FIELDS) == (503, "leaving")
         emptied(other)

@@ -8,7 +8,7 @@ from fastapi.testclient import TestClient
 from problems import parse_problem
 from session_client import Baked
 
-from relume.errors import bytes_text
+from relume.core.errors import bytes_text
 
 BAKES, RENDERS, SYNTHETIC = "/api/bakes", "/api/renders", "/api/materials/btf-works/synthetic"
 SCENE = "0123456789abcdef"

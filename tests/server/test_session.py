@@ -15,9 +15,9 @@ from server_fakes import SIZE, Control
 from server_fixtures import impatient
 from session_client import SIGMA, THETA_H, Baked, open_session
 
-from server.live.state.client_socket import ClientSocket
-from server.live.state.frame_window import FrameWindow
-from server.wire.protocol import FrameHeader
+from relume_server.client_state.flow_control import FrameWindow
+from relume_server.client_state.socket import ClientSocket
+from relume_server.schemas.protocol import FrameHeader
 
 WIDTH, HEIGHT = SIZE
 

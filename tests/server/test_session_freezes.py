@@ -94,7 +94,7 @@ def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: di
 def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.sending.frame_loop.BACKGROUND_DELAY_S", 3600.0)
+    monkeypatch.setattr("relume_server.session.frames.frame_loop.BACKGROUND_DELAY_S", 3600.0)
     control.is_refinement = True
     with open_session(client, baked.bake) as session:
         session.exact(0)
@@ -108,7 +108,7 @@ def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
 def test_a_hand_whose_newest_edit_waits_for_room_does_not_rest(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.sending.frame_loop.BACKGROUND_DELAY_S", 0.5)
+    monkeypatch.setattr("relume_server.session.frames.frame_loop.BACKGROUND_DELAY_S", 0.5)
     control.is_refinement = True
     with open_session(client, baked.bake, acknowledges=False) as session:
         session.frame()
@@ -143,7 +143,7 @@ def test_moving_on_to_another_curve_cancels_the_freeze_and_is_no_fault(
         while session.text("status")["state"] != "ready":
             pass
         assert control.num_cancelled == 1
-    assert [line for line in caplog.records if line.name.startswith("server.live")] == []
+    assert [line for line in caplog.records if line.name.startswith("relume_server.session")] == []
 
 
 def test_edits_that_need_no_freeze_are_painted_while_one_runs(

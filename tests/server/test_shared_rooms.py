@@ -12,8 +12,8 @@ import pytest
 from fastapi.testclient import TestClient
 from session_client import IOR, ROOM_FIELDS, SIGMA, Baked, Session, open_session
 
-from server.live.rooms.door import derive_watch_key
-from server.settings import Settings
+from relume_server.collaboration.join import derive_watch_key
+from relume_server.settings import Settings
 
 WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
 LOST = 1001

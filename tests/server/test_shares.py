@@ -10,8 +10,8 @@ from server_fakes import tiny_scene
 from session_client import Baked
 
 from relume.look import default_look
-from server.records import shares
-from worker.scenes import delete_scene
+from relume_server.persistence import share_store
+from relume_worker.scenes import delete_scene
 
 LOOK = {"materials": {"Paper": {"terms": [{"model": "lambert", "color": [0.1, 0.2, 0.3]}]}}}
 PATHS = {"show": "first_bounce", "bounces": 3}
@@ -78,7 +78,7 @@ def test_the_same_again_is_the_same_link_and_another_look_another(client: TestCl
 
 
 def test_ids_that_begin_alike_grow(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shares, "ID_LENGTH", 1)
+    monkeypatch.setattr(share_store, "ID_LENGTH", 1)
     ids = set()
     for number in range(40):  # more than a character can tell apart
         look = {"display": {"exposure": number / 10}}
@@ -118,11 +118,11 @@ def test_links_are_bounded(client: TestClient, baked: Baked, monkeypatch: pytest
     another = body(baked, look={"display": {"exposure": 2.0}})
     for limit, value, status in (("MAX_SHARES", 1, 503), ("MAX_BYTES", 100, 503), ("MAX_SHARE_BYTES", 100, 413)):
         with monkeypatch.context() as context:
-            context.setattr(shares, limit, value)
+            context.setattr(share_store, limit, value)
             answer = client.post("/api/shares", json=another)
             assert answer.status_code == status
             parse_problem(answer)
-    monkeypatch.setattr(shares, "MAX_SHARES", 1)
+    monkeypatch.setattr(share_store, "MAX_SHARES", 1)
     assert client.delete(f"/api/shares/{kept}").status_code == 204
     assert client.get(f"/api/shares/{kept}").status_code == 404
     assert client.post("/api/shares", json=another).status_code == 201

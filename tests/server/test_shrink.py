@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from relume.imageio.shrink import downsample
+from relume.image_io.downsample import downsample
 
 
 def test_whole_factors_average_blocks() -> None:

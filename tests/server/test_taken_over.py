@@ -11,18 +11,18 @@ from typing import Any
 import pytest
 from sqlalchemy import update
 
-from relume.errors import CancelledError, RelumeError
-from server.apart import steps
-from server.apart.btfs import RESULT_FILE, UPLOAD_FILE
-from server.apart.claim import claim
-from server.apart.step import Step
-from server.queues.btfs import BtfQueue
-from server.queues.work import Quota
-from server.records.tables import BtfRow
-from server.wire.btfs import BtfRequest
-from worker.database import open_database
-from worker.database.clock import epoch_s
-from worker.ledger import Ledger
+from relume.core.errors import CancelledError, RelumeError
+from relume_server.batch import step_registry
+from relume_server.batch.btf_steps import RESULT_FILE, UPLOAD_FILE
+from relume_server.batch.step import Step
+from relume_server.batch.step_claim import claim
+from relume_server.jobs.btf_jobs import BtfQueue
+from relume_server.jobs.job import Quota
+from relume_server.persistence.tables import BtfRow
+from relume_server.schemas.btfs import BtfRequest
+from relume_worker.database import open_database
+from relume_worker.database.clock import epoch_s
+from relume_worker.ledger import Ledger
 
 WAIT_S = 30.0
 Outcome = Callable[[Path], Mapping[str, Any]]
@@ -67,7 +67,7 @@ class Server:
 
 @pytest.fixture
 def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ledger]:
-    monkeypatch.setattr("worker.lease.HEARTBEAT_S", 2 * WAIT_S)  # who stands still renews nothing
+    monkeypatch.setattr("relume_worker.lease.HEARTBEAT_S", 2 * WAIT_S)  # who stands still renews nothing
     with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as found:
         yield found
 
@@ -119,7 +119,7 @@ def wait_until(is_reached: Callable[[], bool]) -> None:
 
 
 def test_a_step_whose_files_another_server_has_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.apart.claim._CHECK_INTERVAL_S", 0.0)
+    monkeypatch.setattr("relume_server.batch.step_claim._CHECK_INTERVAL_S", 0.0)
     seen: list[bool] = []
 
     def work(shop: Any, tell: Any, is_canceled: Callable[[], bool]) -> Mapping[str, Any]:
@@ -128,11 +128,11 @@ def test_a_step_whose_files_another_server_has_ends(tmp_path: Path, monkeypatch:
         seen.append(is_canceled())
         return {}
 
-    monkeypatch.setattr(steps, "STEPS", {"work": work})
+    monkeypatch.setattr(step_registry, "STEPS", {"work": work})
     step = Step("work", claim=(str(tmp_path), "the first"))
     claim(tmp_path, "the first")
-    steps.do_step(SimpleNamespace(), step, lambda share: None, lambda: False)
+    step_registry.do_step(SimpleNamespace(), step, lambda share: None, lambda: False)
     assert seen == [False, True]
     with pytest.raises(CancelledError):
-        steps.do_step(SimpleNamespace(), step, lambda share: None, lambda: False)
+        step_registry.do_step(SimpleNamespace(), step, lambda share: None, lambda: False)
     assert seen == [False, True]

@@ -13,8 +13,8 @@ from fastapi.testclient import TestClient
 from server_fakes import Control
 from session_client import IOR, ROOM_FIELDS, SIGMA, Baked, Frame, Session, open_session
 
-from server.live.rooms.door import derive_watch_key
-from server.settings import Settings
+from relume_server.collaboration.join import derive_watch_key
+from relume_server.settings import Settings
 
 WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
 EXPOSURE, ROTATION = "/display/exposure", "/environment/rotation"  # the bake cannot follow the rotation

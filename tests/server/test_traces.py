@@ -15,8 +15,8 @@ from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTrace
 from server_fakes import Control
 from session_client import SIGMA, THETA_D, Baked, open_session
 
-from server.collector import TraceExporter
-from server.settings import Settings
+from relume_server.settings import Settings
+from relume_server.telemetry.collector import TraceExporter
 
 
 @pytest.fixture

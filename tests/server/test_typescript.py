@@ -6,18 +6,18 @@ from typing import Any
 
 import pytest
 
-from relume.errors import ParameterError
+from relume.core.errors import ParameterError
 from relume.look import complete, default_look
 from relume.look.document import RANGES
-from relume.look.lights import LIGHT_RANGES, default_light
+from relume.look.light_validation import LIGHT_RANGES, default_light
 from relume.scene.model import Material
-from server import typescript
-from server.wire import protocol
+from relume_server import typescript
+from relume_server.schemas import protocol
 
 
 @pytest.mark.parametrize("path", typescript.TARGETS, ids=lambda path: path.name)
 def test_generated_file_is_up_to_date(path: Path) -> None:
-    assert path.read_text(encoding="utf-8") == typescript.TARGETS[path](), "run python -m server.typescript"
+    assert path.read_text(encoding="utf-8") == typescript.TARGETS[path](), "run python -m relume_server.typescript"
 
 
 def test_every_message_is_in_its_union() -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relume.bake import ArraySpec
-from relume.errors import ChunkDamagedError, SchemaVersionError, StoreDeletedError, StoreError, StoreNotFoundError
+from relume.core.errors import ChunkDamagedError, SchemaVersionError, StoreDeletedError, StoreError, StoreNotFoundError
 from relume.store import StoreWriter, create_store, open_store, publish, schema
+from relume.store.bake_protocol import ArraySpec
 from relume.store.publish import verify_manifest
 
 ROWS = 100

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from tiny_scenes import corner, make_camera, make_surface_points, make_tiny_scene, sphere
 
-from relume.light.gather_rays import lattice_offsets, local_ray, make_pattern
-from relume.scene.cornell import cornell_box
+from relume.patches.gather_hits import trace_gather_rays
+from relume.patches.patch_kdtree import NO_PATCH, grow_tree, locate
+from relume.patches.patches import POINTS_PER_PATCH, choose_patches
+from relume.patches.photon_density import lobe_directions
+from relume.raytrace.camera_rays import trace_rays
+from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern
+from relume.raytrace.ray_packet import LANES
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Material, Texture, TextureEncoding
-from relume.trace.cell_tree import NO_PATCH, grow_tree, locate
-from relume.trace.cells import POINTS_PER_PATCH, choose_patches
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.links import trace_gather_rays
-from relume.trace.packet import LANES
-from relume.trace.photons import lobe_directions
-from relume.trace.primary import trace_rays
 
 NUM_CELLS = 1200
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, still_life, studio
 
-from relume.color import luminance
-from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.neighbours import find_neighbors
-from relume.light.triangles import TriangleLights, tessellate_environment
-from relume.scene.demo import demo_scene
-from relume.trace.coherent import make_light_targets, trace_visibility_masks
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.visibility import trace_visibility
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.core.color import luminance
+from relume.lights.neighbors import find_neighbors
+from relume.lights.spherical_triangles import TriangleLights, tessellate_environment
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.visibility import trace_visibility
+from relume.raytrace.visibility_masks import make_light_targets, trace_visibility_masks
+from relume.scene.examples.still_life import demo_scene
 
 UNKNOWN, LIT, HIDDEN, BELOW = range(4)
 # What a bake may differ by from one that traces everything: bits, and relative RMSE of a picture. These pictures are a

@@ -9,17 +9,17 @@ import pytest
 from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad
 from twins import opacity_at, unit
 
-from relume.errors import ChunkDamagedError
-from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.local import make_light_strata, prepare_local_lights
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.core.errors import ChunkDamagedError
+from relume.lights.local_lights import make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
+from relume.raytrace.alpha_filter import STOP_AT_OPAQUE, STOP_AT_PARTIAL
+from relume.raytrace.alpha_test import AlphaMasks, check_alpha_masks, collect_alpha_masks
+from relume.raytrace.camera_rays import trace_rays
+from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.visibility import trace_visibility
 from relume.scene.model import Glass, Material, Opacity
-from relume.trace.cutout_filter import STOP_AT_OPAQUE, STOP_AT_PARTIAL
-from relume.trace.cutouts import AlphaMasks, check_alpha_masks, collect_alpha_masks
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.local_shadows import trace_light_visibility
-from relume.trace.primary import trace_rays
-from relume.trace.visibility import trace_visibility
 
 WHITE = ({"model": "lambert", "color": [1, 1, 1]},)
 MOVED = 0.2

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relume.errors import PlanError
-from relume.light.gather_rays import (
+from relume.core.errors import PlanError
+from relume.raytrace.gather_rays import (
     MAX_RAYS,
     _step,
     glossy_pdf,

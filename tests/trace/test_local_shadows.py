@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from tiny_scenes import make_emissive_triangles, make_surface_points, quad, still_life
 
-from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.gather_rays import cranley_patterson_offset
-from relume.light.local import light_sample, make_light_strata, prepare_local_lights
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.lights.local_lights import light_sample, make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
-from relume.trace.embree import EmbreeScene
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.local_shadows import MIN_GROUPED_SAMPLES, compute_irradiance, trace_light_visibility
+from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.gather_rays import cranley_patterson_offset
+from relume.raytrace.light_visibility import MIN_GROUPED_SAMPLES, compute_irradiance, trace_light_visibility
+from relume.raytrace.scene_buffers import build_scene_buffers
 
 UP = np.array([0, 1, 0], np.float32)
 

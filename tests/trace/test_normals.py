@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from relume.scene.built_in import built_in
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.normals import normals_at
-from relume.trace.primary import Hits, camera_directions, trace_rays
-from relume.trace.surface import surface_at
+from relume.raytrace.camera_rays import Hits, camera_directions, trace_rays
+from relume.raytrace.hit_normals import normals_at
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.surface_interaction import surface_at
+from relume.scene.examples.catalog import built_in
 
 
 def test_normals_are_those_of_the_surface():

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from tiny_scenes import make_surface_points, still_life
 
-from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.local import make_light_strata, prepare_local_lights
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.lights.local_lights import make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
-from relume.trace.embree import EmbreeScene
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.local_shadows import compute_irradiance, trace_light_visibility
-from relume.trace.preview_light import BLOCK, trace_moving_light
+from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.light_visibility import compute_irradiance, trace_light_visibility
+from relume.raytrace.moving_light import BLOCK, trace_moving_light
+from relume.raytrace.scene_buffers import build_scene_buffers
 
 FAR = EmbreeScene.build(np.array([[90, 0, 0], [91, 0, 0], [91, 1, 0]], np.float32), np.array([[0, 1, 2]], np.uint32))
 CORNERS = np.array([0, 5, 10, 15])

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from relume.scene.built_in import built_in
-from relume.trace.primary import camera_directions
+from relume.raytrace.camera_rays import camera_directions
+from relume.scene.examples.catalog import built_in
 
 SIZE = (64, 48)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.primary import Hits
-from relume.trace.surface import surface_at
+from relume.raytrace.camera_rays import Hits
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.surface_interaction import surface_at
 
 INWARD = np.array([[-1.0, 0.0, 0.0]], np.float32)  # along the ray that hits the wall
 

@@ -8,11 +8,11 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, still_life, studio
 
-from relume.eye.view_samples import BACKGROUND, sample_view
-from relume.light.triangles import tessellate_environment
-from relume.trace.geometry import build_scene_buffers
-from relume.trace.primary import camera_directions, trace_rays
-from relume.trace.visibility import trace_visibility
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.raytrace.camera_rays import camera_directions, trace_rays
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.visibility import trace_visibility
 
 GRAZING_SHARE = 2e-5  # of the rays; those that pass within rounding of an edge may go either way
 

@@ -9,13 +9,13 @@ import sys
 
 import pytest
 
-from server import app
-from server.settings import Settings
+from relume_server import app
+from relume_server.settings import Settings
 
 COUNT = """
 import ctypes, sys, threading
 from pathlib import Path
-from relume.resident import limit_malloc_arenas
+from relume.core.memory_usage import limit_malloc_arenas
 if sys.argv[2] == "shared":
     limit_malloc_arenas()
 libc, all_run = ctypes.CDLL(None), threading.Barrier(13)

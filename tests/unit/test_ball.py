@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from relume.balls.ball import _lights, render_preview
-from relume.brdf.document import complete_term
 from relume.brdf.registry import TERMS
+from relume.brdf.term_validation import complete_term
+from relume.output.material_previews.preview import _lights, render_preview
 from relume.scene.model import Texture, TextureEncoding
 
 

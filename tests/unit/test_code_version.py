@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from relume import code_version
-from relume.code_version import code_hash, collect_sources
+from relume.core import source_hash
+from relume.core.source_hash import code_hash, collect_sources
 
 
 @pytest.fixture
@@ -65,13 +65,32 @@ def test_the_hash_follows_what_is_imported_and_nothing_else(package):
 
 
 def test_images_depend_on_the_code_of_frames_and_bakes_do_not():
-    package = code_version._PACKAGE
-    images = names(package, collect_sources(code_version._IMAGES))
-    bakes = names(package, collect_sources(code_version._BAKES, code_version._AFTER_BAKES))
-    of_both = {"brdf/terms/ggx", "light/tiles", "light/triangles", "scene/model", "trace/cells", "views/store_io"}
-    of_images = {"project/project_kernel", "operators/shade", "trace/local_shadows", "light/blur", "views/view"}
-    of_bakes = {"trace/coherent_kernel", "trace/photons", "eye/view_samples", "methods/gather", "store/writer"}
+    package = source_hash._PACKAGE
+    images = names(package, collect_sources(source_hash._IMAGES))
+    bakes = names(package, collect_sources(source_hash._BAKES, source_hash._AFTER_BAKES))
+    of_both = {
+        "brdf/terms/ggx",
+        "lights/sphere_tiles",
+        "lights/spherical_triangles",
+        "scene/model",
+        "patches/patches",
+        "views/store_io",
+    }
+    of_images = {
+        "transport/project_kernel",
+        "operators/shade",
+        "raytrace/light_visibility",
+        "lights/prefilter",
+        "views/view",
+    }
+    of_bakes = {
+        "raytrace/visibility_kernel",
+        "patches/photon_density",
+        "camera/view_samples",
+        "methods/gather",
+        "store/writer",
+    }
     assert of_both <= images & bakes
     assert of_images <= images - bakes
-    assert of_bakes | {"scene/archive"} <= bakes
-    assert not {name for name in images | bakes if name.startswith(("scene/gltf", "reference/", "render/", "server"))}
+    assert of_bakes | {"scene/scene_folder"} <= bakes
+    assert not {name for name in images | bakes if name.startswith(("scene_io/", "reference/", "output/", "server"))}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relume.color import RGB9E5_MAX, luminance, rgb9e5_pack, rgb9e5_unpack, srgb_decode, srgb_encode
+from relume.core.color import RGB9E5_MAX, luminance, rgb9e5_pack, rgb9e5_unpack, srgb_decode, srgb_encode
 
 
 def test_luminance_of_white_is_one_and_keeps_the_type():

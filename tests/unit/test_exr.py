@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_scenes import make_camera, still_life
 
-from relume.exr.attributes import Provenance, build_attributes, world_to_ndc
-from relume.exr.layers import light_and_path_layers, light_group_layers, make_layers
-from relume.exr.picture import export_exr
-from relume.imageio.exr import image_channels, write_exr
+from relume.image_io.exr_writer import image_channels, write_exr
 from relume.look import Look, default_look, validate
-from relume.scene.ground import with_ground
-from relume.trace.primary import camera_directions
+from relume.output.exr.export import export_exr
+from relume.output.exr.layers import light_and_path_layers, light_group_layers, make_layers
+from relume.output.exr.metadata import Provenance, build_attributes, world_to_ndc
+from relume.raytrace.camera_rays import camera_directions
+from relume.scene.shadow_catcher_ground import with_ground
 
 POINT = {"kind": "point", "position": [0, 1, 0]}
 SIZE = (48, 32)

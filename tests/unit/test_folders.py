@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from relume.folders import folder_bytes
+from relume.core.folder_size import folder_bytes
 
 _WALK = os.walk
 

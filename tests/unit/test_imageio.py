@@ -7,10 +7,10 @@ import OpenImageIO
 import pytest
 from PIL import Image
 
-from relume.errors import DiskFullError, ParameterError, RelumeError, ShapeMismatchError
-from relume.imageio.files import to_bytes, write_image
-from relume.imageio.ocio.view import OcioView
-from relume.imageio.tonemap import tone_map
+from relume.core.errors import DiskFullError, ParameterError, RelumeError, ShapeMismatchError
+from relume.image_io.ocio.view import OcioView
+from relume.image_io.tone_mapping import tone_map
+from relume.image_io.write_image import to_bytes, write_image
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_webp_is_close_to_what_the_screen_shows(tmp_path, image):
 
 
 def test_png_says_what_its_colors_are(tmp_path, image, monkeypatch):
-    monkeypatch.setattr("relume.imageio.files.tone_map", lambda shown, exposure, view: shown)
+    monkeypatch.setattr("relume.image_io.write_image.tone_map", lambda shown, exposure, view: shown)
     views = ["agx", OcioView("sRGB - Display", "Un-tone-mapped"), OcioView("Display P3 - Display", "Un-tone-mapped")]
     tagged = []
     for view in views:

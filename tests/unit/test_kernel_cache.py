@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from relume import kernel_cache
-from relume.kernel_cache import cache_folder, kernel_sources
+from relume.core import numba_cache
+from relume.core.numba_cache import cache_folder, kernel_sources
 
 SOURCES = {
     "__init__": "",
@@ -55,8 +55,8 @@ def test_kernels_are_made_of_those_they_call_and_of_modules_with_their_constants
 _COMPILE = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from relume.basis import zernike
-from relume.kernel_cache import module_folder
+from relume.math import zernike
+from relume.core.numba_cache import module_folder
 from pathlib import Path
 print(module_folder(Path(zernike.__file__)))
 
@@ -71,14 +71,14 @@ def _folder_of(checkout: Path, cache: Path) -> Path:
 
 
 def test_another_checkout_finds_what_one_has_compiled_until_a_source_changes(tmp_path):
-    original = Path(kernel_cache.__file__).parent
+    original = Path(numba_cache.__file__).parents[1]
     checkouts = [tmp_path / "one", tmp_path / "two"]
     for checkout in checkouts:
         shutil.copytree(original, checkout / "relume", ignore=shutil.ignore_patterns("__pycache__"))
     first, second = (_folder_of(checkout, tmp_path / "cache") for checkout in checkouts)
     assert first == second
     assert first.is_dir()
-    changed = checkouts[1] / "relume" / "basis" / "zernike.py"
+    changed = checkouts[1] / "relume" / "math" / "zernike.py"
     changed.write_text(changed.read_text() + "# corrected\n")
     assert _folder_of(checkouts[1], tmp_path / "cache") != first
 
@@ -86,11 +86,11 @@ def test_another_checkout_finds_what_one_has_compiled_until_a_source_changes(tmp
 def test_compiled_kernels_lie_in_the_folder_of_their_module(user_cache):
     code = (
         "import numpy as np\n"
-        "from relume.imageio.ocio.sampling import apply_lut\n"
+        "from relume.image_io.ocio.sampling import apply_lut\n"
         "apply_lut(np.zeros((65, 65, 65, 3), np.uint16), np.zeros((1, 3), np.float32))\n"
     )
     subprocess.run([sys.executable, "-c", code], env={**os.environ}, check=True)
-    (folder,) = user_cache.rglob("imageio.ocio.sampling-*")
+    (folder,) = user_cache.rglob("image_io.ocio.sampling-*")
     assert list(folder.glob("*.nbc"))
     assert stat.S_IMODE(folder.stat().st_mode) & 0o022 == 0
 
@@ -100,11 +100,11 @@ def test_importing_relume_imports_no_numba():
     output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     imported, locators = output.stdout.split()
     assert imported == "False"
-    assert locators.startswith("relume.kernel_cache.KernelLocator,")
+    assert locators.startswith("relume.core.numba_cache.KernelLocator,")
 
 
 def test_functions_of_others_are_left_to_numba():
-    assert kernel_cache.KernelLocator.from_function(lambda: None, __file__) is None
+    assert numba_cache.KernelLocator.from_function(lambda: None, __file__) is None
 
 
 def test_unusable_user_cache_falls_back_to_a_temporary_folder(tmp_path, monkeypatch, user_cache):
@@ -146,7 +146,7 @@ def test_folders_unused_for_a_month_go_when_a_new_one_is_made(user_cache):
     foreign = _kernels(caches, "notes", 400)
     linked = caches / "linked-aaaaaaaaaaaaaaaa"
     linked.symlink_to(foreign)
-    made = _folder_of(Path(kernel_cache.__file__).parent.parent, user_cache.parent.parent)
+    made = _folder_of(Path(numba_cache.__file__).parents[2], user_cache.parent.parent)
     assert made.is_dir()
     assert not old.exists()
     assert (recent / "kernel.nbi").exists()
@@ -155,7 +155,7 @@ def test_folders_unused_for_a_month_go_when_a_new_one_is_made(user_cache):
 
 
 def test_folder_in_use_is_marked_and_prunes_nothing(user_cache):
-    checkout = Path(kernel_cache.__file__).parent.parent
+    checkout = Path(numba_cache.__file__).parents[2]
     present = _folder_of(checkout, user_cache.parent.parent)
     os.utime(present, (0, 0))
     old = _kernels(cache_folder(), "trace.old-0123456789abcdef", 400)

@@ -9,18 +9,18 @@ import PyOpenColorIO as ocio  # noqa: N813
 import pytest
 from tiny_scenes import still_life
 
-from relume.environments.reading import read_environment
-from relume.errors import ParameterError
-from relume.exr.attributes import Provenance, build_attributes
-from relume.exr.picture import export_exr
-from relume.exr.space import find_space
-from relume.imageio.ocio.config import Config
-from relume.imageio.ocio.current import get_config, using_config
-from relume.imageio.ocio.lut import sample_lut
-from relume.imageio.ocio.view import OcioView
-from relume.imageio.primaries import INTEROP_SPACES, to_rec_709
-from relume.imageio.tonemap import tone_map
+from relume.assets.environments.read_environment import read_environment
+from relume.core.errors import ParameterError
+from relume.image_io.ocio.active_config import get_config, using_config
+from relume.image_io.ocio.config import Config
+from relume.image_io.ocio.lut import sample_lut
+from relume.image_io.ocio.view import OcioView
+from relume.image_io.primaries import INTEROP_SPACES, to_rec_709
+from relume.image_io.tone_mapping import tone_map
 from relume.look import default_look, validate
+from relume.output.exr.color_space import find_space
+from relume.output.exr.export import export_exr
+from relume.output.exr.metadata import Provenance, build_attributes
 
 STUDIO = "ocio://studio-config-latest"
 SDR, HDR = "ACES 2.0 - SDR 100 nits (Rec.709)", "ACES 2.0 - HDR 1000 nits (P3 D65)"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import relume
-from relume.memory import TRANSIENT_BUDGET_DIVISOR, Cache, CacheOwner
+from relume.core.cache import TRANSIENT_BUDGET_DIVISOR, Cache, CacheOwner
 
 BUDGET = 8_000
 SHARE = BUDGET // TRANSIENT_BUDGET_DIVISOR
@@ -137,39 +137,39 @@ def test_bakes_that_nobody_uses_keep_their_floor_and_what_was_made_in_passing_go
 
 # Small whatever is done: numbers of terms and bands, what is made by code alone, files mapped into memory.
 BOUNDED = {
-    "balls/ball.py",
-    "balls/library.py",
-    "basis/bands.py",
-    "basis/daubechies.py",
+    "assets/btf/direction_rings.py",
+    "assets/environments/built_in.py",
     "brdf/albedo.py",
     "brdf/curves.py",
+    "brdf/highlight_tables.py",
     "brdf/quadrature.py",
     "brdf/symmetry.py",
     "brdf/terms/ggx_multiple.py",
-    "btf/rings.py",
-    "code_version.py",
-    "environments/built_in.py",
-    "imageio/ocio/config.py",
-    "images/shelf.py",
-    "kernel_cache.py",
-    "basis/lobe_grid.py",
-    "brdf/lobe_tables.py",
+    "core/numba_cache.py",
+    "core/source_hash.py",
+    "image_io/ocio/config.py",
+    "images/image_store.py",
+    "live/fixed_camera/illumination.py",
+    "live/free_camera/basis/highlight_lobes.py",
+    "live/free_camera/basis/lobe_shapes.py",
+    "live/free_camera/basis/outgoing_coefficients.py",
+    "live/free_camera/normal_mapping.py",
     "look/library/materials.py",
-    "look/library/navigation.py",
-    "moving/basis/lobes.py",
-    "moving/basis/out_factors.py",
-    "moving/basis/shapes.py",
-    "basis/zernike.py",
-    "moving/bumps.py",
-    "operators/nodes.py",
-    "picture/light.py",
-    "project/sent.py",
-    "scene/cornell.py",
-    "scene/demo/__init__.py",
-    "scene/gltf/sheen.py",
-    "scene/interior.py",
-    "scene/tableau.py",
-    "store/fill.py",
+    "look/library/navigation_map.py",
+    "math/angle_bands.py",
+    "math/daubechies.py",
+    "math/direction_grid.py",
+    "math/zernike.py",
+    "operators/parameter_operator.py",
+    "output/material_previews/library_sheet.py",
+    "output/material_previews/preview.py",
+    "scene/examples/cornell.py",
+    "scene/examples/interior.py",
+    "scene/examples/still_life/__init__.py",
+    "scene/examples/tableau.py",
+    "scene_io/gltf/sheen.py",
+    "store/run_bake.py",
+    "transport/outgoing_patch_light.py",
 }
 
 

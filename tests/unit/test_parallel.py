@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from relume.parallel import for_ranges, low_priority, mark_background_thread, parallel_for_chunks, run_frame
+from relume.core.thread_pools import for_ranges, low_priority, mark_background_thread, parallel_for_chunks, run_frame
 
 
 @pytest.fixture(autouse=True)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from relume.errors import DiskFullError, RelumeError
-from relume.replacing import UNFINISHED, atomic_write, remove_folder
-from server.files.importing import remove_strays
+from relume.core.errors import DiskFullError, RelumeError
+from relume.core.filesystem import UNFINISHED, atomic_write, remove_folder
+from relume_server.io.import_request import remove_strays
 
 
 def write(path: Path, raised: BaseException | None = None) -> None:

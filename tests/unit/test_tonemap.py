@@ -7,9 +7,9 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from relume.color import srgb_encode
-from relume.errors import ParameterError, ShapeMismatchError
-from relume.imageio.tonemap import TONE_MAPS, tone_map
+from relume.core.color import srgb_encode
+from relume.core.errors import ParameterError, ShapeMismatchError
+from relume.image_io.tone_mapping import TONE_MAPS, tone_map
 from relume.look.model import ToneMap
 
 AGX_INSET = np.array(

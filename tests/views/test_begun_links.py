@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from relume.errors import CancelledError
-from relume.views import worn_store
-from relume.views.worn_store import PartialHits
+from relume.core.errors import CancelledError
+from relume.views import map_override_store
+from relume.views.map_override_store import PartialHits
 
 NUM, RAYS, STEP = 50, 3, 8
 
 
 @pytest.fixture
 def begun(monkeypatch):
-    monkeypatch.setattr(worn_store, "_SAMPLES_PER_STEP", STEP)
+    monkeypatch.setattr(map_override_store, "_SAMPLES_PER_STEP", STEP)
     return PartialHits.empty(NUM, RAYS)
 
 

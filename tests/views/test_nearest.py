@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.views.squares import nearest_chosen, one_per_block
+from relume.views.pixel_blocks import nearest_chosen, one_per_block
 
 STEP, NUM, SOFT = 4, 3, 0.5
 
@@ -13,7 +13,7 @@ def squared_distances(view, material, chosen):
     """From every sample to every chosen one; infinite beyond the squares that are looked in. (n, chosen)"""
     rows = view.rows(material)
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
-    normal = view.points(material).normal.astype(np.float64)
+    normal = view.surface_points(material).normal.astype(np.float64)
     squared = (10 * STEP) ** 2 * ((normal[:, None] - normal[chosen]) ** 2).sum(axis=2)
     for place in (x, y):
         squared += (place[:, None] - place[chosen]) ** 2

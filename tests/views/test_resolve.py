@@ -1,4 +1,4 @@
-"""Samples to pixels and pixels to bytes, against NumPy and the shared-exponent packer of `relume.color`."""
+"""Samples to pixels and pixels to bytes, against NumPy and the shared-exponent packer of `relume.core.color`."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import twins
 
-from relume.color import rgb9e5_pack, rgb9e5_unpack
-from relume.errors import ParameterError
+from relume.core.color import rgb9e5_pack, rgb9e5_unpack
+from relume.core.errors import ParameterError
 from relume.scene.model import Camera
 from relume.views.resolve import encode, pack_rgb9e5, resolve
 from relume.views.view import View

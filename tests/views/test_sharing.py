@@ -11,15 +11,15 @@ from analytic_terms import ANALYTIC
 from scipy.sparse import csr_array
 
 from relume.brdf.registry import TERMS
-from relume.light.gather_rays import make_pattern
-from relume.light.triangles import tessellate_environment
-from relume.points import FIXED_ALPHA_SAMPLE, SurfacePoints
-from relume.project.contraction import contract
-from relume.project.projector import Projector
-from relume.project.receivers import GatherRays
-from relume.project.sent import isotropic
-from relume.sharing import FilterWeights, NeighborFilter
-from relume.views.sharing import make_neighbor_filter
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.patches.neighbor_filter import FilterWeights, NeighborFilter
+from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
+from relume.transport.outgoing_patch_light import isotropic
+from relume.transport.projector import Projector
+from relume.transport.shading_points import GatherRays
+from relume.transport.term_contraction import contract
+from relume.views.gather_filter import make_neighbor_filter
 
 WIDTH, HEIGHT = 9, 7
 
@@ -102,7 +102,7 @@ def test_highlights_are_shared_by_what_is_turned_alike():
 
 def test_tents_follow_each_other_and_highlights_have_one():
     pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
-    found = shared_by(pixel, position, normal, tents=3)
+    found = shared_by(pixel, position, normal, num_passes=3)
     assert (found.diffuse.num_passes, found.highlights.num_passes) == (3, 1)
     rings, among = found.diffuse.find_dependencies(4, 11)
     values = np.random.default_rng(9).random((len(pixel), 3))

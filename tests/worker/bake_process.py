@@ -9,8 +9,8 @@ from pathlib import Path
 
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from worker.scenes import register_scene
-from worker.service import BakeService
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
 
 
 def main() -> None:

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from relume.bake import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
-from relume.environments.model import Environment
-from relume.scene.archive import make_scene
+from relume.assets.environments.environment import Environment
 from relume.scene.model import Camera, Material, Mesh, Scene
+from relume.scene.scene_folder import make_scene
+from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
 
 SHARD, CHUNK, TAIL = 64, 16, 10
 RECIPE = Recipe("fake", ("front", "left"), (16, 32), 24)

@@ -17,19 +17,19 @@ from fake_method import RECIPE, FakeMethod, tiny_scene
 from postgres import Cluster
 from test_processes import tree_hash
 
-from relume.errors import BackupError
-from relume.scene.archive import load_scene
+from relume.core.errors import BackupError
+from relume.scene.scene_folder import load_scene
 from relume.store import open_store
-from server.records.looks import LookStore
-from worker.backup.restore import restore
-from worker.backup.shelf import BackupRepository
-from worker.backup.take import create_backup
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.paths import bake_path, scene_path
-from worker.scenes import delete_scene, list_scenes, register_scene
-from worker.service import BakeService
-from worker.status import BakeStatus
+from relume_server.persistence.look_store import LookStore
+from relume_worker.backup.create import create_backup
+from relume_worker.backup.repository import BackupRepository
+from relume_worker.backup.restore import restore
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.paths import bake_path, scene_path
+from relume_worker.scenes import delete_scene, list_scenes, register_scene
+from relume_worker.service import BakeService
+from relume_worker.status import BakeStatus
 
 SCENE = tiny_scene()
 
@@ -179,10 +179,10 @@ def test_scenes_that_come_and_go_meanwhile_leave_it_whole(
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from worker.backup.restore import restore
-from worker.backup.shelf import BackupRepository
-from worker.backup.take import create_backup
-from worker.database import open_database
+from relume_worker.backup.restore import restore
+from relume_worker.backup.repository import BackupRepository
+from relume_worker.backup.create import create_backup
+from relume_worker.database import open_database
 
 count = [0]
 def tell(done):

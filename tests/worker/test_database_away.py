@@ -15,12 +15,12 @@ from postgres import Cluster
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 
-from server.errors import make_problem
-from worker.database import open_database, postgresql
-from worker.database.faults import describe_error, is_unavailable
-from worker.ledger import Ledger
-from worker.scenes import register_scene
-from worker.service import BakeService
+from relume_server.errors import make_problem
+from relume_worker.database import open_database, postgresql
+from relume_worker.database.failures import describe_error, is_unavailable
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def test_a_bake_outlives_a_database_that_is_away(
             assert list(changes)[-1].state == "ready"
         assert [status.state for status in service.bakes()] == ["ready"]
     assert len(log.read_text().split()) == len(set(log.read_text().split()))  # no task was done twice
-    said = [record.getMessage().split(" (")[0] for record in caplog.records if record.name.startswith("worker")]
+    said = [record.getMessage().split(" (")[0] for record in caplog.records if record.name.startswith("relume_worker")]
     assert said == ["the database does not answer", "the database does not answer: that is over"]
 
 

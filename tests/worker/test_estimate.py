@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from relume.bake import Plan, Recipe
 from relume.methods.registry import METHODS
-from relume.scene.archive import make_scene
-from relume.scene.cornell import sunny_sky
-from relume.scene.demo import demo_scene
-from relume.scene.demo.still_life import look_at
-from relume.scene.demo.surfaces import sphere
+from relume.scene.examples.cornell import sunny_sky
+from relume.scene.examples.still_life import demo_scene
+from relume.scene.examples.still_life.grids import sphere
+from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Material
-from worker.estimate import CompletedBake, crowding, estimate_seconds
-from worker.executor import TINY_BAKE_BYTES, TINY_BAKE_RAYS, is_tiny
-from worker.presets import PRESETS
+from relume.scene.scene_folder import make_scene
+from relume.store.bake_protocol import Plan, Recipe
+from relume_worker.estimate import CompletedBake, crowding, estimate_seconds
+from relume_worker.executor import TINY_BAKE_BYTES, TINY_BAKE_RAYS, is_tiny
+from relume_worker.presets import PRESETS
 
 LARGE = Plan(1000, 20 * TINY_BAKE_RAYS, 1, 1)
 SMALL = Plan(1000, TINY_BAKE_RAYS // 2, 1, 1)
@@ -63,7 +63,7 @@ def test_a_busy_machine_takes_longer_and_does_not_make_later_bakes_look_slow():
 
 
 def test_crowding_is_at_least_one_thread_a_core(monkeypatch):
-    monkeypatch.setattr("worker.estimate.num_cores", lambda: 2)
+    monkeypatch.setattr("relume_worker.estimate.num_cores", lambda: 2)
     assert [crowding(load) for load in (0.0, 1.9, 5.0)] == [1.0, 1.0, 2.5]
 
 

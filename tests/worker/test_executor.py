@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 from alone import run_in_thread
 
-from relume.errors import PlanError
-from worker.dask_executor import DaskExecutor
-from worker.executor import BAKE_NICE, Executors
+from relume.core.errors import PlanError
+from relume_worker.dask_executor import DaskExecutor
+from relume_worker.executor import BAKE_NICE, Executors
 
 
 class FakeTask:

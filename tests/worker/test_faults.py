@@ -8,11 +8,11 @@ from fake_method import tiny_scene
 from sqlalchemy import event
 from sqlalchemy.exc import OperationalError
 
-from relume.errors import DatabaseDamagedError, DiskFullError
-from worker.database import open_database
-from worker.database.faults import DatabaseError, database_outage
-from worker.ledger import Ledger
-from worker.scenes import register_scene
+from relume.core.errors import DatabaseDamagedError, DiskFullError
+from relume_worker.database import open_database
+from relume_worker.database.failures import DatabaseError, database_outage
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
 
 GARBAGE = bytes(range(256)) * 64
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
+from relume.raytrace.texture import MipMap
 from relume.scene.model import Texture
-from relume.trace.texture import MipMap
-from worker import tasks
-from worker.idle import DEFAULT_IDLE_S, IdleTimer, idle_seconds
-from worker.scenes import register_scene
-from worker.service import BakeService
+from relume_worker import tasks
+from relume_worker.idle_timer import DEFAULT_IDLE_S, IdleTimer, idle_seconds
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
 
 WAIT_S = 60
 

@@ -9,20 +9,20 @@ from sqlalchemy import delete
 from sqlalchemy.orm import Session
 from tiny_scenes import still_life
 
-from relume.bake import Recipe
-from relume.errors import NotFoundError, ParameterError, PlanError
+from relume.core.errors import NotFoundError, ParameterError, PlanError
 from relume.methods.registry import METHODS
+from relume.scene.custom_camera import CustomCamera, make_custom_camera
 from relume.scene.model import Scene
-from relume.scene.placed_camera import CustomCamera, make_custom_camera
 from relume.store import bake_in_process, open_store
+from relume.store.bake_protocol import Recipe
 from relume.store.publish import array_paths
-from worker import cameras
-from worker.cameras import camera_names_by_scene, delete_camera, list_cameras, resolve_views, store_camera
-from worker.database import open_database
-from worker.database.models import SceneRow
-from worker.ledger import Ledger
-from worker.scenes import SceneRecord, delete_scene, get_scene, register_scene
-from worker.status import recipe_from_json, recipe_json
+from relume_worker import cameras
+from relume_worker.cameras import camera_names_by_scene, delete_camera, list_cameras, resolve_views, store_camera
+from relume_worker.database import open_database
+from relume_worker.database.models import SceneRow
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import SceneRecord, delete_scene, get_scene, register_scene
+from relume_worker.status import recipe_from_json, recipe_json
 
 METHOD = METHODS["direct"]
 

@@ -11,14 +11,14 @@ import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 from sqlalchemy import text
 
-from relume.bake import Recipe, Task
-from relume.errors import NotFoundError
-from server.records.room_leases import RoomLeases
-from worker import lease
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.scenes import delete_scene, get_scene, list_scenes, register_scene
-from worker.status import TaskCost, bake_id, recipe_from_json, recipe_json
+from relume.core.errors import NotFoundError
+from relume.store.bake_protocol import Recipe, Task
+from relume_server.persistence.leases import RoomLeases
+from relume_worker import lease
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import delete_scene, get_scene, list_scenes, register_scene
+from relume_worker.status import TaskCost, bake_id, recipe_from_json, recipe_json
 
 SCENE = tiny_scene()
 PLAN = FakeMethod().plan(SCENE, RECIPE)
@@ -44,7 +44,7 @@ def test_recipe_survives_json_and_names_the_bake() -> None:
 
 def test_same_recipe_under_other_code_is_another_bake(monkeypatch: pytest.MonkeyPatch) -> None:
     before = bake_id(SCENE.id, RECIPE)
-    monkeypatch.setattr("worker.status.bake_code", lambda: "fedcba9876543210")
+    monkeypatch.setattr("relume_worker.status.bake_code", lambda: "fedcba9876543210")
     assert bake_id(SCENE.id, RECIPE) != before
 
 
@@ -201,7 +201,7 @@ def test_open_files_are_bounded_by_the_most_connections_at_once(tmp_path: Path) 
 
 @pytest.fixture
 def _long_leases(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.records.room_leases.ROOM_LEASE_S", 600.0)
+    monkeypatch.setattr("relume_server.persistence.leases.ROOM_LEASE_S", 600.0)
 
 
 @pytest.mark.usefixtures("_long_leases")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from server.settings import GIB, Settings
-from worker import budget
+from relume_server.settings import GIB, Settings
+from relume_worker import budget
 
 
 @pytest.fixture

@@ -8,14 +8,14 @@ import numba as nb
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from cli.follow import detail
-from relume.bake import Plan, Task
-from worker.executor import TINY_BAKE_RAYS
-from worker.ledger import Ledger
-from worker.notes import TaskNotes, note_path, read_note
-from worker.scenes import register_scene
-from worker.service import BakeService
-from worker.status import BakeStatus, TaskCost
+from relume.store.bake_protocol import Plan, Task
+from relume_cli.bake_progress import detail
+from relume_worker.executor import TINY_BAKE_RAYS
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
+from relume_worker.status import BakeStatus, TaskCost
+from relume_worker.task_notes import TaskNotes, note_path, read_note
 
 LARGE = TINY_BAKE_RAYS + 1
 
@@ -92,7 +92,7 @@ def test_note_that_cannot_be_kept_costs_the_words_alone(tmp_path: Path) -> None:
 
 
 def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cli.follow.time.time", lambda: 1012.0)
+    monkeypatch.setattr("relume_cli.bake_progress.time.time", lambda: 1012.0)
     plan, none = Plan(1, 1, 1, 1), {"rays_per_second": None, "bytes": 0, "problem": None, "created": 0.0, "code": None}
 
     def status(state: Any, phase: Any, seconds_left: float | None = None, ahead: int = 0) -> BakeStatus:

@@ -22,15 +22,15 @@ import pytest
 from distributed.security import Security
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from relume.errors import PlanError
+from relume.core.errors import PlanError
 from relume.store import bake_in_process
-from worker.database import open_database
-from worker.executor import TINY_BAKE_RAYS, Executors
-from worker.ledger import Ledger
-from worker.paths import bake_path
-from worker.scenes import register_scene
-from worker.service import BakeService
-from worker.status import bake_id
+from relume_worker.database import open_database
+from relume_worker.executor import TINY_BAKE_RAYS, Executors
+from relume_worker.ledger import Ledger
+from relume_worker.paths import bake_path
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
+from relume_worker.status import bake_id
 
 IDENTITY = bake_id(tiny_scene().id, RECIPE)
 LARGE = TINY_BAKE_RAYS + 1
@@ -221,7 +221,7 @@ class Cluster:
             str(self.port),
             "--no-dashboard",
         ]
-        for arguments in (scheduler, ["cli.main", "worker", "--scheduler", self.address, "--processes", "1"]):
+        for arguments in (scheduler, ["relume_cli.main", "worker", "--scheduler", self.address, "--processes", "1"]):
             command = [sys.executable, "-m", *arguments]
             self.processes.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
             self._wait_for_port()

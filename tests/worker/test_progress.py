@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from relume.bake import Task
-from worker.progress import ExpectedWork, Progress
-from worker.status import TaskCost
+from relume.store.bake_protocol import Task
+from relume_worker.progress import ExpectedWork, Progress
+from relume_worker.status import TaskCost
 
 PLAN = FakeMethod(num_rays=10_000).plan(tiny_scene(), RECIPE)
 TASKS = [Task(1, i, "front", i * 10, i * 10 + 10) for i in range(10)]

@@ -16,18 +16,27 @@ from alembic.migration import MigrationContext
 from sqlalchemy import Engine, inspect, select, text
 from sqlalchemy.exc import SQLAlchemyError
 
-from relume.errors import LedgerVersionError, ParameterError
-from server.access.tables import AuditRow, OwnedRow, TokenRow
-from server.records.looks import LookStore
-from server.records.shares import ShareStore
-from server.records.tables import BtfRow, CommentRow, ComparisonRow, JobRow, LookRow, RenderRow, RoomRow, ShareRow
-from worker.cameras import list_cameras
-from worker.database import open_database, upgrading
-from worker.database.models import Base
-from worker.database.opening import connect
-from worker.database.upgrading import draft_revision, get_revision, latest_revision, upgrade
-from worker.ledger import Ledger
-from worker.scenes import list_scenes
+from relume.core.errors import LedgerVersionError, ParameterError
+from relume_server.auth.tables import AuditRow, OwnedRow, TokenRow
+from relume_server.persistence.look_store import LookStore
+from relume_server.persistence.share_store import ShareStore
+from relume_server.persistence.tables import (
+    BtfRow,
+    CommentRow,
+    ComparisonRow,
+    JobRow,
+    LookRow,
+    RenderRow,
+    RoomRow,
+    ShareRow,
+)
+from relume_worker.cameras import list_cameras
+from relume_worker.database import open_database, upgrading
+from relume_worker.database.connect import connect
+from relume_worker.database.models import Base
+from relume_worker.database.upgrading import draft_revision, get_revision, latest_revision, upgrade
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import list_scenes
 
 BEFORE = Path(__file__).with_name("before_revisions.sql").read_text(encoding="utf-8")
 TABLES = (LookRow, ShareRow, CommentRow, RoomRow, RenderRow, BtfRow, ComparisonRow, TokenRow, OwnedRow, AuditRow)

@@ -13,18 +13,25 @@ import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from relume.bake import Task
-from relume.errors import BudgetError, DiskBudgetError, DiskFullError, MemoryBudgetError, NotFoundError, ParameterError
+from relume.core.errors import (
+    BudgetError,
+    DiskBudgetError,
+    DiskFullError,
+    MemoryBudgetError,
+    NotFoundError,
+    ParameterError,
+)
 from relume.store import bake_in_process, open_store
-from worker import lease, scenes
-from worker.database.models import BakeRow
-from worker.executor import Executors
-from worker.ledger import Ledger
-from worker.paths import staging_path
-from worker.scenes import delete_bakes, delete_scene, register_scene
-from worker.service import START_S, BakeService
-from worker.status import BakeStatus, TaskCost, bake_id
-from worker.tasks import Job, run_task
+from relume.store.bake_protocol import Task
+from relume_worker import lease, scenes
+from relume_worker.database.models import BakeRow
+from relume_worker.executor import Executors
+from relume_worker.ledger import Ledger
+from relume_worker.paths import staging_path
+from relume_worker.scenes import delete_bakes, delete_scene, register_scene
+from relume_worker.service import START_S, BakeService
+from relume_worker.status import BakeStatus, TaskCost, bake_id
+from relume_worker.tasks import Job, run_task
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -70,7 +77,7 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
 
 def test_how_long_a_bake_takes_is_known_once_one_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("ledger", "service"):
-        monkeypatch.setattr(f"worker.{module}.machine_load", lambda: 0.0)
+        monkeypatch.setattr(f"relume_worker.{module}.machine_load", lambda: 0.0)
     with open_service(tmp_path) as service:
         plan = service.plan(SCENE.id, RECIPE)
         assert service.estimate_seconds(plan) is None
@@ -113,7 +120,7 @@ def test_what_a_stopped_bake_has_is_kept_for_a_week(tmp_path: Path, monkeypatch:
     service._delete_orphans()
     assert staging_path(tmp_path, identity).exists()
     assert service.ledger.finished_tasks(identity)
-    monkeypatch.setattr("worker.service.STOPPED_RETENTION_S", -1.0)
+    monkeypatch.setattr("relume_worker.service.STOPPED_RETENTION_S", -1.0)
     service._delete_orphans()
     assert not list((tmp_path / "bakes" / "staging").iterdir())
     assert service.ledger.finished_tasks(identity) == {}
@@ -153,7 +160,7 @@ def test_a_bake_leaves_the_rest_of_the_disk_to_the_ledger(tmp_path: Path, monkey
     with open_service(tmp_path) as service:
         with monkeypatch.context() as patch:
             patch.setattr("relume.store.room.RESERVE_BYTES", 1 << 60)
-            patch.setattr("worker.service.check_budget", lambda *_: None)
+            patch.setattr("relume_worker.service.check_budget", lambda *_: None)
             status = follow(service, service.submit(SCENE.id, RECIPE))
             assert (status.state, (status.problem or "")[:9]) == ("failed", "disk full")
         assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
@@ -194,7 +201,7 @@ def test_failure_is_one_sentence_and_a_second_try_finishes(
 def test_a_lane_that_cannot_go_on_says_so_once_while_the_other_is_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("worker.service.POLL_S", 0.02)
+    monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
     tried = threading.Event()
     with open_service(tmp_path) as service:
         run_next = service._run_next
@@ -217,7 +224,7 @@ def test_a_lane_that_cannot_go_on_says_so_once_while_the_other_is_well(
 def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("worker.service.POLL_S", 0.02)
+    monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
     service, has_room = open_service(tmp_path), threading.Event()
     claim = service.ledger.claim
 
@@ -259,8 +266,8 @@ def test_plan_that_does_not_fit_is_refused_before_anything_is_computed(tmp_path:
 
 
 def test_what_one_process_takes_at_a_time_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("worker.budget.available_bytes", lambda: 10 << 30)
-    monkeypatch.setattr("worker.service.is_tiny", lambda plan: False)
+    monkeypatch.setattr("relume_worker.budget.available_bytes", lambda: 10 << 30)
+    monkeypatch.setattr("relume_worker.service.is_tiny", lambda plan: False)
     alone = 5 << 30
     with open_service(tmp_path, peak_bytes=alone, lone_bytes=alone - 1000) as service:
         assert service.plan(SCENE.id, RECIPE).peak_bytes == alone
@@ -275,7 +282,7 @@ def test_processes_that_a_bake_has_to_start_are_part_of_its_time(
         follow(service, service.submit(SCENE.id, RECIPE))
         plan = service.plan(SCENE.id, RECIPE)
         warm_s = service.estimate_seconds(plan)
-        monkeypatch.setattr("worker.service.is_tiny", lambda plan: False)
+        monkeypatch.setattr("relume_worker.service.is_tiny", lambda plan: False)
         cold_s = service.estimate_seconds(plan)
         monkeypatch.setattr(Executors, "has_cluster", True)
         assert service.estimate_seconds(plan) == warm_s
@@ -369,7 +376,7 @@ def test_a_bake_that_another_process_has_taken_over_is_left_to_it(
         assert may_go_on.wait(30)
         return run_task(job, task)
 
-    monkeypatch.setattr("worker.bake.run_task", stand_still)
+    monkeypatch.setattr("relume_worker.runner.run_task", stand_still)
     with open_service(tmp_path) as service:
         identity = service.submit(SCENE.id, RECIPE)
         assert has_begun.wait(30)
@@ -415,7 +422,7 @@ def test_a_bake_that_is_deleted_in_the_middle_of_a_task_is_no_defect(
         met.set()
         raise KeyError("lights/power")  # as zarr says of an array whose folder is gone
 
-    monkeypatch.setattr("worker.bake.run_task", run_deleted)
+    monkeypatch.setattr("relume_worker.runner.run_task", run_deleted)
     with open_service(tmp_path) as service:
         service.submit(SCENE.id, RECIPE)
         assert met.wait(30)

@@ -20,20 +20,20 @@ from moto.server import ThreadedMotoServer
 from test_processes import tree_hash, wait_for
 from zarr.storage import ObjectStore
 
-from relume.bake import Recipe
-from relume.errors import ParameterError, StorageError
-from relume.scene.archive import load_scene
+from relume.core.errors import ParameterError, StorageError
+from relume.scene.scene_folder import load_scene
 from relume.store import Reader, bake_in_process, open_store
-from server.errors import make_problem
-from worker.backup.shelf import BackupRepository
-from worker.backup.take import create_backup
-from worker.bake import TAKEN_OVER_MESSAGE
-from worker.paths import scene_path
-from worker.scenes import delete_scene, register_scene
-from worker.service import BakeService
-from worker.status import BakeStatus
-from worker.storage import fetch_if_missing, get_storage, open_cached
-from worker.storage.remote import ObjectStorage
+from relume.store.bake_protocol import Recipe
+from relume_server.errors import make_problem
+from relume_worker.backup.create import create_backup
+from relume_worker.backup.repository import BackupRepository
+from relume_worker.paths import scene_path
+from relume_worker.runner import TAKEN_OVER_MESSAGE
+from relume_worker.scenes import delete_scene, register_scene
+from relume_worker.service import BakeService
+from relume_worker.status import BakeStatus
+from relume_worker.storage import fetch_if_missing, get_storage, open_cached
+from relume_worker.storage.remote import ObjectStorage
 
 SCENE = tiny_scene()
 
@@ -220,7 +220,7 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.setenv(name, "key")
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setattr("worker.storage.remote.MAX_RETRIES", 0)
+    monkeypatch.setattr("relume_worker.storage.remote.MAX_RETRIES", 0)
     with machine(tmp_path, "one", ledger_of_all) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         monkeypatch.setenv("RELUME_STORAGE", "s3://away/team")

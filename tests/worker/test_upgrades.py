@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
-from relume.errors import StoreError
+from relume.core.errors import StoreError
 from relume.store import open_store, read_code
-from worker.bake import CODE_CHANGED_MESSAGE
-from worker.paths import staging_path
-from worker.scenes import register_scene
-from worker.service import BakeService
-from worker.status import BakeStatus
-from worker.tasks import Job, run_task
+from relume_worker.paths import staging_path
+from relume_worker.runner import CODE_CHANGED_MESSAGE
+from relume_worker.scenes import register_scene
+from relume_worker.service import BakeService
+from relume_worker.status import BakeStatus
+from relume_worker.tasks import Job, run_task
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -29,7 +29,13 @@ def running(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     """Run other code from now on."""
 
     def run(code: str) -> None:
-        for module in ("relume.store.fill", "worker.status", "worker.ledger", "worker.service", "worker.tasks"):
+        for module in (
+            "relume.store.run_bake",
+            "relume_worker.status",
+            "relume_worker.ledger",
+            "relume_worker.service",
+            "relume_worker.tasks",
+        ):
             monkeypatch.setattr(f"{module}.bake_code", lambda: code)
 
     return run

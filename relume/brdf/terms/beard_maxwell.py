@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from relume.brdf.fresnel import fresnel
-from relume.brdf.local import MIN_COSINE, ONE, TWO, ZERO, half_vector_cosines, quotient_ufunc_with
+from relume.brdf.half_vector import MIN_COSINE, ONE, TWO, ZERO, half_vector_cosines, quotient_ufunc_with
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 _QUARTER = np.float32(0.25)

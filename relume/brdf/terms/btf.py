@@ -1,7 +1,7 @@
 """measured_btf: a bidirectional texture function, each texel with a BRDF of its own (Müller 2004).
 
 As a BRDF it is the mean of its texels: so it is where no texel can be told, in light that it sends to other surfaces.
-Where a surface is seen, `relume.project.texels` finds each texel's own.
+Where a surface is seen, `relume.transport.btf_kernel` finds each texel's own.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from relume.assets.btf.btf_store import STORE, load_btf
+from relume.assets.btf.compress import MAX_COMPONENTS
+from relume.assets.btf.local_pca_btf import F32, LocalPcaBtf
+from relume.assets.btf.mean_brdf import mean_brdf
 from relume.brdf.term import Parameter, Term
-from relume.btf.average import mean_brdf
-from relume.btf.compress import MAX_COMPONENTS
-from relume.btf.eigen import F32, LocalPcaBtf
-from relume.btf.shelf import STORE, load_btf
-from relume.errors import ParameterError
-from relume.memory import asset_cached
+from relume.core.cache import asset_cached
+from relume.core.errors import ParameterError
 
 
 @dataclass(frozen=True, eq=False)

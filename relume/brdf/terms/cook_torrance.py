@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from relume.brdf.fresnel import fresnel
-from relume.brdf.local import MIN_COSINE, ONE, TWO, ZERO, half_vector_cosines, quotient_ufunc
+from relume.brdf.half_vector import MIN_COSINE, ONE, TWO, ZERO, half_vector_cosines, quotient_ufunc
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 _SCALE = 1.0 / (4.0 * math.pi)

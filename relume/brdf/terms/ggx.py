@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from relume.brdf.fresnel import schlick
-from relume.brdf.local import MIN_COSINE, ZERO, quotient_ufunc
+from relume.brdf.half_vector import MIN_COSINE, ZERO, quotient_ufunc
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 _QUARTER = np.float32(0.25)

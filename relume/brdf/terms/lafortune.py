@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from relume.brdf.local import hemisphere_indicator
+from relume.brdf.half_vector import hemisphere_indicator
 from relume.brdf.term import Angle, Curve, Parameter, Params, Term
 from relume.brdf.terms.blinn_phong import lobe
 

@@ -16,12 +16,20 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from relume.basis.bands import MAX_ANGLE
+from relume.assets.measured.interpolate import (
+    NUM_KNOTS,
+    THETA_D,
+    THETA_H,
+    THETA_I,
+    THETA_O,
+    QuotientKind,
+    measured_over_model,
+)
+from relume.assets.measured.measured_store import STORE, load_material
 from relume.brdf.term import F64, Angle, Curve, Params, Term
-from relume.errors import ParameterError
-from relume.measured.asset_store import STORE, load_material
-from relume.measured.lookup import NUM_KNOTS, THETA_D, THETA_H, THETA_I, THETA_O, QuotientKind, measured_over_model
-from relume.memory import asset_cached
+from relume.core.cache import asset_cached
+from relume.core.errors import ParameterError
+from relume.math.angle_bands import MAX_ANGLE
 
 _ROWS = {Angle.THETA_I: THETA_I, Angle.THETA_H: THETA_H, Angle.THETA_D: THETA_D, Angle.THETA_O: THETA_O}
 

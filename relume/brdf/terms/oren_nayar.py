@@ -10,7 +10,7 @@ import math
 from functools import partial
 from typing import Any
 
-from relume.brdf.local import HALF, MIN_COSINE, ONE, ZERO, quotient_ufunc_with
+from relume.brdf.half_vector import HALF, MIN_COSINE, ONE, ZERO, quotient_ufunc_with
 from relume.brdf.term import Angle, Curve, Parameter, Params, Term
 from relume.brdf.terms.lambert import constant
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from relume.brdf.local import hemisphere_indicator
+from relume.brdf.half_vector import hemisphere_indicator
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 

@@ -15,9 +15,9 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from relume.brdf.local import HALF, MIN_COSINE, ONE, TWO, ZERO, quotient_ufunc_with
+from relume.brdf.half_vector import HALF, MIN_COSINE, ONE, TWO, ZERO, quotient_ufunc_with
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
-from relume.uncounted import UNCOUNTED
+from relume.core.numba_options import UNCOUNTED
 
 MIN_ROUGHNESS = 0.07  # of the specification's sample implementation; less is a spike at the horizon
 _QUARTER = np.float32(0.25)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from relume.brdf.local import MIN_COSINE, ONE, ZERO, quotient_ufunc
+from relume.brdf.half_vector import MIN_COSINE, ONE, ZERO, quotient_ufunc
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from relume.brdf.local import MIN_COSINE, ONE, ZERO, quotient_ufunc
+from relume.brdf.half_vector import MIN_COSINE, ONE, ZERO, quotient_ufunc
 from relume.brdf.term import Angle, Curve, Parameter, Term
 from relume.brdf.terms.ward import ndf
 

@@ -1,4 +1,4 @@
-"""Library materials as terms of a look, from the data file that `relume.look.library.fits` writes.
+"""Library materials as terms of a look, from the data file that `relume.look.library.merl_fits` writes.
 
 The numbers are the published fits of Ngan 2005 and Low 2012 to the MERL measurements (Matusik 2003), converted. A
 preset has no texture: what was fitted is the whole colour.

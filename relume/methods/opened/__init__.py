@@ -1,1 +1,1 @@
-"""Bakes of fixed views, opened: what their arrays are to pictures."""
+"""Opened bakes of fixed cameras: stored arrays as the transfer that images are made from."""

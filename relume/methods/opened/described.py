@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from relume.bake import StoreReader
-from relume.errors import ParameterError, StoreError
+from relume.core.cache import Cache
+from relume.core.errors import ParameterError, StoreError
 from relume.look import complete
-from relume.memory import Cache
+from relume.store.bake_protocol import StoreReader
 from relume.views.view import open_view
 
 

@@ -15,9 +15,9 @@ from playwright.sync_api import Locator, expect
 from relume import look as looks
 from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
-from relume.memory import Cache
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
 from relume.methods.registry import open_transfer
-from relume.picture.picture import Picture
 
 HALF_ANGLE = "half angle θh"
 NUDGE = 1e-3

@@ -8,9 +8,9 @@ from editor_server import Server
 from merl_files import make_planes
 from playwright.sync_api import Locator, Page, expect
 
-from relume.measured.asset_store import store_material
-from relume.measured.merl import write_merl
-from worker.paths import materials_path
+from relume.assets.measured.measured_store import store_material
+from relume.assets.measured.merl import write_merl
+from relume_worker.paths import materials_path
 
 
 @pytest.fixture(scope="module")

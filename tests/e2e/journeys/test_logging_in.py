@@ -9,10 +9,10 @@ from editor_page import Editor, changed, opened_page
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 
-from server.access.access import AuthServices
-from server.settings import Settings
-from worker.database import open_database
-from worker.ledger import Ledger
+from relume_server.auth.services import AuthServices
+from relume_server.settings import Settings
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
 
 
 @pytest.fixture(scope="module")

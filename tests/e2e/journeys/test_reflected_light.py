@@ -12,9 +12,9 @@ from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 from tiny_scenes import still_life
 
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.scenes import register_scene
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
 
 
 @pytest.fixture

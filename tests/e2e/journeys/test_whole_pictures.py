@@ -15,9 +15,9 @@ from environment_files import dusk, write_map
 from playwright.sync_api import Browser, Page, expect
 from tiny_scenes import still_life
 
-from worker.database import open_database
-from worker.ledger import Ledger
-from worker.scenes import register_scene
+from relume_worker.database import open_database
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
 
 pytestmark = pytest.mark.slow  # by themselves they take minutes of a browser
 

@@ -1,0 +1,1 @@
+"""Benchmarks: every performance claim is a figure from here. Start at `registry`."""

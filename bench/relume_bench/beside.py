@@ -1,0 +1,54 @@
+"""What is made beside the frames of a picture while a hand moves, as a session makes it."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Self
+
+import numpy as np
+
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+
+
+class BackgroundJobs:
+    """A thread for what a picture waits for; use as a context.
+
+    Attributes:
+        lags_s: of each frame, how long ago the look was wanted whose light between surfaces it shows.
+    """
+
+    def __init__(self, picture: FreeCameraPicture) -> None:
+        self._picture, self._thread = picture, ThreadPoolExecutor(1)
+        self._running: tuple[Any, Future[Any], float] | None = None
+        self._requested_s = self._displayed_request_s = time.perf_counter()
+        self.lags_s: list[float] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._thread.shutdown()
+
+    def request(self) -> None:
+        """Another look is wanted; what has been made goes in."""
+        self._requested_s = time.perf_counter()
+        if self._running is not None and self._running[1].done():
+            job, future, self._displayed_request_s = self._running
+            self._picture.install(job, future.result())
+            self._running = None
+
+    def start_next(self) -> None:
+        """A frame is there; what it lacks is begun, where nothing else is made."""
+        self.lags_s.append(time.perf_counter() - self._displayed_request_s)
+        job = self._picture.next_job() if self._running is None else None
+        if job is not None and not job.is_refinement:
+            future = self._thread.submit(job.run, lambda share: None, lambda: False)
+            self._running = job, future, self._requested_s
+        elif self._running is None:
+            self._displayed_request_s = self._requested_s
+
+    @property
+    def lag_s(self) -> float:
+        """The median."""
+        return float(np.median(self.lags_s))

@@ -1,0 +1,64 @@
+"""Synthetic BTFs of the benchmarks: all their values, kept in bench/.kept from one run to the next."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from relume.assets.btf.btf_store import BtfRecord, store_btf
+from relume.assets.btf.compress import compress
+from relume.assets.btf.direction_rings import ubo_grid
+from relume.assets.btf.local_pca_btf import F32, LocalPcaBtf
+from relume.assets.btf.value_cache import ValueFile
+from relume.core.source_hash import code_hash, collect_sources
+from relume.synthetic_btf.render import TileGeometry
+from relume.synthetic_btf.synthesize import GEOMETRIES
+
+CACHE_FOLDER = Path(__file__).parents[1] / ".kept"
+
+
+class SyntheticBtf:
+    """A synthetic BTF before compression.
+
+    Args:
+        name: of its geometry. folder: where its values are kept. tiny: whether it is a trial.
+    """
+
+    def __init__(self, name: str, folder: Path, tiny: bool) -> None:
+        self.name = name
+        size, self.grid = (8, 1) if tiny else (128, 3)  # as `relume material make-btf` does
+        small = TileGeometry(GEOMETRIES[name](), ubo_grid(), (size, size), self.grid, 1)
+        self.values = ValueFile(folder / name, ubo_grid(), (size, size))
+        self.values.fill(small.get_view, lambda share: None, lambda: False)
+        self.height: F32 = small.height()
+
+    def compress(self, bound: float) -> LocalPcaBtf:
+        """Kept to an error bound, as `relume material make-btf` does."""
+        compressed = compress(self.values, bound, lambda share: None, lambda: False)
+        return replace(compressed, height=self.height)
+
+    def save(self, folder: Path, bound: float) -> BtfRecord:
+        """The same in an asset store."""
+        folder.mkdir(parents=True, exist_ok=True)
+        source = folder / f"{self.name}.json"
+        source.write_text(f"{self.name} {bound}")
+        return store_btf(folder / "btfs", source, self.name, self.name, lambda: self.compress(bound))
+
+
+@contextmanager
+def open_values_folder(tiny: bool) -> Iterator[Path]:
+    """Where values are: named by the code that makes them, those of other code are deleted; trials keep nothing."""
+    if tiny:
+        with TemporaryDirectory() as trial:
+            yield Path(trial)
+        return
+    makers = ("render", "weave", "pebbles", "corduroy")
+    folder = CACHE_FOLDER / code_hash(collect_sources([f"synthetic.{name}" for name in makers]))
+    for stale_folder in CACHE_FOLDER.iterdir() if CACHE_FOLDER.is_dir() else ():
+        if stale_folder != folder:
+            shutil.rmtree(stale_folder)
+    yield folder

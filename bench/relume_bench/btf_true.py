@@ -1,0 +1,36 @@
+"""btf.*: how near BTFs are to what they stand for.
+
+`btf.geometry_rmse`: a plane that is covered with the woven BTF, under a sky, against Mitsuba's paths through the real
+small geometry on the same place, seen from between the directions that the BTF was made for. Its noise is taken off.
+`btf.sphere_rmse`: the same about a ball. `btf.table_rmse`: the plane's view samples against sums over all values before
+compression.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from relume.assets.btf.btf_store import STORE
+from relume_bench.btf_made import SyntheticBtf, open_values_folder
+from relume_bench.btf_pictures import against_geometry, against_table
+from relume_bench.btf_sphere import against_displaced
+from relume_bench.figure import Figure
+
+_BOUND, _FINE = 0.05, 0.02  # of pictures, and of what is compared with all values
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Make a weave, and compare its pictures with the real one's."""
+    with (
+        open_values_folder(tiny) as values_folder,
+        tempfile.TemporaryDirectory() as folder,
+        STORE.with_search_folder(Path(folder) / "btfs"),
+    ):
+        folder_path, synthetic_btf = Path(folder), SyntheticBtf("weave", values_folder, tiny)
+        record = synthetic_btf.save(folder_path, _BOUND)
+        return [
+            against_geometry(record, folder_path, tiny),
+            against_displaced(record, folder_path, tiny),
+            against_table(synthetic_btf.save(folder_path, _FINE), synthetic_btf.values, folder_path, tiny),
+        ]

@@ -1,0 +1,88 @@
+"""freeze.curve_switch_s: what a user waits who touches another curve of a two-curve term.
+
+17,700 view samples of the teapot × 4,000 light triangles, cook_torrance; the rough operator along θh (256 bands, θd
+contracted) and the one along θd (64 bands, θh contracted), by which the picture follows the hand until the exact one is
+there. The larger of the two medians counts. In the row: the same of the exact ones, and how far the rough one is from
+what the exact one makes of a change of the curve, as a share of that change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from relume.assets.environments.studio import studio
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.brdf.term_validation import complete_term
+from relume.core.thread_pools import num_threads
+from relume.lights.light_clusters import cluster_lights, num_clusters
+from relume.lights.sphere_tiles import choose_tiles
+from relume.math.daubechies import analysis
+from relume_bench.figure import Figure
+from relume_bench.points import LitSamples, freeze_for_curve, relative_rmse, sample_lit_surface
+from relume_bench.scenes import cook_torrance, teapot_on_table
+from relume_bench.timing import time_interleaved
+
+
+def lit_teapot(term: dict[str, Any], tiny: bool) -> LitSamples:
+    """View samples of a teapot, all of one term, with their light triangles and what they see of them."""
+    num_positions, num_lights, size = (100, 200, (64, 64)) if tiny else (17_700, 4000, (320, 320))
+    return sample_lit_surface(teapot_on_table(studio(), (term,), (term,)), size, num_positions, num_lights, material=0)
+
+
+def merge_lights(lit_samples: LitSamples) -> LitSamples:
+    """The same with the lights merged that an operator is made of first."""
+    radiance, num = studio().radiance, lit_samples.lights.num_lights
+    return replace(
+        lit_samples, lights=cluster_lights(lit_samples.lights, choose_tiles(radiance, num), num_clusters(num))
+    )
+
+
+def error_of_change(
+    lit_samples: LitSamples, merged: LitSamples, before: dict[str, Any], after: dict[str, Any], curve: str
+) -> float:
+    """How far T Δc of merged lights is from that of all, relative RMSE.
+
+    Args:
+        lit_samples, merged: points with lights. before, after: documents whose `curve` differs.
+    """
+    declared = TERMS[before["model"]].curve(curve)
+    change = analysis(curve_bands(after, declared)) - analysis(curve_bands(before, declared))
+    images = []
+    for variant in (merged, lit_samples):
+        operator = freeze_for_curve(variant, before, curve)
+        tiles, _, _, samples = operator.transport.shape
+        image = np.zeros((tiles, 3, samples), np.float32)
+        operator.add(change, image)
+        images.append(image)
+    return relative_rmse(*images)
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Freeze along both curves in turn."""
+    term = cook_torrance(0.2)
+    document = complete_term(("curve_switch",), term, None)
+    lit_samples = lit_teapot(document, tiny)
+    curves = ("theta_h", "theta_d")
+    merged = merge_lights(lit_samples)
+    freezes = [
+        partial(freeze_for_curve, variant, document, curve) for curve in curves for variant in (merged, lit_samples)
+    ]
+    names = [f"{curve}{suffix}_s" for curve in curves for suffix in ("", "_exact")]
+    durations = time_interleaved(freezes, 2 if tiny else 5)
+    medians = {name: float(np.median(times)) for name, times in zip(names, durations, strict=True)}
+    other_term = complete_term(("curve_switch",), {**term, "params": {"sigma": 0.3, "ior": 2.5}}, None)
+    context = {
+        **medians,
+        **{f"{curve}_error": error_of_change(lit_samples, merged, document, other_term, curve) for curve in curves},
+        "merged_lights": merged.lights.num_lights,
+        "view_samples": lit_samples.surface_points.num_points,
+        "lights": lit_samples.lights.num_lights,
+        "visible_share": float(np.unpackbits(lit_samples.receivers.visible).mean()),
+        "threads": num_threads(),
+    }
+    return [Figure("freeze.curve_switch_s", max(medians[f"{curve}_s"] for curve in curves), "s", context)]

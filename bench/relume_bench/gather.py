@@ -1,0 +1,165 @@
+"""gather.*: what somebody waits who edits a picture with light between surfaces.
+
+The Cornell box under the sky at 400×400 with 2,000 lights and 16,000 gather cells, its floor half glossy. The bake is
+in one process with all threads, after a tiny one that compiles. The edit: the exponent of the floor's highlight moves
+between 3 and 300, from the look to the encoded bytes, all bounces kept; its operator is frozen once before.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from relume.core.cache import Cache
+from relume.core.thread_pools import num_threads
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.look import validate
+from relume.methods.gather import GatherMethod
+from relume.methods.registry import open_transfer
+from relume.scene.examples.cornell import cornell_box
+from relume.scene.model import Scene
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe, Task, TaskOutput
+from relume_bench.figure import Figure
+from relume_bench.timing import percentiles, seconds
+
+_NAMES = ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")
+FLOOR = "/materials/Floor/terms/1"
+_SPEED = "frames/s"
+
+
+class Baked(NamedTuple):
+    """A bake, and how it went.
+
+    Attributes:
+        wall_s: of it. context: its parts.
+    """
+
+    path: Path
+    wall_s: float
+    context: dict[str, Any]
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, open, freeze, drag."""
+    scene = cornell_box(is_floor_glossy=True)
+    with tempfile.TemporaryDirectory() as folder:
+        bake(scene, make_recipe(tiny=True), Path(folder) / "warm.zarr")
+        baked = bake(scene, make_recipe(tiny), Path(folder) / "gather.zarr")
+        size_mb = store_mb(baked.path)
+        transfer = open_transfer(baked.path, Cache(4 << 30))
+        picture = open_exact_picture(transfer)
+        freeze_times = _time_freezes(transfer, picture)
+        frames_s = edit_frames_s(transfer, picture, 5 if tiny else 120)
+    p50, p95 = percentiles(frames_s)
+    max_freeze_s = max(taken for name, taken in freeze_times.items() if not name.endswith("exact_s"))
+    size = {"size": list(make_recipe(tiny).size), "cells": baked.context["cells"]}
+    return [
+        Figure(_NAMES[0], baked.wall_s, "s", {**baked.context, "threads": num_threads()}),
+        Figure(_NAMES[1], size_mb, "MB", {**size, "rays_a_sample": transfer.store.shape("views/0/links")[1]}),
+        Figure(_NAMES[2], max_freeze_s, "s", {**size, "floor_samples": _floor_samples(transfer), **freeze_times}),
+        Figure(_NAMES[3], 1 / p50, _SPEED, {**size, "ms_p50": 1e3 * p50, "ms_p95": 1e3 * p95}),
+    ]
+
+
+def make_recipe(tiny: bool) -> Recipe:
+    """The recipe that is measured, or, where tiny, one that bakes in a second."""
+    return Recipe("gather", ("front",), *(((40, 40), 60) if tiny else ((400, 400), 2000)))
+
+
+def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
+    """Bake in this process by the method `gather`.
+
+    Args:
+        scene: that is baked. recipe: how.
+        target: folder of the store.
+    Returns:
+        Where the store is, wall seconds, and wall and tracing seconds and rays of every stage.
+    """
+    method, stages = (
+        GatherMethod(),
+        {name: {"wall_s": 0.0, "tracing_s": 0.0, "rays": 0} for name in GatherMethod.stages},
+    )
+    last = time.perf_counter()
+
+    def note(task: Task, written: TaskOutput) -> None:
+        nonlocal last
+        stage, current_time = stages[GatherMethod.stages[task.stage]], time.perf_counter()
+        stage["wall_s"] += current_time - last
+        stage["tracing_s"] += written.trace_s
+        stage["rays"] += written.num_rays
+        last = current_time
+
+    wall_s = seconds(lambda: bake_in_process(method, scene, recipe, target, note))
+    num_patches = open_transfer(target, Cache(4 << 30)).store.shape("cells/material")[0]
+    return Baked(
+        target, wall_s, {"cells": num_patches, "size": list(recipe.size), "lights": recipe.num_lights, **stages}
+    )
+
+
+def store_mb(path: Path) -> float:
+    """Content of all files, 10⁶ bytes."""
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file()) / 1e6
+
+
+def open_exact_picture(transfer: FixedViewTransfer) -> Picture:
+    """A picture at rest."""
+    picture = Picture(transfer, "front", Cache(4 << 30))
+    run_until_exact(picture)
+    return picture
+
+
+def run_until_exact(picture: Picture) -> None:
+    """Make all that is lacking."""
+    while not picture.advance(None).exact or picture.next_job() is not None:
+        if picture.next_job() is not None:
+            picture.run_next_job(lambda share: None, lambda: False)
+
+
+def _time_freezes(transfer: FixedViewTransfer, picture: Picture) -> dict[str, float]:
+    """Seconds until the picture follows a hand on the floor's highlight, and until its operators are exact ones.
+
+    Both are made once before, which compiles. The last one made stays the one that the picture follows.
+    """
+    warm, durations = open_exact_picture(transfer), dict[str, float]()
+    for pointer in ("curves/theta_h", "params/exponent"):
+        warm.prepare(f"{FLOOR}/{pointer}")
+        run_until_exact(warm)
+        picture.prepare(f"{FLOOR}/{pointer}")
+        start_time, name = time.perf_counter(), pointer.rpartition("/")[2]
+        picture.run_next_job(lambda share: None, lambda: False)
+        durations[f"{name}_s"] = time.perf_counter() - start_time
+        run_until_exact(picture)
+        durations[f"{name}_exact_s"] = time.perf_counter() - start_time
+    return durations
+
+
+def edit_frames_s(transfer: FixedViewTransfer, picture: Picture, num_frames: int) -> list[float]:
+    """Seconds of each frame but the first, from the look to the encoded bytes, while the floor's exponent is dragged.
+
+    Args:
+        transfer: the opened bake, with its default look.
+        picture: of it, at rest, what a hand needs made before.
+        num_frames: looks of the drag.
+    """
+    durations = []
+    for exponent in np.geomspace(3, 300, num_frames):
+        document = copy.deepcopy(transfer.default_look)
+        document["materials"]["Floor"]["terms"][1]["params"]["exponent"] = float(exponent)
+        look = validate(document, transfer.default_look)
+        start_time = time.perf_counter()
+        picture.set_look(look)
+        picture.encode(picture.advance(None).tiles, "rgb9e5")
+        durations.append(time.perf_counter() - start_time)
+    return durations[1:]
+
+
+def _floor_samples(transfer: FixedViewTransfer) -> int:
+    rows = transfer.views["front"].rows(transfer.material_names.index("Floor"))
+    return int(rows.stop - rows.start)

@@ -1,0 +1,89 @@
+"""gather.follow_error: pictures that follow a dragged colour, or the number of bounces, before they are shaded at rest.
+
+The room of bench/gather.py. Its red wall is dragged to blue, its floor to dark grey, and bounces from all to one, held
+by the hand; what holding makes is made before. The last frame of each drag against the same look shaded, relative RMSE
+of the whole picture; the worst of the three. Beside it the time of a frame, from the look to the encoded bytes.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.look import validate
+from relume.methods.registry import open_transfer
+from relume.scene.examples.cornell import cornell_box
+from relume_bench.figure import Figure
+from relume_bench.gather import bake, make_recipe, run_until_exact
+from relume_bench.points import relative_rmse
+
+Document = dict[str, Any]
+Edit = Callable[[Document, float], None]
+
+_NAME = "gather.follow_error"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Measure three drags in one bake."""
+    recipe, num_frames = make_recipe(tiny), 3 if tiny else 12
+    drags: dict[str, tuple[str, Edit]] = {
+        "red wall to blue": ("/materials/Red wall/terms/0/color", _make_color_edit("Red wall", [0.06, 0.1, 0.7])),
+        "floor to dark grey": ("/materials/Floor/terms/0/color", _make_color_edit("Floor", [0.1, 0.1, 0.1])),
+        "all bounces to one": ("/transport/bounces", _bounces),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = bake(cornell_box(is_floor_glossy=True), recipe, Path(folder) / "gather.zarr").path
+        transfer = open_transfer(path, Cache(4 << 30))
+        drag_results = {
+            name: _measure_drag(transfer, pointer, edit, num_frames) for name, (pointer, edit) in drags.items()
+        }
+    worst = max(drag["error"] for drag in drag_results.values())
+    return [Figure(_NAME, worst, "relative RMSE", {**drag_results, "size": list(recipe.size)})]
+
+
+def _make_color_edit(material: str, target: list[float]) -> Edit:
+    def edit(document: Document, fraction: float) -> None:
+        term = document["materials"][material]["terms"][0]
+        term["color"] = [
+            (1 - fraction) * was + fraction * becomes for was, becomes in zip(term["color"], target, strict=True)
+        ]
+
+    return edit
+
+
+def _bounces(document: Document, fraction: float) -> None:
+    document["transport"]["bounces"] = round(document["transport"]["bounces"] ** (1 - fraction))
+
+
+def _measure_drag(transfer: FixedViewTransfer, pointer: str, edit: Edit, num_frames: int) -> dict[str, float]:
+    """Error of the last frame, the change that it shows, both relative, and median milliseconds of a frame."""
+    picture = Picture(transfer, "front", Cache(4 << 30))
+    run_until_exact(picture)
+    before = picture.image().astype(np.float64)
+    picture.prepare(pointer)
+    run_until_exact(picture)
+    durations = []
+    for fraction in np.linspace(0, 1, num_frames + 1)[1:]:
+        document = copy.deepcopy(transfer.default_look)
+        edit(document, float(fraction))
+        look = validate(document, transfer.default_look)
+        start_time = time.perf_counter()
+        picture.set_look(look)
+        picture.encode(picture.advance(None).tiles, "rgb9e5")
+        durations.append(time.perf_counter() - start_time)
+    incremental = picture.image().astype(np.float64)
+    run_until_exact(picture)
+    exact = picture.image()
+    return {
+        "error": relative_rmse(incremental, exact), "changed_by": relative_rmse(before, exact),
+        "ms_p50": 1e3 * float(np.median(durations[1:])),
+    }  # fmt: skip

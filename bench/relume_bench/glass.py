@@ -1,0 +1,118 @@
+"""glass.rmse: a scene with glass against Mitsuba's whole path tracer with dielectrics of its own.
+
+A grey floor with a clear ball, a ball that absorbs and a green pane before a red ball, under a sky with a sun, all
+paths. Mitsuba's volpath bends light's rays as well: caustics and what inner sides reflect are part of the error. Parts
+of the picture are in the row: the floor before the glass, the pane, the balls.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.look import validate
+from relume.methods.registry import open_transfer
+from relume.output.render_image import render_image
+from relume.scene.examples.cornell import rectangle, sunny_sky
+from relume.scene.examples.still_life.grids import sphere
+from relume.scene.examples.still_life.still_life import look_at
+from relume.scene.model import Glass, Material, Scene
+from relume.scene.scene_folder import make_scene
+from relume.store.bake_protocol import Recipe
+from relume_bench.figure import Figure, skipped
+from relume_bench.gather import bake
+from relume_bench.indirect import PASSES
+from relume_bench.mitsuba import averaged, bsdf, missing, read_passes, render
+from relume_bench.standard_error import NoiseCorrectedError, compare_with_passes
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_NAME, _UNIT = "glass.rmse", "relative RMSE"
+_SIZE, _FINER, _SPP = (400, 300), 2, 128
+_DEPTH = 24
+_ABSORBED = (0.3, 1.5, 4.0)
+_IMAGE_REGIONS = {"floor": (0.0, 1.0, 0.8, 1.0), "pane": (0.41, 0.64, 0.3, 0.7), "clear": (0.1, 0.32, 0.35, 0.62),
+          "absorbing": (0.73, 0.9, 0.43, 0.66)}  # fmt: skip
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """A bake and a render."""
+    if (why := missing()) is not None:
+        return skipped((_NAME,), _UNIT, why)
+    size, spp = ((40, 30), 2) if tiny else (_SIZE, _SPP)
+    scene = glass_scene()
+    with tempfile.TemporaryDirectory() as folder:
+        rendered, reference_passes = (
+            _render_relume(scene, size, tiny, Path(folder)),
+            _render_mitsuba(scene, size, spp, Path(folder)),
+        )
+    comparison = compare_with_passes(rendered, reference_passes)
+    region_summaries = {
+        name: _compare_region(rendered, reference_passes, *bounds).summary for name, bounds in _IMAGE_REGIONS.items()
+    }
+    details = {**comparison.context, "size": list(size), "spp": PASSES * spp, **region_summaries}
+    return [Figure(_NAME, comparison.error.value, _UNIT, details, comparison.error.standard_error)]
+
+
+def _compare_region(
+    rendered: F64, reference_passes: F32, left: float, right: float, top: float, bottom: float
+) -> NoiseCorrectedError:
+    """Of a part of the picture, in shares of width and height."""
+    height, width, _ = rendered.shape
+    rows, columns = slice(int(top * height), int(bottom * height)), slice(int(left * width), int(right * width))
+    return compare_with_passes(rendered[rows, columns], reference_passes[:, rows, columns])
+
+
+def glass_scene() -> Scene:
+    """The scene of this benchmark."""
+    clear = {"model": "ggx", "color": [1.0, 1.0, 1.0], "params": {"roughness": 0.03, "f0": [0.04, 0.04, 0.04]}}
+    materials = [
+        Material("Floor", ({"model": "lambert", "color": [0.6, 0.6, 0.6]},)),
+        Material("Clear", (clear,), glass=Glass(thickness=0.9)),
+        Material("Pane", (clear,), glass=Glass((0.4, 0.9, 0.5))),
+        Material("Absorbing", (clear,), glass=Glass(thickness=0.7, absorbed=_ABSORBED)),
+        Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
+    ]
+    rotation = np.eye(3)
+    meshes = [
+        rectangle([-2, 0, 2], [4, 0, 0], [0, 0, -4]).mesh("floor", 0),
+        sphere(0.45, 48).transform(rotation, [-0.9, 0.46, 0.2]).mesh("clear", 1),
+        rectangle([-0.3, 0.01, 0.5], [0.8, 0, 0], [0, 1, 0]).mesh("pane", 2),
+        sphere(0.35, 48).transform(rotation, [1.0, 0.36, 0.2]).mesh("absorbing", 3),
+        sphere(0.35, 48).transform(rotation, [0.1, 0.36, -0.3]).mesh("red", 4),
+    ]
+    camera = look_at("front", (0.3, 1.1, 3.4), (0.0, 0.4, 0.0), 0.7)
+    return make_scene("glass", meshes, materials, [camera], sunny_sky())
+
+
+def _render_relume(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:
+    width, height = size
+    recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), 60 if tiny else 2000)
+    transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
+    return averaged(render_image(transfer, "front", validate({}, transfer.default_look)), _FINER)
+
+
+def _render_mitsuba(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
+    materials = [scene.materials[mesh.material] for mesh in scene.meshes]
+    bsdfs = [bsdf(m.terms) if m.glass is None else _dielectric(m.glass) for m in materials]
+    job = {"integrator": {"type": "volpath", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
+    render(scene, size, job, folder)
+    return read_passes(folder)
+
+
+def _dielectric(glass: Glass) -> Mapping[str, Any]:
+    """Glass as a plugin of Mitsuba's, with the medium inside of a solid."""
+    if glass.thickness == 0:
+        tint = {"type": "rgb", "value": list(glass.tint)}
+        return {"type": "thindielectric", "int_ior": glass.ior, "specular_transmittance": tint}
+    max_absorption = max(*glass.absorbed, 1e-9)
+    rate = {"type": "rgb", "value": [absorbed / max_absorption for absorbed in glass.absorbed]}
+    inside = {"type": "homogeneous", "albedo": 0.0, "scale": max_absorption, "sigma_t": rate}
+    return {"type": "dielectric", "int_ior": glass.ior, "interior": inside}

@@ -1,0 +1,81 @@
+"""Reflected light alone, of a gather bake and of Mitsuba's path tracer, with the same bounces."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.albedo import pack_reflectance, scatters_diffusely
+from relume.brdf.texture_slots import NormalMap
+from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.look import validate
+from relume.look.document import MAX_BOUNCES
+from relume.output.render_image import render_image
+from relume.scene.model import Scene
+from relume_bench.mitsuba import read_passes, render
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+PASSES = 8  # independent pictures of the peer, from which the noise of their mean is known
+
+
+def reflected(transfer: FixedViewTransfer, terms: Mapping[str, Sequence[Mapping[str, Any]]]) -> F64:
+    """Light of a picture that surfaces have reflected onto what is seen. (height, width, 3)
+
+    Args:
+        terms: of materials that have others than in the scene's own look.
+    """
+    document = copy.deepcopy(transfer.default_look)
+    for name, material_terms in terms.items():
+        document["materials"][name]["terms"] = [dict(term) for term in material_terms]
+    pictures = []
+    for light_paths in ("all", "direct"):
+        document["transport"]["show"] = light_paths
+        look = validate(document, transfer.default_look)
+        pictures.append(render_image(transfer, "front", look).astype(np.float64))
+    return np.asarray(pictures[0] - pictures[1])
+
+
+@contextmanager
+def ignore_glossy_reflection() -> Iterator[None]:
+    """Restrict our light between surfaces to what diffuse terms send, for peers that are restricted alike."""
+
+    def key_of_diffuse_terms(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None) -> bytes:
+        return pack_reflectance(list(filter(scatters_diffusely, terms)), normals)
+
+    with patch("relume.live.fixed_camera.illumination.pack_reflectance", key_of_diffuse_terms):
+        yield
+
+
+def mitsuba_job(camera_bsdfs: Sequence[Any], bounce_bsdfs: Sequence[Any]) -> dict[str, Any]:
+    """What `relume_bench.mitsuba.render` is to be told besides counts; arguments as of `reflected_by_mitsuba`."""
+    return {"seen": camera_bsdfs, "bsdfs": bounce_bsdfs, "bounces": MAX_BOUNCES}
+
+
+def reflected_by_mitsuba(
+    scene: Scene,
+    size: tuple[int, int],
+    camera_bsdfs: Sequence[Any],
+    bounce_bsdfs: Sequence[Any],
+    spp: int,
+    folder: Path,
+) -> F32:
+    """Independent passes of Mitsuba's picture of the same light. (`GLASS_RULE`, height, width, 3)
+
+    Args:
+        scene: its first view is rendered.
+        size: width and height, pixels.
+        camera_bsdfs, bounce_bsdfs: BSDFs of the meshes where the camera sees them, and further along paths.
+        spp: samples of a pixel in each pass, a power of two.
+        folder: where files of the exchange are written.
+    """
+    render(scene, size, {"spp": [spp], "passes": PASSES, **mitsuba_job(camera_bsdfs, bounce_bsdfs)}, folder)
+    return read_passes(folder)

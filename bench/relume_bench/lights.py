@@ -1,0 +1,143 @@
+"""lights.rmse_…: direct light of each kind against Mitsuba 3; lights.gain_fps: frames a second while one is dimmed.
+
+The Cornell box, 128×128 pixels, diffuse; the environment is dark. Pictures are compared by means over squares of 4×4
+pixels, Mitsuba's noise taken off: a pixel has one view sample inside surfaces and Mitsuba's many, which differ along
+every edge of a hard shadow.
+Mitsuba's spot falls off in angle and ours in cosine: the cone compared has an edge of a tenth of a degree.
+bench/relume_bench/mitsuba.py says where Mitsuba is looked for.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.environments.environment import Environment
+from relume.core.cache import Cache
+from relume.lights.local_lights import rectangle
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.look import Look, validate
+from relume.methods.registry import METHODS, open_transfer
+from relume.output.render_image import render_image
+from relume.scene.examples.cornell import cornell_box
+from relume.scene.model import Scene
+from relume.scene.scene_folder import make_scene
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+from relume_bench.figure import Figure, skipped
+from relume_bench.indirect import PASSES
+from relume_bench.mitsuba import bsdf, missing, read_passes, render
+from relume_bench.standard_error import compare_with_passes
+
+F64 = NDArray[np.float64]
+
+_LIGHTS: dict[str, dict[str, Any]] = {
+    "point": {"kind": "point", "position": [0.4, 1.5, 0.6], "emission": [3.0, 2.0, 1.0]},
+    "spot": {
+        "kind": "spot", "position": [0.0, 1.9, 0.9], "direction": [0.0, -1.0, -0.5], "cone": [29.9, 30.0],
+        "emission": [3.0, 3.0, 3.0],
+    },
+    "directional": {"kind": "directional", "direction": [-0.4, -1.0, -0.5], "emission": [2.0, 2.0, 2.0]},
+    "rectangle": {  # before the room and above the picture: Mitsuba would show it
+        "kind": "rectangle", "position": [0.1, 2.3, 1.3], "direction": [0.0, -0.7, -1.0], "rotation": 20.0,
+        "size": [0.5, 0.3], "emission": [20.0, 18.0, 15.0],
+    },
+}  # fmt: skip
+_BLOCK = 4
+_NAMES = tuple(f"lights.rmse_{kind}" for kind in _LIGHTS)
+_FPS = "lights.gain_fps"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Errors, and frames per second while one of two lights is dimmed; compute and encode."""
+    with tempfile.TemporaryDirectory() as folder:
+        return [*_errors(Path(folder), tiny), _gain_fps(Path(folder), tiny)]
+
+
+def _errors(folder: Path, tiny: bool) -> list[Figure]:
+    if (why := missing()) is not None:
+        return skipped(_NAMES, "relative RMSE", why)
+    size, spp = ((32, 32), 4) if tiny else ((128, 128), 128)
+    room = cornell_box()
+    night = Environment("night", np.full((4, 8, 3), 1e-7, np.float32))
+    scene = make_scene("night", room.meshes, room.materials, room.cameras, night)
+    recipe = Recipe("direct", ("front",), size, 20)
+    transfer = open_transfer(bake_in_process(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Cache(4 << 30))
+    bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
+    figures = []
+    for name, (kind, light) in zip(_NAMES, _LIGHTS.items(), strict=True):
+        rendered = render_image(transfer, "front", _make_look(transfer, {"A": light})).astype(np.float64)
+        job = {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs, "emitters": [_emitter(light, transfer)]}
+        render(scene, size, job, folder)
+        reference_passes = read_passes(folder)
+        comparison = compare_with_passes(
+            _average_blocks(rendered),
+            np.array([_average_blocks(block_pass) for block_pass in reference_passes], np.float32),
+        )
+        context = {**comparison.context, "size": list(size), "spp": PASSES * spp, "kind": kind}
+        figures.append(Figure(name, comparison.error.value, "relative RMSE", context, comparison.error.standard_error))
+    return figures
+
+
+def _make_look(transfer: FixedViewTransfer, lights: dict[str, Any]) -> Look:
+    return validate({"environment": {"scale": 0.0}, "lights": lights}, transfer.default_look)
+
+
+def _average_blocks(picture: NDArray[np.floating]) -> F64:
+    height, width, _ = picture.shape
+    blocks = picture.reshape(height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK, 3)
+    return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
+
+
+def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, Any]:
+    """A light of a look as Mitsuba describes it; `to_world` by rows."""
+    geometry = _make_look(transfer, {"A": light}).lights["A"].geometry
+    emission = {"type": "rgb", "value": light["emission"]}
+    if light["kind"] == "point":
+        return {"type": "point", "position": light["position"], "intensity": emission}
+    if light["kind"] == "directional":
+        return {"type": "directional", "direction": light["direction"], "irradiance": emission}
+    to_world = np.eye(4)
+    if light["kind"] == "spot":
+        forward = np.array(geometry.direction) / np.linalg.norm(geometry.direction)
+        right = np.cross([1.0, 0.0, 0.0], forward)
+        right /= np.linalg.norm(right)
+        to_world[:3, :3] = np.stack([np.cross(forward, right), right, forward], axis=1)
+        to_world[:3, 3] = geometry.position
+        inner, outer = geometry.cone
+        angles = {"beam_width": inner, "cutoff_angle": outer}
+        return {"type": "spot", "intensity": emission, "to_world": to_world.ravel().tolist(), **angles}
+    corner, edges = rectangle(geometry)  # Mitsuba's covers [-1, 1]²
+    to_world[:3, :2] = edges.T / 2
+    to_world[:3, 2] = np.array(geometry.direction) / np.linalg.norm(geometry.direction)
+    to_world[:3, 3] = corner + edges.sum(axis=0) / 2
+    area = {"type": "area", "radiance": emission}
+    return {"type": "rectangle", "emitter": area, "to_world": to_world.ravel().tolist()}
+
+
+def _gain_fps(folder: Path, tiny: bool) -> Figure:
+    """Time frames of a picture with reflected light, 400×400, while one of two lights is dimmed."""
+    scene: Scene = cornell_box()
+    size, method = ((32, 32), "direct") if tiny else ((400, 400), "gather")
+    store = bake_in_process(
+        METHODS[method], scene, Recipe(method, ("front",), size, 20 if tiny else 1000), folder / "gather.zarr"
+    )
+    transfer = open_transfer(store, Cache(4 << 30))
+    picture = Picture(transfer, "front", Cache(1 << 30))
+    durations = []
+    for k in range(5 if tiny else 60):
+        panel = _LIGHTS["rectangle"] | {"scale": 1 + k / 60}
+        picture.set_look(validate({"lights": {"A": _LIGHTS["point"], "B": panel}}, transfer.default_look))
+        start_time = time.perf_counter()
+        if k > 1:  # the first shades all, the second one light alone
+            picture.encode(picture.advance(None).tiles, "rgb9e5")
+            durations.append(time.perf_counter() - start_time)
+        while not picture.advance(None).exact or picture.next_job() is not None:
+            picture.run_next_job(lambda share: None, lambda: False)
+    return Figure(_FPS, 1 / float(np.median(durations)), "fps", {"size": list(size), "method": method})

@@ -1,0 +1,114 @@
+"""load.drag_beside_renders_ratio: frames a second of a dragged slider beside full queues ÷ alone.
+
+A real server in its own process, the picture of `relume_bench.session`. A client drags σ and sends each edit when the
+frame of the one before is there, so that it has all the frames that the server can give. In turn,
+on the same session: alone,
+and while batches of exact pictures and a comparison with brute force wait and run; the ratio is of the medians.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+import urllib.request
+from typing import Any
+
+import numpy as np
+
+from relume.assets.environments.studio import studio
+from relume.store.bake_protocol import Recipe
+from relume_bench.figure import Figure
+from relume_bench.house import House, Server, SessionClient, baked_house, serving, session
+from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+
+_NAME = "load.drag_beside_renders_ratio"
+_SIGMA = "/materials/Teapot/terms/1/params/sigma"
+_NUM_BATCHES = 8
+_WAIT_S = 120.0
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, serve, drag with the queues empty and full, in turn."""
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.5) if tiny else ((512, 512), 1000, 5, 3.0)
+    scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
+    with (
+        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
+        serving(house) as server,
+        session(server, house.bake) as client,
+    ):
+        client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
+        client.exact(0)
+        slider_client = _SliderClient(client)
+        slider_client.drag(seconds)  # what is made once is made
+        unloaded_ms: list[float] = []
+        loaded_ms: list[float] = []
+        painted = 0
+        for _ in range(rounds):
+            unloaded_ms.append(slider_client.drag(seconds))
+            queued = _fill(server, house)
+            loaded_ms.append(slider_client.drag(seconds))
+            responses = [_call(server, "GET", address) for address in queued]
+            painted += sum(int(body["done"] if "done" in body else body["passes"]) for body in responses)
+            for address in queued:
+                _call(server, "DELETE", f"{address}?forget=true" if "truths" in address else address)
+            time.sleep(0.5)
+    context = {
+        "alone_fps": float(np.median(unloaded_ms)),
+        "beside_fps": float(np.median(loaded_ms)),
+        "each_ratio": [b / a for a, b in zip(unloaded_ms, loaded_ms, strict=True)],
+        "steps_done_beside": painted,
+        "rounds": rounds,
+        "seconds": seconds,
+        "size": list(size),
+    }
+    return [Figure(_NAME, context["beside_fps"] / context["alone_fps"], "ratio", context)]  # type: ignore[operator]
+
+
+class _SliderClient:
+    """Drags σ to and fro."""
+
+    def __init__(self, client: SessionClient) -> None:
+        self._client, self._revision = client, 0
+
+    def drag(self, seconds: float) -> float:
+        """Frames a second."""
+        start_time, frames = time.perf_counter(), 0
+        while (durations := time.perf_counter() - start_time) < seconds:
+            self._revision += 1
+            sigma = 0.2 + 0.15 * np.sin(2 * np.pi * self._revision / 90)
+            patch = [{"op": "replace", "path": _SIGMA, "value": round(float(sigma), 5)}]
+            self._client.send_message(type="edit", revision=self._revision, patch=patch)
+            while (received := self._client.frame()) is None or received[0]["revision"] < self._revision:
+                pass
+            frames += 1
+        self._client.exact(self._revision)
+        return frames / durations
+
+
+def _fill(server: Server, house: House) -> list[str]:
+    """Queue batches and a comparison, and wait until both run; returns their addresses."""
+    common = {"bake": house.bake, "view": "front"}
+    looks = [{"materials": {"Teapot": {"terms": [LAMBERT, cook_torrance(0.15 + 0.002 * k)]}}} for k in range(200)]
+    job_addresses = [
+        str(_call(server, "POST", "/api/renders", {**common, "looks": looks, "format": "png"})["id"])
+        for _ in range(_NUM_BATCHES)
+    ]
+    comparison_id = str(_call(server, "POST", "/api/truths", {**common, "passes": 1024})["id"])
+    addresses = [*(f"/api/renders/{identity}" for identity in job_addresses), f"/api/truths/{comparison_id}"]
+    deadline = time.monotonic() + _WAIT_S
+    while not all(_call(server, "GET", addresses[k])["progress"] > 0 for k in (0, -1)):
+        if time.monotonic() > deadline:
+            raise TimeoutError("the queues do not begin")
+        time.sleep(0.05)
+    return addresses
+
+
+def _call(server: Server, method: str, path: str, body: Any = None) -> dict[str, Any]:
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", method=method)
+    if body is not None:
+        request.data = json.dumps(body).encode()
+        request.add_header("Content-Type", "application/json")
+    with urllib.request.urlopen(request, timeout=_WAIT_S) as answer:
+        text = answer.read()
+    content: dict[str, Any] = json.loads(text) if text else {}
+    return content

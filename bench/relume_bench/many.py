@@ -1,0 +1,127 @@
+"""load.aggregate_ratio: frames a second summed over 1 … 64 sessions that all drag, lowest ÷ best.
+load.frame_cost_ratio: the server's processor time for a frame, least ÷ most of the same numbers of sessions.
+
+A real server in its own process; this one has the hands of all sessions (`bench.controls`). All sessions are on one
+bake: with one slider in everybody's hand, so that all read one operator, and with four sliders in turn. Numbers of
+sessions are taken in turn, round after round; the ratios are of medians. What a frame costs hardly depends on what else
+the machine does, and tells whether sessions are in each other's way; how many there are a second does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from collections.abc import AsyncIterator, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from websockets.asyncio.client import connect
+
+from relume.assets.environments.studio import studio
+from relume.store.bake_protocol import Recipe
+from relume_bench.figure import Figure
+from relume_bench.hands import SliderClient
+from relume_bench.house import OPENING, SPEAKS, House, Server, baked_house, serving
+from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+
+_NAMES = ("load.aggregate_ratio", "load.frame_cost_ratio")
+_SLIDERS = tuple(
+    (f"/materials/{material}/terms/1/params/{name}", span)
+    for name, span in (("sigma", (0.1, 0.4)), ("ior", (1.3, 2.5)))
+    for material in ("Teapot", "Table")
+)
+_WARM_S = 1.0
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake, serve, drag with more and more hands."""
+    size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((640, 480), 1000, 5, 2.0)
+    numbers = (1, 2) if tiny else (1, 2, 4, 8, 16, 32, 64)
+    glossy_terms = (LAMBERT, cook_torrance(0.2))
+    scene = teapot_on_table(studio(), glossy_terms, glossy_terms)
+    settings = {"RELUME_MAX_SESSIONS": "256"}  # those that have just gone are counted, too
+    variants = {"one_operator": (_SLIDERS[:1], numbers), "several": (_SLIDERS, tuple(n for n in numbers if n > 2))}
+    results: dict[tuple[str, int], list[tuple[float, float]]] = {}
+    with (
+        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
+        serving(house, settings) as server,
+    ):
+        asyncio.run(_prepare_curves(server, house))
+        for _ in range(rounds):
+            for kind, (sliders, some) in variants.items():
+                for number in some:
+                    rates = asyncio.run(_measure_drag(server, house, sliders, number, seconds))
+                    results.setdefault((kind, number), []).append(rates)
+    ratios: list[NDArray[np.float64]] = []
+    context: dict[str, object] = {}
+    for kind, (_, some) in variants.items():
+        medians = np.array([np.median(results[kind, number], axis=0) for number in some]).reshape(-1, 2)
+        if len(medians):
+            ratios.append(medians.min(axis=0) / medians.max(axis=0))
+        context |= {f"{kind}_fps": medians[:, 0].tolist(), f"{kind}_ms_a_frame": medians[:, 1].tolist()}
+    context |= {"sessions": list(numbers), "rounds": rounds, "seconds": seconds, "size": list(size)}
+    return [
+        Figure(name, float(ratio), "ratio", context) for name, ratio in zip(_NAMES, np.min(ratios, axis=0), strict=True)
+    ]
+
+
+async def _prepare_curves(server: Server, house: House) -> None:
+    """Have made what is made once: pictures of the scene's own look, what each slider needs."""
+    async with _open_slider_clients(server, house, _SLIDERS, len(_SLIDERS)) as slider_clients:
+        for slider_client in slider_clients:
+            await slider_client.drag()
+            await asyncio.sleep(_WARM_S)
+            await slider_client.release()
+
+
+async def _measure_drag(
+    server: Server, house: House, sliders: Sequence[tuple[str, tuple[float, float]]], number: int, seconds: float
+) -> tuple[float, float]:
+    """Frames a second of so many hands together, and milliseconds of processor time that the server takes for each."""
+    async with _open_slider_clients(server, house, sliders, number) as slider_clients:
+        await asyncio.gather(*(slider_client.drag() for slider_client in slider_clients))
+        await asyncio.sleep(min(_WARM_S, seconds))
+        frames, spent_s, start_time = _frames(slider_clients), _spent_s(server), time.perf_counter()
+        await asyncio.sleep(seconds)
+        frames, spent_s = _frames(slider_clients) - frames, _spent_s(server) - spent_s
+        return frames / (time.perf_counter() - start_time), 1e3 * spent_s / max(1, frames)
+
+
+@asynccontextmanager
+async def _open_slider_clients(
+    server: Server, house: House, sliders: Sequence[tuple[str, tuple[float, float]]], number: int
+) -> AsyncIterator[list[SliderClient]]:
+    """Open the sessions; each fails here where its hand does."""
+    async with AsyncExitStack() as stack:
+        slider_clients = []
+        for k in range(number):
+            session = connect(server.session(house.bake), subprotocols=[SPEAKS], max_size=None, compression=None)
+            slider, span = sliders[k % len(sliders)]
+            connection = await stack.enter_async_context(session)
+            await connection.send(OPENING)
+            slider_clients.append(SliderClient(connection, slider, span, 0.618 * k))
+        reading = [asyncio.create_task(slider_client.run()) for slider_client in slider_clients]
+        try:
+            yield slider_clients
+            for task in reading:
+                if task.done():
+                    task.result()
+        finally:
+            for task in reading:
+                task.cancel()
+
+
+def _frames(slider_clients: Sequence[SliderClient]) -> int:
+    return sum(slider_client.num_frames for slider_client in slider_clients)
+
+
+def _spent_s(server: Server) -> float:
+    """Processor time of the server's process so far; nothing where the system does not say."""
+    stat = Path(f"/proc/{server.pid}/stat")
+    if not stat.is_file():
+        return 0.0
+    user, system = stat.read_text().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")

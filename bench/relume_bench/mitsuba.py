@@ -1,0 +1,149 @@
+"""Hands scenes to Mitsuba 3, which lives in its own environment.
+
+`python3 -m venv bench/.venv-peers` and `bench/.venv-peers/bin/pip install mitsuba numpy`, or RELUME_PEERS_PYTHON names
+an interpreter that has it. DRJIT_LIBLLVM_PATH names the LLVM library if it is not found under /usr/lib.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term_validation import complete_term
+from relume.scene.model import Scene
+
+F32 = NDArray[np.float32]
+
+_FINE_ROWS = 2048  # of a map that is handed over, where n times its rows may be as many
+_MAX_SPP_PER_PASS = 32  # at once; more would not fit in memory
+
+
+def missing() -> str | None:
+    """What Mitsuba lacks to run here; None where it can."""
+    if _interpreter() is None:
+        return "Mitsuba is not installed; bench/relume_bench/mitsuba.py says where it is looked for"
+    if _llvm() is None:
+        return "there is no LLVM library; install libllvm19 or set DRJIT_LIBLLVM_PATH"
+    return None
+
+
+def _interpreter() -> Path | None:
+    default = Path(__file__).parents[1] / ".venv-peers" / "bin" / "python"
+    python = Path(os.environ.get("RELUME_PEERS_PYTHON", default))
+    return python if python.is_file() else None
+
+
+def _llvm() -> str | None:
+    libraries = sorted(map(str, Path("/usr/lib").glob("*/libLLVM*19*")))
+    return os.environ.get("DRJIT_LIBLLVM_PATH") or (libraries[0] if libraries else None)
+
+
+def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Terms of a material as a plugin of peer_mitsuba_plugins.py.
+
+    Args:
+        terms: `lambert` ones, and at most one `blinn_phong` or dielectric `cook_torrance`; textures are left out.
+    """
+    whole = [complete_term(("mitsuba",), term, None) for term in terms]
+    diffuse = np.sum([term["color"] for term in whole if term["model"] == "lambert"] or [[0.0] * 3], axis=0).tolist()
+    lobes = [term for term in whole if term["model"] != "lambert"]
+    if lobes and lobes[0]["model"] == "cook_torrance":
+        params = lobes[0]["params"]
+        return {
+            "type": "lambert_cook_torrance", "albedo": diffuse, "gain": lobes[0]["color"],
+            "sigma": params["sigma"], "ior": params["ior"],
+        }  # fmt: skip
+    glossy, exponent = (lobes[0]["color"], lobes[0]["params"]["exponent"]) if lobes else ([0.0] * 3, 1.0)
+    diffuse_fraction = sum(diffuse) / max(
+        1e-9, sum(diffuse) + 4 * sum(glossy)
+    )  # a highlight reflects up to four times its colour
+    return {
+        "type": "lambert_blinn_phong", "albedo": diffuse, "gain": glossy, "exponent": exponent,
+        "diffuse_share": diffuse_fraction,
+    }  # fmt: skip
+
+
+def map_for_mitsuba(radiance: F32) -> F32:
+    """An environment's map as Mitsuba reads it: row j of R lies at θ = π j/(R − 1), the first and last at the poles.
+
+    Finer rows lie within one of ours, or on the border of two, where they are the mean of both. Columns lie as ours.
+
+    Args:
+        radiance: (height, width, 3)
+    Returns:
+        (n · height + 1, n · width, 3), n from 2 to 8.
+    """
+    height = len(radiance)
+    finer = min(8, max(2, _FINE_ROWS // height))
+    row = np.arange(finer * height + 1)
+    above, below = np.maximum(row - 1, 0) // finer, np.minimum(row, finer * height - 1) // finer
+    return np.asarray(0.5 * (radiance[above] + radiance[below]), np.float32).repeat(finer, axis=1)
+
+
+def read_passes(folder: Path) -> F32:
+    """Read the independent pictures that `render` was asked for. (passes, height, width, 3)"""
+    return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
+
+
+def averaged(fine: NDArray[Any], finer: int) -> NDArray[np.float64]:
+    """Average a picture that has `with_detail` times as many pixels both ways as the peer's. (h, w, 3) float64"""
+    height, width, _ = fine.shape
+    blocks = fine.reshape(height // finer, finer, width // finer, finer, 3)
+    return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
+
+
+def render(
+    scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path, images: Mapping[str, F32] | None = None
+) -> dict[str, Any]:
+    """Hand the scene's first view over as arrays and let the peer render.
+
+    Args:
+        scene: that is handed over. size: width and height, pixels.
+        job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted; "bounces"
+            and "seen" where reflected light alone is (peer_mitsuba_render.py); "integrator" where more than direct
+            light is; "emitters", of lights beside the map; both are Mitsuba's own descriptions.
+        folder: where files of the exchange are written.
+        images: that descriptions of materials name as {"array": name}. (height, width, 1) each
+    Returns:
+        What it wrote to result.json in `folder`.
+    Raises:
+        CalledProcessError: the peer failed.
+    """
+    arrays: dict[str, Any] = {}
+    for k, mesh in enumerate(scene.meshes):
+        arrays |= {f"positions_{k}": mesh.positions, f"normals_{k}": mesh.normals, f"faces_{k}": mesh.faces}
+        arrays[f"uvs_{k}"] = mesh.uvs
+    return render_arrays(arrays | dict(images or {}), scene, size, job, folder)
+
+
+def render_arrays(
+    arrays: Mapping[str, Any], scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
+    """Let the peer render surfaces that are handed over as arrays, seen and lit as a scene's first view.
+
+    Args:
+        arrays: "positions_k", "normals_k", "uvs_k" and "faces_k" of each surface, and what descriptions name.
+        scene: whose camera and environment are taken.
+        size, job, folder: as of `render`.
+    """
+    camera, llvm = scene.cameras[0], _llvm()
+    arrays_by_name: dict[str, Any] = {
+        "camera": camera.to_world,
+        "environment": map_for_mitsuba(scene.environment.radiance),
+    }
+    np.savez(folder / "scene.npz", allow_pickle=False, **{**arrays_by_name, **arrays})
+    whole = {"yfov": camera.yfov, "size": list(size), "most": _MAX_SPP_PER_PASS, **job}
+    (folder / "job.json").write_text(json.dumps(whole))
+    script = Path(__file__).with_name("peer_mitsuba_render.py")
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(llvm)}
+    command = [str(_interpreter()), "-I", str(script), str(folder)]
+    subprocess.run(command, env=environment, check=True, timeout=3600)
+    result: dict[str, Any] = json.loads((folder / "result.json").read_text())
+    return result

@@ -1,0 +1,227 @@
+"""A built-in scene with views that move, as somebody moves an eye, a material or a light in it."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.primary_visibility import trace_primary as look_around
+from relume.live.free_camera.refine_job import RefineHighlights
+from relume.look import Look, complete, validate
+from relume.methods.free_camera_transfer import BakedFreeCamera
+from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.output.render_image import render_image
+from relume.scene.examples.catalog import built_in
+from relume.scene.model import Scene
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+from relume_bench.beside import BackgroundJobs
+from relume_bench.timing import percentiles
+
+_MOVED = 0.01  # of the distance to the target, each frame
+_CACHE_BYTES = 4 << 30
+_GOLDEN = 0.618
+_UNCOUNTED = 4  # drags; what is made beside them takes some tenths of a second each time
+
+
+class Drag(NamedTuple):
+    """Times of its frames.
+
+    Attributes:
+        seconds: of each. lag_s: how old the look is whose light between surfaces is shown, the median.
+    """
+
+    seconds: list[float]
+    lag_s: float
+
+    @property
+    def median_s(self) -> float:
+        """Of the frames."""
+        return float(np.median(self.seconds))
+
+    def summarize(self) -> dict[str, float]:
+        """What a context tells of it: milliseconds, and frames a second of all."""
+        p50, p95 = percentiles(self.seconds)
+        per_second = len(self.seconds) / sum(self.seconds)
+        return {"p50_ms": 1e3 * p50, "p95_ms": 1e3 * p95, "per_s": per_second, "lag_ms": 1e3 * self.lag_s}
+
+
+def run_update_jobs(picture: FreeCameraPicture) -> None:
+    """What is made beside the frames while a hand moves, made now."""
+    while (job := picture.next_job()) is not None and not job.is_refinement:
+        _run_job(picture, job)
+
+
+def run_light_jobs(picture: FreeCameraPicture | Picture) -> None:
+    """What follows when a hand rests: all its light is found; not the finer frame, which is no matter of light."""
+    while (job := picture.next_job()) is not None and not isinstance(job, RefineHighlights):
+        _run_job(picture, job)
+
+
+def _run_job(picture: FreeCameraPicture | Picture, job: Any) -> None:
+    picture.install(job, job.run(lambda share: None, lambda: False))
+    picture.advance(None)
+
+
+class FreeCameraScene:
+    """A built-in scene, baked with views that move.
+
+    Args:
+        name: of the scene. folder: for its stores. size: of pictures. tiny: whether it is a trial.
+        num_probes: about how many; None: 50,000.
+    """
+
+    def __init__(
+        self, name: str, folder: Path, size: tuple[int, int], tiny: bool, num_probes: int | None = None
+    ) -> None:
+        requested_probes = num_probes or (2000 if tiny else 50_000)
+        self.name, self.folder, self.size, self._scene = name, folder, size, built_in(name)
+        self.recipe = Recipe(
+            "surface", (self._scene.cameras[0].name,), size, 60 if tiny else 1000, num_points=requested_probes
+        )
+        bake_in_process(
+            METHODS["surface"], self._scene, replace(self.recipe, num_points=500), folder / f"{name}-warm.zarr"
+        )
+        start_time, path = time.perf_counter(), folder / f"{name}.zarr"
+        bake_in_process(METHODS["surface"], self._scene, self.recipe, path)
+        self.bake_s = time.perf_counter() - start_time
+        self.num_bytes = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+        self._num_drags, self._num_uncounted = 0, 1 if tiny else _UNCOUNTED
+        self.bake = open_bake(path, Cache(_CACHE_BYTES))
+        assert isinstance(self.bake, BakedFreeCamera)
+        self.free_camera_bake = self.bake
+        self.num_probes = self.free_camera_bake.stored_scene.probes.num_points
+        triangles = sum(len(mesh.faces) for mesh in self._scene.meshes)
+        self.sizes = {"size": f"{size[0]}×{size[1]}", "lights": self.recipe.num_lights, "triangles": triangles}
+
+    @property
+    def scene(self) -> Scene:
+        """As it was made."""
+        return self._scene
+
+    def look(self, change: Callable[[dict[str, Any]], None] = lambda document: None) -> Look:
+        """The scene's own, changed."""
+        document = copy.deepcopy(complete({}, self.free_camera_bake.default_look))
+        change(document)
+        return validate(document, self.free_camera_bake.default_look)
+
+    def picture(self, look: Look, *, is_watched: bool = False) -> FreeCameraPicture:
+        """A picture with that look, all its light there."""
+        picture = FreeCameraPicture(self.free_camera_bake, self.recipe.views[0], is_watched=is_watched)
+        picture.set_look(look)
+        picture.advance(None)
+        run_light_jobs(picture)
+        return picture
+
+    def time_camera_moves(
+        self, frames: int, change: Callable[[dict[str, Any]], None] = lambda document: None
+    ) -> list[float]:
+        """Seconds from an eye to its encoded frame, each once; of a changed look. Somebody watches."""
+        picture, camera = self.picture(self.look(change), is_watched=True), self._scene.cameras[0]
+
+        def move(k: int) -> None:
+            to_world = camera.to_world.copy()
+            to_world[:3, 3] += _MOVED * (k + 1) * to_world[:3, 0]
+            picture.set_camera(replace(camera, to_world=to_world), self.size)
+
+        return self._timed(picture, frames, move).seconds
+
+    def edits(
+        self,
+        frames: int,
+        change: Callable[[dict[str, Any], float], None],
+        *,
+        is_watched: bool = False,
+        on_frame: Callable[[FreeCameraPicture, int], None] = lambda picture, k: None,
+    ) -> Drag:
+        """A look after the other, each as soon as the frame of the one before is encoded.
+
+        Args:
+            frames: how many. change: of the look's document, by the share of the way. is_watched: somebody waits.
+            on_frame: what else happens to the picture in each frame.
+        Returns:
+            Seconds from each look to its frame. No two drags come to the same values: what an edit is projected to is
+            found in each.
+        """
+
+        def drag() -> Drag:
+            self._num_drags += 1
+            shift = self._num_drags * _GOLDEN % 1
+            looks = [
+                self.look(lambda document, k=k: change(document, (k + shift) / (frames + 1)))  # type: ignore[misc]
+                for k in range(frames + 1)
+            ]
+            picture = self.picture(looks[-1], is_watched=is_watched)
+
+            def apply_edit(k: int) -> None:
+                picture.set_look(looks[k])
+                on_frame(picture, k)
+
+            return self._timed(picture, frames, apply_edit)
+
+        for _ in range(self._num_uncounted):  # of a process just begun, kernels are loaded and memory is touched first
+            drag()
+        return drag()
+
+    def measure_visible_fraction(self, material: str) -> float:
+        """Share of the first view's pixels that show a material."""
+        face = look_around(
+            self.free_camera_bake.stored_scene, self.free_camera_bake.embree, self._scene.cameras[0], self.size
+        ).hits.face
+        face = face[: self.size[0] * self.size[1]]
+        visible_material = self.free_camera_bake.stored_scene.face_material[face[face >= 0]]
+        return float(np.sum(visible_material == list(self.free_camera_bake.material_names).index(material)) / len(face))
+
+    def _timed(self, picture: FreeCameraPicture, frames: int, apply_edit: Callable[[int], None]) -> Drag:
+        frame_times = []
+        with BackgroundJobs(picture) as background:
+            for k in range(frames):
+                start_time = time.perf_counter()
+                apply_edit(k)
+                background.request()
+                picture.advance(None)
+                picture.encode(picture.all_tiles(), "rgb9e5")
+                frame_times.append(time.perf_counter() - start_time)
+                background.start_next()
+        return Drag(frame_times, background.lag_s)
+
+    def exact(self, change: Callable[[dict[str, Any]], None]) -> NDArray[np.float32]:
+        """The picture of a fixed view from the same place."""
+        path = self.folder / f"{self.name}-gather.zarr"
+        if not path.exists():
+            bake_in_process(METHODS["gather"], self._scene, replace(self.recipe, method="gather"), path)
+        transfer = open_transfer(path, Cache(_CACHE_BYTES))
+        return render_image(transfer, self.recipe.views[0], self.look(change))[..., :3]
+
+    def inner(self) -> NDArray[np.bool_]:
+        """Pixels whose neighbours see the same face's plane: no edge of an object. (height, width)"""
+        gbuffer = look_around(
+            self.free_camera_bake.stored_scene, self.free_camera_bake.embree, self._scene.cameras[0], self.size
+        )
+        width, height = self.size
+        num = width * height  # the first rays go through the middles of pixels
+        face = gbuffer.hits.face[:num].reshape(height, width)
+        normal = np.where(face[..., None] >= 0, self.free_camera_bake.stored_scene.face_normal[np.maximum(face, 0)], 0)
+        offset = (gbuffer.hits.distance[:num, None] * gbuffer.directions[:num]).reshape(height, width, 3)
+        level = np.einsum("hwc,hwc->hw", normal, np.where(face[..., None] >= 0, offset, 0))
+        inner = face >= 0
+        for axis in (0, 1):
+            for step in (1, -1):
+                same = np.abs(np.roll(normal, step, axis) - normal).max(axis=2) < 0.2
+                inner &= same & (np.abs(np.roll(level, step, axis) - level) < 0.02 * np.abs(level).max())
+        return inner
+
+
+def rotated(document: dict[str, Any], fraction: float) -> None:
+    """Turn the environment by a share of a quarter turn."""
+    document["environment"]["rotation"] = 90 * fraction

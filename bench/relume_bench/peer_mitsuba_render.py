@@ -1,0 +1,178 @@
+"""Renders a scene with Mitsuba 3 at rising sample counts; run by the peer's own interpreter, knows nothing of relume.
+
+python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json, and picture.npy
+                                            or passes.npy (as many independent pictures as the job asks for)
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+mi: Any = __import__("mitsuba")
+mi.set_variant("llvm_ad_rgb")
+sys.path.append(str(Path(__file__).parent))  # the interpreter is isolated
+plugins: Any = __import__("peer_mitsuba_plugins")
+__import__("peer_mitsuba_gltf")
+
+
+def resolve_description(arrays: Any, value: Any) -> Any:
+    """A description with its images.
+
+    Args:
+        arrays: of scene.npz.
+        value: {"array": name} in it becomes a texture of that array, (height, width, 1 or 3), its values as they are;
+            "wrap_mode" and "filter_type" may stand beside it.
+    """
+    if isinstance(value, dict) and "array" in value:
+        plain_entries = {key: entry for key, entry in value.items() if key != "array"}
+        return {"type": "bitmap", "bitmap": mi.Bitmap(arrays[value["array"]]), "raw": True, **plain_entries}
+    if isinstance(value, dict) and value.get("type") != "rgb":
+        return {key: resolve_description(arrays, entry) for key, entry in value.items()}
+    return mi.ScalarVector3f(value) if isinstance(value, list) else value
+
+
+def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
+    """One mesh of the scene.
+
+    Args:
+        arrays: of scene.npz. k: which mesh; "NAME_of_k" of the arrays are attributes of its vertices.
+        bsdf: its material, as `relume_bench.mitsuba.bsdf` describes it; "interior" is the medium inside, "emitter" what
+            it shines. One that is neither a dielectric nor has "sides" is the same from both.
+    """
+    props = mi.Properties()
+    attached = {
+        key: mi.load_dict(resolve_description(arrays, bsdf[key])) for key in ("interior", "emitter") if key in bsdf
+    }
+    bsdf_entries = {
+        key: resolve_description(arrays, value)
+        for key, value in bsdf.items()
+        if key not in ("interior", "emitter", "sides")
+    }
+    has_sides = "dielectric" in bsdf_entries["type"] or "sides" in bsdf
+    props["mesh_bsdf"] = mi.load_dict(bsdf_entries if has_sides else {"type": "twosided", "front": bsdf_entries})
+    for key, value in attached.items():
+        props[key] = value
+    positions, faces = arrays[f"positions_{k}"], arrays[f"faces_{k}"]
+    vertex_flags = {"has_vertex_normals": True, "has_vertex_texcoords": True}
+    shape = mi.Mesh(f"mesh_{k}", len(positions), len(faces), **vertex_flags, props=props)
+    for name in (name for name in arrays if name.endswith(f"_of_{k}")):
+        values = arrays[name]
+        shape.add_attribute(f"vertex_{name.removesuffix(f'_of_{k}')}", values.shape[1], values.ravel())
+    params = mi.traverse(shape)
+    params["vertex_texcoords"] = arrays[f"uvs_{k}"].ravel()
+    params["vertex_positions"], params["vertex_normals"] = positions.ravel(), arrays[f"normals_{k}"].ravel()
+    params["faces"] = faces.ravel()
+    params.update()
+    return shape
+
+
+def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
+    """The scene with a BSDF for each mesh.
+
+    Our cameras look along -Z with +X to the right, Mitsuba's along +Z with +X to the left; our maps have +X in their
+    middle, Mitsuba's +Z.
+
+    Args:
+        folder: with scene.npz. job: of job.json: size, camera, emitters, integrator, by default of direct light.
+        bsdfs: descriptions, one a mesh.
+    """
+    arrays = np.load(folder / "scene.npz", allow_pickle=False)
+    transform = mi.ScalarTransform4f
+    sensor = {
+        "type": "perspective",
+        "fov": float(np.degrees(job["yfov"])),
+        "fov_axis": "y",
+        "to_world": transform((arrays["camera"] @ np.diag([-1.0, 1.0, -1.0, 1.0])).tolist()),
+        "film": {
+            "type": "hdrfilm", "width": job["size"][0], "height": job["size"][1],
+            "rfilter": {"type": "box"}, "pixel_format": "rgb", "component_format": "float32",
+        },
+    }  # fmt: skip
+    environment = {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(arrays["environment"]),
+        "to_world": transform().rotate([0, 1, 0], 90),
+    }
+    integrator = job.get("integrator", {"type": "direct"})
+    scene = {"type": "scene", "integrator": integrator, "sensor": sensor, "light": environment}
+    for k, emitter in enumerate(job.get("emitters", [])):
+        placed = {key: transform(np.reshape(emitter[key], (4, 4)).tolist()) for key in ("to_world",) if key in emitter}
+        scene[f"emitter_{k}"] = {**emitter, **placed}
+    for k, bsdf in enumerate(bsdfs):
+        scene[f"shape_{k}"] = mesh(arrays, k, bsdf)
+    return mi.load_dict(scene)
+
+
+def renderer(folder: Path, job: dict[str, Any]) -> Callable[[int, int], Any]:
+    """What makes a picture of so many samples a pixel from a seed, `job["most"]` samples at once.
+
+    Direct light; or, where the job says "bounces", the light alone that surfaces have reflected so many times at most
+    onto what the camera sees. "bsdfs" are of the surfaces on the way, "seen" of what the camera sees.
+    """
+    scene, max_spp = load(folder, job, job["bsdfs"]), job["most"]
+    is_direct = "bounces" not in job
+    integrator = None if is_direct else plugins.Indirect(load(folder, job, job["seen"]), job["bounces"])
+
+    def render(spp: int, seed: int) -> Any:
+        total: Any = 0.0
+        passes = max(1, spp // max_spp)
+        for k in range(passes):
+            picture = mi.render(scene, integrator=integrator, spp=min(spp, max_spp), seed=seed * 10_000 + k)
+            total = total + np.array(picture)
+        return total / passes
+
+    return render
+
+
+def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:
+    """Render two pictures with different seeds at each count: their difference is √2 times the error of one.
+
+    Args:
+        render: makes a picture of so many samples a pixel from a seed.
+        job: its "spp" are the counts, rising; "most" of them are rendered at once.
+        folder: where picture.npy, of the last count, and result.json are written.
+    """
+    render(job["spp"][0], 99)  # compiles
+    step_results = []
+    for spp in job["spp"]:
+        if spp >= job["most"]:
+            render(job["most"], 98)  # each wavefront size warms up by itself
+        start_time = time.perf_counter()
+        first_image, second_image = (render(spp, seed) for seed in (1, 2))
+        taken_s = (time.perf_counter() - start_time) / 2
+        picture = (first_image + second_image) / 2
+        scale = np.sqrt(np.mean(picture[..., :3] ** 2))
+        error = np.sqrt(np.mean((first_image - second_image) ** 2) / 2) / scale
+        step_results.append({"spp": spp, "seconds": taken_s, "error": float(error)})
+    np.save(folder / "picture.npy", np.ascontiguousarray(picture[..., :3], np.float32))
+    (folder / "result.json").write_text(json.dumps({"steps": step_results, "version": mi.__version__}))
+
+
+def passes(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:
+    """Render pictures that are independent of each other.
+
+    Args:
+        render: makes a picture of so many samples a pixel from a seed.
+        job: its first "spp" is the count, and "passes" the number of pictures.
+        folder: where passes.npy, (passes, height, width, 3), and result.json are written.
+    """
+    pictures = [render(job["spp"][0], seed)[..., :3] for seed in range(job["passes"])]
+    np.save(folder / "passes.npy", np.array(pictures, np.float32))
+    (folder / "result.json").write_text(json.dumps({"version": mi.__version__}))
+
+
+def main(folder: Path) -> None:
+    """Render what job.json asks for."""
+    job = json.loads((folder / "job.json").read_text())
+    (passes if "passes" in job else steps)(renderer(folder, job), job, folder)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,181 @@
+"""Materials of a glTF file as the peer's BSDF has them, factors times images. See `relume_bench.gltf_plain`.
+
+Glass is the peer's own dielectric: thin where the file names no thickness, else solid and filled with what absorbs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume_bench.gltf_plain import File
+
+F32 = NDArray[np.float32]
+Description = dict[str, Any]
+
+_FINER = 4  # texels of a mask that is cut, for each of the image's
+_LEAST_SHEEN = 0.07**2
+
+
+class Materials:
+    """Describes the materials of one file.
+
+    Attributes:
+        arrays: images that descriptions name.
+    """
+
+    def __init__(self, file: File) -> None:
+        self._file = file
+        self.arrays: dict[str, F32] = {}
+
+    def bsdf(self, number: int | None, has: Mapping[str, Any]) -> Description:
+        """A material, complete, with what it shines.
+
+        Args:
+            number: of it in the file; None for the default. has: attributes of the surface that wears it.
+        """
+        description = {} if number is None else self._file.json["materials"][number]
+        pbr, name = description.get("pbrMetallicRoughness", {}), f"m{number}"
+        reflecting = self._reflecting(description, pbr, name, has)
+        transmission = _extension(description, "transmission").get("transmissionFactor", 0.0)
+        if transmission:
+            return self._glass(description, pbr, transmission)
+        whole: Description = {"type": "twosided", "front": reflecting}
+        if description.get("alphaMode", "OPAQUE") != "OPAQUE":
+            whole = {"type": "mask", "opacity": self._opacity(description, pbr, name), "content": whole}
+        return {**whole, "sides": True, **self._make_emitter(description, name)}
+
+    def _reflecting(self, description: Description, pbr: Description, name: str, has: Mapping[str, Any]) -> Description:
+        specular, coat, sheen = (_extension(description, kind) for kind in ("specular", "clearcoat", "sheen"))
+        ior = _extension(description, "ior").get("ior", 1.5)
+        bsdf: Description = {"type": "gltf", "f0": 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2}
+        factor = pbr.get("baseColorFactor", [1, 1, 1, 1])[:3]
+        self._add(bsdf, name, "base", pbr.get("baseColorTexture"), factor, slice(3), is_color=True)
+        metallic_roughness = pbr.get("metallicRoughnessTexture")
+        self._add(bsdf, name, "rough", metallic_roughness, pbr.get("roughnessFactor", 1.0), slice(1, 2))
+        self._add(bsdf, name, "metal", metallic_roughness, pbr.get("metallicFactor", 1.0), slice(2, 3))
+        self._add(
+            bsdf, name, "weight", specular.get("specularTexture"), specular.get("specularFactor", 1.0), slice(3, 4)
+        )
+        tint = specular.get("specularColorFactor", [1, 1, 1])
+        self._add(bsdf, name, "tint", specular.get("specularColorTexture"), tint, slice(3), is_color=True)
+        if coat.get("clearcoatFactor", 0):
+            self._add(bsdf, name, "coat", coat.get("clearcoatTexture"), coat["clearcoatFactor"], slice(1))
+            coat_roughness = coat.get("clearcoatRoughnessFactor", 0.0)
+            self._add(bsdf, name, "coat_rough", coat.get("clearcoatRoughnessTexture"), coat_roughness, slice(1, 2))
+        if any(sheen.get("sheenColorFactor", [0])):
+            self._add(
+                bsdf, name, "sheen", sheen.get("sheenColorTexture"), sheen["sheenColorFactor"], slice(3), is_color=True
+            )
+            bsdf["sheen_alpha"] = max(sheen.get("sheenRoughnessFactor", 0.0) ** 2, _LEAST_SHEEN)
+        self._bend(bsdf, description, name, has)
+        return bsdf
+
+    def _bend(self, bsdf: Description, description: Description, name: str, has: Mapping[str, Any]) -> None:
+        """Normals, the direction of anisotropy, colours of vertices."""
+        stretched = _extension(description, "anisotropy")
+        if (info := description.get("normalTexture")) is not None:
+            normal_map = np.asarray(self._file.image(info["index"])[..., :3] / np.float32(127.5) - 1, np.float32)
+            normal_map *= np.array([info.get("scale", 1.0)] * 2 + [1.0], np.float32)
+            normal_map /= np.linalg.norm(normal_map, axis=2, keepdims=True)
+            bsdf["normal"] = self._image(f"{name}_normal", np.asarray(normal_map * 0.5 + 0.5, np.float32), info)
+            _set_uv_transform(bsdf, "normal", info)
+        if stretched.get("anisotropyStrength", 0):
+            bsdf["anisotropy"] = stretched["anisotropyStrength"]
+            bsdf["turn"] = stretched.get("anisotropyRotation", 0.0)
+        if "TANGENT" in has and ("normal" in bsdf or "anisotropy" in bsdf):
+            bsdf["tangent"] = {"type": "mesh_attribute", "name": "vertex_tangent"}
+            bsdf["hand"] = {"type": "mesh_attribute", "name": "vertex_hand"}
+        if "COLOR_0" in has:
+            bsdf["colors"] = {"type": "mesh_attribute", "name": "vertex_colors"}
+
+    def _add(
+        self, bsdf: Description, name: str, key: str, info: Description | None, factor: Any, channels: slice,
+        *, is_color: bool = False,
+    ) -> None:  # fmt: skip
+        texels = np.ones((1, 1, len(np.atleast_1d(factor))), np.float32)
+        if info is not None:
+            image_values = np.asarray(self._file.image(info["index"])[..., channels] / np.float32(255), np.float32)
+            texels = _linear(image_values) if is_color else image_values
+        texels = texels * np.atleast_1d(np.asarray(factor, np.float32))
+        bsdf[key] = self._image(f"{name}_{key}", texels, info)
+        _set_uv_transform(bsdf, key, info)
+
+    def _image(self, name: str, texels: F32, info: Description | None, **more: Any) -> Description:
+        self.arrays[name] = np.ascontiguousarray(texels, np.float32)
+        return {"array": name, **({} if info is None else {"wrap_mode": self._file.wraps(info["index"])}), **more}
+
+    def _opacity(self, description: Description, pbr: Description, name: str) -> Any:
+        """Alpha, cut where it is a mask: between texels as well."""
+        info, alpha = pbr.get("baseColorTexture"), pbr.get("baseColorFactor", [1, 1, 1, 1])[3]
+        texels = np.full((1, 1, 1), alpha, np.float32)
+        if info is not None:
+            texels = texels * self._file.image(info["index"])[..., 3:] / np.float32(255)
+        if description["alphaMode"] == "BLEND":
+            return self._image(f"{name}_alpha", texels, info)
+        fine = _finer(texels, _FINER) if info is not None else texels
+        cut = (fine >= description.get("alphaCutoff", 0.5)).astype(np.float32)
+        return self._image(f"{name}_alpha", cut, info, filter_type="nearest")
+
+    def _make_emitter(self, description: Description, name: str) -> Description:
+        factor = np.array(description.get("emissiveFactor", [0, 0, 0]), np.float32)
+        factor = factor * np.float32(_extension(description, "emissive_strength").get("emissiveStrength", 1.0))
+        if not factor.any():
+            return {}
+        info, texels = description.get("emissiveTexture"), np.ones((1, 1, 3), np.float32)
+        if info is not None:
+            texels = _linear(np.asarray(self._file.image(info["index"])[..., :3] / np.float32(255), np.float32))
+        if not texels.any():
+            return {}
+        return {"emitter": {"type": "area", "radiance": self._image(f"{name}_emission", texels * factor, info)}}
+
+    def _glass(self, description: Description, pbr: Description, transmission: float) -> Description:
+        volume, ior = _extension(description, "volume"), _extension(description, "ior").get("ior", 1.5)
+        tint = {"type": "rgb", "value": [transmission * c for c in pbr.get("baseColorFactor", [1, 1, 1, 1])[:3]]}
+        if not volume.get("thicknessFactor", 0):
+            return {"type": "thindielectric", "int_ior": ior, "specular_transmittance": tint}
+        distance = volume.get("attenuationDistance", np.inf)
+        absorbed = -np.log(np.maximum(volume.get("attenuationColor", [1, 1, 1]), 1e-6)) / distance
+        max_absorption = float(max(*absorbed, 1e-9))
+        rate = {"type": "rgb", "value": (absorbed / max_absorption).tolist()}
+        inside = {"type": "homogeneous", "albedo": 0.0, "scale": max_absorption, "sigma_t": rate}
+        roughness = pbr.get("roughnessFactor", 1.0) if "metallicRoughnessTexture" not in pbr else 0.0
+        kind: Description = {"type": "dielectric"}
+        if roughness > 0.1:
+            kind = {"type": "roughdielectric", "distribution": "ggx", "alpha": roughness**2}
+        return {**kind, "int_ior": ior, "specular_transmittance": tint, "interior": inside}
+
+
+def _extension(description: Description, kind: str) -> Description:
+    extension: Description = description.get("extensions", {}).get(f"KHR_materials_{kind}", {})
+    return extension
+
+
+def _set_uv_transform(bsdf: Description, key: str, info: Description | None) -> None:
+    """Where a texture lies, by KHR_texture_transform: translation · rotation · scale, v down."""
+    uv_transform = (info or {}).get("extensions", {}).get("KHR_texture_transform")
+    if uv_transform is None:
+        return
+    c, s = np.cos(uv_transform.get("rotation", 0.0)), np.sin(uv_transform.get("rotation", 0.0))
+    (x, y), (u, v) = uv_transform.get("offset", [0, 0]), uv_transform.get("scale", [1, 1])
+    rows = [[c * u, s * v, x], [-s * u, c * v, y]]
+    bsdf |= {f"{key}_{row}{column}": float(rows[row][column]) for row in range(2) for column in range(3)}
+
+
+def _linear(display: F32) -> F32:
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def _finer(texels: F32, times: int) -> F32:
+    """Bilinear between the middles of texels, which go round at the borders. (times · rows, times · columns, ...)"""
+    for axis in (0, 1):
+        size = texels.shape[axis]
+        position = (np.arange(size * times) + 0.5) / times - 0.5
+        low = np.floor(position).astype(int)
+        fraction = (position - low).astype(np.float32).reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+        below, above = (np.take(texels, (low + k) % size, axis=axis) for k in (0, 1))
+        texels = below * (1 - fraction) + above * fraction
+    return texels

@@ -1,0 +1,53 @@
+"""Bake a saved scene as a worker process does and report its cost.
+
+`python -m relume_bench.plan_process FOLDER RECIPE`.
+
+RECIPE is JSON as `relume_worker.status.recipe_json` writes it. Prints one line of JSON: bytes of memory at the most,
+samples of all views, rays, bytes of the store's arrays. Linux only: the system counts the memory.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import distributed.worker  # noqa: F401  a worker process holds it too
+
+from relume.methods.registry import METHODS
+from relume.scene.scene_folder import load_scene
+from relume.store import bake_in_process, open_store
+from relume.store.bake_protocol import Task, TaskOutput
+from relume.store.publish import array_paths
+from relume_worker.status import FREE_CAMERA_METHODS, recipe_from_json
+
+
+def main(folder: str, recipe: str) -> None:
+    """Bake, look at the store, print."""
+    planned_recipe, rays = recipe_from_json(recipe), 0
+
+    def count(_: Task, written: TaskOutput) -> None:
+        nonlocal rays
+        rays += written.num_rays
+
+    with tempfile.TemporaryDirectory() as target:
+        scene = load_scene(folder)
+        store = bake_in_process(METHODS[planned_recipe.method], scene, planned_recipe, Path(target) / "s.zarr", count)
+        peak_bytes = _peak_bytes()
+        reader = open_store(store)
+        view_arrays = [f"views/{k}/pixel" for k in range(len(planned_recipe.views))]
+        sample_arrays = ["points/material"] if planned_recipe.method in FREE_CAMERA_METHODS else view_arrays
+        samples = sum(reader.shape(path)[0] for path in sample_arrays)
+        store_bytes = sum(reader.read(path).nbytes for path in array_paths(store))
+    print(json.dumps({"peak_bytes": peak_bytes, "view_samples": samples, "rays": rays, "store_bytes": store_bytes}))
+
+
+def _peak_bytes() -> int:
+    """The most memory that this process has held since it was started."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,252 @@
+"""The list of benchmarks, and the loop that runs them. To add one: write its module and add a line here."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from datetime import date
+from typing import Any
+
+from relume.store.schema import SCHEMA_VERSION
+from relume_bench.figure import Figure
+from relume_bench.machine import measure_stolen_fraction, processor_ticks
+
+
+@dataclass(frozen=True)
+class Group:
+    """Figures that are measured together, by `measure(tiny)` of a module.
+
+    Attributes:
+        tiny: of `measure`: sizes that end in seconds and mean nothing, for the tests.
+    """
+
+    module: str
+    names: tuple[str, ...]
+
+    def measure(self, tiny: bool) -> list[Figure]:
+        """Run it; a failure is a figure without a value."""
+        start_time, ticks = time.perf_counter(), processor_ticks()
+        try:
+            figures: list[Figure] = importlib.import_module(self.module).measure(tiny)
+        except Exception as error:  # the other groups shall be measured
+            traceback.print_exc()
+            return [Figure(name, None, "", {"failed": f"{type(error).__name__}: {error}"[:500]}) for name in self.names]
+        details = {
+            "measured_in_s": round(time.perf_counter() - start_time, 1),
+            "stolen_share": measure_stolen_fraction(ticks, processor_ticks()),
+            "measured_on": f"{date.today().isoformat()}, schema {SCHEMA_VERSION}",
+        }
+        return [replace(figure, context={**figure.context, **details}) for figure in figures]
+
+
+GROUPS = (
+    Group("relume_bench.bandwidth", ("frame.bandwidth_ratio",)),
+    Group("relume_bench.incremental", ("frame.incremental_rmse",)),
+    Group("relume_bench.curve_switch", ("freeze.curve_switch_s",)),
+    Group("relume_bench.curve_switch_terms", ("freeze.terms_s",)),
+    Group("relume_bench.shade", ("shade.pairs_per_s_vs_limit", "shade.vs_leaves")),
+    Group(
+        "relume_bench.opening",
+        (
+            "opening.first_s",
+            "opening.exact_s",
+            "opening.exact_gather_s",
+            "opening.ahead_s",
+            "opening.ahead_gather_s",
+            "opening.relit_s",
+            "opening.relit_gather_s",
+            "opening.large_first_s",
+            "opening.large_exact_s",
+            "opening.large_edit_ms",
+            "opening.larger_ratio",
+        ),
+    ),
+    Group("relume_bench.glimpse", ("glimpse.speedup", "glimpse.error")),
+    Group("relume_bench.slider_drag", ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")),
+    Group("relume_bench.large", ("large.frame_ms", "large.frame_ratio", "large.bytes_ratio")),
+    Group("relume_bench.sharp_slider", ("slider.sharp_error", "slider.sharp_levels")),
+    Group("relume_bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
+    Group(
+        "relume_bench.accuracy_terms",
+        (
+            "accuracy.oren_nayar",
+            "accuracy.phong",
+            "accuracy.blinn_phong",
+            "accuracy.lafortune",
+            "accuracy.ward",
+            "accuracy.ward_duer",
+            "accuracy.ward_anisotropic",
+            "accuracy.ashikhmin_shirley",
+            "accuracy.cook_torrance",
+            "accuracy.schlick",
+            "accuracy.beard_maxwell",
+            "accuracy.ggx",
+        ),
+    ),
+    Group("relume_bench.paper_fig5", ("paper.fig5_incremental", "paper.fig5_non_linear")),
+    Group("relume_bench.truth", ("truth.mitsuba",)),
+    Group("relume_bench.rotation", ("accuracy.rotation_lambert", "accuracy.rotation_cook_torrance_0.2")),
+    Group("relume_bench.swap", ("accuracy.swap_lambert", "accuracy.swap_cook_torrance_0.2")),
+    Group("relume_bench.pca", ("pca.blinn_phong_6", "pca.vectors", "pca.slider_nodes")),
+    Group("relume_bench.rays", ("bake.rays_vs_embreex",)),
+    Group("relume_bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),
+    Group("relume_bench.ray_saving", ("bake.ray_saving",)),
+    Group("relume_bench.store_size", ("store.bytes_per_view_sample",)),
+    Group("relume_bench.plan_disk", ("plan.disk_ratio",)),
+    Group("relume_bench.plan", ("plan.memory_share", "plan.samples_share", "plan.store_share", "plan.rays_share")),
+    Group("relume_bench.mesh_files", ("import.obj", "import.ply")),
+    Group("relume_bench.workers", ("bake.two_workers_speedup",)),
+    Group("relume_bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),
+    Group("relume_bench.refusal", ("import.refusal_ms",)),
+    Group("relume_bench.slow_readers", ("slow_readers.mb",)),
+    Group("relume_bench.entering", ("rooms.enter_s",)),
+    Group("relume_bench.load", ("load.drag_beside_renders_ratio",)),
+    Group("relume_bench.many", ("load.aggregate_ratio", "load.frame_cost_ratio")),
+    Group("relume_bench.flood", ("flood.latency_ratio",)),
+    Group("relume_bench.demo", ("demo.preview_s", "demo.bake_s", "demo.first_picture_s")),
+    Group("relume_bench.canvas", ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")),
+    Group("relume_bench.gather", ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")),
+    Group(
+        "relume_bench.surface_truth",
+        tuple(
+            f"surface.rmse_{kind}" for kind in ("diffuse", "hard_sun", "glossy_0.5", "glossy_0.3", "ggx_0.5", "ggx_0.3")
+        ),
+    ),
+    Group("relume_bench.resting", ("surface.rest_s", "surface.rest_first_s")),
+    Group("relume_bench.canvas_moving", ("surface.canvas_fps",)),
+    Group("relume_bench.btf", ("btf.compression_error", "btf.compression_ratio", "btf.compression_s")),
+    Group("relume_bench.btf_true", ("btf.geometry_rmse", "btf.sphere_rmse", "btf.table_rmse")),
+    Group("relume_bench.btf_shown", ("btf.view_fps", "btf.light_ms", "btf.light_bytes")),
+    Group("relume_bench.btf_held", ("btf.held_ms",)),
+    Group("relume_bench.btf_several", ("btf.several_ratio", "btf.five_vs_two")),
+    Group("relume_bench.in_out", ("in_out.phong_terms_per_exponent", "in_out.torrance_sparrow_terms_sigma2")),
+    Group(
+        "relume_bench.surface",
+        (
+            "surface.bake_s",
+            "surface.bytes_per_point",
+            "surface.view_fps",
+            "surface.sun_fps",
+            "surface.brdf_ms",
+            "surface.light_ms",
+            "surface.against_fixed_diffuse",
+            "surface.against_fixed_glossy_0.5",
+            "surface.against_fixed_glossy_0.3",
+        ),
+    ),
+    Group("relume_bench.surface_edits", ("surface.brdf_vs_sun",)),
+    Group("relume_bench.surface_points", ("surface.points_rmse",)),
+    Group("relume_bench.surface_live", ("surface.all_vs_sun", "surface.first_touch_s", "surface.follow_error")),
+    Group("relume_bench.gather_rooms", ("gather.interior_bake_s", "gather.interior_store_mb")),
+    Group("relume_bench.gather_lights", ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")),
+    Group("relume_bench.gather_follow", ("gather.follow_error",)),
+    Group("relume_bench.gather_error", ("gather.rmse_diffuse", "gather.rmse_glossy")),
+    Group(
+        "relume_bench.gather_scenes",
+        ("gather.rmse_cornell_box", "gather.rmse_tableau", "gather.rmse_still_life", "gather.rmse_interior"),
+    ),
+    Group(
+        "relume_bench.gather_full",
+        tuple(
+            f"gather.full_{kind}_{scene}"
+            for scene in ("cornell_box", "tableau", "still_life", "interior")
+            for kind in ("rmse", "bias")
+        ),
+    ),
+    Group("relume_bench.glass", ("glass.rmse",)),
+    Group("relume_bench.rough", ("rough.rmse",)),
+    Group("relume_bench.real_files", ("assets.rmse",)),
+    Group("relume_bench.mirror", ("mirror.rmse", "mirror.sharp_rmse")),
+    Group(
+        "relume_bench.estimators",
+        (
+            "estimators.final_gather",
+            "estimators.connect_equal_rays",
+            "estimators.connect_equal_store",
+            "estimators.connect_all",
+        ),
+    ),
+    Group(
+        "relume_bench.lights",
+        (
+            "lights.rmse_point",
+            "lights.rmse_spot",
+            "lights.rmse_directional",
+            "lights.rmse_rectangle",
+            "lights.gain_fps",
+        ),
+    ),
+    Group(
+        "relume_bench.memory",
+        (
+            "memory.server_after_mb",
+            "memory.workers_after_mb",
+            "memory.server_rest_mb",
+            "memory.workers_rest_mb",
+            "memory.server_growth",
+        ),
+    ),
+    Group("relume_bench.peer_mitsuba", ("peer.mitsuba_time_ratio",)),
+    Group("relume_bench.peer_gather", ("peer.mitsuba_gather_time_ratio", "peer.cycles_time_ratio")),
+)
+
+
+_NOTEWORTHY = 0.02
+
+
+def names() -> list[str]:
+    """All figures, in the order they are measured."""
+    return [name for group in GROUPS for name in group.names]
+
+
+def measure(prefix: str, tiny: bool = False) -> Iterator[Figure]:
+    """Measure the groups that have a figure whose name starts with `prefix`; yields those figures."""
+    for group in GROUPS:
+        names = [name for name in group.names if name.startswith(prefix)]
+        if names:
+            yield from (figure for figure in group.measure(tiny) if figure.name in names)
+
+
+def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
+    """Measure and print; 1 where something failed or nothing has such a name.
+
+    Args:
+        prefix: figures whose name starts with it are measured; "" for all.
+        as_json: print a list of figures to standard output, and lines for people to standard error.
+        tiny: sizes that end in seconds and mean nothing, for the tests.
+    """
+    if not any(name.startswith(prefix) for name in names()):
+        print(f"relume: no benchmark starts with {prefix!r}; there are {', '.join(names())}", file=sys.stderr)
+        return 1
+    figures = []
+    for figure in measure(prefix, tiny):
+        figures.append(figure)
+        print(_line(figure), file=sys.stderr if as_json else sys.stdout, flush=True)
+    if as_json:
+        print(json.dumps([_plain(asdict(figure)) for figure in figures], indent=1, allow_nan=False))
+    return 1 if any("failed" in figure.context for figure in figures) else 0
+
+
+def _line(figure: Figure) -> str:
+    if figure.value is None:
+        return f"{figure.name:<32} -  {figure.context.get('skipped') or figure.context.get('failed')}"
+    stolen = figure.context.get("stolen_share") or 0
+    stolen_note = f"   (the host gave {stolen:.0%} of the processor time to others)" if stolen >= _NOTEWORTHY else ""
+    error = "" if figure.standard_error is None else f" ± {figure.standard_error:.2g}"
+    return f"{figure.name:<32} {figure.value:.4g}{error} {figure.unit}{stolen_note}"
+
+
+def _plain(value: Any) -> Any:
+    """Numbers short enough to read, NumPy's as Python's."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return float(f"{value:.6g}") if isinstance(value, float) else value

@@ -1,0 +1,118 @@
+"""Bakes whose light is weighed again: tiles and shadow rays as they were, power and moments those of another map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.environments.environment import Environment
+from relume.brdf.curves import curve_bands
+from relume.brdf.registry import TERMS
+from relume.brdf.term_validation import complete_term
+from relume.core.jackknife import JackknifeEstimate
+from relume.lights.sphere_tiles import Tiles, choose_tiles
+from relume.lights.spherical_triangles import RotatedEnvironment, TriangleLights, integrate_environment
+from relume.operators.shade import shade
+from relume.raytrace.visibility import trace_visibility
+from relume.reference import environment_texels, reference_radiance
+from relume_bench.figure import Figure
+from relume_bench.points import LitSamples
+from relume_bench.scenes import LAMBERT, cook_torrance
+from relume_bench.standard_error import estimate_point_error
+
+F64 = NDArray[np.float64]
+
+
+def documents(kind: str) -> dict[str, dict[str, Any]]:
+    """Complete terms that are compared, by the name of their figure."""
+    terms = {"lambert": LAMBERT, "cook_torrance_0.2": cook_torrance(0.2)}
+    return {f"accuracy.{kind}_{name}": complete_term(("accuracy",), dict(term), None) for name, term in terms.items()}
+
+
+@dataclass(frozen=True)
+class Bake:
+    """Tiles and where their shadow rays went."""
+
+    tiles: Tiles
+    towards: NDArray[np.float32]
+
+
+def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
+    """What a bake of this environment keeps.
+
+    Args:
+        num_lights: tiles into which the sphere is divided, at least.
+        relightable: tiles do not depend on where the light is, and shadow rays go to their middles.
+    """
+    tiles = choose_tiles(environment.radiance, num_lights, relightable)
+    centroids = tiles.centroids.astype(np.float32)
+    return Bake(
+        tiles,
+        centroids
+        if relightable
+        else integrate_environment(tiles, RotatedEnvironment.from_radiance(environment.radiance)).direction,
+    )
+
+
+def compare(
+    lit_samples: LitSamples,
+    bakes: Mapping[str, Bake],
+    light: Environment,
+    terms: Mapping[str, Mapping[str, Any]],
+    spp: int,
+) -> dict[tuple[str, str], JackknifeEstimate]:
+    """Relative RMSE of each term in each bake, of the same points under one light.
+
+    Args:
+        lit_samples: the points; what they see is traced anew for each bake.
+        bakes: by a name for each.
+        light: the map that is shown.
+        terms: complete ones, by the names of their figures.
+        spp: texels of the truth at each point; 0 for every texel.
+    Returns:
+        By the names of term and bake.
+    """
+    documents = [[dict(document)] for document in terms.values()]
+    reference = reference_radiance(
+        lit_samples.geometry, environment_texels(light), lit_samples.surface_points, documents, spp
+    )
+    errors = {}
+    for kind, baked in bakes.items():
+        lights = integrate_environment(baked.tiles, RotatedEnvironment.from_radiance(light.radiance))
+        for (name, document), right in zip(terms.items(), reference, strict=True):
+            errors[name, kind] = estimate_point_error(_radiance(lit_samples, baked, lights, document), right)
+    return errors
+
+
+def _radiance(lit_samples: LitSamples, baked: Bake, lights: TriangleLights, document: Mapping[str, Any]) -> F64:
+    """Of the points under the lights in a bake's tiles. (n, 3)"""
+    surface_points, term = lit_samples.surface_points, TERMS[document["model"]]
+    visible = trace_visibility(
+        lit_samples.geometry.embree, surface_points.position, surface_points.normal, baked.towards
+    ).visible
+    bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
+    receivers = replace(lit_samples.receivers, visible=visible)
+    image = shade(term, bands, lights, receivers, lambda share: None, lambda: False).image
+    radiance = image.transpose(0, 2, 1).reshape(-1, 3)[: surface_points.num_points]
+    return np.asarray(radiance.astype(np.float64) * np.asarray(document["color"]))
+
+
+def figures(errors_by_name: Mapping[str, Mapping[str, JackknifeEstimate]], context: Mapping[str, Any]) -> list[Figure]:
+    """Each figure's worst error of a relightable bake; all errors, labelled "kind, …", beside it."""
+    results = []
+    for name, errors in errors_by_name.items():
+        worst, plain = _worst(errors, "relightable"), _worst(errors, "plain")
+        details = {"plain": plain.value, "plain_standard_error": plain.standard_error}
+        values_by_label = {label: error.value for label, error in errors.items()}
+        results.append(
+            Figure(name, worst.value, "relative RMSE", {**context, **details, **values_by_label}, worst.standard_error)
+        )
+    return results
+
+
+def _worst(errors: Mapping[str, JackknifeEstimate], kind: str) -> JackknifeEstimate:
+    return max(error for label, error in errors.items() if label.startswith(kind))

@@ -1,0 +1,139 @@
+"""surface.rest_s, surface.rest_first_s: what somebody waits who has moved the eye and lets it rest.
+
+The eye of the still life, 640×480, steps aside twice, and is then given the time that it needs; the median of both.
+From the eye's last move to the encoded exact picture, without the quarter of a second that a session waits before it
+begins. `tracing_s` of that are view samples, shadow rays and gather rays; the rest is shading. `direct_s`: the same
+under a look without reflected light, for which no gather rays are traced. `free_camera_error` is how far the moving
+picture was from the exact one that replaces it, edges included, which only the exact one antialiases.
+
+`surface.rest_first_s` ends with the moving picture that a few exact samples have corrected; `first_error` is how
+far that was from the exact one, `its_…` are of the Cornell box.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.core.thread_pools import num_threads
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
+from relume.live.free_camera.refinement.refinement_jobs import TRACING_FRACTION, SparseExactJob, StaticViewJob
+from relume.look import complete, validate
+from relume.methods.free_camera_transfer import BakedFreeCamera
+from relume.methods.registry import METHODS, open_bake
+from relume.methods.static_view import StaticViewBuilder
+from relume.scene.examples.catalog import built_in
+from relume.scene.model import Scene
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+from relume_bench.figure import Figure
+
+_CACHE_BYTES = 4 << 30
+
+
+class _Convergence(NamedTuple):
+    """Seconds until the exact picture, those in which it was traced, and until the first corrected one; errors.
+
+    `error` and `first_error` are the relative RMSE of the moving picture, and of the corrected one.
+    """
+
+    convergence_s: float
+    tracing_s: float
+    error: float
+    first_s: float
+    first_error: float
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake both scenes, move the eye, wait."""
+    still_life = _measure_scene("interior" if tiny else "still_life", (64, 48) if tiny else (640, 480), tiny)
+    box = still_life if tiny else _measure_scene("cornell_box", (400, 400), tiny)
+    whole, direct = still_life
+    context = {
+        "size": "640×480",
+        "tracing_s": whole.tracing_s,
+        "direct_s": direct.convergence_s,
+        "moving_error": whole.error,
+    }
+    box_context = {
+        "cornell_box_400": box[0].convergence_s,
+        "its_tracing_s": box[0].tracing_s,
+        "its_direct_s": box[1].convergence_s,
+    }
+    errors = {"size": "640×480", "moving_error": whole.error, "first_error": whole.first_error}
+    errors |= {"its_moving_error": box[0].error, "its_first_error": box[0].first_error}
+    threads = {"threads": num_threads()}
+    return [
+        Figure("surface.rest_s", whole.convergence_s, "s", {**context, **box_context, **threads}),
+        Figure("surface.rest_first_s", whole.first_s, "s", {**errors, "cornell_box_400": box[0].first_s, **threads}),
+    ]
+
+
+def _measure_scene(name: str, size: tuple[int, int], tiny: bool) -> tuple[_Convergence, _Convergence]:
+    """Of all light, and of that which comes straight."""
+    scene = built_in(name)
+    recipe = Recipe(
+        "surface", (scene.cameras[0].name,), size, 60 if tiny else 1000, num_points=2000 if tiny else 50_000
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        path = bake_in_process(METHODS["surface"], scene, recipe, Path(folder) / "moving.zarr")
+        convergences = []
+        for light_paths in ("all", "direct"):
+            free_camera_bake = open_bake(path, Cache(_CACHE_BYTES))
+            assert isinstance(free_camera_bake, BakedFreeCamera)
+            convergences.append(_median(scene, free_camera_bake, size, light_paths))
+    return convergences[0], convergences[1]
+
+
+def _median(scene: Scene, free_camera_bake: BakedFreeCamera, size: tuple[int, int], light_paths: str) -> _Convergence:
+    """Two rests of one session, after one in a small picture, in which kernels are compiled and cells are lit."""
+    look = validate(
+        complete({"transport": {"show": light_paths}}, free_camera_bake.default_look), free_camera_bake.default_look
+    )
+    picture = ProgressivePicture(
+        FreeCameraPicture(free_camera_bake, scene.cameras[0].name),
+        StaticViewBuilder(free_camera_bake.light_transport, scene).make_static_view,
+        free_camera_bake.cache,
+    )
+    picture.set_look(look)
+    coarse_size = size[0] // 4, size[1] // 4
+    _, *counted = (_measure_convergence(scene, picture, step, coarse_size if step == 0 else size) for step in range(3))
+    return _Convergence(*np.median(np.array(counted), axis=0).tolist())
+
+
+def _measure_convergence(scene: Scene, picture: ProgressivePicture, step: int, size: tuple[int, int]) -> _Convergence:
+    camera = scene.cameras[0]
+    to_world = camera.to_world.copy()
+    to_world[:3, 3] += 0.01 * (step + 1) * to_world[:3, 0]
+    picture.set_camera(replace(camera, to_world=to_world), size)
+    picture.advance(None)
+    before, start_time, first, first_s, tracing_s = picture.image().copy(), time.perf_counter(), None, 0.0, 0.0
+    while (job := picture.next_job()) is not None:
+        job_began = time.perf_counter()
+
+        def record_progress(fraction: float, job: object = job, job_began: float = job_began) -> None:
+            nonlocal tracing_s
+            if fraction <= TRACING_FRACTION and isinstance(job, StaticViewJob):
+                tracing_s = time.perf_counter() - job_began
+
+        picture.install(job, job.run(record_progress, lambda: False))
+        picture.advance(None)
+        if isinstance(job, SparseExactJob):
+            picture.encode(picture.all_tiles(), "rgb9e5")
+            first, first_s = picture.image().copy(), time.perf_counter() - start_time
+    picture.encode(picture.all_tiles(), "rgb9e5")
+    convergence_s, exact = time.perf_counter() - start_time, picture.image()
+    first_error = _error(before if first is None else first, exact)
+    return _Convergence(convergence_s, tracing_s, _error(before, exact), first_s, first_error)
+
+
+def _error(image: NDArray[np.float32], exact: NDArray[np.float32]) -> float:
+    return float(np.sqrt(np.mean((image - exact) ** 2) / np.mean(exact**2)))

@@ -1,0 +1,82 @@
+"""Figures that are estimates, with their standard errors: each independent part is left out in turn (the jackknife)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.jackknife import JackknifeEstimate, jackknife, rms_of_parts
+from relume.reference.comparison import error_squared
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+class NoiseCorrectedError(NamedTuple):
+    """A picture against independent noisy ones of the truth, their noise taken off.
+
+    Attributes:
+        error: relative RMSE of the picture; 0 where its estimated square is negative.
+        bias: the picture's mean over the truth's, less one.
+        noise: relative RMS of the noise that the mean of all passes has.
+        limit: what the relative RMSE is very likely below, by two standard errors of its square.
+    """
+
+    error: JackknifeEstimate
+    bias: JackknifeEstimate
+    noise: float
+    limit: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the error can be told from the noise: its square is more than two of its standard errors."""
+        return self.error.value > 0 and self.limit**2 < 2 * self.error.value**2
+
+    @property
+    def summary(self) -> str:
+        """Error and bias in words, for the row of another figure."""
+        return f"{100 * self.error.value:.1f} % (bias {100 * self.bias.value:.1f} %)"
+
+    @property
+    def context(self) -> dict[str, float]:
+        """All but the error, for the row of a figure."""
+        return {
+            "bias": self.bias.value, "bias_standard_error": self.bias.standard_error,
+            "noise": self.noise, "limit": self.limit,
+        }  # fmt: skip
+
+
+def estimate_point_error(values: NDArray[np.floating], reference: NDArray[np.floating]) -> JackknifeEstimate:
+    """Relative RMSE √(Σ (found − truth)² / Σ truth²) over points that were drawn at random.
+
+    Args:
+        values, reference: radiance or irradiance. (n, channels), n at least 2
+    """
+    reference = reference.astype(np.float64)
+    squared_errors, squared_reference = ((values - reference) ** 2).sum(axis=1), (reference**2).sum(axis=1)
+    return rms_of_parts(squared_errors, squared_reference)
+
+
+def compare_with_passes(rendered: F64, passes: F32) -> NoiseCorrectedError:
+    """Relative RMSE of a picture against the mean that noisy pictures share: E[(o − a)(o − b)] = (o − mean)².
+
+    The standard error is that of the passes' noise; the picture itself is taken as it is.
+
+    Args:
+        rendered: (height, width, 3).
+        passes: (passes, height, width, 3), at least 2 of them.
+    """
+    num, mean_squared_radiance = len(passes), error_squared(np.zeros_like(rendered), passes)[0]
+    relative_squared_error, deviation = (term / mean_squared_radiance for term in error_squared(rendered, passes))
+    error = np.sqrt(max(0.0, relative_squared_error))
+    means = passes.mean(axis=(1, 2, 3), dtype=np.float64)
+    biases = rendered.mean() / ((means.sum() - means) / (num - 1)) - 1
+    spread = ((passes - passes.mean(axis=0, dtype=np.float64)) ** 2).mean() / (num - 1)
+    return NoiseCorrectedError(
+        JackknifeEstimate(float(error), float(np.sqrt(max(0.0, relative_squared_error) + deviation) - error)),
+        JackknifeEstimate(float(rendered.mean() / means.mean() - 1), jackknife(biases)),
+        float(np.sqrt(spread / mean_squared_radiance)),
+        float(np.sqrt(max(0.0, relative_squared_error) + 2 * deviation)),
+    )

@@ -1,0 +1,122 @@
+"""surface.*: what somebody waits who moves the eye, a material or a light of a view that moves.
+
+Scenes: the Cornell box under the sky at 400×400, and the still life at 640×480, which has twice as many triangles as
+points. Times are from a message's content to the encoded bytes. `surface.view_fps`: the eye moves sideways, the
+look stays, and highlights are found finely only once the eye rests; `surface.sun_fps`: the same under a clear sky,
+the shadows of whose sun pixels find. `surface.brdf_ms`: the exponent of the floor's highlight moves, the eye and
+the lights stay; `edited_share` of the picture's pixels show it.
+What surfaces reflect onto each other is made beside the frames and follows `lag_ms` behind; `per_s` counts all frames,
+those among them that show it in every pixel, too. `surface.light_ms`: the environment turns, with all bounces, and
+is followed roughly, in the same way; `all_points_ms` is what all of it takes, at rest.
+`surface.against_fixed_…` is the moving view against the picture that replaces it, of a `gather` bake from the same
+place, pixels at edges of objects left out, which one side has antialiased; both spread evenly what highlights send to
+other surfaces.
+"""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.core.thread_pools import num_threads
+from relume_bench.figure import Figure
+from relume_bench.moving_scene import FreeCameraScene, rotated
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake both scenes, move, edit, compare."""
+    with tempfile.TemporaryDirectory() as folder:
+        box = FreeCameraScene("cornell_box", Path(folder), (60, 60) if tiny else (400, 400), tiny)
+        still_life = FreeCameraScene(
+            "interior" if tiny else "still_life", Path(folder), (64, 48) if tiny else (640, 480), tiny
+        )
+        frames = 3 if tiny else 60
+        camera_times = {scene.name: scene.time_camera_moves(frames) for scene in (box, still_life)}
+        sun_times = {scene.name: scene.time_camera_moves(frames, _clear) for scene in (box, still_life)}
+        context = {"threads": num_threads(), "points": {scene.name: scene.num_probes for scene in (box, still_life)}}
+        brdf, light = (
+            box.edits(frames, make_exponent_edit(_EDITED), is_watched=True),
+            box.edits(max(2, frames // 6), rotated, is_watched=True),
+        )
+        exactly = {"all_points_ms": 1e3 * box.edits(3, rotated).median_s}
+        return [
+            Figure(
+                "surface.bake_s", still_life.bake_s, "s", {**context, "cornell_box": box.bake_s, **still_life.sizes}
+            ),
+            Figure("surface.bytes_per_point", still_life.num_bytes / still_life.num_probes, "bytes", context),
+            Figure(
+                "surface.view_fps",
+                1 / float(np.median(camera_times[still_life.name])),
+                "frames/s",
+                {**context, "size": "640×480", "cornell_box_400": 1 / float(np.median(camera_times["cornell_box"]))},
+            ),
+            Figure(
+                "surface.sun_fps",
+                1 / float(np.median(sun_times[still_life.name])),
+                "frames/s",
+                {**context, "size": "640×480", "cornell_box_400": 1 / float(np.median(sun_times["cornell_box"]))},
+            ),
+            Figure(
+                "surface.brdf_ms",
+                1e3 * brdf.median_s,
+                "ms",
+                {
+                    **context,
+                    **brdf.summarize(),
+                    "edited_share": box.measure_visible_fraction(_EDITED),
+                    "size": "400×400",
+                    "bounces": "all",
+                },
+            ),
+            Figure(
+                "surface.light_ms",
+                1e3 * light.median_s,
+                "ms",
+                {**context, **light.summarize(), **exactly, "size": "400×400", "bounces": "all"},
+            ),
+            *(_error(box if "diffuse" in name else still_life, name, terms) for name, terms in _MATERIALS.items()),
+        ]
+
+
+_MATERIALS: dict[str, list[dict[str, Any]]] = {
+    "surface.against_fixed_diffuse": [{"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}],
+    "surface.against_fixed_glossy_0.5": [{"model": "ggx", "params": {"roughness": 0.5, "f0": 0.9}, "texture": None}],
+    "surface.against_fixed_glossy_0.3": [{"model": "ggx", "params": {"roughness": 0.3, "f0": 0.9}, "texture": None}],
+}
+_EDITED = "Floor"
+_GLOSSY = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "texture": None, "params": {"exponent": 20.0}}
+
+
+def _clear(document: dict[str, Any]) -> None:
+    document["environment"]["map"] = "clear_sky"
+
+
+def make_exponent_edit(material: str) -> Callable[[dict[str, Any], float], None]:
+    """A change of a look: the exponent of a highlight of a material, from 5 to 35 by a share."""
+
+    def change(document: dict[str, Any], fraction: float) -> None:
+        white = {"model": "lambert", "color": [0.3, 0.3, 0.3], "texture": None}
+        highlight = {**_GLOSSY, "params": {"exponent": 5.0 + 30 * fraction}}
+        document["materials"][material]["terms"] = [white, highlight]
+
+    return change
+
+
+def _error(scene: FreeCameraScene, name: str, terms: list[dict[str, Any]]) -> Figure:
+    """Of a scene whose surfaces are all of one material."""
+
+    def change(document: dict[str, Any]) -> None:
+        for material in document["materials"].values():
+            material["terms"] = copy.deepcopy(terms)
+
+    image, exact, inner = scene.picture(scene.look(change)).image(), scene.exact(change), scene.inner()
+    error = float(np.sqrt(np.mean((image[inner] - exact[inner]) ** 2) / np.mean(exact[inner] ** 2)))
+    bias = float(image[inner].mean() / exact[inner].mean() - 1)
+    everywhere = float(np.sqrt(np.mean((image - exact) ** 2) / np.mean(exact**2)))
+    context = {"scene": scene.name, "bias": bias, "with_edges": everywhere, "pixels": int(inner.sum()), **scene.sizes}
+    return Figure(name, 100 * error, "%", context)

@@ -1,0 +1,58 @@
+"""surface.brdf_vs_sun: how many times as soon as with Sun 2007 the picture of an edited material is there.
+
+    ratio = (1 / frames a second of Sun 2007, table 1, "V&B") / (median from a look to its encoded frame)
+
+The value is the smallest of three: Tweety, Indoor and Watch, with as many vertices as the Cornell box has points here.
+The exponent of the floor's highlight moves; what the floor sends to others follows some frames behind, `lag_ms`, made
+beside the frames on the same cores. `p95_ms` is of frames that show it in all pixels, `per_s` counts all; `max_spread`
+is the ratio of the walls. The eye stands, as in an editor; Sun's column lets view and BRDF change at once, on a machine
+of 2007, in scenes and at frame sizes of its own. `moved_eye` is the ratio where our eye moves in each frame, too.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from relume.core.thread_pools import num_threads
+from relume_bench.figure import Figure
+from relume_bench.moving_scene import Drag, FreeCameraScene
+from relume_bench.surface import make_exponent_edit
+
+_SUN_FRAME_RATES = {"tweety": (13_000, 28.73), "indoor": (35_700, 12.57), "watch": (62_100, 7.23)}
+_FLOOR, _WALLS = "Floor", "Walls"
+
+
+def measure(tiny: bool) -> list[Figure]:
+    """Bake the box with as many points as each of Sun's scenes has vertices, and edit it."""
+    frames, size = (3, (60, 60)) if tiny else (60, (400, 400))
+    context: dict[str, Any] = {"threads": num_threads(), "size": "×".join(map(str, size))}
+    ratios = []
+    for name, (num_probes, fps) in _SUN_FRAME_RATES.items():
+        with tempfile.TemporaryDirectory() as folder:
+            box = FreeCameraScene("cornell_box", Path(folder), size, tiny, num_probes=2000 if tiny else num_probes)
+            sun_frame_ms = 1e3 / fps
+            floor = box.edits(frames, make_exponent_edit(_FLOOR), is_watched=True)
+            widest = box.edits(frames, make_exponent_edit(_WALLS), is_watched=True)
+            moved = _drag_with_camera(box, frames)
+        ratios.append(sun_frame_ms / (1e3 * floor.median_s))
+        context |= {"floor": box.measure_visible_fraction(_FLOOR), "walls": box.measure_visible_fraction(_WALLS)}
+        context[name] = {
+            "points": box.num_probes, "sun_ms": sun_frame_ms, "ratio": ratios[-1], **floor.summarize(),
+            "widest": sun_frame_ms / (1e3 * widest.median_s), "moved_eye": sun_frame_ms / (1e3 * moved.median_s),
+        }  # fmt: skip
+    return [Figure("surface.brdf_vs_sun", min(ratios), "×", context)]
+
+
+def _drag_with_camera(box: FreeCameraScene, frames: int) -> Drag:
+    """Frames in which the eye moves and the floor is edited."""
+    camera, change = box.scene.cameras[0], make_exponent_edit(_FLOOR)
+
+    def move(picture: Any, k: int) -> None:
+        to_world = camera.to_world.copy()
+        to_world[:3, 3] += 0.01 * (k + 1) * to_world[:3, 0]
+        picture.set_camera(replace(camera, to_world=to_world), box.size)
+
+    return box.edits(max(2, frames // 3), change, is_watched=True, on_frame=move)

@@ -1,1 +1,0 @@
-"""`relume material`: measured materials, and textures that look different from every side."""

@@ -1,1 +1,0 @@
-"""Pictures that commands make: of which looks, where to, and how they are painted."""

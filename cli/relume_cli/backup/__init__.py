@@ -1,0 +1,1 @@
+"""Backup commands: create, check, restore."""

@@ -1,0 +1,131 @@
+"""`relume delete`: scenes, bakes, looks and environments that nobody needs any more."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+
+import typer
+
+from relume_cli.options import Data
+from relume_cli.terminal.printing import Json, print_result
+
+if TYPE_CHECKING:
+    from relume_cli.database.actions import OpenFolder
+
+Kind = Literal["scene", "bake", "look", "environment"]
+
+
+class Deletable(NamedTuple):
+    """One thing that is to be deleted: what names it, in words, and how."""
+
+    id: str
+    label: str
+    delete: Callable[[], object]
+
+
+def delete(
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What it is; a scene goes with its bakes.")],
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Ids or names, as relume list shows them.")],
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+    as_json: Json = False,
+    data: Data = None,
+) -> None:
+    """Delete scenes, bakes, looks or environments.
+
+    A server may go on; sessions that show a bake which is deleted are told, and end. Looks that name an environment
+    which is deleted are refused from then on.
+    """
+    from relume_cli.database.actions import open_data_folder
+    from relume_cli.tokens import audit_change
+
+    with open_data_folder(data) as data_folder:
+        deletables = list(
+            {deletable.id: deletable for deletable in (FINDERS[kind](data_folder, name) for name in names)}.values()
+        )
+        _confirm(deletables, yes)
+        for deletable in deletables:
+            deletable.delete()
+            audit_change(data_folder.access, f"delete {kind}", deletable.id)
+            print_result({"kind": kind, "id": deletable.id}, deletable.id, as_json=as_json)
+
+
+def _confirm(deletables: list[Deletable], yes: bool) -> None:
+    from relume.core.errors import PlanError
+
+    labels = ", ".join(deletable.label for deletable in deletables)
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise PlanError(f"there is no terminal to ask at; give --yes to delete {labels}")
+    typer.confirm(f"Delete {labels}?", abort=True, err=True)
+
+
+def _scene(data_folder: OpenFolder, name: str) -> Deletable:
+    from relume_cli.data_folder import find_scene
+    from relume_server.persistence.comment_store import CommentStore
+    from relume_worker.scenes import delete_scene
+
+    ledger = data_folder.service.ledger
+    scene = find_scene(ledger, name)
+    bakes = [bake.id for bake in data_folder.service.bakes(scene.id)]
+
+    def remove() -> None:
+        delete_scene(data_folder.service.data_dir, ledger, scene.id)
+        CommentStore(ledger.sessions).delete_scene(scene.id)
+        data_folder.access.quotas.disown("scene", scene.id)
+        data_folder.access.quotas.disown("bake", *bakes)
+
+    return Deletable(scene.id, f"scene {scene.id} ({scene.name}) with {len(bakes)} bakes", remove)
+
+
+def _bake(data_folder: OpenFolder, name: str) -> Deletable:
+    """By its id alone: of the bakes of a scene none is meant more than another."""
+    from relume.core.errors import NotFoundError
+    from relume_cli.database.actions import find_bakes
+    from relume_cli.terminal.documents import recipe_text
+
+    bakes = find_bakes(data_folder.service, name)
+    if len(bakes) > 1:
+        raise NotFoundError(f"{name!r} has {len(bakes)} bakes; give one of {', '.join(bake.id for bake in bakes[:10])}")
+
+    def remove() -> None:
+        data_folder.service.delete(bakes[0].id)
+        data_folder.access.quotas.disown("bake", bakes[0].id)
+
+    return Deletable(bakes[0].id, f"bake {bakes[0].id} ({recipe_text(bakes[0].recipe)})", remove)
+
+
+def _look(data_folder: OpenFolder, name: str) -> Deletable:
+    from relume_cli.name_lookup import pick
+    from relume_server.persistence.look_store import LookStore
+
+    store = LookStore(data_folder.service.ledger.sessions)
+    look_name = pick("look", name, [(look.name, look.name) for look in store.list()], "looks are saved in the editor")
+    etag = store.get(look_name).etag
+    return Deletable(look_name, f"look {look_name!r}", lambda: store.delete(look_name, etag))
+
+
+def _environment(data_folder: OpenFolder, name: str) -> Deletable:
+    from relume.assets.environments.environment_store import STORE, records
+    from relume_cli.name_lookup import pick
+    from relume_worker.paths import environments_path
+
+    folder = environments_path(data_folder.settings.data)
+    candidates = [(record.id, record.name) for record in records(folder)]
+    environment_id = pick("imported environment", name.removeprefix(STORE.prefix), candidates, "built-in ones stay")
+
+    def remove() -> None:
+        STORE.remove(folder, environment_id)
+        data_folder.access.quotas.disown("environment", environment_id)
+
+    return Deletable(environment_id, f"environment {environment_id} ({dict(candidates)[environment_id]})", remove)
+
+
+FINDERS: dict[Kind, Callable[[OpenFolder, str], Deletable]] = {
+    "scene": _scene,
+    "bake": _bake,
+    "look": _look,
+    "environment": _environment,
+}

@@ -1,0 +1,173 @@
+"""`relume list`: what there is to be named on the command line, in looks and in REST calls."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from relume_cli.options import Data
+from relume_cli.terminal.printing import Json, iso_time, print_result
+
+if TYPE_CHECKING:
+    from relume.assets.btf.btf_store import BtfRecord
+    from relume.assets.measured.measured_store import MaterialRecord
+    from relume_cli.database.actions import OpenFolder
+
+Kind = Literal["scenes", "bakes", "looks", "environments", "materials", "images", "renders", "built-ins"]
+Row = tuple[dict[str, Any], str]
+"""A thing as JSON, and as a line that begins with what names it."""
+
+
+def list_items(
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to list.", show_default=True)] = "scenes",
+    scene: Annotated[str | None, typer.Option("--scene", metavar="SCENE", help="Bakes: of this scene alone.")] = None,
+    state: Annotated[
+        str | None, typer.Option("--state", metavar="STATE", help="Bakes and renders: in this state alone.")
+    ] = None,
+    as_json: Json = False,
+    data: Data = None,
+) -> None:
+    """List scenes, bakes, looks and all else that has a name.
+
+    The newest comes first; what names a thing stands in front of its line.
+    """
+    from relume.core.errors import ParameterError
+    from relume_cli.database.actions import open_data_folder
+
+    if scene is not None and kind != "bakes":
+        raise ParameterError("--scene", scene, f"none with {kind}: bakes alone are of a scene")
+    if state is not None and kind not in ("bakes", "renders"):
+        raise ParameterError("--state", state, f"none with {kind}: bakes and renders alone have one")
+    if kind == "built-ins":
+        rows = _built_ins()
+    elif kind == "bakes":
+        with open_data_folder(data) as there:
+            rows = list(_bakes(there, scene, state))
+    else:
+        with open_data_folder(data) as data_folder:
+            rows = [row for row in LISTS[kind](data_folder) if state in (None, row[0].get("state"))]
+    for document, line in rows:
+        print_result(document, line, as_json=as_json)
+
+
+def _scenes(data_folder: OpenFolder) -> Iterator[Row]:
+    from relume_cli.terminal.documents import scene_document
+    from relume_worker.scenes import list_scenes
+
+    bakes = data_folder.service.bakes()
+    for record in list_scenes(data_folder.service.ledger):
+        scene_bakes = [status for status in bakes if status.scene == record.id]
+        line = f"{record.id}  {record.num_triangles:>10,} triangles  {len(scene_bakes):>3} bakes  {record.name}"
+        yield scene_document(record, scene_bakes), line
+
+
+def _bakes(data_folder: OpenFolder, scene: str | None, state: str | None) -> Iterator[Row]:
+    from relume_cli.data_folder import find_scene
+    from relume_cli.terminal.documents import bake_document, recipe_text
+    from relume_worker.scenes import list_scenes
+
+    names = {record.id: record.name for record in list_scenes(data_folder.service.ledger)}
+    scene_id = None if scene is None else find_scene(data_folder.service.ledger, scene).id
+    for status in data_folder.service.bakes(scene_id):
+        if state in (None, status.state):
+            name = names.get(status.scene, status.scene)
+            line = f"{status.id}  {status.state:9}  {status.progress:>4.0%}  {name}: {recipe_text(status.recipe)}"
+            yield bake_document(status, data_folder.service), line
+
+
+def _looks(data_folder: OpenFolder) -> Iterator[Row]:
+    from relume_server.persistence.look_store import LookStore
+
+    for look in LookStore(data_folder.service.ledger.sessions).list():
+        modified = iso_time(look.modified)
+        times = {"created": iso_time(look.created), "modified": modified}
+        document = {"name": look.name, "etag": look.etag, **times, "bytes": look.num_bytes}
+        yield document, f"{look.name}  {modified[:16]}"
+
+
+def _environments(data_folder: OpenFolder) -> Iterator[Row]:
+    from relume.assets.environments.built_in import BUILT_IN
+    from relume.assets.environments.environment_store import records
+    from relume_worker.paths import environments_path
+
+    for name, (label, _) in BUILT_IN.items():
+        yield {"id": name, "map": name, "name": label, "created": None, "warnings": []}, f"{name:20}  {label}"
+    for record in records(environments_path(data_folder.settings.data)):
+        created, warnings = iso_time(record.created), list(record.warnings)
+        document = {"id": record.id, "map": record.map, "name": record.name, "created": created, "warnings": warnings}
+        yield document, f"{record.map:20}  {record.name}"
+
+
+def _materials(data_folder: OpenFolder) -> Iterator[Row]:
+    from relume.assets.btf import btf_store
+    from relume.assets.measured import measured_store
+    from relume_worker.paths import btfs_path, materials_path
+
+    material_records: list[MaterialRecord | BtfRecord] = [
+        *measured_store.records(materials_path(data_folder.settings.data)),
+        *btf_store.records(btfs_path(data_folder.settings.data)),
+    ]
+    for record in material_records:
+        created, terms = iso_time(record.created), record.terms()
+        document = {"id": record.id, "data": record.data, "name": record.name, "created": created, "terms": terms}
+        yield document, f"{record.data:21}  {record.name}"
+
+
+def _images(data_folder: OpenFolder) -> Iterator[Row]:
+    from relume.images.image_store import records
+    from relume_worker.paths import images_path
+
+    for record in records(images_path(data_folder.settings.data)):
+        document = {
+            "id": record.id,
+            "texture": record.texture,
+            "name": record.name,
+            "created": iso_time(record.created),
+        }
+        yield document, f"{record.texture:22}  {record.name}"
+
+
+def _renders(data_folder: OpenFolder) -> Iterator[Row]:
+    """As the ledger has them; how far a server is within a frame it alone knows."""
+    from sqlalchemy import select
+
+    from relume_server.persistence.tables import RenderRow
+    from relume_server.schemas.renders import RenderRequest
+
+    with data_folder.service.ledger.sessions() as session:
+        rows = list(session.scalars(select(RenderRow).order_by(RenderRow.created.desc())))
+    for row in rows:
+        request = RenderRequest.model_validate(json.loads(row.request))
+        document = {
+            "id": row.id,
+            "bake": request.bake,
+            "view": request.view,
+            "format": request.format,
+            "size": request.size,
+            "state": row.state,
+            "done": row.done,
+            "total": request.num_frames,
+            "problem": row.problem,
+            "created": iso_time(row.created),
+        }
+        done = f"{row.done} of {request.num_frames} frames"
+        yield document, f"{row.id}  {row.state:9}  {done}  {request.name or request.view}, {request.format}"
+
+
+def _built_ins() -> list[Row]:
+    from relume.scene.examples.catalog import BUILT_IN
+
+    return [({"name": name, "label": entry.label}, f"{name:22}  {entry.label}") for name, entry in BUILT_IN.items()]
+
+
+LISTS: dict[str, Callable[[OpenFolder], Iterator[Row]]] = {
+    "scenes": _scenes,
+    "looks": _looks,
+    "environments": _environments,
+    "materials": _materials,
+    "images": _images,
+    "renders": _renders,
+}

@@ -1,0 +1,28 @@
+"""`relume ledger upgrade`: brings the ledger to the schema of this relume."""
+
+from __future__ import annotations
+
+from relume_cli.options import Data
+from relume_cli.terminal.printing import Json, print_result
+
+
+def ledger_upgrade(as_json: Json = False, data: Data = None) -> None:
+    """Upgrade the ledger for this relume; make a backup before.
+
+    No older relume may use it any more. Servers do by themselves what only adds to a ledger; this does the rest.
+    """
+    from relume_cli.data_folder import open_settings
+    from relume_worker.database.connect import connect
+    from relume_worker.database.upgrading import latest_revision, upgrade
+
+    engine = connect(open_settings(data).database_url)
+    try:
+        revisions = upgrade(engine, is_requested=True)
+    finally:
+        engine.dispose()
+    document = {"revision": latest_revision(), "made": [revision for revision, _ in revisions]}
+    lines = [
+        *(f"{revision}: {description}" for revision, description in revisions),
+        f"the ledger is at revision {latest_revision()}",
+    ]
+    print_result(document, "\n".join(lines), as_json=as_json)

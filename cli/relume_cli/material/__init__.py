@@ -1,0 +1,1 @@
+"""`relume material`: measured materials and BTFs."""

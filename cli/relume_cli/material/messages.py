@@ -1,0 +1,30 @@
+"""What commands say of a material that they have kept."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from relume_cli.terminal.printing import print_result
+
+if TYPE_CHECKING:
+    from relume.assets.btf.btf_store import BtfRecord
+    from relume.assets.measured.measured_store import MaterialRecord
+
+
+def print_material(record: BtfRecord | MaterialRecord, lines: list[str], *, as_json: bool) -> None:
+    """Print its name in looks, its terms, and how well it is kept.
+
+    Args:
+        record: of the material. lines: that say how well. as_json: whether JSON was asked for.
+    """
+    terms = record.terms()
+    document = {"id": record.id, "data": record.data, "name": record.name, "terms": terms}
+    details = [f"  {json.dumps({'terms': terms})}", *lines]
+    print_result(document, record.data, as_json=as_json, details=details)
+
+
+def print_btf(record: BtfRecord, *, as_json: bool) -> None:
+    """Print a BTF's name in looks, its terms, and how well it is kept."""
+    summary = f"  {record.clusters} clusters × {record.components} components, 1:{record.ratio:.0f}, "
+    print_material(record, [f"{summary}{record.error[-1]:.1%} relative RMS"], as_json=as_json)

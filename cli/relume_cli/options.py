@@ -1,0 +1,88 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from relume.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from relume.scene.custom_camera import CustomCamera
+
+Data = Annotated[
+    Path | None, typer.Option("--data", metavar="DIR", help="Data folder. [default: RELUME_DATA or user data]")
+]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Id of a scene, the start of one, or its name.")]
+BakeName = Annotated[
+    str,
+    typer.Argument(metavar="BAKE", help="Id of a bake, the start of one, or a scene, of which the finest is meant."),
+]
+View = Annotated[str | None, typer.Option("--view", metavar="NAME", help="View; the first one where not given.")]
+Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Width and height in pixels.")]
+LookFile = Annotated[
+    Path | None, typer.Option("--look", metavar="LOOK.json", help="Look document, may be partial; else the default.")
+]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Check all of it and say what would be done; do nothing.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="tcp://…", help="Dask scheduler to bake on; else processes of this machine."),
+]
+
+MAX_DOCUMENT_BYTES = 16 << 20
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height from "640x480". Raises ParameterError."""
+    match = re.fullmatch(r"([1-9]\d{0,4})[x×]([1-9]\d{0,4})", text)
+    if match is None:
+        raise ParameterError("--size", text, "width and height in pixels, such as 640x480")
+    return int(match[1]), int(match[2])
+
+
+def check_readable(option: str, path: Path) -> Path:
+    """The same path. Raises ParameterError where there is no file, or none that may be read."""
+    try:
+        with path.open("rb"):
+            return path
+    except OSError as error:
+        raise ParameterError(option, str(path), f"a file that exists and can be read ({error.strerror})") from None
+
+
+def read_look(path: Path | None) -> dict[str, object]:
+    """A look document from a file; an empty one where there is no file. Raises ParameterError."""
+    if path is None:
+        return {}
+    document = read_json("--look", path)
+    if not isinstance(document, dict):
+        raise ParameterError("--look", str(path), "a file with a JSON object")
+    return document
+
+
+def read_camera(path: Path) -> CustomCamera:
+    """A camera from a file. Raises ParameterError."""
+    from relume.scene.custom_camera import read_custom_camera
+
+    return read_custom_camera(read_json("--camera", path))
+
+
+def read_json(option: str, path: Path | None) -> object:
+    """A JSON document of bounded size, from a file, or from stdin where there is none. Raises ParameterError."""
+    if path is None:
+        text = sys.stdin.buffer.read(MAX_DOCUMENT_BYTES + 1)
+    else:
+        with check_readable(option, path).open("rb") as file:
+            text = file.read(MAX_DOCUMENT_BYTES + 1)
+    source = "-" if path is None else str(path)
+    if len(text) > MAX_DOCUMENT_BYTES:
+        raise ParameterError(option, source, f"at most {MAX_DOCUMENT_BYTES >> 20} MB of JSON")
+    try:
+        document: object = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ParameterError(option, source, f"a JSON document; {error}") from None
+    return document

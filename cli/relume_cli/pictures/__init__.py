@@ -1,0 +1,1 @@
+"""Images written by commands: which looks, where to, how."""

@@ -1,0 +1,59 @@
+"""The files of pictures that commands make."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from relume.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from relume.output.exr.layers import Layering
+
+FORMATS = (".exr", ".png", ".webp")
+
+
+class ExrOptions(NamedTuple):
+    """Options of EXR alone: layers (`relume.output.exr.layers`), precision, and linear color space."""
+
+    layering: Layering = False
+    precision: Literal["half", "float"] = "half"
+    color_space: str | None = None
+
+
+def exr_options(
+    output: Path, *, layers: bool, light_groups: bool, full_float: bool, color_space: str | None
+) -> ExrOptions:
+    """The options of EXR. Raises ParameterError where another file is written, or two exclude each other."""
+    if layers and light_groups:
+        raise ParameterError("--layers", "with --light-groups", "one of the two: each are the whole picture")
+    if (layers or light_groups or full_float or color_space) and output.suffix.lower() != ".exr":
+        allowed = "a file name that ends in .exr, for --layers, --light-groups, --float, --color-space"
+        raise ParameterError("--output", str(output), allowed)
+    return ExrOptions("light_groups" if light_groups else layers, "float" if full_float else "half", color_space)
+
+
+def check_output(path: Path) -> None:
+    """Raise ParameterError before hours of work where the picture could not be written."""
+    if path.suffix.lower() not in FORMATS:
+        raise ParameterError("--output", str(path), f"a file name that ends in {', '.join(FORMATS)}")
+    if not path.parent.is_dir():
+        raise ParameterError("--output", str(path), "a file in a folder that exists")
+
+
+def check_display_view(path: Path, look: Any) -> None:
+    """Raise ParameterError before hours of work where a look has a view that no config here has."""
+    from relume.image_io.ocio.active_config import require_config
+    from relume.image_io.ocio.view import OcioView
+
+    if path.suffix.lower() != ".exr" and isinstance(look.display.tone_map, OcioView):
+        require_config().check_view(look.display.tone_map)
+
+
+def save(path: Path, image: NDArray[Any], look: Any) -> None:
+    """Write linear radiance, (H, W, 3); formats for the screen are shown as the look's display says."""
+    from relume.image_io.write_image import write_image
+
+    write_image(path, image, look.display.exposure, look.display.tone_map)

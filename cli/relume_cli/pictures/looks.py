@@ -1,0 +1,95 @@
+"""The looks that a batch renders: files, folders of them, stdin, and saved ones."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from relume.core.errors import NotFoundError, ParameterError
+from relume_cli.name_lookup import match_name
+from relume_cli.options import read_json
+
+if TYPE_CHECKING:
+    from relume_server.persistence.look_store import LookStore
+
+Looks = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--look",
+        metavar="LOOK",
+        help="Look document: a file, a folder of them, - for stdin, or the name of a saved look; several times for "
+        "several. May be partial.",
+    ),
+]
+STDIN = "-"
+MAX_LOOKS = 1000
+
+
+class NamedLook(NamedTuple):
+    """A look document, perhaps partial, and what it is called."""
+
+    name: str
+    document: dict[str, Any]
+
+
+def read_looks(arguments: Sequence[str], look_store: LookStore) -> list[NamedLook]:
+    """All looks that are meant, in the order in which they were given; the scene's own where none was.
+
+    Args:
+        arguments: as on the command line. look_store: looks by name.
+    Raises:
+        ParameterError: one cannot be read, or is no look. NotFoundError: there is none of that name.
+    """
+    looks = [look for argument in arguments for look in _resolve_argument(argument, look_store)] or [
+        NamedLook("default", {})
+    ]
+    if len(looks) > MAX_LOOKS:
+        raise ParameterError("--look", f"{len(looks)} looks", f"at most {MAX_LOOKS:,}")
+    return looks
+
+
+def _resolve_argument(argument: str, look_store: LookStore) -> list[NamedLook]:
+    if argument == STDIN:
+        return _from_stdin()
+    path = Path(argument)
+    if path.is_dir():
+        files = sorted(path.glob("*.json"))
+        if not 1 <= len(files) <= MAX_LOOKS:
+            raise ParameterError("--look", argument, f"a folder with 1 to {MAX_LOOKS:,} files that end in .json")
+        return [_from_file(file) for file in files]
+    if path.is_file() or path.suffix.lower() == ".json" or "/" in argument:
+        return [_from_file(path)]
+    return [_by_name(argument, look_store)]
+
+
+def _from_file(path: Path) -> NamedLook:
+    return _make_named_look(path.stem, read_json("--look", path), str(path))
+
+
+def _from_stdin() -> list[NamedLook]:
+    """One object is a look, a list has several."""
+    document = read_json("--look", None)
+    if not isinstance(document, list):
+        return [_make_named_look("stdin", document, STDIN)]
+    return [
+        _make_named_look(f"{number:04d}", item, f"{STDIN}, number {number}") for number, item in enumerate(document)
+    ]
+
+
+def _make_named_look(name: str, document: object, source: str) -> NamedLook:
+    if not isinstance(document, dict):
+        raise ParameterError("--look", source, "a JSON object, as GET /api/looks/NAME answers")
+    return NamedLook(name, document)
+
+
+def _by_name(argument: str, look_store: LookStore) -> NamedLook:
+    names = [look.name for look in look_store.list()]
+    name = match_name(argument, names)
+    if name in names:
+        return _make_named_look(name, json.loads(look_store.get(name).document), name)
+    saved_names = ", ".join(repr(look_name) for look_name in names[:10]) or "none yet"
+    raise NotFoundError(f"--look is {argument[:80]!r}: no file, no folder and no saved look; saved are: {saved_names}")

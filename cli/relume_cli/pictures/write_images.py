@@ -1,0 +1,141 @@
+"""Paints pictures of an opened bake, and turntables: numbered frames of a scene, or of its light, from all sides."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from relume_cli.pictures.files import save
+from relume_cli.pictures.plans import VIDEO, frames_folder
+from relume_cli.terminal.progress import ReportProgress, report_part
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from relume.live.fixed_camera.protocols import OpenBake
+    from relume.look import Look
+    from relume.methods.static_view import StaticViewBuilder
+    from relume.scene.model import Camera
+    from relume_cli.pictures.files import ExrOptions
+    from relume_cli.pictures.plans import PlannedFile, TurntablePlan
+    from relume_server.schemas.renders import Animation
+    from relume_worker.scenes import SceneRecord
+    from relume_worker.status import BakeStatus
+
+
+class RenderSource(NamedTuple):
+    """What is rendered: a bake of a scene, opened, one of its views, and what makes exact pictures of moved eyes."""
+
+    scene: SceneRecord
+    bake: BakeStatus
+    view: str
+    transfer: OpenBake
+    static_views: StaticViewBuilder | None
+
+
+def write_picture(
+    source: RenderSource, look: Look, path: Path, exr: ExrOptions, report: Callable[[float], None]
+) -> None:
+    """Write the exact picture of a look.
+
+    Args:
+        source: a bake. look: complete. path: of the file. exr: used where it is one.
+        report: called with the share done.
+    """
+    from relume.output.render_image import render_image
+
+    if path.suffix.lower() == ".exr":
+        _write_exr(source, look, path, exr, report)
+        return
+    image = render_image(
+        source.transfer, source.view, look, progress=report, for_display=True, static_views=source.static_views
+    )
+    save(path, image, look)
+
+
+def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, report: Callable[[float], None]) -> None:
+    from relume.live.fixed_camera.protocols import EditAxis
+    from relume.output.exr.color_space import find_space
+    from relume.output.exr.export import export_exr
+    from relume.output.exr.layers import make_layers
+    from relume.output.exr.metadata import Provenance, build_attributes
+    from relume.output.render_image import render_image
+
+    view = source.transfer.views[source.view]
+    layers = make_layers(exr.layering, look, has_indirect=EditAxis.BOUNCES in source.transfer.axes)
+    space = find_space(exr.color_space)
+    origin = Provenance(source.scene.id, source.scene.name, source.bake.id)
+    export_exr(
+        path,
+        lambda shown, told: render_image(
+            source.transfer, source.view, shown, progress=told, static_views=source.static_views
+        ),
+        look,
+        layers,
+        build_attributes(origin, view.camera, (view.width, view.height), look, layers, space),
+        exr.precision,
+        report,
+        space,
+    )
+
+
+def write_turntable(
+    source: RenderSource, planned_file: PlannedFile, turntable_plan: TurntablePlan, report: ReportProgress
+) -> None:
+    """Write 0000.png, 0001.png, … into a folder, but for those that are there; or a video of them.
+
+    Args:
+        source: an opened bake, whose eyes move where the way needs it. planned_file: a look, and where it goes.
+        turntable_plan: how. report: called with the share done, in frames too.
+    """
+    from relume.output.render_image import render_image
+    from relume_server.batch.frame_sequence import look_at_frame
+    from relume_server.io.video import write_video
+
+    animation, cameras = check_turntable(source, planned_file, turntable_plan)
+    folder, view = frames_folder(planned_file.path), source.transfer.views[source.view]
+    folder.mkdir(exist_ok=True)
+
+    def frame(camera: Camera | None, frame_look: Look, report_frame: Callable[[float], None]) -> NDArray[Any]:
+        camera_and_size = None if camera is None else (camera, (view.width, view.height))
+        return render_image(
+            source.transfer,
+            source.view,
+            frame_look,
+            progress=report_frame,
+            for_display=True,
+            camera_and_size=camera_and_size,
+            static_views=source.static_views,
+        )
+
+    for index, camera in enumerate(cameras):
+        file, frame_look = folder / f"{index:04d}.png", look_at_frame(animation, source.view, source.transfer, index)
+        if not file.exists():
+            report_frame = report_part(
+                report, index, turntable_plan.frames, f"frame {index + 1} of {turntable_plan.frames}"
+            )
+            save(file, frame(camera, frame_look, report_frame), frame_look)
+    if planned_file.path.suffix.lower() == VIDEO:
+        report(1.0, "making the video")
+        write_video(folder, turntable_plan.fps, planned_file.path, lambda: False)
+        shutil.rmtree(folder)
+
+
+def check_turntable(
+    source: RenderSource, planned_file: PlannedFile, turntable_plan: TurntablePlan
+) -> tuple[Animation, Sequence[Camera | None]]:
+    """What the frames show, and from where.
+
+    Args:
+        source: an opened bake. planned_file: a look, and where it goes. turntable_plan: how.
+    Raises:
+        ParameterError: the bake cannot follow.
+    """
+    from relume_server.batch.frame_sequence import check_animation
+    from relume_server.schemas.renders import Animation, Turntable
+
+    path = Turntable(turntable=turntable_plan.frames, turns=turntable_plan.subject)
+    animation = Animation(bake=source.bake.id, looks=[planned_file.document], path=path)
+    return animation, check_animation(animation, source.view, source.transfer)

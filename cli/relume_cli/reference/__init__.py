@@ -1,0 +1,1 @@
+"""`relume reference`: brute force from the command line."""

@@ -1,0 +1,99 @@
+"""Scenes and bakes as JSON: the fields of the bodies that REST answers with, by the same names."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from relume_cli.terminal.printing import iso_time, size_text
+from relume_worker.status import FREE_CAMERA_METHODS
+
+if TYPE_CHECKING:
+    from relume.store.bake_protocol import Plan, Recipe
+    from relume_worker.scenes import SceneRecord
+    from relume_worker.service import BakeService
+    from relume_worker.status import BakeStatus
+
+
+def scene_document(record: SceneRecord, bakes: Sequence[BakeStatus]) -> dict[str, Any]:
+    """A scene, with the ids of its bakes."""
+    return {
+        "id": record.id,
+        "name": record.name,
+        "created": iso_time(record.created),
+        "views": [{"name": view, "is_placed": False} for view in record.views],
+        "materials": list(record.materials),
+        "lights": list(record.lights),
+        "variants": [{"name": name, "look": look} for name, look in record.variants.items()],
+        "warnings": list(record.warnings),
+        "remarks": [warning.document() for warning in record.warnings],
+        "triangles": record.num_triangles,
+        "bakes": [status.id for status in bakes],
+    }
+
+
+def bake_document(status: BakeStatus, service: BakeService) -> dict[str, Any]:
+    """A bake at this moment."""
+    since_s = None if status.phase_since is None else max(0.0, round(time.time() - status.phase_since, 1))
+    return {
+        "id": status.id,
+        "scene": status.scene,
+        "user": status.client,
+        "created": iso_time(status.created),
+        "state": status.state,
+        "progress": status.progress,
+        "phase": status.phase,
+        "phase_seconds": since_s,
+        "ahead": status.ahead,
+        "rays_per_second": status.rays_per_second,
+        "seconds_left": status.seconds_left,
+        "bytes": status.bytes,
+        "problem": status.problem,
+        "code": status.code,
+        "is_current": status.is_current,
+        "recipe": recipe_document(status.recipe),
+        "plan": plan_document(status.plan, service),
+    }
+
+
+def recipe_document(recipe: Recipe) -> dict[str, Any]:
+    """What is baked."""
+    return {
+        "method": recipe.method,
+        "views": list(recipe.views),
+        "size": list(recipe.size),
+        "lights": recipe.num_lights,
+        "points": recipe.num_points if recipe.method in FREE_CAMERA_METHODS else None,
+        "gather_samples": recipe.gather_samples,
+        "gather_rays": recipe.gather_rays,
+        "relightable": recipe.relightable,
+        "cameras": [camera.document() for camera in recipe.cameras],
+    }
+
+
+def plan_document(plan: Plan, service: BakeService) -> dict[str, Any]:
+    """What it costs."""
+    return {
+        "view_samples": plan.num_view_samples,
+        "rays": plan.num_rays,
+        "store_bytes": plan.store_bytes,
+        "peak_bytes": plan.peak_bytes,
+        "seconds": service.estimate_seconds(plan),
+    }
+
+
+def recipe_text(recipe: Recipe) -> str:
+    """A recipe in a few words."""
+    width, height = recipe.size
+    return f"{recipe.method}, {width}×{height}, {recipe.num_lights:,} lights, views {', '.join(recipe.views)}"
+
+
+def plan_lines(plan: Plan, service: BakeService) -> list[str]:
+    """A plan for people."""
+    seconds = service.estimate_seconds(plan)
+    return [
+        f"  {plan.num_view_samples:,} view samples, {plan.num_rays / 1e6:,.1f} M rays",
+        f"  at most {size_text(plan.store_bytes)} on the disk, {size_text(plan.peak_bytes)} of memory",
+        "  time unknown: nothing was baked here yet" if seconds is None else f"  about {seconds:,.0f} s",
+    ]

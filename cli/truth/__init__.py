@@ -1,1 +1,0 @@
-"""Brute force from the command line."""

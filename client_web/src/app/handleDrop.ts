@@ -1,0 +1,25 @@
+/** Files dropped on the editor: each is imported by its type; unsupported ones are reported. */
+import type { DroppedFile } from "../start/files/dropTypes";
+import { isEnvironment, isMeasuredFile, isTextureLike } from "../start/files/sceneFiles";
+import { editorRejection } from "../start/files/rejections";
+import { isTextureFile, applyImageFiles, consumeDropTarget } from "../panels/inspector/images/importImages";
+import { importMaterials } from "../panels/library/libraryItems";
+import { importEnvironmentFile } from "../panels/scene/environments";
+import { clearErrors, showError } from "../ui/toasts";
+
+export function handleDrop(dropped: readonly DroppedFile[]): void {
+  clearErrors("files"); // what was wrong with those before
+  const targetMaterial = consumeDropTarget();
+  const files = dropped.map(({ file }) => file);
+  const environments = files.filter((file) => isEnvironment(file) && !isTextureFile(file));
+  const measured = files.filter(isMeasuredFile);
+  const images = files.filter((file) => isTextureFile(file) || isTextureLike(file));
+  if (environments.length > 0) void importEnvironmentFile(environments);
+  if (measured.length > 0) void importMaterials(measured);
+  if (images.some(isTextureFile)) void applyImageFiles(images, targetMaterial);
+  const accepted = new Set([...environments, ...measured, ...(images.some(isTextureFile) ? images : [])]);
+  // a folder may hold anything beside what is of use
+  const rejected = dropped.filter(({ path, file }) => !accepted.has(file) && (accepted.size === 0 || !path.includes("/")));
+  if (rejected.length > 0) showError(editorRejection(rejected), "files");
+  else if (dropped.length === 0) showError("The folder is empty. Nothing was changed.", "files");
+}

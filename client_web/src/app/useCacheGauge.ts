@@ -1,0 +1,20 @@
+/** How much frozen transport the server holds, read now and then from its metrics. */
+import { useEffect, useState } from "preact/hooks";
+import { parseGauge } from "./parseMetrics";
+
+const POLL_INTERVAL_MS = 10_000;
+
+export function useCacheGauge(): number | null {
+  const [bytes, setBytes] = useState<number | null>(null);
+  useEffect(() => {
+    const read = async () => {
+      if (document.hidden) return;
+      const response = await fetch("/metrics").catch(() => null);
+      if (response?.ok) setBytes(parseGauge(await response.text(), "relume_frozen_cache_bytes"));
+    };
+    void read();
+    const timer = window.setInterval(() => void read(), POLL_INTERVAL_MS);
+    return () => clearInterval(timer);
+  }, []);
+  return bytes;
+}

@@ -1,0 +1,46 @@
+/** Curve → pixels: pointing at an interval asks the server which pixels it lights. */
+import { sendToShown } from "../session/connections";
+import { stage } from "../render/renderStage";
+import { freezeStatus } from "../state/connection";
+import { brushedRange } from "../state/curvePreview";
+import { fidelity } from "../state/fidelity";
+import { curvePath } from "../state/selection";
+import { hasFreeCamera } from "../state/views";
+import { isIntervalLit } from "./curveView";
+
+const DWELL_MS = 120;
+const EVERY_MS = 50;
+const RETRY_MS = 300;
+let timer = 0;
+let last = 0;
+
+export function clearBrush(): void {
+  clearTimeout(timer);
+  timer = 0;
+  if (brushedRange.peek() !== null) stage.clearBrush();
+}
+
+/** Whether the image is of surface probes, for which no curve is precomputed: another replaces it when the camera stops. */
+const isPointBrush = () => hasFreeCamera.peek() && (fidelity.peek() === "approximate" || fidelity.peek() === "preview");
+
+/** Whether the operator of the open curve is being precomputed. */
+const isPending = () => freezeStatus.peek()?.state === "freezing" || isPointBrush();
+
+/** Request the pixels of an interval; at first only when the pointer stops, then at most every `EVERY_MS`; when the curve is
+ * precomputed, and in a free-camera view when the camera has stopped. */
+export function requestBrush(from: number, to: number): void {
+  const curve = curvePath.peek();
+  if (!isIntervalLit.peek() || curve === null) return;
+  clearTimeout(timer);
+  const wait = brushedRange.peek() === null ? DWELL_MS : Math.max(0, last + EVERY_MS - performance.now());
+  const request = () => {
+    if (isPending()) {
+      timer = window.setTimeout(request, RETRY_MS);
+      return;
+    }
+    last = performance.now();
+    brushedRange.value = [from, to];
+    sendToShown({ type: "brush", curve, from: Math.max(0, from), to: Math.min(90, to) });
+  };
+  timer = window.setTimeout(request, wait);
+}

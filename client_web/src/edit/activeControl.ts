@@ -1,0 +1,18 @@
+/** The active control: sent with every edit, so that the server need not guess it from what the edit changed. */
+import { signal } from "@preact/signals";
+import { jsonPointer, pointerTokens } from "../state/document/pointer";
+import type { Look } from "../protocol";
+
+/** JSON pointer to the look's value that the active control edits; null if no image can be prepared for it. */
+export const activeControl = signal<string | null>(null);
+
+/** The active control of an edit at a JSON pointer: a curve, a parameter, a color or texture of a term, a light, a
+ * field of the environment or of the light paths. */
+export function activePath(path: string, look: Look): string | null {
+  const [table, name, , , member, field] = pointerTokens(path);
+  if (table === "lights") return name !== undefined && Object.hasOwn(look.lights, name) ? jsonPointer(table, name) : null;
+  if (table === "environment" || table === "transport") return name === undefined ? null : path;
+  if (table !== "materials") return null;
+  if (member === "color" || member === "texture") return path;
+  return (member === "params" || member === "curves") && field !== undefined ? path : null;
+}

@@ -1,0 +1,23 @@
+/** What a step of the history is called: what was changed, then what was done to it. */
+import { pointerTokens } from "../state/document/pointer";
+import type { Look, ModelBody } from "../protocol";
+
+const SEPARATOR = " · ";
+
+/** "Teapot · half angle θh · move point": material, curve and action of an edit at a JSON pointer of the look. */
+export function stepLabel(path: string, action: string, look: Look, models: readonly ModelBody[]): string {
+  const [table, subject, , index, kind, name] = pointerTokens(path);
+  if (table === "lights" && subject !== undefined) return subject + SEPARATOR + action;
+  if (table !== "materials" || subject === undefined) return action;
+  if (kind !== "curves") return subject + SEPARATOR + action;
+  const term = look.materials[subject]?.terms[Number(index)];
+  const curves = models.find((model) => model.model === term?.model)?.curves;
+  const label = curves?.find((curve) => curve.name === name)?.label ?? name;
+  return [subject, label, action.charAt(0).toLowerCase() + action.slice(1)].join(SEPARATOR);
+}
+
+/** A label's material or light, null where it has none, and what was done with it. */
+export function splitStepLabel(label: string): { subject: string | null; action: string } {
+  const end = label.indexOf(SEPARATOR);
+  return end < 0 ? { subject: null, action: label } : { subject: label.slice(0, end), action: label.slice(end + SEPARATOR.length) };
+}

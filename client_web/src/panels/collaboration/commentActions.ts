@@ -1,0 +1,125 @@
+/** Writing, resolving and deleting comments; finding what one is about. */
+import { effect } from "@preact/signals";
+import { cameraOf, moveFreeCamera } from "../../viewport/cameras/freeCamera";
+import { onComment } from "../../session/sessionHandlers";
+import { renderThumbnail } from "../looks/displayImage";
+import * as api from "../../session/net/api";
+import { stage } from "../../render/renderStage";
+import type { CommentBody, CommentRequest } from "../../protocol";
+import { bake } from "../../state/bakes";
+import { comments, commentNumber, pendingPin, selectedComment } from "../../state/comments";
+import { look } from "../../state/look";
+import { noCommentMessage } from "../../state/sessionUser";
+import { commentsOpen } from "../../state/panels";
+import { pixelProbe } from "../../state/pointerPixel";
+import { togglePanel } from "../../state/panelWidths";
+import { scene } from "../../state/scene";
+import { ownName, members, selfNumber } from "../../state/collaboration";
+import { shownViews, showSingleView, activeViewName, views, setFocus } from "../../state/views";
+import { reportErrors, showNote } from "../../ui/toasts";
+
+const SNAPSHOT_WIDTH = 320;
+
+/** Read the list again. */
+export async function refreshComments(): Promise<void> {
+  const sceneId = scene.peek()?.id;
+  if (sceneId === undefined) return;
+  const fetched = await api.listComments(sceneId);
+  if (scene.peek()?.id === sceneId) comments.value = fetched;
+}
+
+effect(() => {
+  if (commentsOpen.value) void reportErrors(refreshComments);
+});
+
+onComment(() => void reportErrors(refreshComments));
+
+effect(() => {
+  const openScene = scene.value;
+  comments.value = [];
+  pendingPin.value = selectedComment.value = null;
+  if (openScene !== null) void reportErrors(refreshComments);
+});
+
+/** Put the pin of the comment that is being written to a pixel of a view, as near as the image has it. */
+export function placePin(view: string, x: number, y: number): void {
+  const { width, height } = stage.imageOf(view).pixels;
+  const clampTo = (coordinate: number, size: number) => Math.min(size - 1, Math.max(0, coordinate));
+  pendingPin.value = { view, x: clampTo(x, width), y: clampTo(y, height), size: [width, height] };
+}
+
+/** Begin a comment on the pixel that the pointer is over, else on the middle of the active view. */
+export function beginComment(): void {
+  if (noCommentMessage.peek() !== null) return showNote(noCommentMessage.peek() as string);
+  const pixel = pixelProbe.peek();
+  const { width, height } = stage.active.pixels;
+  if (pixel === null) placePin(activeViewName.peek(), Math.floor(width / 2), Math.floor(height / 2));
+  else placePin(pixel.view, pixel.x, pixel.y);
+  if (!commentsOpen.peek()) togglePanel("comments");
+}
+
+export function cancelComment(): void {
+  pendingPin.value = null;
+}
+
+/** Save the comment with a snapshot of the image; whether that succeeded. */
+export async function saveComment(text: string): Promise<boolean> {
+  const [pin, sceneId, bakeId, current] = [pendingPin.peek(), scene.peek()?.id, bake.peek(), look.peek()];
+  if (pin === null || sceneId === undefined || bakeId === null || current === null) return false;
+  const snapshot = renderThumbnail(stage.imageOf(pin.view).pixels, current.display, SNAPSHOT_WIDTH);
+  const isSaved = await reportErrors(async () => {
+    const memberName = members.peek().find(({ number }) => number === selfNumber.peek())?.name; // as others see this one
+    const author = ownName.peek() || memberName || null;
+    const created = await api.addComment(sceneId, { ...pin, bake: bakeId, camera: cameraOf(pin.view), text, author, picture: snapshot });
+    pendingPin.value = null;
+    selectedComment.value = created.id;
+    await refreshComments();
+    return true;
+  });
+  return isSaved ?? false;
+}
+
+export async function setCommentResolved(comment: CommentBody, resolved: boolean): Promise<void> {
+  await reportErrors(async () => {
+    await api.setResolved(scene.peek()?.id ?? "", comment.id, resolved);
+    await refreshComments();
+  });
+}
+
+async function snapshotBase64({ picture: url }: CommentBody): Promise<string | null> {
+  if (url === null) return null;
+  const bytes = new Uint8Array(await (await api.request(url)).arrayBuffer());
+  return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+}
+
+/** Delete a comment; for a while it can be restored, as a new one. */
+export async function deleteCommentWithUndo(comment: CommentBody): Promise<void> {
+  const sceneId = scene.peek()?.id ?? "";
+  await reportErrors(async () => {
+    const { bake: bakeId, view, x, y, size, camera, text, author } = comment;
+    const commentToRestore: CommentRequest = { bake: bakeId, view, x, y, size, camera, text, author, picture: await snapshotBase64(comment) };
+    const label = `Comment ${commentNumber(comment.id)} is deleted.`;
+    await api.deleteComment(sceneId, comment.id);
+    await refreshComments();
+    showNote(label, { label: "Undo", run: () => void reportErrors(() => api.addComment(sceneId, commentToRestore).then(refreshComments)) });
+  });
+}
+
+/** Show what a comment is about: its view, and where the camera was. */
+export function showComment(comment: CommentBody): void {
+  selectedComment.value = comment.id;
+  const { view, camera } = comment;
+  if (!views.peek().some(({ name }) => name === view)) return showNote(`The view “${view}” is not in this bake.`);
+  if (shownViews.peek().includes(view)) setFocus(view);
+  else showSingleView(view);
+  if (camera !== null) moveFreeCamera(view, camera);
+}
+
+const CAMERA_TOLERANCE = 1e-3;
+
+/** Whether a view's camera is where a comment was written. */
+export function isCameraAtComment({ view, camera }: CommentBody): boolean {
+  const currentCamera = cameraOf(view);
+  if (camera === null || currentCamera == null) return camera === null && currentCamera == null;
+  return camera.to_world.every((value, k) => Math.abs(value - (currentCamera.to_world[k] as number)) < CAMERA_TOLERANCE);
+}

@@ -1,0 +1,42 @@
+/** Working together: making a room, the links into it, and leaving it. */
+import { connectToBake } from "../../session/connect";
+import { createShareLink } from "../looks/shareLink";
+import { keyFragment } from "../../session/scene/url";
+import { bake } from "../../state/bakes";
+import { scene } from "../../state/scene";
+import { joinState, members, selfNumber } from "../../state/collaboration";
+import { reportErrors } from "../../ui/toasts";
+
+/** A name that nobody guesses. */
+function generateRoomKey(): string {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+/** Open a room with the look that is here; the image stays until the room's is there. */
+export function startRoom(): void {
+  const [sceneId, bakeId] = [scene.value?.id, bake.value];
+  if (sceneId === undefined || bakeId === null) return;
+  joinState.value = { scene: sceneId, room: generateRoomKey(), watch: null, share: null };
+  connectToBake(bakeId);
+}
+
+/** Go on alone with the look as it is. */
+export function leaveRoom(): void {
+  joinState.value = selfNumber.value = null;
+  members.value = [];
+  if (bake.value !== null) connectToBake(bake.value);
+}
+
+/** The link into the room, to edit or only to watch. It carries the look of now as well: where nobody is in the room any
+ * more, it opens that. */
+export async function createRoomLink(kind: "edit" | "watch"): Promise<string | null> {
+  const room = joinState.value;
+  const key = kind === "edit" ? room?.room : room?.watch;
+  if (key == null) return null;
+  return (await reportErrors(async () => {
+    const url = new URL((await createShareLink()).url, location.href);
+    url.hash = keyFragment(kind === "edit" ? "room" : "watch", key);
+    return url.href;
+  })) ?? null;
+}

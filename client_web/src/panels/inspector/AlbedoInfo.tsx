@@ -1,0 +1,19 @@
+/** Warns if the summed terms of a material reflect more light than they receive. */
+import { getAlbedo } from "../../session/net/api";
+import type { Term } from "../../protocol";
+import { isBtfTerm } from "../../state/look";
+import { albedoMessage } from "./albedo";
+import { useServerQuery } from "./useServerQuery";
+
+export function AlbedoInfo({ terms }: { terms: readonly Term[] }) {
+  const evaluated = terms.filter((term) => !isBtfTerm(term));
+  const query = evaluated.length > 0 ? JSON.stringify(evaluated) : null;
+  const albedo = useServerQuery(query, (text) => getAlbedo(JSON.parse(text) as Term[]));
+  const message = albedo && albedoMessage(albedo);
+  if (!message) return null;
+  return (
+    <p class="aside" role="status" title="Directional albedo of all terms, their images taken as white.">
+      {message}
+    </p>
+  );
+}

@@ -1,0 +1,157 @@
+/** What is selected: a light, or a material with its terms as cards. */
+import { jsonPointer } from "../../state/document/pointer";
+import { editValue } from "../../edit/edit";
+import { history } from "../../edit/history";
+import { BaseColorImage } from "./images/BaseColorImage";
+import { MetalnessImage } from "./images/MetalnessImage";
+import { NormalImage } from "./images/NormalImage";
+import { openLibrary } from "../library/libraryItems";
+import { LightInspector } from "../lights/LightInspector";
+import { openLight } from "../lights/lightEdits";
+import { MAX_TERMS } from "../../look.gen";
+import { defaultLook, look } from "../../state/look";
+import { shownPanels } from "../../state/panelWidths";
+import { materialOf, models } from "../../state/scene";
+import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, selectedTerms } from "../../state/selection";
+import { IconButton } from "../../ui/IconButton";
+import { Section } from "../../ui/Section";
+import { AlbedoInfo } from "./AlbedoInfo";
+import { TermCard } from "./TermCard";
+import { defaultTerm, isMirror, modelsFor } from "./terms";
+
+function replaceTerms(label: string, material: string, next: unknown): void {
+  history.endGesture();
+  editValue(label, jsonPointer("materials", material, "terms"), next);
+}
+
+function AddTerm({ material }: { material: string }) {
+  return (
+    <select
+      class="add-term"
+      aria-label="Add a term"
+      value=""
+      disabled={selectedTerms.value.length >= MAX_TERMS}
+      onChange={(event) => {
+        const model = models.value.find((m) => m.model === event.currentTarget.value);
+        if (model !== undefined) replaceTerms("Add term", material, [...selectedTerms.value, defaultTerm(model)]);
+        event.currentTarget.value = "";
+      }}
+    >
+      <option value="">+ Add a term…</option>
+      {modelsFor(null, models.value).map((m) => (
+        <option key={m.model} value={m.model}>
+          {m.label}
+        </option>
+      ))}
+    </select>
+  );
+}
+
+/** A ground shows shadows alone, in front of what is behind it, or is a surface like others. */
+function ShadowCatcherToggle({ material }: { material: string }) {
+  const catcher = look.value?.materials[material]?.catcher;
+  if (catcher === undefined) return null;
+  return (
+    <div class="catcher">
+      <label>
+        <input
+          type="checkbox"
+          checked={catcher}
+          onChange={(event) => {
+            const only = event.currentTarget.checked;
+            editValue(only ? "Shadows only" : "A surface to see", jsonPointer("materials", material, "catcher"), only);
+          }}
+        />
+        Shadows only
+      </label>
+      {catcher && (
+        <p>
+          The background shows through, as dark as the shadows on it. Switch this off to see and change the material
+          itself; in reflected light it goes on lighting the objects.
+        </p>
+      )}
+    </div>
+  );
+}
+
+/** What of glass is edited here, and what is not. */
+function GlassToggle({ material }: { material: string }) {
+  if (materialOf(material)?.is_glass !== true) return null;
+  return <p class="aside">Glass: what it reflects is edited here; what comes through it is as in the scene’s file.</p>;
+}
+
+export function Inspector() {
+  const [light, displayedMaterial] = [openLight.value, selectedLight.value];
+  if (light !== null && displayedMaterial !== null) return <LightInspector key={displayedMaterial} name={displayedMaterial} light={light} />;
+  return <MaterialInspector />;
+}
+
+function MaterialInspector() {
+  const material = selectedMaterial.value;
+  if (material === null || selectedTerms.value.length === 0) {
+    return (
+      <div class="panel inspector">
+        <header class="panel-head">
+          <h2>Material</h2>
+          <button aria-pressed={shownPanels.value.includes("library")} onClick={() => void openLibrary()}>
+            Library
+          </button>
+        </header>
+        <p class="hint">
+          Click something in the picture, or choose a material on the left, to change how it reflects light.
+        </p>
+      </div>
+    );
+  }
+  const original = defaultLook.value?.materials[material];
+  const materialLook = look.value?.materials[material];
+  const isShadowCatcher = materialLook?.catcher === true;
+  return (
+    <div class="panel inspector">
+      <header class="panel-head">
+        <h2 class="spacer">{material}</h2>
+        <button aria-pressed={shownPanels.value.includes("library")} onClick={() => void openLibrary()}>
+          Library
+        </button>
+        <IconButton
+          icon="reset"
+          label="Reset this material"
+          disabled={original === undefined || original === materialLook}
+          onClick={() => editValue("Reset material", jsonPointer("materials", material), original)}
+        />
+      </header>
+      <ShadowCatcherToggle material={material} />
+      <GlassToggle material={material} />
+      {!isShadowCatcher && <BaseColorImage key={material} material={material} terms={selectedTerms.value} />}
+      {!isShadowCatcher && selectedTerms.value.map((term, index) => (
+        <TermCard
+          key={index}
+          material={material}
+          term={term}
+          index={index}
+          onRemove={
+            selectedTerms.value.length > 1
+              ? () => {
+                  selectedCurve.value = null;
+                  selectedTerm.value = 0;
+                  replaceTerms(
+                    "Remove term",
+                    material,
+                    selectedTerms.value.filter((_, i) => i !== index),
+                  );
+                }
+              : null
+          }
+        />
+      ))}
+      {!isShadowCatcher && <AlbedoInfo key={material} terms={selectedTerms.value} />}
+      {!isShadowCatcher && <AddTerm material={material} />}
+      {!isShadowCatcher && materialLook !== undefined && (
+        <Section title="Metal and normal maps">
+          <MetalnessImage material={material} terms={selectedTerms.value} />
+          <NormalImage material={material} materialLook={materialLook} mirrors={materialOf(material)?.terms.some(isMirror) === true} />
+        </Section>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,34 @@
+/** A button that asks for the file of an image. */
+import { useRef } from "preact/hooks";
+import { imageUploadProgress } from "./imageStore";
+
+const TYPES = ".png,.jpg,.jpeg,.webp,.exr";
+
+interface Props {
+  /** Label of the image's purpose. */
+  label: string;
+  onFile(file: File): void;
+}
+
+export function ImageFileField({ label, onFile }: Props) {
+  const file = useRef<HTMLInputElement>(null);
+  return (
+    <>
+      <button type="button" title={label} disabled={imageUploadProgress.value !== null} onClick={() => file.current?.click()}>
+        Image…
+      </button>
+      <input
+        ref={file}
+        type="file"
+        hidden
+        accept={TYPES}
+        aria-label={label}
+        onChange={(event) => {
+          const selectedFile = event.currentTarget.files?.[0];
+          event.currentTarget.value = "";
+          if (selectedFile !== undefined) onFile(selectedFile);
+        }}
+      />
+    </>
+  );
+}

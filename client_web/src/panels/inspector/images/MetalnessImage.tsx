@@ -1,0 +1,23 @@
+/** The metalness image of a material: choose, upload, remove. */
+import type { Term } from "../../../protocol";
+import { MapImageField } from "./MapImageField";
+import { imageOf, assignMetalness, removeMetalnessMap } from "./imageStore";
+import { canBeMetal, metalnessOf } from "./metalness";
+
+export function MetalnessImage({ material, terms }: { material: string; terms: readonly Term[] }) {
+  if (!canBeMetal(terms)) return null;
+  return (
+    <MapImageField
+      label="Metalness map"
+      title="An image whose blue says where the surface is metal."
+      file="File of a map of metalness"
+      material={material}
+      displayedImage={metalnessOf(terms, imageOf)}
+      assign={assignMetalness}
+      unassign={removeMetalnessMap}
+      onOther={() => removeMetalnessMap(material)}
+    >
+      <option value="">As in the scene</option>
+    </MapImageField>
+  );
+}

@@ -1,0 +1,35 @@
+/** Files held over the picture: the object below is outlined, and takes the images among those that are dropped on it. */
+import { freeCameraOf } from "../../../viewport/cameras/freeCamera";
+import { requestPixelProbe } from "../../../session/pixelProbe";
+import { pickMaterial } from "../../../render/materialPicking";
+import type { ImageCanvas } from "../../../render/canvas";
+import { hoveredMaterial } from "../../../state/selection";
+import { IMAGE_TYPES, onDrop } from "./importImages";
+
+const hasFiles = ({ dataTransfer }: DragEvent): boolean => dataTransfer?.types.includes("Files") ?? false;
+
+/** Whether there may be images among them: a folder has no type, and shows its files only when it is dropped. */
+function mayHoldImages({ dataTransfer }: DragEvent): boolean {
+  return [...(dataTransfer?.items ?? [])].some(({ kind, type }) => kind === "file" && (type === "" || IMAGE_TYPES.includes(type)));
+}
+
+export function acceptImageDrops(screen: ImageCanvas): () => void {
+  const { canvas } = screen;
+  const target = (event: DragEvent) => {
+    if (mayHoldImages(event)) hoveredMaterial.value = pickMaterial(screen, event).material;
+  };
+  const drop = (event: DragEvent) => {
+    if (!hasFiles(event)) return;
+    const { px, py, material } = pickMaterial(screen, event);
+    const { view } = screen.image;
+    hoveredMaterial.value = null;
+    // where the camera moves, the server knows; the page takes the files when the event comes to it
+    onDrop(freeCameraOf(view) === null ? Promise.resolve(material) : requestPixelProbe(view, px, py).then((answer) => answer.material));
+  };
+  canvas.addEventListener("dragover", target);
+  canvas.addEventListener("drop", drop);
+  return () => {
+    canvas.removeEventListener("dragover", target);
+    canvas.removeEventListener("drop", drop);
+  };
+}

@@ -1,0 +1,61 @@
+/** Terms that follow a roughness map, and the same terms with an image as roughness map. */
+import { isImageReference } from "../../../state/document/imageReference";
+import type { ImageBody, ModelBody, ParamValue, Term } from "../../../protocol";
+import { modelOf } from "../../../state/scene";
+
+type RoughnessFollow = NonNullable<Term["roughness_map"]>;
+
+const followsMap = (term: Term): boolean => term.roughness_map !== undefined && term.roughness_map !== false;
+
+/** The image used as the material's roughness map; all terms that follow one follow the same. */
+export function roughnessImage(terms: readonly Term[]): string | null {
+  return terms.map((term) => term.roughness_map).find(isImageReference) ?? null;
+}
+
+/** The terms that an image dropped on the object is for: those that follow a map or may, else all that have a width. */
+export function roughTermIndices(terms: readonly Term[]): number[] {
+  const indicesWhere = (predicate: (term: Term) => boolean) => terms.flatMap((term, k) => (modelOf(term)?.width != null && predicate(term) ? [k] : []));
+  const following = indicesWhere((term) => term.roughness_map !== undefined);
+  return following.length > 0 ? following : indicesWhere(() => true);
+}
+
+/** The width of a term whose material is so rough; null where the model measures it otherwise. */
+function lobeWidth(model: ModelBody, roughness: number): ParamValue | null {
+  const info = model.parameters.find(({ name }) => name === model.width);
+  if (info === undefined || !((model.width_power ?? 0) > 0)) return null;
+  const value = Math.min(Math.max(roughness ** (model.width_power as number), info.minimum), info.maximum);
+  return Math.round(value * 1e4) / 1e4;
+}
+
+/** Let a term follow a map, an image, or none; others that follow one follow the same. */
+export function withMap(terms: readonly Term[], index: number, follows: RoughnessFollow): Term[] {
+  const image = isImageReference(follows) || roughnessImage(terms) !== null;
+  return terms.map((term, k) => {
+    const changes = k === index || (image && follows !== false && followsMap(term));
+    return changes ? { ...term, roughness_map: follows } : term;
+  });
+}
+
+/** Let terms follow an image, as rough as it says: sliders show its mean, and scale it from there. */
+export function withRoughnessImage(terms: readonly Term[], indices: readonly number[], image: ImageBody): Term[] {
+  const following = indices.reduce<Term[]>((result, index) => withMap(result, index, image.texture), [...terms]);
+  return following.map((term) => {
+    const model = modelOf(term);
+    if (model?.width == null || term.roughness_map !== image.texture) return term;
+    const width = lobeWidth(model, image.roughness);
+    return width === null ? term : { ...term, params: { ...term.params, [model.width]: width } };
+  });
+}
+
+/** Terms without the image, as rough as the scene's own are. */
+export function withoutRoughnessImage(terms: readonly Term[], originals: readonly Term[]): Term[] {
+  return terms.map((term, k) => {
+    if (!isImageReference(term.roughness_map)) return term;
+    const original = originals[k]?.model === term.model ? originals[k] : undefined;
+    const width = modelOf(term)?.width;
+    const value = width == null ? undefined : original?.params?.[width];
+    const params = width == null || value === undefined ? term.params : { ...term.params, [width]: value };
+    const { roughness_map: _image, ...bare } = term;
+    return { ...bare, params, ...(original?.roughness_map === undefined ? {} : { roughness_map: original.roughness_map }) };
+  });
+}

@@ -1,0 +1,25 @@
+/** A server query about an edited value, sent once editing pauses. */
+import { useEffect, useState } from "preact/hooks";
+
+const AFTER_MS = 250; // a slider that moves asks once
+
+/** The answer to `query`, the previous one until it has come; null without a query or if it was rejected, which is
+ * said where it is edited. */
+export function useServerQuery<T>(query: string | null, fetchAnswer: (queryText: string) => Promise<T | null>): T | null {
+  const [answer, setAnswer] = useState<T | null>(null);
+  useEffect(() => {
+    if (query === null) return undefined;
+    let isOld = false;
+    const timer = setTimeout(() => {
+      fetchAnswer(query).then(
+        (result) => !isOld && setAnswer(result),
+        () => !isOld && setAnswer(null),
+      );
+    }, AFTER_MS);
+    return () => {
+      isOld = true;
+      clearTimeout(timer);
+    };
+  }, [query]);
+  return query === null ? null : answer;
+}

@@ -1,0 +1,135 @@
+/** The material library: drag a ball into the image, or choose one for the selection. */
+import { useRef } from "preact/hooks";
+import { libraryOpen } from "../../state/panels";
+import { models } from "../../state/scene";
+import { selectedMaterial } from "../../state/selection";
+import { IconButton } from "../../ui/IconButton";
+import { useReturnFocus } from "../../ui/restoreFocus";
+import { BtfJobs } from "./BtfJobs";
+import { NavigationMap } from "./NavigationMap";
+import {
+  BTFS,
+  DRAG_TYPE,
+  otherGroupMatches,
+  fittedModels,
+  group,
+  groups,
+  hasGroups,
+  importMaterial,
+  MEASURED,
+  model,
+  applyToSelected,
+  query,
+  showGroup,
+  visibleEntries,
+} from "./libraryItems";
+
+const UNFITTED: Record<string, string> = { [MEASURED]: "imported measurements", [BTFS]: "textures from all sides" };
+
+const label = (name: string) => UNFITTED[name] ?? models.value.find((info) => info.model === name)?.label ?? name;
+
+function Filters() {
+  return (
+    <div class="library-filters">
+      <select
+        aria-label="Kind"
+        value={group.value}
+        disabled={!hasGroups.value}
+        onChange={(event) => (group.value = event.currentTarget.value)}
+      >
+        <option value="all">all kinds</option>
+        {groups.value.map((name) => (
+          <option key={name}>{name}</option>
+        ))}
+      </select>
+      <select aria-label="Model" value={model.value} onChange={(event) => (model.value = event.currentTarget.value)}>
+        {[...fittedModels.value, MEASURED, BTFS].map((name) => (
+          <option key={name} value={name}>
+            {label(name)}
+          </option>
+        ))}
+      </select>
+    </div>
+  );
+}
+
+/** Files that are dropped onto the panel are materials, wherever else they would be scenes. */
+function importFiles(event: DragEvent): void {
+  const files = [...(event.dataTransfer?.files ?? [])];
+  if (files.length === 0) return;
+  event.preventDefault();
+  event.stopPropagation();
+  for (const file of files) void importMaterial(file);
+}
+
+export function LibraryPanel() {
+  const panel = useRef<HTMLElement>(null);
+  useReturnFocus(panel);
+  return (
+    <aside
+      ref={panel}
+      class="panel library"
+      aria-label="Library of materials"
+      onDragOver={(event) => event.preventDefault()}
+      onDrop={importFiles}
+    >
+      <header class="panel-head">
+        <h2>Library</h2>
+        <IconButton icon="close" label="Close" onClick={() => (libraryOpen.value = false)} />
+      </header>
+      <p class="library-help">
+        {selectedMaterial.value === null
+          ? "Drag a ball onto an object, or select one first."
+          : `A click puts it on ${selectedMaterial.value}; drag onto any object.`}{" "}
+        It comes without the object's images; Texture, in the inspector, brings one back.
+      </p>
+      <NavigationMap />
+      <input
+        class="library-search"
+        type="search"
+        placeholder="Search"
+        aria-label="Search the library"
+        maxLength={80}
+        value={query.value}
+        onInput={(event) => (query.value = event.currentTarget.value)}
+        onKeyDown={(event) => event.stopPropagation()}
+      />
+      <Filters />
+      <BtfJobs />
+      {visibleEntries.value.length === 0 && query.value !== "" && (
+        <div class="library-help library-elsewhere" role="status">
+          Nothing here is called “{query.value}”{otherGroupMatches.value.length > 0 && ", but elsewhere"}.
+          {otherGroupMatches.value.map(([name, num]) => (
+            <button key={name} type="button" onClick={() => showGroup(name)}>
+              {label(name)}: {num}
+            </button>
+          ))}
+        </div>
+      )}
+      {visibleEntries.value.length === 0 && query.value === "" && model.value === MEASURED && (
+        <p class="library-help">No measurements yet. A MERL file (.binary) becomes a material whose curves can be edited.</p>
+      )}
+      {visibleEntries.value.length === 0 && query.value === "" && model.value === BTFS && (
+        <p class="library-help">
+          No such textures yet. Render one here, or import measured ones: a .btf file of UBO2014, or a zip of images that
+          are named by the directions of light and view.
+        </p>
+      )}
+      <ul class="library-balls">
+        {visibleEntries.value.map((material) => (
+          <li key={material.id}>
+            <button
+              draggable
+              title={material.description}
+              onClick={() => applyToSelected(material.id)}
+              onDragStart={(event) => event.dataTransfer?.setData(DRAG_TYPE, material.id)}
+            >
+              <img src={material.thumbnail} alt="" width={64} height={64} loading="lazy" />
+              <span>{material.name}</span>
+            </button>
+          </li>
+        ))}
+      </ul>
+    </aside>
+  );
+}

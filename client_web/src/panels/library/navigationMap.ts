@@ -1,0 +1,44 @@
+/** Sun's navigation map: where a point of the plane lies on the plot. Reflectance by its root, roughness by its logarithm. */
+import type { ParamValue, Term } from "../../protocol";
+
+export interface HighlightRange {
+  f0: [low: number, high: number];
+  sigma: [low: number, high: number];
+}
+export interface MapPosition {
+  x: number;
+  y: number;
+}
+
+const fractionOf = (value: number, [low, high]: [number, number]) => (value - low) / (high - low || 1);
+const interpolate = (fraction: number, [low, high]: [number, number]) => low + Math.min(1, Math.max(0, fraction)) * (high - low);
+
+/** Of the materials on the map; at least two. */
+export function mapRange(points: readonly { f0: number; sigma: number }[]): HighlightRange {
+  const [f0, sigma] = [points.map((p) => p.f0), points.map((p) => p.sigma)];
+  return { f0: [Math.min(...f0), Math.max(...f0)], sigma: [Math.min(...sigma), Math.max(...sigma)] };
+}
+
+const mean = (value: ParamValue | undefined, otherwise: number): number =>
+  value === undefined ? otherwise : typeof value === "number" ? value : (value[0] + value[1] + value[2]) / 3;
+
+/** Where a material's highlight is on the map; null where it has none of its kind. */
+export function highlightOf(terms: readonly Term[]): { f0: number; sigma: number } | null {
+  const params = terms.find(({ model }) => model === "cook_torrance")?.params;
+  if (params === undefined) return null;
+  const [n, k] = [mean(params.ior, 1.5), mean(params.extinction, 0)];
+  return { f0: ((n - 1) ** 2 + k ** 2) / ((n + 1) ** 2 + k ** 2), sigma: mean(params.sigma, 0.2) };
+}
+
+const squareRootRange = (range: HighlightRange): [number, number] => [Math.sqrt(range.f0[0]), Math.sqrt(range.f0[1])];
+const logRange = (range: HighlightRange): [number, number] => [Math.log(range.sigma[0]), Math.log(range.sigma[1])];
+
+/** Place in a unit square, smooth and dark at the upper left. */
+export function positionOf(point: { f0: number; sigma: number }, range: HighlightRange): MapPosition {
+  return { x: fractionOf(Math.sqrt(point.f0), squareRootRange(range)), y: fractionOf(Math.log(point.sigma), logRange(range)) };
+}
+
+/** The inverse; points outside the square are clamped to its edge. */
+export function highlightAt(position: MapPosition, range: HighlightRange): { f0: number; sigma: number } {
+  return { f0: interpolate(position.x, squareRootRange(range)) ** 2, sigma: Math.exp(interpolate(position.y, logRange(range))) };
+}

@@ -1,0 +1,149 @@
+/** The selected light: its kind, how strong it is, and where it is. */
+import { editValue } from "../../edit/edit";
+import { beginDrag } from "../../session/prepare";
+import { MAX_LIGHT_NAME } from "../../look.gen";
+import type { Light, Triple } from "../../protocol";
+import { defaultLook } from "../../state/look";
+import { aimLocked } from "../../state/panels";
+import { IconButton } from "../../ui/IconButton";
+import { EditableName } from "../../ui/EditableName";
+import { LabeledSlider } from "../../ui/LabeledSlider";
+import { NumberField } from "../../ui/NumberField";
+import { Emission } from "./Emission";
+import { angleFieldsOf, numbersFieldsOf, type AngleField, type NumbersField } from "./lightFields";
+import { placeLight } from "./handleGeometry";
+import { completeLight, LIGHT_KINDS, labelOf, changeKind, type AddedKind } from "./lightKinds";
+import { changeLight, duplicateLight, editLight, isAddedLight, lightPath, removeLight, renameLight } from "./lightEdits";
+
+interface NamedLight {
+  name: string;
+  light: Light;
+}
+
+function NumbersFields({ name, light, numbersField }: NamedLight & { numbersField: NumbersField }) {
+  const { field, label, unit } = numbersField;
+  const values = (light as Partial<Record<NumbersField["field"], number[]>>)[field] ?? [];
+  const setValues = (next: number[]) => {
+    if (field === "position") {
+      const change = placeLight(light, next as Triple, aimLocked.value);
+      if (change !== null) changeLight(numbersField.editLabel, name, change);
+    } else if (numbersField.allows?.(next) ?? true) editLight(numbersField.editLabel, name, field, next);
+  };
+  return (
+    <div class="numbers" role="group" aria-label={label} style={{ "--count": numbersField.names.length }}>
+      <span class="param-label">
+        {label} {unit !== "" && <small>{unit}</small>}
+      </span>
+      {numbersField.names.map((component, k) => (
+        <label key={component}>
+          <small>{component}</small>
+          <NumberField
+            label={`${label}, ${component}`}
+            value={values[k] as number}
+            minimum={numbersField.minimum}
+            maximum={numbersField.maximum}
+            step={numbersField.step}
+            onChange={(next) => setValues(values.map((value, i) => (i === k ? next : value)))}
+          />
+        </label>
+      ))}
+    </div>
+  );
+}
+
+function AngleFieldSlider({ name, light, angleField }: NamedLight & { angleField: AngleField }) {
+  return (
+    <LabeledSlider
+      label={angleField.label}
+      value={angleField.valueOf(light)}
+      initial={angleField.valueOf(completeLight({ kind: light.kind }, defaultLook.value?.lights[name]))}
+      minimum={angleField.minimum}
+      maximum={angleField.maximum}
+      scale="linear"
+      unit="°"
+      onChange={(angle) => editLight(angleField.editLabel, name, angleField.field, angleField.changeFor(light, angle))}
+      onHold={() => beginDrag(lightPath(name))}
+    />
+  );
+}
+
+function LightKindSelect({ name, light }: NamedLight) {
+  if (light.kind === "mesh")
+    return <p class="hint">The surfaces of “{light.material}” shine. Where they are is the scene’s own.</p>;
+  const change = (kind: AddedKind) => editValue("Change kind", lightPath(name), changeKind(light, kind));
+  return (
+    <div class="kind">
+      <select
+        aria-label="Kind of light"
+        value={light.kind}
+        onChange={(event) => change(event.currentTarget.value as AddedKind)}
+      >
+        {LIGHT_KINDS.map(({ kind, label, help }) => (
+          <option key={kind} value={kind} title={help}>
+            {label}
+          </option>
+        ))}
+      </select>
+    </div>
+  );
+}
+
+function AimLockSwitch() {
+  return (
+    <label class="aim-lock" title="While it is moved, it goes on aiming at the same point">
+      <input
+        type="checkbox"
+        checked={aimLocked.value}
+        onChange={(event) => (aimLocked.value = event.currentTarget.checked)}
+      />
+      Keep the aim when it moves
+    </label>
+  );
+}
+
+export function LightInspector({ name, light }: NamedLight) {
+  const initial = defaultLook.value?.lights[name];
+  return (
+    <div class="panel inspector">
+      <header class="panel-head">
+        <h2 class="spacer">
+          {isAddedLight(name) ? (
+            <EditableName
+              key={name}
+              class="light-name"
+              name={name}
+              maximum={MAX_LIGHT_NAME}
+              onRename={(next) => renameLight(name, next)}
+            />
+          ) : (
+            name
+          )}
+        </h2>
+        {light.kind !== "mesh" && (
+          <IconButton icon="copy" label="Duplicate this light" onClick={() => duplicateLight(name)} />
+        )}
+        {isAddedLight(name) ? (
+          <IconButton icon="trash" label="Remove this light" keys="Delete" onClick={() => removeLight(name)} />
+        ) : (
+          <IconButton
+            icon="reset"
+            label="Reset this light"
+            disabled={initial === light}
+            onClick={() => editValue("Reset", lightPath(name), initial)}
+          />
+        )}
+      </header>
+      <section class="card light-card" aria-label={labelOf(light.kind)}>
+        <LightKindSelect name={name} light={light} />
+        <Emission name={name} light={light} />
+        {"position" in light && "direction" in light && <AimLockSwitch />}
+        {numbersFieldsOf(light).map((field) => (
+          <NumbersFields key={field.label} name={name} light={light} numbersField={field} />
+        ))}
+        {angleFieldsOf(light).map((field) => (
+          <AngleFieldSlider key={field.label} name={name} light={light} angleField={field} />
+        ))}
+      </section>
+    </div>
+  );
+}

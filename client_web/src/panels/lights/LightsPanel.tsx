@@ -1,0 +1,114 @@
+/** The lights of the scene as a mixer: each switched on and off, alone, stronger or weaker, and tinted. */
+import { useEffect, useRef } from "preact/hooks";
+import { fromHex, toHex } from "../../render/color/colorMath";
+import { beginDrag } from "../../session/prepare";
+import type { Light } from "../../protocol";
+import { soloLight, toggleLightSolo } from "../../state/visibility/soloSources";
+import { handlesOpen } from "../../state/display";
+import { defaultLook, look } from "../../state/look";
+import { foldedSections, toggleFolded } from "../../state/panels";
+import { selectedLight, selectLight } from "../../state/selection";
+import { IconButton } from "../../ui/IconButton";
+import { Section } from "../../ui/Section";
+import { Slider } from "../../ui/Slider";
+import { ToggleButton } from "../../ui/ToggleButton";
+import { LIGHT_KINDS, labelOf } from "./lightKinds";
+import { editLight, lightPath, lights } from "./lightEdits";
+import { isAddMenuOpen, placingKind, startPlacement, stopPlacement } from "./placement";
+
+const TITLE = "Lights";
+
+function LightRow({ name, light }: { name: string; light: Light }) {
+  const selected = name === selectedLight.value;
+  const row = useRef<HTMLLIElement>(null);
+  useEffect(() => {
+    if (selected) row.current?.scrollIntoView({ block: "nearest" }); // a new one may be below the fold
+  }, [selected]);
+  return (
+    <li
+      ref={row}
+      class={`light ${selected ? "selected" : ""} ${light.on ? "" : "off"}`}
+    >
+      <IconButton
+        icon="lamp"
+        label={`${name}: ${light.on ? "switch off" : "switch on"}`}
+        pressed={light.on}
+        onClick={() => editLight(light.on ? "Off" : "On", name, "on", !light.on)}
+      />
+      <button
+        class="name"
+        title={`${name}: ${labelOf(light.kind)}`}
+        aria-pressed={selected}
+        onClick={() => selectLight(selected ? null : name)}
+      >
+        {name}
+      </button>
+      <input
+        type="color"
+        aria-label={`${name}: colour`}
+        title="Tint"
+        value={toHex(light.color)}
+        onInput={(event) => editLight("Tint", name, "color", fromHex(event.currentTarget.value, light.color))}
+      />
+      <IconButton
+        icon="solo"
+        label={`${name} alone`}
+        pressed={soloLight.value === name}
+        onClick={() => toggleLightSolo(name)}
+      />
+      <Slider
+        label={`${name}: intensity`}
+        value={light.scale}
+        initial={defaultLook.value?.lights[name]?.scale ?? 1}
+        minimum={0.01}
+        maximum={100}
+        scale="log"
+        unit="×"
+        onChange={(value) => editLight("Intensity", name, "scale", value)}
+        onHold={() => beginDrag(lightPath(name))}
+      />
+    </li>
+  );
+}
+
+function LightKindMenu() {
+  return (
+    <div class="light-kinds" role="group" aria-label="Kind of light">
+      {LIGHT_KINDS.map(({ kind, label, help }) => (
+        <button key={kind} title={help} aria-pressed={placingKind.value === kind} onClick={() => startPlacement(kind)}>
+          {label}
+        </button>
+      ))}
+    </div>
+  );
+}
+
+function LightActions() {
+  const toggle = () => {
+    if (isAddMenuOpen.value) return stopPlacement();
+    isAddMenuOpen.value = true;
+    if (foldedSections.value.includes(TITLE)) toggleFolded(TITLE);
+  };
+  const movable = Object.values(lights.value).some(({ kind }) => kind !== "mesh");
+  return (
+    <>
+      {movable && <ToggleButton icon="handles" label="Handles in the picture" keys="G" state={handlesOpen} />}
+      <IconButton icon="plus" label="Add a light" pressed={isAddMenuOpen.value} onClick={toggle} />
+    </>
+  );
+}
+
+export function LightsPanel() {
+  const all = Object.entries(lights.value);
+  return (
+    <Section title={TITLE} count={all.length} actions={<LightActions />}>
+      {isAddMenuOpen.value && <LightKindMenu />}
+      {all.length === 0 && look.value !== null && !isAddMenuOpen.value && <p class="environment-words">None yet; + adds one.</p>}
+      <ul class="lights">
+        {all.map(([name, light]) => (
+          <LightRow key={name} name={name} light={light} />
+        ))}
+      </ul>
+    </Section>
+  );
+}

@@ -1,0 +1,99 @@
+/** What of a light is shown in an image, and what pulling at it changes. */
+import type { Light, Triple } from "../../protocol";
+import type { ProjectionCamera } from "./lightProjection";
+import { add, cross, dot, length, scale, subtract, roundComponents, normalize } from "./vector";
+
+/** Where a light's handles are: where it is, and where it aims; null where there is no such thing. */
+export interface Anchors {
+  position: Triple;
+  target: Triple | null;
+}
+
+const FAR = 0.3;
+const MIN_LENGTH = 1e-3;
+
+/** A directional light has no position: its handle is shown a fraction of the image's height from the image's center, about as
+ * far away as the middle of the world. */
+function placementPivot(camera: ProjectionCamera): { middle: Triple; reach: number } {
+  const depth = Math.max(0.1, length(camera.position));
+  return { middle: add(camera.position, scale(camera.forward, depth)), reach: FAR * depth * camera.height };
+}
+
+export function anchorsOf(light: Light, camera: ProjectionCamera): Anchors | null {
+  switch (light.kind) {
+    case "point":
+      return { position: light.position, target: null };
+    case "spot":
+    case "rectangle":
+      return { position: light.position, target: add(light.position, light.direction) };
+    case "directional": {
+      const { middle, reach } = placementPivot(camera);
+      return { position: subtract(middle, scale(normalize(light.direction), reach)), target: middle };
+    }
+    case "mesh":
+      return null;
+  }
+}
+
+/** Fields of a light that change together. */
+export interface LightChange {
+  position?: Triple;
+  direction?: Triple;
+}
+
+/** What moving a light to a place changes: where it is, and with a locked aim the way it points, so that it goes on
+ * aiming at the same point. Null where that would leave it without a direction. */
+export function placeLight(light: Light, to: Triple, aimLocked: boolean): LightChange | null {
+  if (light.kind === "mesh" || light.kind === "directional") return null;
+  const position = roundComponents(to);
+  if (light.kind === "point" || !aimLocked) return { position };
+  const direction = subtract(add(light.position, light.direction), position);
+  return length(direction) < MIN_LENGTH ? null : { position, direction: roundComponents(direction) };
+}
+
+/** What pulling a light's handle to a point changes. */
+export function moveLight(light: Light, to: Triple, camera: ProjectionCamera, aimLocked: boolean): LightChange | null {
+  if (light.kind !== "directional") return placeLight(light, to, aimLocked);
+  const direction = subtract(placementPivot(camera).middle, to);
+  return length(direction) < MIN_LENGTH ? null : { direction: roundComponents(normalize(direction)) };
+}
+
+/** What aiming a light at a point changes. */
+export function aimLight(light: Light, target: Triple): LightChange | null {
+  if (light.kind !== "spot" && light.kind !== "rectangle") return null;
+  const direction = subtract(target, light.position);
+  return length(direction) < MIN_LENGTH ? null : { direction: roundComponents(direction) };
+}
+
+/** Two unit vectors across a direction: the first along a rectangle's width, the second along its height. */
+export function spotEdgePoint(direction: Triple, degrees: number): [width: Triple, height: Triple] {
+  const axis = normalize(direction);
+  const up: Triple = Math.abs(axis[1]) < 0.999 ? [0, 1, 0] : [0, 0, 1];
+  const level = normalize(subtract(up, scale(axis, dot(up, axis))));
+  const angle = (degrees * Math.PI) / 180;
+  const height = add(scale(level, Math.cos(angle)), scale(cross(axis, level), Math.sin(angle)));
+  return [cross(height, axis), height];
+}
+
+const RING = 48;
+const WIDEST_DEGREES = 80;
+
+/** A closed line in the world that shows a light's size: a rectangle's edge, the edge of a spot's cone at its target. */
+export function lightOutline(light: Light): Triple[] {
+  if (light.kind === "rectangle") {
+    const [width, height] = spotEdgePoint(light.direction, light.rotation);
+    const corner = (x: number, y: number) =>
+      add(light.position, add(scale(width, (x * light.size[0]) / 2), scale(height, (y * light.size[1]) / 2)));
+    return [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+  }
+  if (light.kind === "spot") {
+    const [width, height] = spotEdgePoint(light.direction, 0);
+    const radius = length(light.direction) * Math.tan((Math.min(light.cone[1], WIDEST_DEGREES) * Math.PI) / 180);
+    const middle = add(light.position, light.direction);
+    return Array.from({ length: RING }, (_, k) => {
+      const angle = (2 * Math.PI * k) / RING;
+      return add(middle, add(scale(width, radius * Math.cos(angle)), scale(height, radius * Math.sin(angle))));
+    });
+  }
+  return [];
+}

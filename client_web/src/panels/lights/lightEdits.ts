@@ -1,0 +1,75 @@
+/** The lights of the look: which is selected, and changing, adding and removing them. */
+import { batch, computed } from "@preact/signals";
+import { jsonPointer } from "../../state/document/pointer";
+import { editValue, replaceLook } from "../../edit/edit";
+import { MAX_LIGHTS } from "../../look.gen";
+import type { Light, Look, Triple } from "../../protocol";
+import { soloLight } from "../../state/visibility/soloSources";
+import { defaultLook, look } from "../../state/look";
+import { selectedLight, selectLight } from "../../state/selection";
+import { showNote } from "../../ui/toasts";
+import type { LightChange } from "./handleGeometry";
+import { offsetCopy, nextLightName } from "./lightKinds";
+
+export const lights = computed<Record<string, Light>>(() => look.value?.lights ?? {});
+export const lightNames = computed(() => Object.keys(lights.value));
+
+/** The selected light, while it is there. */
+export const openLight = computed<Light | null>(() => lights.value[selectedLight.value ?? ""] ?? null);
+
+/** Whether a light was added here: it can be removed, where the scene's own can be switched off. */
+export function isAddedLight(name: string): boolean {
+  return defaultLook.value?.lights[name] === undefined;
+}
+
+export function lightPath(name: string, field?: string): string {
+  return field === undefined ? jsonPointer("lights", name) : jsonPointer("lights", name, field);
+}
+
+/** Change a field of a light; during one gesture on one field that is one step. */
+export function editLight(label: string, name: string, field: string, value: unknown): void {
+  editValue(label, lightPath(name, field), value);
+}
+
+export function addLight(name: string, light: Light): void {
+  batch(() => {
+    editValue("Add", lightPath(name), light);
+    selectLight(name);
+  });
+}
+
+/** Change fields of a light that belong together. */
+export function changeLight(label: string, name: string, change: LightChange): void {
+  const light = lights.peek()[name];
+  const fields = Object.entries(change);
+  if (light === undefined || fields.length === 0) return;
+  if (fields.length === 1) editLight(label, name, ...(fields[0] as [string, Triple]));
+  else editValue(label, lightPath(name), { ...light, ...change });
+}
+
+/** Another light like this one, beside it. */
+export function duplicateLight(name: string): void {
+  const light = lights.peek()[name];
+  if (light === undefined || light.kind === "mesh") return;
+  if (lightNames.peek().length >= MAX_LIGHTS) showNote(`A scene has at most ${MAX_LIGHTS} lights; remove one first.`);
+  else addLight(nextLightName(name, lightNames.peek()), offsetCopy(light));
+}
+
+/** Give a light that was added here another name; it stays where it is in the list. */
+export function renameLight(name: string, to: string): void {
+  const current = look.peek();
+  if (current === null || !isAddedLight(name) || to === name) return;
+  if (current.lights[to] !== undefined) return showNote(`There is a light “${to}” already; take another name.`);
+  const renamed = Object.entries(current.lights).map(([entryName, light]) => [entryName === name ? to : entryName, light]);
+  batch(() => {
+    replaceLook(`${name} · Rename to ${to}`, { ...current, lights: Object.fromEntries(renamed) as Look["lights"] });
+    if (selectedLight.peek() === name) selectedLight.value = to;
+    if (soloLight.peek() === name) soloLight.value = to;
+  });
+}
+
+export function removeLight(name: string): void {
+  if (!isAddedLight(name)) return;
+  if (selectedLight.peek() === name) selectedLight.value = null;
+  editValue("Remove", lightPath(name), undefined);
+}

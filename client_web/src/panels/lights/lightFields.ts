@@ -1,0 +1,93 @@
+/** What of a light the inspector shows as numbers and as angles: which field, in which range, and how it is changed. */
+import { RANGES } from "../../look.gen";
+import type { Light, Triple } from "../../protocol";
+import { length } from "./vector";
+
+type Spot = Extract<Light, { kind: "spot" }>;
+type Rectangle = Extract<Light, { kind: "rectangle" }>;
+
+/** A few numbers on one line. */
+export interface NumbersField {
+  field: "position" | "direction" | "size";
+  editLabel: string;
+  label: string;
+  unit: string;
+  /** What each number is called. */
+  names: readonly string[];
+  minimum: number;
+  maximum: number;
+  step: number;
+  /** Whether a light may have these numbers; others are rejected. */
+  allows?(values: number[]): boolean;
+}
+
+const XYZ = ["x", "y", "z"];
+
+const NUMBERS: readonly NumbersField[] = [
+  { field: "position", editLabel: "Move", label: "Position", unit: "m", names: XYZ, ...RANGES.light.position, step: 0.01 },
+  {
+    field: "direction",
+    editLabel: "Aim",
+    label: "Direction",
+    unit: "",
+    names: XYZ,
+    ...RANGES.light.direction,
+    step: 0.05,
+    allows: (values) => length(values as Triple) > 0,
+  },
+  {
+    field: "size",
+    editLabel: "Size",
+    label: "Size",
+    unit: "m",
+    names: ["width", "height"],
+    ...RANGES.light.size,
+    step: 0.01,
+  },
+];
+
+/** An angle of the kinds of light that have its field, degrees. */
+export interface AngleField {
+  field: "rotation" | "cone";
+  editLabel: string;
+  label: string;
+  minimum: number;
+  maximum: number;
+  valueOf(light: Light): number;
+  /** The field with another angle. */
+  changeFor(light: Light, angle: number): unknown;
+}
+
+const cone = (light: Light) => (light as Spot).cone;
+
+const ANGLES: readonly AngleField[] = [
+  {
+    field: "rotation",
+    editLabel: "Turn",
+    label: "Rotation",
+    minimum: -180,
+    maximum: 180,
+    valueOf: (light) => (light as Rectangle).rotation,
+    changeFor: (_, angle) => angle,
+  },
+  {
+    field: "cone",
+    editLabel: "Cone",
+    label: "Cone, full light",
+    ...RANGES.light.cone,
+    valueOf: (light) => cone(light)[0],
+    changeFor: (light, angle) => [angle, Math.max(angle, cone(light)[1])],
+  },
+  {
+    field: "cone",
+    editLabel: "Cone",
+    label: "Cone, edge",
+    minimum: 1,
+    maximum: RANGES.light.cone.maximum,
+    valueOf: (light) => cone(light)[1],
+    changeFor: (light, angle) => [Math.min(cone(light)[0], angle), angle],
+  },
+];
+
+export const numbersFieldsOf = (light: Light) => NUMBERS.filter(({ field }) => field in light);
+export const angleFieldsOf = (light: Light) => ANGLES.filter(({ field }) => field in light);

@@ -1,0 +1,116 @@
+/** The kinds of light: their labels, and a new light of each. */
+import { DEFAULT_LIGHTS, MAX_LIGHT_NAME } from "../../look.gen";
+import type { Light, LightKind, Rgb, Triple } from "../../protocol";
+import { add, length, scale, subtract, roundComponents } from "./vector";
+
+/** Kinds that can be added; a mesh that shines only comes with a scene. */
+export type AddedKind = Exclude<LightKind, "mesh">;
+
+interface LightKindLabels {
+  kind: AddedKind;
+  label: string;
+  help: string;
+  /** What a click in the image shall be on. */
+  click: string;
+}
+
+export const LIGHT_KINDS: readonly LightKindLabels[] = [
+  { kind: "point", label: "Point", help: "A bulb: shines alike in all directions", click: "hang the light" },
+  { kind: "spot", label: "Spot", help: "Shines into a cone", click: "aim the spot" },
+  { kind: "rectangle", label: "Panel", help: "A rectangle that shines to its front", click: "aim the panel" },
+  { kind: "directional", label: "Sun", help: "Parallel light from far away", click: "aim the sun" },
+];
+
+export function labelOf(kind: LightKind): string {
+  return LIGHT_KINDS.find((candidate) => candidate.kind === kind)?.label ?? "Shining surface";
+}
+
+/** The quantity that a light's emission is. */
+export const UNITS: Record<LightKind, string> = {
+  point: "W/sr",
+  spot: "W/sr",
+  directional: "W/m²",
+  rectangle: "W/sr/m²",
+  mesh: "W/sr/m²",
+};
+
+/** What a click in an image found, and what light there is in it. */
+export interface ClickedSurface {
+  position: Triple;
+  /** Unit, towards the camera. */
+  normal: Triple;
+  /** From the camera, meters. */
+  distance: number;
+  /** Mean radiance of the image. */
+  radiance: number;
+}
+
+const OFFSET_FRACTION = 0.2;
+const SIDE_FRACTION = 0.4;
+/** Irradiance of a new light, of the image's mean radiance: as bright as what is there on a surface of middle gray. */
+const BRIGHTNESS_FRACTION = 6;
+
+/** Where a panel is put, so that its lower edge is not below what was clicked, which may stand on a floor. A panel that hangs
+ * below what was clicked stays there. */
+function liftAboveSurface(clicked: Triple, position: Triple, direction: Triple, halfSide: number): Triple {
+  const hangs = direction[1] > Math.SQRT1_2 * length(direction);
+  const below = clicked[1] - (position[1] - halfSide * Math.sqrt(1 - (direction[1] / length(direction)) ** 2));
+  return hangs || below <= 0 ? position : roundComponents(add(position, [0, below, 0]));
+}
+
+/** A light for what was clicked: off the surface by a part of the camera's distance, aimed at it, and as bright as the
+ * rest of the image. */
+export function createLight(kind: AddedKind, { position, normal, distance, radiance }: ClickedSurface): Light {
+  const offset = distance * OFFSET_FRACTION;
+  const lightPosition = roundComponents(add(position, scale(normal, offset)));
+  const direction = roundComponents(subtract(position, lightPosition));
+  const irradiance = BRIGHTNESS_FRACTION * (radiance > 0 ? radiance : 1);
+  const gray = (value: number): Rgb => Array<number>(3).fill(Number(value.toPrecision(2))) as Rgb;
+  const intensity = gray(irradiance * offset ** 2);
+  switch (kind) {
+    case "point":
+      return { ...DEFAULT_LIGHTS.point, emission: intensity, position: lightPosition };
+    case "spot":
+      return { ...DEFAULT_LIGHTS.spot, emission: intensity, position: lightPosition, direction };
+    case "directional":
+      return { ...DEFAULT_LIGHTS.directional, emission: gray(irradiance), direction };
+    case "rectangle": {
+      const side = Number((SIDE_FRACTION * offset).toPrecision(2));
+      const emission = gray((irradiance * offset ** 2) / side ** 2);
+      const raised = liftAboveSurface(position, lightPosition, direction, side / 2);
+      const aim = roundComponents(subtract(position, raised));
+      return { ...DEFAULT_LIGHTS.rectangle, emission, position: raised, direction: aim, size: [side, side] };
+    }
+  }
+}
+
+/** The first of "Spot", "Spot 2", … that is free; after "Key 2" comes "Key 3". */
+export function nextLightName(like: string, usedNames: readonly string[]): string {
+  if (!usedNames.includes(like)) return like;
+  const stem = like.replace(/ \d+$/, "").slice(0, MAX_LIGHT_NAME - 4);
+  let n = 2;
+  while (usedNames.includes(`${stem} ${n}`)) n += 1;
+  return `${stem} ${n}`;
+}
+
+const COPY_OFFSET = 0.25;
+
+/** A copy of a light, offset if it has a position, so that their handles do not coincide. */
+export function offsetCopy(light: Light): Light {
+  if (!("position" in light)) return { ...light };
+  const reach = "direction" in light ? length(light.direction) : 1;
+  return { ...light, position: roundComponents(add(light.position, [COPY_OFFSET * Math.max(reach, 0.1), 0, 0])) };
+}
+
+/** A complete light from a partial look; missing fields are as in `base`, or else as in a new light. */
+export function completeLight(partial: Partial<Light>, base: Light | undefined): Light {
+  const kind = partial.kind ?? base?.kind ?? "point";
+  return { ...(base?.kind === kind ? base : DEFAULT_LIGHTS[kind]), ...partial } as Light;
+}
+
+/** The same light as another kind: what both have stays. */
+export function changeKind(light: Light, kind: AddedKind): Light {
+  const start = DEFAULT_LIGHTS[kind];
+  const shared = Object.entries(light).filter(([field]) => field !== "kind" && field in start);
+  return { ...start, ...Object.fromEntries(shared) } as Light;
+}

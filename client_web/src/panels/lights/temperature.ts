@@ -1,0 +1,61 @@
+/** Colors of glowing bodies: temperature in kelvin to linear Rec. 709, and the temperature next to a color. */
+import { luminance } from "../../render/color/tonemap";
+import type { Rgb } from "../../protocol";
+
+export const MIN_KELVIN = 1000;
+export const MAX_KELVIN = 15000;
+/** Distance from the line of glowing bodies, in CIE 1960 u and v, from which on a color is called colored. */
+const MAX_PLANCKIAN_DISTANCE = 0.03;
+
+/** u and v (CIE 1960) of a black body; Krystek 1985, within 1e-4 from 1,000 to 15,000 K. */
+export function planckian(kelvin: number): [u: number, v: number] {
+  const square = kelvin * kelvin;
+  return [
+    (0.860117757 + 1.54118254e-4 * kelvin + 1.28641212e-7 * square) /
+      (1 + 8.42420235e-4 * kelvin + 7.08145163e-7 * square),
+    (0.317398726 + 4.22806245e-5 * kelvin + 4.20481691e-8 * square) /
+      (1 - 2.89741816e-5 * kelvin + 1.61456053e-7 * square),
+  ];
+}
+
+/** Linear Rec. 709 of a glowing body, of luminance 1. What the primaries cannot mix, below 1,900 K, is cut off. */
+export function rgbOfKelvin(kelvin: number): Rgb {
+  const [u, v] = planckian(kelvin);
+  const scale = 2 * u - 8 * v + 4;
+  const [x, y] = [(3 * u) / scale, (2 * v) / scale];
+  const [X, Z] = [x / y, (1 - x - y) / y];
+  const rgb: Rgb = [
+    Math.max(0, 3.2404542 * X - 1.5371385 - 0.4985314 * Z),
+    Math.max(0, -0.969266 * X + 1.8760108 + 0.041556 * Z),
+    Math.max(0, 0.0556434 * X - 0.2040259 + 1.0572252 * Z),
+  ];
+  return rgb.map((value) => value / luminance(rgb)) as Rgb;
+}
+
+function uvOf([r, g, b]: Rgb): [u: number, v: number] {
+  const X = 0.4124564 * r + 0.3575761 * g + 0.1804375 * b;
+  const Y = 0.2126729 * r + 0.7151522 * g + 0.072175 * b;
+  const Z = 0.0193339 * r + 0.119192 * g + 0.9503041 * b;
+  const scale = X + 15 * Y + 3 * Z;
+  return [(4 * X) / scale, (6 * Y) / scale];
+}
+
+const STEPS = 400;
+const kelvinSteps = Array.from({ length: STEPS + 1 }, (_, k) => MIN_KELVIN * (MAX_KELVIN / MIN_KELVIN) ** (k / STEPS));
+const chromaticities = kelvinSteps.map(planckian);
+
+/** The temperature next to a color, and whether the color is far from that of any glowing body. */
+export function kelvinOf(rgb: Rgb): { kelvin: number; isColored: boolean } {
+  if (luminance(rgb) <= 0) return { kelvin: 6500, isColored: false };
+  const [u, v] = uvOf(rgb);
+  const distances = chromaticities.map(([a, b]) => Math.hypot(u - a, v - b));
+  const nearest = distances.reduce((best, distance, k) => (distance < (distances[best] as number) ? k : best), 0);
+  const kelvin = kelvinSteps[nearest] as number;
+  return { kelvin: Math.round(kelvin / 10) * 10, isColored: (distances[nearest] as number) > MAX_PLANCKIAN_DISTANCE };
+}
+
+/** A quantity of light as bright as before, in the color of a glowing body. */
+export function withKelvin(previous: Rgb, kelvin: number): Rgb {
+  const brightness = luminance(previous);
+  return rgbOfKelvin(kelvin).map((value) => Number((value * brightness).toPrecision(6))) as Rgb;
+}

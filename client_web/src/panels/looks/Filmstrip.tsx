@@ -1,0 +1,231 @@
+/** Saved looks, and the steps of this visit: click one to return to it. */
+import { useEffect, useRef } from "preact/hooks";
+import { isDeepEqual } from "../../state/document/difference";
+import { previewedStep, replaceLook } from "../../edit/edit";
+import { history } from "../../edit/history";
+import { splitStepLabel } from "../../edit/stepLabel";
+import { connectToBake } from "../../session/connect";
+import type { Look } from "../../protocol";
+import { bake } from "../../state/bakes";
+import { defaultLook, look } from "../../state/look";
+import { mayEdit, joinTarget } from "../../state/sessionUser";
+import { timelineOpen } from "../../state/panels";
+import { scene } from "../../state/scene";
+import { lookThumbnail, thumbnailRevision } from "../../state/thumbnails";
+import { IconButton } from "../../ui/IconButton";
+import { EditableName } from "../../ui/EditableName";
+import { Icon } from "../../ui/Icon";
+import { completeLook, justSaved, storeLookAsA, saveLook, sideA } from "./abCompare";
+import { thumbnailOf, variantThumbnail } from "./namedThumbnails";
+import { deleteLook, refreshSavedLooks, renameLook, savedLooks, updateLook, type SavedLook } from "./savedLooks";
+import { goToStep } from "./undoRedo";
+
+const MAX_STEPS = 40;
+const MAX_NAME = 80;
+
+function LookName({ saved }: { saved: SavedLook }) {
+  const isNew = justSaved.value === saved.name;
+  return (
+    <EditableName
+      key={saved.name}
+      class="tile-name"
+      name={saved.name}
+      maximum={MAX_NAME}
+      editing={isNew}
+      onRename={(name) => void renameLook(saved, name.replace(/[/\\]/g, "-"))}
+      onDone={() => isNew && (justSaved.value = null)}
+    />
+  );
+}
+
+function TileImage({ image, text }: { image: string | null; text: string }) {
+  return image === null ? <span class="blank">{text.slice(0, 2)}</span> : <img src={image} alt="" draggable={false} />;
+}
+
+/** Take a saved look over; for one who only looks the session begins again with it. */
+function showSaved(name: string, fullLook: Look): void {
+  const [openScene, current] = [scene.value, bake.value];
+  if (mayEdit.value || openScene === null || current === null) return replaceLook(`Show ${name}`, fullLook);
+  joinTarget.value = { scene: openScene.id, look: name };
+  connectToBake(current);
+}
+
+function SavedTile({ saved }: { saved: SavedLook }) {
+  thumbnailRevision.value;
+  const fullLook = completeLook(saved.look);
+  const isDisplayed = isDeepEqual(fullLook, look.value);
+  return (
+    <li class={`tile ${isDisplayed ? "shown" : ""}`}>
+      <button
+        class="tile-picture"
+        aria-label={`Show ${saved.name}`}
+        aria-pressed={isDisplayed}
+        onClick={() => showSaved(saved.name, fullLook)}
+      >
+        <TileImage image={thumbnailOf(saved.etag)} text={saved.name} />
+        {sideA.value?.label === saved.name && <span class="mark">A</span>}
+      </button>
+      <span class="tile-actions">
+        <button
+          class="icon"
+          title={`Compare with ${saved.name}: keep it as A`}
+          aria-label={`Keep ${saved.name} as A`}
+          onClick={() => void storeLookAsA(fullLook, saved.name)}
+        >
+          A
+        </button>
+        <IconButton
+          icon="save"
+          label={`Save the live look over ${saved.name}`}
+          disabled={isDisplayed || !mayEdit.value}
+          onClick={() => look.value && void updateLook(saved, look.value)}
+        />
+        <IconButton icon="trash" label={`Delete ${saved.name}`} disabled={!mayEdit.value} onClick={() => void deleteLook(saved)} />
+      </span>
+      <LookName saved={saved} />
+    </li>
+  );
+}
+
+/** A look that came with the scene's file: to show, to compare with, not to change. */
+function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }) {
+  thumbnailRevision.value;
+  const fullLook = completeLook(partial);
+  const isDisplayed = isDeepEqual(fullLook, look.value);
+  return (
+    <li class={`tile ${isDisplayed ? "shown" : ""}`}>
+      <button
+        class="tile-picture"
+        aria-label={`Show ${name}`}
+        aria-pressed={isDisplayed}
+        onClick={() => replaceLook(`Show ${name}`, fullLook)}
+      >
+        <TileImage image={variantThumbnail(name)} text={name} />
+        {sideA.value?.label === name && <span class="mark">A</span>}
+      </button>
+      <span class="tile-actions">
+        <button
+          class="icon"
+          title={`Compare with ${name}: keep it as A`}
+          aria-label={`Keep ${name} as A`}
+          onClick={() => void storeLookAsA(fullLook, name)}
+        >
+          A
+        </button>
+      </span>
+      <span class="tile-name" title={`${name}, a variant of the scene's file`}>
+        {name}
+      </span>
+    </li>
+  );
+}
+
+function SceneVariants() {
+  const variants = scene.value?.variants ?? [];
+  if (variants.length === 0) return null;
+  return (
+    <>
+      <h2>Variants</h2>
+      <ul class="tiles saved" aria-label="Variants of the scene">
+        {variants.map(({ name, look: partial }) => (
+          <VariantTile key={name} name={name} partial={partial as Partial<Look>} />
+        ))}
+      </ul>
+    </>
+  );
+}
+
+/** What was edited on a line of its own, so that a long name leaves room for what was done. */
+function StepLabel({ label }: { label: string }) {
+  const { subject, action } = splitStepLabel(label);
+  return (
+    <span class="tile-name" title={label}>
+      {subject !== null && <span class="of">{subject}</span>}
+      <span class="deed">{action}</span>
+    </span>
+  );
+}
+
+function StepTile({ count, label, look }: { count: number; label: string; look: Look | undefined }) {
+  const current = history.cursor.value === count;
+  const undone = count > history.cursor.value;
+  return (
+    <li class={`tile step ${current ? "shown" : ""} ${undone ? "undone" : ""}`}>
+      <button
+        class="tile-picture"
+        aria-label={`Go to step ${count}: ${label}`}
+        aria-current={current ? "step" : undefined}
+        onClick={() => goToStep(count)}
+      >
+        <TileImage image={lookThumbnail(look)} text={label} />
+      </button>
+      <StepLabel label={label} />
+    </li>
+  );
+}
+
+function HistorySteps() {
+  const strip = useRef<HTMLUListElement>(null);
+  const steps = history.steps.value;
+  const showCurrent = () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  useEffect(showCurrent, [history.cursor.value, steps.length]);
+  useEffect(() => {
+    const observer = new ResizeObserver(showCurrent); // saved looks and variants that arrive take room from it
+    observer.observe(strip.current as Element);
+    return () => observer.disconnect();
+  }, []);
+  const first = Math.max(0, steps.length - MAX_STEPS);
+  const opened = steps.find((step) => step.kind === "look")?.before ?? previewedStep.value?.before ?? look.value ?? undefined;
+  // steps that are not of the look (one was deleted) show the image before them
+  let last = opened;
+  const tiles = steps.map((step, i) => {
+    if (step.kind === "look") last = step.after;
+    return { count: i + 1, label: step.label, look: last };
+  });
+  return (
+    <ul class="tiles" ref={strip} aria-label="Steps of this visit">
+      {first === 0 && <StepTile count={0} label="Opened" look={opened} />}
+      {tiles.slice(first).map((tile) => (
+        <StepTile key={tile.count} {...tile} />
+      ))}
+    </ul>
+  );
+}
+
+export function Filmstrip() {
+  useEffect(() => void (scene.value !== null && refreshSavedLooks()), [scene.value?.id]);
+  return (
+    <section class="filmstrip" aria-label="Looks">
+      <h2>Looks</h2>
+      <button
+        class="save"
+        onClick={() => void saveLook()}
+        disabled={look.value === null || !mayEdit.value}
+        title="Save the live look (Ctrl+S)"
+      >
+        <Icon name="plus" />
+        Save look
+      </button>
+      <button
+        class="save"
+        disabled={!mayEdit.value}
+        aria-expanded={timelineOpen.value}
+        onClick={() => (timelineOpen.value = !timelineOpen.value)}
+        title="Play looks one after another, and render what lies between (M)"
+      >
+        <Icon name="film" />
+        Time line
+      </button>
+      {defaultLook.value !== null && savedLooks.value.length > 0 && (
+        <ul class="tiles saved" aria-label="Saved looks">
+          {savedLooks.value.map((saved) => (
+            <SavedTile key={saved.name} saved={saved} />
+          ))}
+        </ul>
+      )}
+      {defaultLook.value !== null && <SceneVariants />}
+      <h2>History</h2>
+      <HistorySteps />
+    </section>
+  );
+}

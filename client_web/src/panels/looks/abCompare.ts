@@ -1,0 +1,107 @@
+/** A/B comparison: A is a stored image, B is the live one. */
+import { effect, signal } from "@preact/signals";
+import { applyCameras, currentCameras, type CameraSet } from "../../viewport/cameras/freeCamera";
+import { isDeepEqual } from "../../state/document/difference";
+import { replaceLook } from "../../edit/edit";
+import { history } from "../../edit/history";
+import { completeLight } from "../lights/lightKinds";
+import { withViews } from "../../session/requestFrames";
+import { stage } from "../../render/renderStage";
+import type { Look } from "../../protocol";
+import { isLookFiltered } from "../../state/visibility/activeFilters";
+import { connection } from "../../state/connection";
+import { isDisplayFrozen, isReferenceShown, wipe } from "../../state/display";
+import { isFrameExact } from "../../state/fidelity";
+import { defaultLook, look } from "../../state/look";
+import { filmstripOpen } from "../../state/panels";
+import { scene } from "../../state/scene";
+import { lookThumbnail } from "../../state/thumbnails";
+import { reportErrors, showNote } from "../../ui/toasts";
+import { renderThumbnail } from "./displayImage";
+import { addLook, unusedName } from "./savedLooks";
+
+/** The look whose image is stored as A, its label, and its cameras. */
+export const sideA = signal<{ look: Look; label: string; cameras: CameraSet } | null>(null);
+
+/** The look that was saved last, while its name waits to be typed over. */
+export const justSaved = signal<string | null>(null);
+
+/** Missing parts of a saved look are the scene's own. */
+export function completeLook(partial: Partial<Look>): Look {
+  const base = defaultLook.value as Look;
+  return {
+    materials: { ...base.materials, ...partial.materials },
+    environment: { ...base.environment, ...partial.environment },
+    background: { ...base.background, ...partial.background },
+    lights: {
+      ...base.lights,
+      ...Object.fromEntries(
+        Object.entries(partial.lights ?? {}).map(([name, light]) => [name, completeLight(light, base.lights[name])]),
+      ),
+    },
+    transport: { ...base.transport, ...partial.transport },
+    display: { ...base.display, ...partial.display },
+  };
+}
+
+export function storeA(): void {
+  if (look.value === null || !stage.active.hasPixels) return;
+  sideA.value = { look: look.value, label: "kept", cameras: currentCameras() };
+  stage.storeReference();
+  showNote("This picture is A now. W wipes between A and B, the live picture; C shows A while it is held.");
+}
+
+/** Keep the image of another look as A; it is fetched from the server. */
+export async function storeLookAsA(storedLook: Look, label: string): Promise<void> {
+  await reportErrors(async () => {
+    await withViews(storedLook, () => stage.storeReference());
+    sideA.value = { look: storedLook, label, cameras: currentCameras() };
+  });
+}
+
+/** The live image becomes A, and A becomes live, with its cameras. It is a way to compare, so it takes no undone
+ * steps away. */
+export function swapWithA(): void {
+  const [a, live] = [sideA.value, look.value];
+  if (a === null || live === null) return;
+  const cameras = currentCameras();
+  stage.storeReference();
+  if (!isDeepEqual(live, a.look) && history.commitUndone())
+    showNote("What you had undone is kept in the history, before the swap.");
+  replaceLook("Swap A and B", a.look);
+  applyCameras(a.cameras);
+  sideA.value = { look: live, label: "swapped", cameras };
+}
+
+export function toggleWipe(): void {
+  wipe.value = { ...wipe.value, isOn: !wipe.value.isOn };
+}
+
+export async function saveLook(): Promise<void> {
+  const current = look.value;
+  if (current === null) return;
+  const image = isLookFiltered() ? lookThumbnail(current) : renderThumbnail(stage.active.pixels, current.display);
+  const name = await reportErrors(unusedName);
+  if (name === undefined) return;
+  filmstripOpen.value = true;
+  justSaved.value = name;
+  await addLook(name, current, image); // without one it gets its own when it is shown whole
+}
+
+// until another image is stored, A is the one the scene opened with
+let openedScene: string | null = null;
+effect(() => {
+  const id = scene.value?.id ?? null;
+  if (!isFrameExact.value || id === null || id === openedScene) return;
+  openedScene = id;
+  sideA.value = { look: look.peek() as Look, label: "as opened", cameras: currentCameras() };
+  stage.storeReference();
+});
+
+// a view that was not shown when A was stored has no image of it yet
+effect(() => {
+  const a = sideA.value;
+  const isCompared = wipe.value.isOn || isReferenceShown.value;
+  if (a === null || !isCompared || !isFrameExact.value || isDisplayFrozen.value || connection.value !== "open") return;
+  if (stage.displayed.some((image) => image.reference === null)) void storeLookAsA(a.look, a.label);
+});

@@ -1,0 +1,103 @@
+/** Keyframes of the timeline, stored for this tab. Their changes are steps of the history. */
+import { computed, effect, signal } from "@preact/signals";
+import { history, type Keyframe } from "../../edit/history";
+import type { LooksRequest } from "../../protocol";
+import { scene } from "../../state/scene";
+import { hasFreeCamera } from "../../state/views";
+
+export const MAX_KEYFRAMES = 24;
+export const [MIN_SECONDS, MAX_SECONDS] = [0.5, 20];
+
+export const keyframes = signal<readonly Keyframe[]>([]);
+export const seconds = signal(4);
+/** How materials go from one look to the next. */
+export const interpolation = signal<NonNullable<LooksRequest["between"]>>("parameters");
+export const isLooping = signal(true);
+/** What moves during playback: nothing; the camera, once around from the first look's pose, or from key to key; or, before a
+ * camera that stays, the object or the environment, once around. */
+export type CameraPathMode = "still" | "around" | "along" | "object" | "environment";
+export const cameraPathMode = signal<CameraPathMode>("still");
+/** What can move in the focused view: with a fixed camera the environment alone. */
+export const currentPath = computed<CameraPathMode>(() => (hasFreeCamera.value || cameraPathMode.value === "environment" ? cameraPathMode.value : "still"));
+/** How many looks there is something to play of. */
+export const fewestKeyframes = computed(() => (currentPath.value === "still" || currentPath.value === "along" ? 2 : 1));
+
+function replaceKeyframes(label: string, after: readonly Keyframe[]): void {
+  const before = keyframes.peek();
+  keyframes.value = after;
+  history.record({ kind: "timeline", label, before, after });
+  history.endGesture();
+}
+
+export function addKeyframe(keyframe: Keyframe): void {
+  if (keyframes.peek().length < MAX_KEYFRAMES) replaceKeyframes(`${keyframe.name} to the time line`, [...keyframes.peek(), keyframe]);
+}
+
+export function removeKeyframe(index: number): void {
+  const name = keyframes.peek()[index]?.name ?? "";
+  replaceKeyframes(`${name} off the time line`, keyframes.peek().toSpliced(index, 1));
+}
+
+/** Move a keyframe by one position. */
+export function moveKeyframe(index: number, offset: -1 | 1): void {
+  const [moved, to] = [keyframes.peek()[index], index + offset];
+  if (moved === undefined || to < 0 || to >= keyframes.peek().length) return;
+  replaceKeyframes(`${moved.name} ${offset < 0 ? "earlier" : "later"}`, keyframes.peek().toSpliced(index, 1).toSpliced(to, 0, moved));
+}
+
+/** See one from somewhere else on a way from key to key. */
+export function setKeyframeCamera(index: number, camera: NonNullable<Keyframe["camera"]>): void {
+  const moved = keyframes.peek()[index];
+  if (moved !== undefined) replaceKeyframes(`${moved.name} from elsewhere`, keyframes.peek().with(index, { ...moved, camera }));
+}
+
+/** A name for a look that has none. */
+export function nextKeyframeName(): string {
+  const usedNames = new Set(keyframes.peek().map(({ name }) => name));
+  let number = keyframes.peek().length + 1;
+  while (usedNames.has(`Key ${number}`)) number += 1;
+  return `Key ${number}`;
+}
+
+interface StoredTimeline {
+  keyframes: readonly Keyframe[];
+  seconds: number;
+  interpolation: typeof interpolation.value;
+  cameraPath?: CameraPathMode;
+}
+
+const storageKey = (id: string) => `relume.timeline.${id}`;
+
+function loadTimeline(id: string): void {
+  let stored: StoredTimeline | null = null;
+  try {
+    stored = JSON.parse(sessionStorage.getItem(storageKey(id)) ?? "null") as StoredTimeline | null;
+  } catch {
+    // forbidden or not ours: the timeline is empty
+  }
+  keyframes.value = stored?.keyframes ?? [];
+  seconds.value = stored?.seconds ?? 4;
+  interpolation.value = stored?.interpolation ?? "parameters";
+  cameraPathMode.value = stored?.cameraPath ?? "still";
+}
+
+/** Keep the timeline of each scene for a reload. */
+export function trackTimeline(): void {
+  let displayedScene: string | null = null;
+  effect(() => {
+    const id = scene.value?.id ?? null;
+    const [shownKeys, cameraPath] = [keyframes.value, cameraPathMode.value];
+    const stored: StoredTimeline = { keyframes: shownKeys, seconds: seconds.value, interpolation: interpolation.value, cameraPath };
+    if (id === null) return;
+    if (id !== displayedScene) {
+      displayedScene = id;
+      loadTimeline(id);
+      return;
+    }
+    try {
+      sessionStorage.setItem(storageKey(id), JSON.stringify(stored));
+    } catch {
+      // storage is full or forbidden: a reload then begins with an empty time line
+    }
+  });
+}

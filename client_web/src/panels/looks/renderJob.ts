@@ -1,0 +1,97 @@
+/** The batch that the server renders for this tab, one at a time: followed to its end, over reloads of the page and while
+ * the server is away, and then saved. */
+import { signal } from "@preact/signals";
+import { deleteRender, getRender, problemText, startRender, nullIfUnavailable } from "../../session/net/api";
+import type { RenderBody, RenderRequest } from "../../protocol";
+import { saveInTab, loadFromTab } from "../../state/tabSession";
+import { formatSeconds } from "../../ui/scale";
+import { reportErrors, showNote } from "../../ui/toasts";
+
+const POLL_MS = 300;
+const KEY = "relume.rendering";
+
+/** `fetchFrom`: the file of the finished batch. */
+interface ExportJob {
+  id: string;
+  exportName: string;
+  fetchFrom: string;
+}
+
+/** What the server renders now: how far it is, and a way to stop it, once it has begun. */
+export const exporting = signal<{ exportName: string; progress: number; secondsLeft: number | null; stop: (() => void) | null } | null>(null);
+
+export function exportText({ exportName, progress, secondsLeft }: NonNullable<typeof exporting.value>): string {
+  const left = secondsLeft === null ? "" : `, ${formatSeconds(secondsLeft)} left`;
+  return `${exportName} ${Math.floor(100 * progress)} %${left}`;
+}
+
+export function download(href: string, name: string): void {
+  const link = document.createElement("a");
+  link.href = href;
+  link.download = name;
+  link.click();
+}
+
+/** Its last state; null where it was stopped on the way. */
+async function finishRendering({ id, exportName }: ExportJob): Promise<RenderBody | null> {
+  let isStopped = false;
+  const stop = () => {
+    isStopped = true;
+    void reportErrors(() => deleteRender(id));
+    clearExport();
+  };
+  for (;;) {
+    const state = await nullIfUnavailable(getRender(id));
+    if (isStopped) return null;
+    if (state?.state === "ready" || state?.state === "failed") return state;
+    const { progress, seconds_left: secondsLeft } = state ?? { progress: exporting.peek()?.progress ?? 0, seconds_left: null };
+    exporting.value = { exportName, progress, secondsLeft, stop };
+    await new Promise((waited) => setTimeout(waited, POLL_MS));
+    if (isStopped) return null;
+  }
+}
+
+function clearExport(): void {
+  exporting.value = null;
+  saveInTab(KEY, null);
+}
+
+/** Follow it to its end, and save it. */
+async function pollRendering(rendering: ExportJob): Promise<void> {
+  const { id, exportName, fetchFrom } = rendering;
+  const state = await finishRendering(rendering);
+  if (state === null) return; // another one may have begun since
+  if (state.state === "failed") throw new Error(`The ${exportName} could not be rendered: ${problemText(state.problem)}`);
+  clearExport();
+  download(`/api/renders/${encodeURIComponent(id)}/${fetchFrom}`, "");
+}
+
+/** Do `work` while nothing else is exported; a failure is shown. */
+async function runExport(exportName: string, work: () => Promise<void>): Promise<void> {
+  exporting.value = { exportName, progress: 0, secondsLeft: null, stop: null };
+  await reportErrors(async () => {
+    try {
+      await work();
+    } catch (error) {
+      clearExport();
+      throw error;
+    }
+  });
+}
+
+/** Have a batch rendered and saved, unless one is running; `light` says which is missing. */
+export async function renderAndSave(exportName: string, fetchFrom: string, request: RenderRequest, light: string): Promise<void> {
+  if (exporting.peek() !== null) return;
+  await runExport(exportName, async () => {
+    showNote(`Rendering the ${exportName} on the server${light}…`);
+    const { id } = await startRender(request);
+    saveInTab(KEY, { id, exportName, fetchFrom });
+    await pollRendering({ id, exportName, fetchFrom });
+  });
+}
+
+/** Go on with what the page was following when it was reloaded. */
+export async function resumeRendering(): Promise<void> {
+  const stored = loadFromTab<ExportJob>(KEY);
+  if (stored !== null && exporting.peek() === null) await runExport(stored.exportName, () => pollRendering(stored));
+}

@@ -1,0 +1,155 @@
+/** Saved looks on the server, each with its version; saving and deleting can be undone. */
+import { signal } from "@preact/signals";
+import { history } from "../../edit/history";
+import type { NamedLook } from "../../edit/history";
+import { ApiError, json, request } from "../../session/net/api";
+import type { Look, LookEntry } from "../../protocol";
+import { scene } from "../../state/scene";
+import { lookThumbnail } from "../../state/thumbnails";
+import { reportErrors } from "../../ui/toasts";
+import { nextName } from "./lookNames";
+import { fetchThumbnail, uploadThumbnail, cacheThumbnail, thumbnailOf } from "./namedThumbnails";
+
+export interface SavedLook extends NamedLook {
+  etag: string;
+  created: string;
+}
+
+export const savedLooks = signal<SavedLook[]>([]);
+const MAX_READ = 60;
+const path = (name: string) => `/api/looks/${encodeURIComponent(name)}`;
+/** Whether a look speaks only of what this scene has, or can be given. */
+function fitsScene(look: Partial<Look>): boolean {
+  const materialNames = new Set(scene.value?.materials.map((material) => material.name));
+  const lightNames = new Set(scene.value?.lights);
+  return (
+    Object.keys(look.materials ?? {}).every((name) => materialNames.has(name)) &&
+    Object.entries(look.lights ?? {}).every(([name, light]) => light.kind !== "mesh" || lightNames.has(name))
+  );
+}
+
+async function readSavedLook({ name, etag, created, thumbnail }: LookEntry): Promise<SavedLook> {
+  const response = await request(path(name));
+  if (thumbnail !== null && thumbnailOf(etag) === null) cacheThumbnail(etag, thumbnail);
+  return { name, etag: response.headers.get("etag") ?? etag, created, look: (await response.json()) as Partial<Look> };
+}
+
+/** In the order in which they were saved first: times of the server, all written alike. */
+function sortByCreation(looks: SavedLook[]): SavedLook[] {
+  return looks.sort((a, b) => (a.created < b.created ? -1 : Number(a.created > b.created)));
+}
+
+export async function refreshSavedLooks(): Promise<void> {
+  await reportErrors(async () => {
+    const entries = (await (await request("/api/looks")).json()) as LookEntry[];
+    const looks = await Promise.allSettled(entries.slice(0, MAX_READ).map(readSavedLook));
+    const loaded = looks.flatMap((result) => (result.status === "fulfilled" ? [result.value] : []));
+    savedLooks.value = sortByCreation(loaded.filter(({ look }) => fitsScene(look)));
+  });
+}
+
+/** A name that no look has: looks of other scenes, which are not shown, have names too. */
+export async function unusedName(): Promise<string> {
+  const entries = (await (await request("/api/looks")).json()) as LookEntry[];
+  return nextName(
+    entries.map(({ name }) => name),
+    savedLooks.value.length,
+  );
+}
+
+function reportConflict(error: unknown, name: string, isNew = false): never {
+  if (isNew && error instanceof ApiError && error.status === 412)
+    throw new Error(`There is a look called “${name}” already, perhaps of another scene. Choose another name.`);
+  if (error instanceof ApiError && (error.status === 412 || error.status === 428)) {
+    void refreshSavedLooks();
+    throw new Error(
+      `“${name}” was changed elsewhere meanwhile. Nothing was overwritten; look at the new version first.`,
+    );
+  }
+  throw error;
+}
+
+function etagOf(name: string): string | null {
+  return savedLooks.value.find((entry) => entry.name === name)?.etag ?? null;
+}
+
+async function writeLook({ name, look, created }: NamedLook, etag: string | null, image: string | null): Promise<void> {
+  const headers: Record<string, string> = etag === null ? { "If-None-Match": "*" } : { "If-Match": etag };
+  const query = etag === null && created !== undefined ? `?created=${encodeURIComponent(created)}` : "";
+  const response = await request(path(name) + query, json("PUT", look, headers)).catch((error: unknown) =>
+    reportConflict(error, name, etag === null),
+  );
+  const existing = savedLooks.value.find((entry) => entry.name === name);
+  const since = existing?.created ?? ((await response.json()) as LookEntry).created;
+  const saved = { name, etag: response.headers.get("etag") ?? "", created: since, look };
+  savedLooks.value = sortByCreation([...savedLooks.value.filter((entry) => entry !== existing), saved]);
+  if (image !== null) cacheThumbnail(saved.etag, image);
+  await uploadThumbnail(path(name), saved.etag);
+}
+
+async function eraseLook(name: string): Promise<void> {
+  const etag = etagOf(name) ?? "*";
+  await fetchThumbnail(etag).catch(() => undefined); // it goes with the look, which may come back
+  await request(path(name), { method: "DELETE", headers: { "If-Match": etag } }).catch((error: unknown) =>
+    reportConflict(error, name),
+  );
+  savedLooks.value = savedLooks.value.filter((entry) => entry.name !== name);
+}
+
+/** Replace a saved look by another; null for none. `image`: its thumbnail, where it has one. */
+export async function exchangeSavedLook(from: NamedLook | null, to: NamedLook | null, image: string | null = null): Promise<void> {
+  if (to !== null) await writeLook({ created: from?.created, ...to }, from?.name === to.name ? etagOf(to.name) : null, image);
+  if (from !== null && from.name !== to?.name) await eraseLook(from.name);
+}
+
+/** Give a saved look a thumbnail. */
+export function attachSavedThumbnail({ name, etag }: SavedLook, image: string): void {
+  cacheThumbnail(etag, image);
+  void uploadThumbnail(path(name), etag);
+}
+
+/** The pending change of the saved looks, and those that wait for it. */
+let pendingChange: Promise<void> | null = null;
+
+/** When no change is under way: each is a step of the history then. Null where none is. */
+export const whenSaved = (): Promise<void> | null => pendingChange;
+
+async function runChange(label: string, before: NamedLook | null, to: NamedLook | null, image: string | null): Promise<void> {
+  await reportErrors(async () => {
+    await exchangeSavedLook(before, to, image);
+    const saved = savedLooks.value.find(({ name }) => name === to?.name);
+    history.record({ kind: "shelf", label, before, after: saved === undefined ? to : toNamedLook(saved) });
+    history.endGesture();
+  });
+}
+
+/** Change the saved looks after the previous changes: an undo in between would undo the step before. */
+async function queueChange(
+  label: string,
+  previous: NamedLook | null,
+  after: NamedLook | null,
+  image: string | null = null,
+): Promise<void> {
+  const operation = (pendingChange ?? Promise.resolve()).then(() => runChange(label, previous, after, image));
+  pendingChange = operation;
+  await operation;
+  if (pendingChange === operation) pendingChange = null;
+}
+
+const toNamedLook = ({ name, look, created }: SavedLook): NamedLook => ({ name, look, created });
+
+export function addLook(name: string, look: Look, image: string | null): Promise<void> {
+  return queueChange(`Save ${name}`, null, { name, look }, image);
+}
+
+export function deleteLook(saved: SavedLook): Promise<void> {
+  return queueChange(`Delete ${saved.name}`, toNamedLook(saved), null);
+}
+
+export function updateLook(saved: SavedLook, look: Look): Promise<void> {
+  return queueChange(`Update ${saved.name}`, toNamedLook(saved), { name: saved.name, look }, lookThumbnail(look));
+}
+
+export function renameLook(saved: SavedLook, name: string): Promise<void> {
+  return queueChange(`Rename ${saved.name}`, toNamedLook(saved), { name, look: saved.look });
+}

@@ -1,0 +1,87 @@
+/** The light around the scene: which one it is, how bright, which way it is turned, and its tint. */
+import { useRef } from "preact/hooks";
+import { editValue } from "../../edit/edit";
+import { beginDrag } from "../../session/prepare";
+import { ENVIRONMENT_SOURCE, soloLight, toggleLightSolo } from "../../state/visibility/soloSources";
+import { defaultLook, look } from "../../state/look";
+import { IconButton } from "../../ui/IconButton";
+import { LabeledColor } from "../../ui/LabeledColor";
+import { LabeledSlider } from "../../ui/LabeledSlider";
+import { Section } from "../../ui/Section";
+import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
+import { imported, offerToDeleteEnvironment } from "./environments";
+
+function EnvironmentActions({ scale }: { scale: number }) {
+  /** How bright it was when it was switched off. */
+  const previousScale = useRef(1);
+  const isOn = scale > 0;
+  const toggle = () => {
+    if (isOn) previousScale.current = scale;
+    editValue(isOn ? "Environment off" : "Environment on", "/environment/scale", isOn ? 0 : previousScale.current);
+  };
+  return (
+    <>
+      <IconButton
+        icon="lamp"
+        label={`Environment: ${isOn ? "switch off" : "switch on"}`}
+        pressed={isOn}
+        onClick={toggle}
+      />
+      <IconButton
+        icon="solo"
+        label="Environment alone"
+        pressed={soloLight.value === ENVIRONMENT_SOURCE}
+        onClick={() => toggleLightSolo(ENVIRONMENT_SOURCE)}
+      />
+      {imported.value !== null && (
+        <IconButton
+          icon="trash"
+          label={`Delete the environment ${imported.value.name}`}
+          onClick={() => imported.value && offerToDeleteEnvironment(imported.value)}
+        />
+      )}
+      <ImportEnvironment />
+    </>
+  );
+}
+
+export function EnvironmentPanel() {
+  const environment = look.value?.environment;
+  const initial = defaultLook.value?.environment;
+  if (environment === undefined || initial === undefined) return null;
+  return (
+    <Section title="Environment" actions={<EnvironmentActions scale={environment.scale} />}>
+      <EnvironmentGallery />
+      <LabeledSlider
+        shortLabel="Brightness"
+        label="Environment brightness"
+        value={environment.scale}
+        initial={initial.scale}
+        minimum={0.01}
+        maximum={100}
+        scale="log"
+        unit="×"
+        onChange={(value) => editValue("Environment brightness", "/environment/scale", value)}
+      />
+      <LabeledSlider
+        shortLabel="Rotation"
+        label="Environment rotation"
+        value={environment.rotation}
+        initial={initial.rotation}
+        minimum={-180}
+        maximum={180}
+        scale="linear"
+        unit="°"
+        onChange={(value) => editValue("Environment rotation", "/environment/rotation", value)}
+        onHold={() => beginDrag("/environment/rotation")}
+      />
+      <LabeledColor
+        shortLabel="Tint"
+        label="Environment tint"
+        value={environment.color}
+        initial={initial.color}
+        onChange={(value) => editValue("Environment tint", "/environment/color", value)}
+      />
+    </Section>
+  );
+}

@@ -1,0 +1,118 @@
+/** What is in the scene: materials to select, the lights and the light around them. */
+import { useEffect } from "preact/hooks";
+import { toHex } from "../../render/color/colorMath";
+import { isDeepEqual } from "../../state/document/difference";
+import { LightsPanel } from "../lights/LightsPanel";
+import { measuredThumbnailUrl } from "../../session/net/api";
+import type { MaterialLook } from "../../protocol";
+import { soloMaterial, toggleMaterialSolo } from "../../state/visibility/soloSources";
+import { defaultLook, look } from "../../state/look";
+import { materialNames, modelOf } from "../../state/scene";
+import { mayEdit } from "../../state/sessionUser";
+import { hoveredMaterial, selectMaterial, selectedMaterial } from "../../state/selection";
+import { IconButton } from "../../ui/IconButton";
+import { Section } from "../../ui/Section";
+import { watchBalls, displayedBalls } from "./materialBalls";
+import { BackgroundPanel } from "./BackgroundPanel";
+import { EnvironmentPanel } from "./EnvironmentPanel";
+import { TransportPanel } from "./TransportPanel";
+
+/** A ball of the material; until it is rendered one in its colors: body from its diffuse term, highlight from the rest. Of
+ * what was measured its image. */
+function MaterialSwatch({ name, material }: { name: string; material: MaterialLook | undefined }) {
+  const terms = material?.terms ?? [];
+  const ball = displayedBalls.value.get(name);
+  if (ball !== undefined) return <span class="swatch" style={{ background: `url(${ball}) center / 130%` }} />;
+  const measured = terms.find((term) => term.data != null)?.data;
+  if (measured != null) return <span class="swatch" style={{ background: `url(${measuredThumbnailUrl(measured)}) center / 130%` }} />;
+  const diffuse = terms.find((term) => modelOf(term)?.texture === "diffuse");
+  const glossy = terms.find((term) => modelOf(term)?.texture !== "diffuse");
+  const body = diffuse === undefined ? "#1c1c1c" : toHex(diffuse.color);
+  const light = glossy === undefined ? body : toHex(glossy.color);
+  return (
+    <span
+      class="swatch"
+      style={{ background: `radial-gradient(circle at 35% 30%, ${light} 4%, ${body} 48%, #111 130%)` }}
+    />
+  );
+}
+
+function MaterialList() {
+  const move = (event: KeyboardEvent) => {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const items = [...(event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=option]")];
+    items[
+      Math.min(items.length - 1, Math.max(0, items.indexOf(document.activeElement as HTMLElement) + step))
+    ]?.focus();
+  };
+  const focusable = selectedMaterial.value ?? materialNames.value[0];
+  return (
+    <div
+      class="materials"
+      role="listbox"
+      aria-label="Materials"
+      onKeyDown={move}
+      onPointerLeave={() => (hoveredMaterial.value = null)}
+    >
+      {materialNames.value.map((name) => {
+        const material = look.value?.materials[name];
+        const changed =
+          look.value !== null &&
+          !isDeepEqual(material, defaultLook.value?.materials[name]);
+        return (
+          <button
+            key={name}
+            role="option"
+            tabIndex={name === focusable ? 0 : -1}
+            aria-selected={name === selectedMaterial.value}
+            class={name === hoveredMaterial.value ? "hovered" : ""}
+            onPointerEnter={() => (hoveredMaterial.value = name)}
+            onFocus={(event) => (hoveredMaterial.value = event.currentTarget.matches(":focus-visible") ? name : null)}
+            onBlur={() => (hoveredMaterial.value = null)}
+            onClick={() => selectMaterial(name)}
+          >
+            <MaterialSwatch name={name} material={material} />
+            <span class="name" title={name}>
+              {name}
+            </span>
+            {changed && <span class="dot" title="Changed" aria-label="changed" />}
+          </button>
+        );
+      })}
+    </div>
+  );
+}
+
+function SoloButton() {
+  const selected = selectedMaterial.value;
+  return (
+    <IconButton
+      icon="solo"
+      label={selected === null ? "Select a material to show it alone" : `Show ${selected} alone`}
+      keys="S"
+      pressed={soloMaterial.value !== null}
+      disabled={selected === null && soloMaterial.value === null}
+      onClick={toggleMaterialSolo}
+    />
+  );
+}
+
+export function ScenePanel() {
+  useEffect(watchBalls, []);
+  return (
+    <nav class="panel outline" aria-label="Scene">
+      <Section title="Materials" count={materialNames.value.length} actions={<SoloButton />}>
+        <MaterialList />
+      </Section>
+      <div inert={!mayEdit.value}>
+        <LightsPanel />
+        <EnvironmentPanel />
+        <BackgroundPanel />
+      </div>
+      <TransportPanel />
+    </nav>
+  );
+}

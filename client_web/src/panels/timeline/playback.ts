@@ -1,0 +1,136 @@
+/** Playing the timeline: the server says what each frame shows, as it would render it, and frames are shown in passing. */
+import { computed, effect, signal } from "@preact/signals";
+import { freeCameraOf } from "../../viewport/cameras/freeCamera";
+import type { CameraPose } from "../../viewport/cameras/orbit";
+import { commitPreview, cancelPreview, previewedStep, previewStep } from "../../edit/edit";
+import { interpolateLooks } from "../../session/net/api";
+import type { Look, LooksBody, RenderRequest } from "../../protocol";
+import { bake } from "../../state/bakes";
+import { timelineOpen } from "../../state/panels";
+import { activeViewName } from "../../state/views";
+import { reportErrors } from "../../ui/toasts";
+import { interpolation, fewestKeyframes, keyframes, isLooping, seconds, currentPath, type CameraPathMode } from "../looks/keyframes";
+
+export const FPS = 25;
+const REQUEST_DELAY_MS = 120; // after the last change of the timeline
+
+/** Where the timeline is: 0 the first look, 1 the last. */
+export const playhead = signal(0);
+export const isPlaying = signal(false);
+/** The look of each frame; null while there are none, or they are loading. */
+export const frameLookList = signal<readonly Look[] | null>(null);
+/** Camera of each frame; null if the camera stays. */
+const frameCameras = signal<LooksBody["cameras"]>(null);
+export const numFrames = computed(() => Math.max(2, Math.round(seconds.value * FPS) + 1));
+
+const previewLabel = (fraction: number) => `The time line at ${(fraction * seconds.peek()).toFixed(1)} s`;
+
+/** What goes where while `num` frames are shown; null where nothing does. */
+export function renderPath(motion: CameraPathMode, num: number): NonNullable<RenderRequest["path"]> | null {
+  const freeCamera = freeCameraOf(activeViewName.peek());
+  if (motion === "environment") return { turntable: num, turns: motion, start: freeCamera?.pose ?? null };
+  if (freeCamera === null || motion === "still") return null;
+  const cameras = keyframes.peek().map((key): CameraPose => key.camera ?? freeCamera.first);
+  if (motion === "along") return { eyes: cameras };
+  return { turntable: num, turns: motion === "object" ? motion : "eye", start: cameras[0] ?? freeCamera.first };
+}
+
+function showPlayhead(): void {
+  const looks = frameLookList.peek();
+  if (looks === null) return;
+  const index = Math.round(playhead.peek() * (looks.length - 1));
+  const [frameLook, camera] = [looks[index], frameCameras.peek()?.[index]];
+  if (frameLook !== undefined) previewStep(previewLabel(playhead.peek()), frameLook);
+  const freeCamera = freeCameraOf(activeViewName.peek());
+  if (camera !== undefined) freeCamera?.play(camera);
+  if (!isPlaying.peek()) freeCamera?.stop();
+}
+
+/** Move the playhead, and stop there. */
+export function seek(fraction: number): void {
+  playhead.value = Math.min(1, Math.max(0, fraction));
+  showPlayhead();
+}
+
+let [previousTime, animationFrame] = [0, 0];
+
+/** One loop at most: a pause and a play within one frame begin no second. */
+function scheduleTick(): void {
+  cancelAnimationFrame(animationFrame);
+  animationFrame = requestAnimationFrame(tick);
+}
+
+function tick(now: number): void {
+  if (!isPlaying.peek()) return;
+  const step = (now - previousTime) / (1000 * seconds.peek());
+  previousTime = now;
+  const next = playhead.peek() + step;
+  const ends = next >= 1 && !isLooping.peek();
+  if (ends) isPlaying.value = false;
+  seek(ends ? 1 : next % 1);
+  scheduleTick();
+}
+
+let isPlayRequested = false; // play was requested while the frames were loading
+
+export function play(): void {
+  isPlayRequested = frameLookList.peek() === null;
+  if (isPlayRequested) return;
+  if (playhead.peek() >= 1) playhead.value = 0;
+  showPlayhead();
+  isPlaying.value = true;
+  previousTime = performance.now();
+  scheduleTick();
+}
+
+export function togglePlay(): void {
+  if (isPlaying.peek()) isPlaying.value = false;
+  else if (isPlayRequested) isPlayRequested = false;
+  else play();
+}
+
+/** What is shown becomes the look that is edited. */
+export function commitShownLook(): void {
+  isPlaying.value = false;
+  commitPreview();
+}
+
+// with the timeline closed the look is as it was
+effect(() => {
+  if (!timelineOpen.value) cancelPreview();
+});
+
+// an edit or an undo ends the playing: what is shown is the user's again
+effect(() => {
+  if (previewedStep.value === null) isPlaying.value = false;
+});
+
+// when playback ends, the camera stops
+effect(() => {
+  if (!isPlaying.value) freeCameraOf(activeViewName.peek())?.stop();
+});
+
+let newestRequest = 0;
+effect(() => {
+  const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
+  const body = { frames: Math.max(numFrames.value, looks.length), between: interpolation.value, view: activeViewName.value };
+  const motion = currentPath.value;
+  const requestNumber = ++newestRequest;
+  frameLookList.value = null;
+  if (!timelineOpen.value || id === null || looks.length < fewestKeyframes.value) {
+    isPlaying.value = isPlayRequested = false;
+    return;
+  }
+  window.setTimeout(() => {
+    if (requestNumber !== newestRequest) return;
+    void reportErrors(async () => {
+      const path = renderPath(motion, body.frames);
+      const answer = await interpolateLooks({ bake: id, looks: looks.map((look) => ({ ...look })), path, ...body });
+      if (requestNumber !== newestRequest) return;
+      frameCameras.value = motion === "environment" ? null : answer.cameras; // the user may move a camera that stays
+      frameLookList.value = answer.looks as unknown as Look[];
+      if (isPlayRequested) play();
+      else if (previewedStep.peek() !== null) showPlayhead();
+    });
+  }, REQUEST_DELAY_MS);
+});

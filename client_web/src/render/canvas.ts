@@ -1,0 +1,169 @@
+/** A canvas that shows one image, as the view's settings say. Each has a graphics context of its own: a frame of one
+ * view then draws that view alone, where a shared canvas would have to draw all of them again. */
+import { effect, signal } from "@preact/signals";
+import { soloMaterial } from "../state/visibility/soloSources";
+import { toneMap } from "../state/color";
+import { brushedRange } from "../state/curvePreview";
+import { displayedFrames, falseColor, isDisplayFrozen, isReferenceShown, wipe } from "../state/display";
+import { recordFrameShown } from "../state/latency";
+import { exposure } from "../state/look";
+import { materialNames } from "../state/scene";
+import { hoveredMaterial } from "../state/selection";
+import { focusedView, sideBySide } from "../state/views";
+import type { ViewImage, ImagePresenter } from "./viewImage";
+import { DisplayRenderer } from "./displayRenderer";
+import { MARGIN_ALONE, MARGIN_GRID, displayedWidth, toScreenPoint, type CanvasGeometry } from "./zoomTransform";
+import { transformOf } from "./viewTransforms";
+
+const MAX_WAIT_MS = 250;
+const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];
+
+export class ImageCanvas implements ImagePresenter {
+  readonly renderer: DisplayRenderer;
+  /** The browser took the graphics memory away, and has not given it back yet. */
+  readonly isLost = signal(false);
+  private box: [width: number, height: number] = [1, 1];
+  /** Nothing has been drawn since the canvas was made or got another size. */
+  private blank = true;
+  private hasDrawnThisFrame = false;
+  private queued = false;
+  private closed = false;
+  private waiting: (() => void)[] = [];
+  private readonly stop: () => void;
+
+  /** Throws where the browser has no WebGL2. */
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private current: ViewImage,
+  ) {
+    this.renderer = new DisplayRenderer(canvas);
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault(); // else it would never come back
+      this.isLost.value = true;
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.isLost.value = false;
+      this.renderer.restore();
+      this.upload();
+    });
+    this.setImage(current);
+    this.stop = effect(() => {
+      this.settings();
+      this.redraw();
+    });
+  }
+
+  get image(): ViewImage {
+    return this.current;
+  }
+
+  /** Show this image from now on. */
+  setImage(image: ViewImage): void {
+    if (this.current.screen === this) this.current.screen = null;
+    this.current = image;
+    image.screen = this;
+    this.upload();
+  }
+
+  /** The canvas goes away. */
+  close(): void {
+    this.closed = true;
+    this.stop();
+    if (this.current.screen === this) this.current.screen = null;
+    for (const done of this.waiting.splice(0)) done();
+    this.renderer.release();
+  }
+
+  private upload(): void {
+    const { renderer, current } = this;
+    const { width, height } = current.pixels;
+    renderer.setImage(current.pixels);
+    current.showReference();
+    if (current.ids !== null) renderer.setIds(current.ids.width, current.ids.height, current.ids.values);
+    if (current.brush !== null) renderer.setBrush(width, height, current.brush);
+    if (current.alpha !== null) renderer.setAlpha(width, height, current.alpha);
+    if (current.display !== null) renderer.setDisplay(current.display);
+    this.redraw();
+  }
+
+  /** Draw a new frame at once; a second one in the same animation frame waits for the next. Resolves when it is drawn,
+   * so that acknowledgements keep the server at the screen's pace. */
+  present(): Promise<void> {
+    if (!this.hasDrawnThisFrame || document.hidden) {
+      this.draw();
+      return Promise.resolve();
+    }
+    this.redraw();
+    // a tab that is hidden meanwhile gets no animation frames
+    return new Promise((done) => {
+      this.waiting.push(done);
+      window.setTimeout(done, MAX_WAIT_MS);
+    });
+  }
+
+  redraw(): void {
+    if (this.queued) return;
+    this.queued = true;
+    requestAnimationFrame(() => {
+      this.queued = false;
+      this.draw();
+      for (const done of this.waiting.splice(0)) done();
+    });
+  }
+
+  /** The canvas has another size, in CSS pixels: remembered, because asking makes the browser lay out the page. */
+  resize(width: number, height: number): void {
+    this.box = [Math.max(1, width), Math.max(1, height)];
+    this.blank = true;
+    this.redraw();
+  }
+
+  size(): CanvasGeometry {
+    const [width, height] = this.box;
+    const margin = sideBySide.value ? MARGIN_GRID : MARGIN_ALONE;
+    return { width, height, aspect: this.current.aspect, margin };
+  }
+
+  private settings() {
+    const { reference, ids, brush, view } = this.current;
+    const hovered = hoveredMaterial.value;
+    const soloName = soloMaterial.value;
+    const { isOn, position } = wipe.value;
+    const displaysA = isReferenceShown.value; // read also while there is no A yet: a redraw follows what was read
+    return {
+      held: isDisplayFrozen.value,
+      transform: transformOf(view),
+      exposure: exposure.value,
+      toneMap: toneMap.value,
+      falseColor: falseColor.value,
+      wipe: reference === null ? -1 : displaysA ? 2 : isOn ? position : -1,
+      hover: hovered === null || ids === null ? -1 : materialNames.value.indexOf(hovered),
+      solo: soloName === null || ids === null ? -1 : materialNames.value.indexOf(soloName),
+      brush: brushedRange.value !== null && brush !== null,
+    };
+  }
+
+  private draw(): void {
+    const { renderer, current } = this;
+    const { held: isDisplayFrozen, transform, ...settings } = this.settings();
+    // what was there stays until there is something else
+    if (this.closed || isDisplayFrozen || (!current.hasPixels && !this.blank)) return;
+    const size = this.size();
+    const ratio = renderer.canvas.width / size.width;
+    const width = displayedWidth(transform, size);
+    const [left, top] = toScreenPoint(transform, size, 0, 0);
+    renderer.draw({
+      ...settings,
+      transform: [Math.round(left * ratio), Math.round(top * ratio), width * ratio, (width * ratio) / current.aspect],
+      displayReferred: current.display !== null,
+      transparent: current.alpha !== null,
+      transparentReference: current.referenceAlpha !== null,
+      surround: SURROUND,
+    });
+    this.blank = false;
+    if (current.view === focusedView.peek()) recordFrameShown(current.revision);
+    displayedFrames.value += 1;
+    this.hasDrawnThisFrame = true;
+    requestAnimationFrame(() => (this.hasDrawnThisFrame = false));
+  }
+}

@@ -1,0 +1,186 @@
+/** The WebGL2 side of the image. Everything it shows is also held on the CPU, so a lost context is only a redraw. */
+import type { LutTable } from "./color/lutTable";
+import type { DisplayedToneMap } from "./color/tonemap";
+import { LUT_SIZE, type Tile } from "../protocol";
+import { allocate, makeTexture, makeVolume, Program } from "./webgl";
+import type { PixelBuffer } from "./pixels";
+import { fragmentShader, VERTEX, type DisplayFeatures } from "./displayShaders";
+
+const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uAlpha", "uReferenceAlpha", "uIds"] as const;
+type TextureUnit = (typeof UNITS)[number];
+/** Screen pixels per image pixel from which the pixels themselves are shown. */
+const NEAREST_FROM = 6;
+
+export interface DisplayState {
+  /** Left, top, width, height of the image in device pixels. */
+  transform: [number, number, number, number];
+  exposure: number;
+  toneMap: DisplayedToneMap;
+  falseColor: boolean;
+  wipe: number;
+  hover: number;
+  /** Id of the material that is shown alone, -1 for none. */
+  solo: number;
+  brush: boolean;
+  displayReferred: boolean;
+  transparent: boolean;
+  transparentReference: boolean;
+  surround: [number, number, number];
+}
+
+export class DisplayRenderer {
+  private readonly gl: WebGL2RenderingContext;
+  private programs = new Map<string, Program>();
+  private textures!: Record<TextureUnit, WebGLTexture>;
+  private size: [number, number] = [1, 1];
+  /** The view's table, and what of it the context holds. */
+  private tableTexture!: WebGLTexture;
+  private table: LutTable | null = null;
+
+  constructor(readonly canvas: HTMLCanvasElement) {
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
+    if (gl === null)
+      throw new Error(
+        "This browser offers no WebGL2, which the picture needs. Turn on graphics acceleration or try another browser.",
+      );
+    this.gl = gl;
+    this.restore();
+  }
+
+  /** Build everything anew, at the start and after the context was lost. */
+  restore(): void {
+    const { gl } = this;
+    this.programs.clear();
+    this.textures = Object.fromEntries(
+      UNITS.map((unit) => [unit, makeTexture(gl, unit === "uIds" ? gl.NEAREST : gl.LINEAR)]),
+    ) as Record<TextureUnit, WebGLTexture>;
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    for (const unit of ["uPicture", "uReference"] as const) allocate(gl, this.textures[unit], 1, 1, new Uint32Array(1));
+    this.setBrush(1, 1, new Uint8Array(1));
+    this.setAlpha(1, 1, new Uint8Array(1));
+    this.setReferenceAlpha(1, 1, new Uint8Array(1));
+    this.setIds(1, 1, new Uint16Array([65535]));
+    this.setDisplay(new ImageData(1, 1));
+    this.tableTexture = makeVolume(gl);
+    this.table = null;
+  }
+
+  /** Give the context back: a browser has few of them. */
+  release(): void {
+    this.gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
+  private use(features: DisplayFeatures): Program {
+    const key = JSON.stringify(features);
+    let program = this.programs.get(key);
+    if (program === undefined) {
+      program = new Program(this.gl, VERTEX, fragmentShader(features));
+      this.programs.set(key, program);
+      this.gl.useProgram(program.handle);
+      [...UNITS, "uTable"].forEach((unit, index) => this.gl.uniform1i(program?.uniform(unit) ?? null, index));
+    } else this.gl.useProgram(program.handle);
+    return program;
+  }
+
+  setImage(pixels: PixelBuffer): void {
+    this.size = [pixels.width, pixels.height];
+    allocate(this.gl, this.textures.uPicture, pixels.width, pixels.height, pixels.encoded);
+  }
+
+  /** The same image, all pixels anew. */
+  updateImage(pixels: PixelBuffer): void {
+    this.uploadTiles([{ tile: [0, 0, pixels.width, pixels.height], encoded: pixels.encoded }]);
+  }
+
+  setReference(pixels: PixelBuffer): void {
+    allocate(this.gl, this.textures.uReference, pixels.width, pixels.height, pixels.encoded);
+  }
+
+  uploadTiles(tiles: { tile: Tile; encoded: Uint32Array }[]): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uPicture);
+    for (const { tile, encoded } of tiles) {
+      const [x, y, w, h] = tile;
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, x, y, w, h, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, encoded);
+    }
+  }
+
+  setDisplay(image: TexImageSource): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uDisplay);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, image);
+  }
+
+  setBrush(width: number, height: number, values: Uint8Array): void {
+    this.setBytes("uBrush", width, height, values);
+  }
+
+  setAlpha(width: number, height: number, values: Uint8Array): void {
+    this.setBytes("uAlpha", width, height, values);
+  }
+
+  setReferenceAlpha(width: number, height: number, values: Uint8Array): void {
+    this.setBytes("uReferenceAlpha", width, height, values);
+  }
+
+  private setBytes(unit: TextureUnit, width: number, height: number, values: Uint8Array): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R8, width, height, 0, gl.RED, gl.UNSIGNED_BYTE, values);
+  }
+
+  setIds(width: number, height: number, ids: Uint16Array): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uIds);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R16UI, width, height, 0, gl.RED_INTEGER, gl.UNSIGNED_SHORT, ids);
+  }
+
+  draw(state: DisplayState): void {
+    const { gl, canvas } = this;
+    if (gl.isContextLost()) return;
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    const program = this.use({
+      toneMap: typeof state.toneMap === "string" ? state.toneMap : "table",
+      falseColor: state.falseColor,
+      isMinified: state.transform[2] < this.size[0],
+      displayReferred: state.displayReferred,
+      transparent: state.transparent,
+      compare: state.wipe > 0,
+      transparentReference: state.wipe > 0 && state.transparentReference,
+      brush: state.brush,
+      outline: state.hover >= 0,
+      solo: state.solo >= 0,
+    });
+    this.bindTextures(state.transform[2] / this.size[0] >= NEAREST_FROM);
+    if (typeof state.toneMap !== "string") this.bindTable(state.toneMap);
+    gl.uniform2f(program.uniform("uCanvas"), canvas.width, canvas.height);
+    gl.uniform4f(program.uniform("uPlace"), ...state.transform);
+    gl.uniform2f(program.uniform("uSize"), ...this.size);
+    gl.uniform1f(program.uniform("uGain"), 2 ** state.exposure);
+    gl.uniform1f(program.uniform("uWipe"), state.wipe);
+    gl.uniform1i(program.uniform("uHover"), state.hover);
+    gl.uniform1i(program.uniform("uSolo"), state.solo);
+    gl.uniform3f(program.uniform("uSurround"), ...state.surround);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  private bindTable(table: LutTable): void {
+    const { gl } = this;
+    gl.activeTexture(gl.TEXTURE0 + UNITS.length);
+    gl.bindTexture(gl.TEXTURE_3D, this.tableTexture);
+    if (table === this.table) return;
+    gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGB16F, LUT_SIZE, LUT_SIZE, LUT_SIZE, 0, gl.RGB, gl.FLOAT, table);
+    this.table = table;
+  }
+
+  private bindTextures(magnified: boolean): void {
+    const { gl } = this;
+    UNITS.forEach((unit, index) => {
+      gl.activeTexture(gl.TEXTURE0 + index);
+      gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
+      if (unit === "uPicture" || unit === "uReference" || unit === "uAlpha" || unit === "uReferenceAlpha") {
+        gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, magnified ? gl.NEAREST : gl.LINEAR);
+      }
+    });
+  }
+}

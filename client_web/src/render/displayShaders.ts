@@ -1,0 +1,245 @@
+/** One pass: find the image's pixel, expose, tone-map, then what is laid over it (brush, outline, wipe).
+ *
+ * What is not in use is not compiled in: a software rasteriser pays for branches that it does not take, and the plain
+ * image is three times as quick without them. */
+
+import { LUT_GAIN, LUT_SIZE } from "../protocol";
+
+/** What a variant of the shader does; the renderer compiles each when it is first needed. */
+export interface DisplayFeatures {
+  toneMap: "none" | "agx" | "filmic" | "table";
+  falseColor: boolean;
+  /** The image is shown smaller than it is. */
+  isMinified: boolean;
+  /** The server has tone-mapped the image already. */
+  displayReferred: boolean;
+  /** There is nothing behind some of it: squares show. */
+  transparent: boolean;
+  compare: boolean;
+  /** The same of the A side. */
+  transparentReference: boolean;
+  brush: boolean;
+  outline: boolean;
+  solo: boolean;
+}
+
+export const VERTEX = `#version 300 es
+void main() {
+  vec2 p = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
+  gl_Position = vec4(p * 2.0 - 1.0, 0.0, 1.0);
+}`;
+
+/** Source of a variant. */
+export function fragmentShader(features: DisplayFeatures): string {
+  const defines = [
+    features.falseColor
+      ? "FALSE_COLOR"
+      : features.toneMap === "agx"
+        ? "AGX"
+        : features.toneMap === "filmic"
+          ? "FILMIC"
+          : features.toneMap === "table"
+            ? "TABLE"
+            : "PLAIN",
+    features.isMinified && "SHRUNK",
+    features.displayReferred && "DISPLAY_REFERRED",
+    features.transparent && "TRANSPARENT",
+    features.compare && "COMPARE",
+    features.transparentReference && "TRANSPARENT_REFERENCE",
+    features.brush && "BRUSH",
+    features.outline && "OUTLINE",
+    features.solo && "SOLO",
+  ];
+  const lines = defines.flatMap((name) => (name ? [`#define ${name}`] : []));
+  const table = [`#define GAIN ${LUT_GAIN.toFixed(1)}`, `#define LAST ${(LUT_SIZE - 1).toFixed(1)}`];
+  return ["#version 300 es", ...lines, ...table, FRAGMENT_BODY].join("\n");
+}
+
+const FRAGMENT_BODY = `precision highp float;
+precision highp usampler2D;
+
+uniform sampler2D uPicture;    // linear radiance
+uniform sampler2D uReference;  // the A side of a comparison, linear radiance
+uniform sampler2D uDisplay;    // an image that the server has tone-mapped already
+uniform sampler2D uBrush;      // 0..1: share of each pixel that a stretch of the curve lights
+uniform sampler2D uAlpha;      // how much of what is behind each pixel it hides; its light is multiplied by that
+uniform sampler2D uReferenceAlpha;  // the same of the A side
+uniform usampler2D uIds;       // material of each pixel, 65535 = background
+uniform vec2 uCanvas;          // device pixels
+uniform vec4 uPlace;           // left, top, width, height of the picture, device pixels from the top left
+uniform vec2 uSize;            // pixels of the picture
+uniform float uGain;           // 2^exposure
+uniform float uWipe;           // picture fraction left of which the reference shows
+uniform int uHover;            // material to outline
+uniform int uSolo;             // material that is shown alone
+uniform vec3 uSurround;
+out vec4 outColor;
+
+const vec3 ACCENT = vec3(0.941, 0.706, 0.235);
+
+vec3 srgb(vec3 x) {
+  x = clamp(x, 0.0, 1.0);
+  return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), x));
+}
+
+vec3 agx(vec3 x) {
+  const mat3 inset = mat3(0.842479062253094, 0.0423282422610123, 0.0423756549057051, 0.0784335999999992,
+    0.878468636469772, 0.0784336, 0.0792237451477643, 0.0791661274605434, 0.879142973793104);
+  const mat3 outset = mat3(1.19687900512017, -0.0528968517574562, -0.0529716355144438, -0.0980208811401368,
+    1.15190312990417, -0.0980434501171241, -0.0990297440797205, -0.0989611768448433, 1.15107367264116);
+  x = (clamp(log2(max(inset * x, 1e-10)), -12.47393, 4.026069) + 12.47393) / 16.499999;
+  vec3 x2 = x * x, x4 = x2 * x2;
+  x = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;
+  return clamp(outset * x, 0.0, 1.0);
+}
+
+vec3 filmic(vec3 x) {
+  return srgb((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14));
+}
+
+#ifdef TABLE
+uniform highp sampler3D uTable;  // display values; blue is the quickest
+
+vec3 node(vec3 at) {
+  return texelFetch(uTable, ivec3(at.bgr), 0).rgb;
+}
+
+// a view's table between its nodes: the tetrahedron of the corners at 0, along the longest part, but the shortest, at 1
+vec3 table(vec3 x) {
+  const vec3 R = vec3(1.0, 0.0, 0.0), G = vec3(0.0, 1.0, 0.0), B = vec3(0.0, 0.0, 1.0);
+  vec3 place = min(log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN)), 1.0) * LAST;
+  vec3 at = min(floor(place), LAST - 1.0);
+  vec3 part = place - at;
+  vec3 longest = part.r >= part.g ? (part.r >= part.b ? R : B) : (part.g >= part.b ? G : B);
+  vec3 shortest = part.r < part.g ? (part.r < part.b ? R : B) : (part.g < part.b ? G : B);
+  float most = dot(part, longest), least = dot(part, shortest), between = part.r + part.g + part.b - most - least;
+  return (1.0 - most) * node(at) + (most - between) * node(at + longest)
+    + (between - least) * node(at + 1.0 - shortest) + least * node(at + 1.0);
+}
+#endif
+
+// luminance in stops about middle gray, one color for every two stops, black and white at the ends
+vec3 falseColor(vec3 x) {
+  float stops = log2(max(dot(x, vec3(0.2126, 0.7152, 0.0722)), 1e-6) / 0.18);
+  if (stops < -6.0) return vec3(0.02);
+  if (stops < -4.0) return vec3(0.22, 0.10, 0.45);
+  if (stops < -2.0) return vec3(0.12, 0.30, 0.75);
+  if (stops < -0.5) return vec3(0.10, 0.60, 0.65);
+  if (stops < 0.5) return vec3(0.45);
+  if (stops < 2.0) return vec3(0.35, 0.70, 0.25);
+  if (stops < 4.0) return vec3(0.95, 0.80, 0.15);
+  if (stops < 6.0) return vec3(0.90, 0.35, 0.10);
+  return vec3(1.0);
+}
+
+vec3 display(vec3 x) {
+  x *= uGain;
+#if defined(FALSE_COLOR)
+  return falseColor(x);
+#elif defined(AGX)
+  return agx(x);
+#elif defined(FILMIC)
+  return filmic(x);
+#elif defined(TABLE)
+  return table(x);
+#else
+  return srgb(x);
+#endif
+}
+
+vec3 radiance(vec2 uv, bool reference) {
+#ifdef COMPARE
+  if (reference) return texture(uReference, uv).rgb;
+#endif
+  return texture(uPicture, uv).rgb;
+}
+
+float alpha(vec2 uv, bool reference) {
+#ifdef TRANSPARENT
+  if (!reference) return texture(uAlpha, uv).r;
+#endif
+#ifdef TRANSPARENT_REFERENCE
+  if (reference) return texture(uReferenceAlpha, uv).r;
+#endif
+  return 1.0;
+}
+
+// light, and how much it hides of what is behind it
+vec4 sampled(vec2 uv, bool reference) {
+  return vec4(radiance(uv, reference), alpha(uv, reference));
+}
+
+// the same where the picture is shown: shared exponents cannot be mipmapped, so four taps across the footprint
+vec4 filtered(vec2 uv, bool reference) {
+#ifdef SHRUNK
+  vec2 d = (uSize / uPlace.zw - 1.0) * 0.25 / uSize;
+  return 0.25 * (sampled(uv + d, reference) + sampled(uv - d, reference)
+    + sampled(uv + vec2(d.x, -d.y), reference) + sampled(uv + vec2(-d.x, d.y), reference));
+#else
+  return sampled(uv, reference);
+#endif
+}
+
+vec3 squares() {
+  vec2 at = floor(gl_FragCoord.xy / 10.0);
+  return vec3(mod(at.x + at.y, 2.0) < 0.5 ? 0.27 : 0.36);
+}
+
+vec3 shown(vec2 uv, bool reference) {
+  vec4 light = filtered(uv, reference);
+#if defined(TRANSPARENT) || defined(TRANSPARENT_REFERENCE)
+  return mix(squares(), display(light.rgb / max(light.a, 1.0 / 512.0)), light.a);
+#else
+  return display(light.rgb);
+#endif
+}
+
+int idAt(vec2 uv) {
+  ivec2 p = clamp(ivec2(uv * uSize), ivec2(0), ivec2(uSize) - 1);
+  return int(texelFetch(uIds, p, 0).r);
+}
+
+bool outlined(vec2 uv) {
+  bool inside = idAt(uv) == uHover;
+  vec2 d = 1.5 / uPlace.zw;
+  for (int i = 0; i < 4; i++) {
+    vec2 o = i < 2 ? vec2(float(i) * 2.0 - 1.0, 0.0) : vec2(0.0, float(i - 2) * 2.0 - 1.0);
+    if ((idAt(uv + o * d) == uHover) != inside) return true;
+  }
+  return false;
+}
+
+void main() {
+  vec2 screen = vec2(gl_FragCoord.x, uCanvas.y - gl_FragCoord.y);
+  vec2 uv = (screen - uPlace.xy) / uPlace.zw;
+  if (any(lessThan(uv, vec2(0.0))) || any(greaterThanEqual(uv, vec2(1.0)))) {
+    outColor = vec4(uSurround, 1.0);
+    return;
+  }
+  bool reference = false;
+#ifdef COMPARE
+  reference = uv.x < uWipe;
+#endif
+#ifdef DISPLAY_REFERRED
+  vec3 color = reference ? shown(uv, true) : texture(uDisplay, uv).rgb;
+#ifdef TRANSPARENT
+  if (!reference) color += (1.0 - filtered(uv, false).a) * squares();
+#endif
+#else
+  vec3 color = shown(uv, reference);
+#endif
+#ifdef BRUSH
+  if (!reference) {
+    float share = texture(uBrush, uv).r;
+    float gray = dot(color, vec3(0.2126, 0.7152, 0.0722));
+    color = mix(vec3(gray * 0.6), ACCENT, sqrt(share) * 0.9);
+  }
+#endif
+#ifdef SOLO
+  if (idAt(uv) != uSolo) color = vec3(0.08 + 0.3 * dot(color, vec3(0.2126, 0.7152, 0.0722)));
+#endif
+#ifdef OUTLINE
+  if (outlined(uv)) color = ACCENT;
+#endif
+  outColor = vec4(color, 1.0);
+}`;

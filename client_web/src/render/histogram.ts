@@ -1,0 +1,51 @@
+/** How often each brightness occurs in an image: luminance, red, green and blue in stops about middle gray. */
+import { decodeRgb9e5 } from "./color/rgb9e5";
+import { luminance } from "./color/tonemap";
+
+export const MIDDLE_GRAY = 0.18;
+export const MIN_STOP = -10;
+export const MAX_STOP = 8;
+export const BINS_PER_STOP = 6;
+export const NUM_BINS = (MAX_STOP - MIN_STOP) * BINS_PER_STOP;
+/** More samples than this change no bar by a pixel. */
+const MAX_SAMPLES = 60_000;
+
+export interface Histogram {
+  luminance: Uint32Array;
+  /** Red, green, blue. */
+  channels: [Uint32Array, Uint32Array, Uint32Array];
+  samples: number;
+}
+
+/** The bin of a radiance; what is darker or brighter than the ends counts at the ends. */
+export function binIndex(value: number): number {
+  const stop = Math.log2(Math.max(value, 1e-12) / MIDDLE_GRAY);
+  return Math.min(NUM_BINS - 1, Math.max(0, Math.floor((stop - MIN_STOP) * BINS_PER_STOP)));
+}
+
+/** Histogram of RGB9_E5 pixels under an exposure in stops; a large image is sampled uniformly. */
+export function computeHistogram(encoded: Uint32Array, exposure: number): Histogram {
+  const bins = () => new Uint32Array(NUM_BINS);
+  const result: Histogram = { luminance: bins(), channels: [bins(), bins(), bins()], samples: 0 };
+  const count = (bins: Uint32Array, value: number) => {
+    const bin = binIndex(value);
+    bins[bin] = (bins[bin] as number) + 1;
+  };
+  const gain = 2 ** exposure;
+  // an odd step does not fall in with the image's columns
+  const step = Math.ceil(encoded.length / MAX_SAMPLES) | 1;
+  for (let i = 0; i < encoded.length; i += step) {
+    const rgb = decodeRgb9e5(encoded[i] as number);
+    count(result.luminance, gain * luminance(rgb));
+    result.channels.forEach((channel, c) => count(channel, gain * (rgb[c] as number)));
+    result.samples += 1;
+  }
+  return result;
+}
+
+/** The stop below which a fraction of the luminances lies, to a bin. */
+export function percentile(histogram: Histogram, fraction: number): number {
+  let sum = 0;
+  const bin = histogram.luminance.findIndex((n) => (sum += n) >= fraction * histogram.samples);
+  return MIN_STOP + (Math.max(0, bin) + 0.5) / BINS_PER_STOP;
+}

@@ -1,0 +1,158 @@
+/** One view's image: receives the frames of a session, stores them, and answers lookups. The canvas it is on draws
+ * it; an image on no canvas keeps its content. */
+import { decodeRgb9e5 } from "./color/rgb9e5";
+import type { Frame } from "../session/net/binaryFrame";
+import type { Fidelity, Rgb } from "../protocol";
+import { brushedRange } from "../state/curvePreview";
+import { materialNames } from "../state/scene";
+import type { PendingFrame } from "./frameArrival";
+import { applyFrame, brushImage, copyPixels, emptyPixels, normalizeWeights, readAlpha, type PixelBuffer } from "./pixels";
+import type { MaterialIds } from "./png16";
+import type { DisplayRenderer } from "./displayRenderer";
+import type { CanvasGeometry } from "./zoomTransform";
+
+const BACKGROUND = 65535;
+
+/** What an image may be shown on. */
+export interface ImagePresenter {
+  readonly renderer: DisplayRenderer;
+  present(): Promise<void>;
+  redraw(): void;
+  size(): CanvasGeometry;
+}
+
+export class ViewImage {
+  pixels = emptyPixels(1, 1);
+  /** The A side of a comparison. */
+  reference: PixelBuffer | null = null;
+  /** The same as `alpha`, of the A side. */
+  referenceAlpha: Uint8Array | null = null;
+  ids: MaterialIds | null = null;
+  /** The bake that the ids are of, or will be when they have come. */
+  idsOf: string | null = null;
+  /** Fraction of each pixel that an interval of the curve lights, 255 = the most of all. */
+  brush: Uint8Array | null = null;
+  /** Coverage of each pixel, by which its radiance has been multiplied; null: opaque. */
+  alpha: Uint8Array | null = null;
+  /** What the server has tone-mapped already, where that is what was sent last. */
+  display: ImageBitmap | null = null;
+  revision = 0;
+  /** The revision for which it is exact; −1 while it is not. */
+  exactRevision = -1;
+  /** The same of what a room's look has become. */
+  exactShared = -1;
+  fidelity: Fidelity = "preview";
+  screen: ImagePresenter | null = null;
+
+  constructor(readonly view: string) {}
+
+  /** Take a frame and draw it; an image of another size replaces what was there. Resolves when it is drawn. */
+  async show(frame: Frame): Promise<void> {
+    const { width, height, kind, format, revision } = frame.header;
+    if (kind === "brush") return this.showBrush(frame);
+    if (format === "jpeg") return this.showJpeg(frame);
+    if (this.pixels.width !== width || this.pixels.height !== height) {
+      this.pixels = emptyPixels(width, height);
+      this.brush = this.alpha = null;
+      this.screen?.renderer.setImage(this.pixels);
+    }
+    if (frame.header.tiles.length > 0) {
+      this.display = null;
+      this.addTiles(frame);
+    }
+    this.revision = revision;
+    return this.screen?.present();
+  }
+
+  /** Show a complete image in place of the current one. Resolves when it is drawn. */
+  async showFrame({ pixels, alpha, jpeg, header }: PendingFrame): Promise<void> {
+    this.brush = null;
+    this.revision = header.revision;
+    if (pixels !== null) {
+      this.pixels = pixels;
+      this.display = null;
+      this.screen?.renderer.setImage(pixels);
+      this.setAlpha(alpha);
+    }
+    return jpeg === null ? this.screen?.present() : this.showJpeg(jpeg);
+  }
+
+  private addTiles(frame: Frame): void {
+    const tiles = applyFrame(this.pixels, frame);
+    this.setAlpha(readAlpha(this.alpha, frame));
+    // one big upload is quicker than many small ones of the same size
+    const area = tiles.reduce((sum, { encoded }) => sum + encoded.length, 0);
+    if (area > this.pixels.encoded.length / 2) this.screen?.renderer.updateImage(this.pixels);
+    else this.screen?.renderer.uploadTiles(tiles);
+  }
+
+  private setAlpha(alpha: Uint8Array | null): void {
+    this.alpha = alpha;
+    if (alpha !== null) this.screen?.renderer.setAlpha(this.pixels.width, this.pixels.height, alpha);
+  }
+
+  private showBrush(frame: Frame): void {
+    if (brushedRange.peek() === null) return;
+    this.brush = normalizeWeights(brushImage(frame));
+    this.screen?.renderer.setBrush(frame.header.width, frame.header.height, this.brush);
+    this.screen?.redraw();
+  }
+
+  private async showJpeg(frame: Frame): Promise<void> {
+    const blob = new Blob([frame.payload as BlobPart], { type: "image/jpeg" });
+    this.display = await createImageBitmap(blob, { colorSpaceConversion: "none" });
+    this.screen?.renderer.setDisplay(this.display);
+    this.revision = frame.header.revision;
+    return this.screen?.present();
+  }
+
+  get aspect(): number {
+    return this.pixels.width / this.pixels.height;
+  }
+
+  get hasPixels(): boolean {
+    return this.pixels.width > 1 || this.display !== null;
+  }
+
+  setIds(ids: MaterialIds | null): void {
+    this.ids = ids;
+    if (ids !== null) this.screen?.renderer.setIds(ids.width, ids.height, ids.values);
+    this.screen?.redraw();
+  }
+
+  /** Keep it as it is now as the A side of comparisons. */
+  storeReference(): void {
+    this.reference = copyPixels(this.pixels);
+    this.referenceAlpha = this.alpha?.slice() ?? null;
+    this.showReference();
+    this.screen?.redraw();
+  }
+
+  clearReference(): void {
+    this.reference = this.referenceAlpha = null;
+    this.screen?.redraw();
+  }
+
+  /** Give the A side to the screen. */
+  showReference(): void {
+    const { reference, referenceAlpha, screen } = this;
+    if (reference === null) return;
+    screen?.renderer.setReference(reference);
+    if (referenceAlpha !== null)
+      screen?.renderer.setReferenceAlpha(reference.width, reference.height, referenceAlpha);
+  }
+
+  /** Linear radiance of a pixel; null outside. */
+  radiance(x: number, y: number): Rgb | null {
+    if (x < 0 || y < 0 || x >= this.pixels.width || y >= this.pixels.height) return null;
+    return decodeRgb9e5(this.pixels.encoded[y * this.pixels.width + x] ?? 0);
+  }
+
+  /** Name of the material at a pixel; null for the background. */
+  material(x: number, y: number): string | null {
+    const { ids } = this;
+    if (ids === null || x < 0 || y < 0 || x >= ids.width || y >= ids.height) return null;
+    const id = ids.values[y * ids.width + x] ?? BACKGROUND;
+    return id === BACKGROUND ? null : (materialNames.peek()[id] ?? null);
+  }
+}

@@ -1,0 +1,42 @@
+/** Fetches what the server's OpenColorIO config has, and the tables of its views as they are wanted. */
+import { computed, effect } from "@preact/signals";
+import { parseLut, type LutTable } from "../render/color/lutTable";
+import { getColor, getLut } from "./net/api";
+import type { Look, OcioView } from "../protocol";
+import { colorConfig, hasOcioView, toneMapKey, lutFor, lutTables, toneMap } from "../state/color";
+import { look } from "../state/look";
+import { reportErrors } from "../ui/toasts";
+
+export async function loadColor(): Promise<void> {
+  colorConfig.value = await getColor();
+}
+
+const targetToneMap = computed(() => look.value?.display.tone_map ?? "agx");
+const requestedTables = new Set<string>();
+
+/** One that could not be had is asked for again when it is chosen again. */
+async function fetchLut(config: string, view: OcioView): Promise<void> {
+  const key = toneMapKey(view);
+  if (requestedTables.has(key) || lutTables.peek().get(key)) return;
+  requestedTables.add(key);
+  let table: LutTable | null = null;
+  await reportErrors(async () => (table = parseLut(await getLut(config, view))));
+  requestedTables.delete(key);
+  lutTables.value = new Map(lutTables.peek()).set(key, table);
+}
+
+/** Resolves when what a look is shown by is there. */
+export function untilToneMapReady(targetLook: Look): Promise<void> {
+  return new Promise((done) => {
+    const stop = effect(() => void (lutFor(targetLook.display.tone_map) !== null && queueMicrotask(() => (stop(), done()))));
+  });
+}
+
+/** What was shown stays until a view's table has come. */
+export function trackToneMap(): void {
+  effect(() => void (toneMap.value = lutFor(targetToneMap.value) ?? toneMap.peek()));
+  effect(() => {
+    const [requested, config] = [targetToneMap.value, colorConfig.value?.id ?? null];
+    if (typeof requested !== "string" && config !== null && hasOcioView(requested)) void fetchLut(config, requested);
+  });
+}

@@ -1,0 +1,87 @@
+/** The connections to bakes: that whose images are shown, and one on a finer bake until its first image is there. */
+import { Session, type SessionHandlers } from "./net/session";
+import type { OpenParameters } from "./net/socket";
+import { PendingFrames } from "../render/frameArrival";
+import type { ClientMessage, HelloMessage } from "../protocol";
+import { isOffline } from "../state/connection";
+import { joinTarget } from "../state/sessionUser";
+import { scene } from "../state/scene";
+import { joinState, ownName, loadMemberToken } from "../state/collaboration";
+
+/** Parameters that open a session: of a read-only user the shared look; of a member the room, and the token in it. */
+function openParametersOf(): ReturnType<OpenParameters> {
+  const sceneId = scene.peek()?.id;
+  const currentJoin = joinState.peek();
+  if (currentJoin !== null && currentJoin.scene === sceneId) {
+    const { room: id, watch, share } = currentJoin;
+    return { ...(id !== null ? { room: id } : { watch }), share, seat: loadMemberToken(currentJoin), name: ownName.peek() || null };
+  }
+  const { scene: watchedScene, ...look } = joinTarget.peek() ?? { scene: null };
+  return watchedScene !== null && watchedScene === sceneId ? look : {};
+}
+
+/** A session with a bake, and its pending images. */
+export class BakeConnection {
+  readonly session: Session;
+  /** What the server said first; null until then. */
+  hello: HelloMessage | null = null;
+  /** Views whose first images are pending. */
+  pendingFrames = new PendingFrames();
+  /** The views that the server was asked to show, as text. */
+  sentViews: string | null = null;
+  /** The visible region of each view as last sent to the server, as text. */
+  sentRegions = new Map<string, string>();
+  /** The server knows that this browser draws free-camera views. */
+  isRenderingAnnounced = false;
+
+  constructor(
+    readonly bake: string,
+    handlersOf: (self: BakeConnection) => SessionHandlers,
+  ) {
+    this.session = new Session(bake, handlersOf(this), openParametersOf);
+  }
+
+  /** The server is there, perhaps again: it knows of no views yet, and nothing of it has come. */
+  onHello(hello: HelloMessage): void {
+    this.hello = hello;
+    this.pendingFrames = new PendingFrames();
+    this.sentViews = null;
+    this.sentRegions.clear();
+    this.isRenderingAnnounced = false;
+  }
+}
+
+export const connections: { shown: BakeConnection | null; incoming: BakeConnection | null } = {
+  shown: null,
+  incoming: null,
+};
+
+/** Send a question to the shown bake; whether it went. */
+export function sendToShown(message: ClientMessage): boolean {
+  return connections.shown?.session.sendAfterEdits(message) ?? false;
+}
+
+export function reconnectNow(): void {
+  connections.shown?.session.reconnectNow();
+  connections.incoming?.session.reconnectNow();
+}
+
+/** Follow the browser's network state: pings the server when it is offline, and reconnects at once when it is back. */
+export function trackNetwork(): void {
+  isOffline.value = !navigator.onLine;
+  window.addEventListener("offline", () => {
+    isOffline.value = true;
+    connections.shown?.session.checkConnection();
+    connections.incoming?.session.checkConnection();
+  });
+  window.addEventListener("online", () => {
+    isOffline.value = false;
+    reconnectNow();
+  });
+}
+
+export function disconnectAll(): void {
+  connections.shown?.session.close();
+  connections.incoming?.session.close();
+  connections.shown = connections.incoming = null;
+}

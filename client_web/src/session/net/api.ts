@@ -1,0 +1,265 @@
+/** REST calls; failures become ApiError with the server's message (RFC 9457). */
+import type {
+  AlbedoBody,
+  BakeBody,
+  BakeRequest,
+  ExampleSceneBody,
+  ColorBody,
+  CommentBody,
+  CommentRequest,
+  DryRunBody,
+  EnvironmentBody,
+  ImageBody,
+  ZernikeFitBody,
+  LooksBody,
+  LooksRequest,
+  MaterialBody,
+  MaterialMapBody,
+  BtfBody,
+  BtfJobBody,
+  MeasuredBody,
+  MetalnessBody,
+  ModelBody,
+  OcioView,
+  Problem,
+  RenderBody,
+  RenderRequest,
+  SceneBody,
+  ShareBody,
+  ShareEntry,
+  ShareRequest,
+  SyntheticBtfRequest,
+  Term,
+  ComparisonBody,
+  ComparisonPlanBody,
+  ComparisonRequest,
+} from "../../protocol";
+
+export class ApiError extends Error {
+  constructor(
+    message: string,
+    readonly status: number,
+  ) {
+    super(message);
+  }
+}
+
+/** Nobody answered. */
+export class UnreachableError extends ApiError {
+  constructor() {
+    super("The server cannot be reached. Nothing was lost; try again when it is back.", 0);
+  }
+}
+
+/** What a problem document says, in one sentence. */
+export function problemText(
+  problem: Problem | string | null | undefined,
+  fallback = "The server could not do that.",
+): string {
+  if (problem == null) return fallback;
+  if (typeof problem === "string") return problem;
+  return problem.detail ?? problem.title ?? fallback;
+}
+
+async function errorFromResponse(response: Response): Promise<ApiError> {
+  const fallback = `The server answered ${response.status} ${response.statusText}.`;
+  const problem = (await response.json().catch(() => null)) as Problem | null;
+  const detail = typeof problem?.detail === "string" ? problem.detail : problem?.title;
+  return new ApiError(detail ?? fallback, response.status);
+}
+
+let unauthorizedListener: (message: string) => void = () => undefined;
+
+/** Listener for a server that asks for a login. */
+export function onUnauthorized(callback: typeof unauthorizedListener): void {
+  unauthorizedListener = callback;
+}
+
+export async function request(path: string, init: RequestInit = {}): Promise<Response> {
+  let response: Response;
+  try {
+    response = await fetch(path, init);
+  } catch {
+    throw new UnreachableError();
+  }
+  if (response.ok) return response;
+  const error = await errorFromResponse(response);
+  if (error.status === 401) unauthorizedListener(error.message);
+  throw error;
+}
+
+const UNAVAILABLE_STATUSES = [0, 502, 503, 504];
+
+/** What the server answers; null where it is away, or a proxy says so: it goes on with its work when it is back. */
+export async function nullIfUnavailable<T>(answer: Promise<T>): Promise<T | null> {
+  return answer.catch((error: unknown) => {
+    if (error instanceof ApiError && UNAVAILABLE_STATUSES.includes(error.status)) return null;
+    throw error;
+  });
+}
+
+export function json(method: string, body: unknown, headers: Record<string, string> = {}): RequestInit {
+  return { method, headers: { "content-type": "application/json", ...headers }, body: JSON.stringify(body) };
+}
+
+export async function getJson<T>(path: string): Promise<T> {
+  return (await (await request(path)).json()) as T;
+}
+
+export const listScenes = () => getJson<SceneBody[]>("/api/scenes");
+export const getScene = (id: string) => getJson<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
+export const listBuiltIns = () => getJson<ExampleSceneBody[]>("/api/built-ins");
+/** Make a built-in scene; a second time it is the same one. */
+export async function createBuiltInScene(name: string): Promise<SceneBody> {
+  return (await (await request(`/api/built-ins/${encodeURIComponent(name)}`, { method: "POST" })).json()) as SceneBody;
+}
+export const listModels = () => getJson<ModelBody[]>("/api/models");
+export const listMaterials = () => getJson<MaterialBody[]>("/api/materials");
+export const listBtfs = () => getJson<BtfBody[]>("/api/materials/btf");
+export const getBtf = (id: string) => getJson<BtfBody>(`/api/materials/btf/${encodeURIComponent(id)}`);
+const btfJobPath = (id: string) => `/api/materials/btf-works/${encodeURIComponent(id)}`;
+export const listBtfJobs = () => getJson<BtfJobBody[]>("/api/materials/btf-works");
+export async function startBtfJob(body: SyntheticBtfRequest): Promise<BtfJobBody> {
+  return (await (await request("/api/materials/btf-works/synthetic", json("POST", body))).json()) as BtfJobBody;
+}
+/** The results so far are kept. */
+export async function stopBtfJob(id: string): Promise<void> {
+  await request(btfJobPath(id), { method: "DELETE" });
+}
+export async function resumeBtfJob(id: string): Promise<void> {
+  await request(`${btfJobPath(id)}/resume`, { method: "POST" });
+}
+export async function deleteBtfJob(id: string): Promise<void> {
+  await request(`${btfJobPath(id)}?forget=true`, { method: "DELETE" });
+}
+export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
+export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
+export const getMaterialAt = (f0: number, sigma: number) => getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
+/** Of a library material, whose id is "table/material". */
+export const materialThumbnailUrl = (id: string) =>
+  `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
+/** Of what was measured, by its name in looks: "btf:id", "merl:id". */
+export const measuredThumbnailUrl = (data: string) => {
+  const [kind, id = ""] = data.split(":");
+  return `/api/materials/${kind === "btf" ? "btf" : "measured"}/${encodeURIComponent(id)}/thumbnail.png`;
+};
+export const listEnvironments = () => getJson<EnvironmentBody[]>("/api/environments");
+export async function deleteEnvironment(id: string): Promise<void> {
+  await request(`/api/environments/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+export const getColor = () => getJson<ColorBody>("/api/color");
+/** A view of a config as a table. */
+export async function getLut(config: string, { display, view }: OcioView): Promise<ArrayBuffer> {
+  const query = new URLSearchParams({ display, view });
+  return (await request(`/api/color/${encodeURIComponent(config)}/lut?${query}`)).arrayBuffer();
+}
+export const listImages = () => getJson<ImageBody[]>("/api/images");
+export async function deleteImage(id: string): Promise<void> {
+  await request(`/api/images/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+/** What a material's terms become where an image says that it is metal. */
+export async function addMetalness(image: string, scene: string, material: string, terms: readonly Term[]): Promise<Term[]> {
+  const path = `/api/images/${encodeURIComponent(image)}/metalness`;
+  return ((await (await request(path, json("POST", { scene, material, terms }))).json()) as MetalnessBody).terms;
+}
+/** A ball of a material with these terms, in their images. */
+export async function renderMaterialBall(scene: string, material: string, terms: readonly Term[]): Promise<Blob> {
+  const path = `/api/scenes/${encodeURIComponent(scene)}/ball`;
+  return (await request(path, json("POST", { material, terms }))).blob();
+}
+/** The light that a bake's scene came with. */
+export const bakedEnvironmentThumbnailUrl = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;
+export const getBake = (id: string) => getJson<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);
+
+export const listBakes = (scene: string) => getJson<BakeBody[]>(`/api/bakes?scene=${encodeURIComponent(scene)}`);
+
+export async function deleteScene(id: string): Promise<void> {
+  await request(`/api/scenes/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+
+/** The same scene on a ground, as a new one. */
+export async function addGround(id: string): Promise<SceneBody> {
+  return (await (await request(`/api/scenes/${encodeURIComponent(id)}/ground`, { method: "POST" })).json()) as SceneBody;
+}
+
+export async function planBake(body: BakeRequest): Promise<DryRunBody> {
+  return (await (await request("/api/bakes", json("POST", { ...body, dry_run: true }))).json()) as DryRunBody;
+}
+
+export async function startBake(body: BakeRequest): Promise<BakeBody> {
+  return (await (await request("/api/bakes", json("POST", body))).json()) as BakeBody;
+}
+
+/** Cancel a bake; one that has ended a moment before needs it no more. */
+export async function cancelBake(id: string): Promise<void> {
+  await request(`/api/bakes/${encodeURIComponent(id)}`, { method: "DELETE" }).catch((error: unknown) => {
+    if (!(error instanceof ApiError && error.status === 409)) throw error;
+  });
+}
+
+/** Directional albedo of a material of these terms. */
+export async function getAlbedo(terms: Term[]): Promise<AlbedoBody> {
+  return (await (await request("/api/models/albedo", json("POST", { terms }))).json()) as AlbedoBody;
+}
+
+/** How terms are sent in views with a free camera. */
+export async function getInOut(terms: Term[]): Promise<ZernikeFitBody[]> {
+  return (await (await request("/api/models/in-out", json("POST", { terms }))).json()) as ZernikeFitBody[];
+}
+
+export async function startRender(body: RenderRequest): Promise<RenderBody> {
+  return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
+}
+/** The complete look of each frame of an animation. */
+export async function interpolateLooks(body: LooksRequest): Promise<LooksBody> {
+  return (await (await request("/api/renders/looks", json("POST", body))).json()) as LooksBody;
+}
+export async function deleteRender(id: string): Promise<void> {
+  await request(`/api/renders/${encodeURIComponent(id)}`, { method: "DELETE" });
+}
+export const getRender = (id: string) => getJson<RenderBody>(`/api/renders/${encodeURIComponent(id)}`);
+
+export async function createShare(body: ShareRequest): Promise<ShareEntry> {
+  return (await (await request("/api/shares", json("POST", body))).json()) as ShareEntry;
+}
+export const getShare = (id: string) => getJson<ShareBody>(`/api/shares/${encodeURIComponent(id)}`);
+
+export type ComparisonImage = "error" | "reference" | "method-error" | "method-reference";
+
+const commentsPath = (scene: string) => `/api/scenes/${encodeURIComponent(scene)}/comments`;
+const commentPath = (scene: string, id: string) => `${commentsPath(scene)}/${encodeURIComponent(id)}`;
+
+export const listComments = (scene: string) => getJson<CommentBody[]>(commentsPath(scene));
+export async function addComment(scene: string, body: CommentRequest): Promise<CommentBody> {
+  return (await (await request(commentsPath(scene), json("POST", body))).json()) as CommentBody;
+}
+export async function setResolved(scene: string, id: string, resolved: boolean): Promise<void> {
+  await request(commentPath(scene, id), json("PATCH", { resolved }));
+}
+export async function deleteComment(scene: string, id: string): Promise<void> {
+  await request(commentPath(scene, id), { method: "DELETE" });
+}
+
+const comparisonPath = (id: string) => `/api/truths/${encodeURIComponent(id)}`;
+
+export async function startComparison(body: ComparisonRequest): Promise<ComparisonBody> {
+  return (await (await request("/api/truths", json("POST", body))).json()) as ComparisonBody;
+}
+export const getComparison = (id: string) => getJson<ComparisonBody>(comparisonPath(id));
+/** How long a comparison would take; nothing is begun. */
+export async function planComparison(body: ComparisonRequest): Promise<ComparisonPlanBody> {
+  return (await (await request("/api/truths", json("POST", { ...body, dry_run: true }))).json()) as ComparisonPlanBody;
+}
+/** Its passes so far are stored. */
+export async function stopComparison(id: string): Promise<void> {
+  await request(comparisonPath(id), { method: "DELETE" });
+}
+export async function resumeComparison(id: string): Promise<ComparisonBody> {
+  return (await (await request(`${comparisonPath(id)}/resume`, { method: "POST" })).json()) as ComparisonBody;
+}
+export async function deleteComparison(id: string): Promise<void> {
+  await request(`${comparisonPath(id)}?forget=true`, { method: "DELETE" });
+}
+/** The address of a comparison's image as it is after so many passes. */
+export const comparisonImageUrl = (id: string, name: ComparisonImage, passes: number) =>
+  `${comparisonPath(id)}/${name}.png?passes=${passes}`;

@@ -1,0 +1,23 @@
+/** What comes over a live session's socket, typed: texts are messages, everything else is a binary frame. */
+import type { ServerMessage } from "../../protocol";
+
+/** For each kind of message what is done with it. */
+export type MessageHandlers = {
+  [Message in ServerMessage as Message["type"]]: (message: Message) => void;
+};
+
+export class MessageError extends Error {}
+
+/** Dispatch a message to the handler of its kind; kinds that this editor does not know are left alone. Raises MessageError
+ * where the text is no message. */
+export function dispatchMessage(text: string, handlers: MessageHandlers): void {
+  let message: ServerMessage | null;
+  try {
+    message = JSON.parse(text) as ServerMessage | null;
+  } catch {
+    throw new MessageError("the server sent a message that is not JSON");
+  }
+  const type = message?.type;
+  if (type === undefined) throw new MessageError("the server sent a message without a type");
+  if (Object.hasOwn(handlers, type)) (handlers[type] as (message: ServerMessage) => void)(message as ServerMessage);
+}

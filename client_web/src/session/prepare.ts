@@ -1,0 +1,31 @@
+/** Announces an upcoming edit to the server, so that it prepares for it. */
+import { effect } from "@preact/signals";
+import { activeControl } from "../edit/activeControl";
+import { stage } from "../render/renderStage";
+import { clearCurvePreview } from "../state/curvePreview";
+import { curvePath } from "../state/selection";
+import { sendToShown } from "./connections";
+
+/** The pointer has come to the control of a parameter, a light or a field of the environment. */
+export function beginDrag(parameter: string): void {
+  activeControl.value = parameter;
+  sendToShown({ type: "touch", parameter });
+}
+
+/** The pointer has come back to the open curve, which the server may have evicted meanwhile. */
+export function beginCurveDrag(): void {
+  const curve = curvePath.peek();
+  if (curve !== null && activeControl.peek() !== curve) prepareCurve(curve);
+}
+
+function prepareCurve(curve: string): void {
+  activeControl.value = curve;
+  sendToShown({ type: "touch", curve });
+}
+
+effect(() => {
+  const curve = curvePath.value;
+  clearCurvePreview();
+  stage.clearBrush();
+  if (curve !== null) prepareCurve(curve);
+});

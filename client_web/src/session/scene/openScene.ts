@@ -1,0 +1,133 @@
+/** Opening a scene: the finest bake there is, or a preview at once and the full bake behind it. */
+import { previewedStep } from "../../edit/edit";
+import { history } from "../../edit/history";
+import { disconnectAll } from "../connections";
+import { loadColor } from "../colorTransforms";
+import { getScene, listModels } from "../net/api";
+import { stage } from "../../render/renderStage";
+import { singleTransforms, gridTransforms } from "../../render/viewTransforms";
+import type { SceneBody } from "../../protocol";
+import { pathOverride } from "../../state/visibility/lightPaths";
+import { soloMaterial, soloLight } from "../../state/visibility/soloSources";
+import { axes, bake, bakes, pendingBake, method } from "../../state/bakes";
+import { connection, freezeStatus } from "../../state/connection";
+import { fidelity, isOutdated } from "../../state/fidelity";
+import { defaultLook, look } from "../../state/look";
+import { models, page, scene } from "../../state/scene";
+import { selectedCurve, selectedLight, selectedMaterial, selectedTerm } from "../../state/selection";
+import { joinState, members, selfNumber, type JoinState } from "../../state/collaboration";
+import { availableViews, hoveredView, shownViews, activeViewName } from "../../state/views";
+import { reportErrors } from "../../ui/toasts";
+import { listBakesByQuality, viewsToBake, type BakeSettings } from "./bakeSettings";
+import { DEFAULT_BAKE_METHOD } from "./bakeMethods";
+import { loadSceneState, loadHistory, saveSceneState } from "./persistence";
+import { bakePreview, trackBake, openBake, startFullBake, stopTrackingBake } from "./bakeHandover";
+import { parseUrl, type UrlState } from "./url";
+
+/** Forget the scene that was open; this one is, from now on. */
+function resetEditor(newScene: SceneBody): void {
+  saveSceneState();
+  disconnectAll();
+  stopTrackingBake();
+  stage.clear();
+  history.clear();
+  previewedStep.value = null;
+  scene.value = newScene;
+  look.value = defaultLook.value = null;
+  bake.value = pendingBake.value = method.value = null;
+  axes.value = [];
+  selectedMaterial.value = selectedCurve.value = null;
+  selectedLight.value = soloMaterial.value = soloLight.value = pathOverride.value = null;
+  singleTransforms.value = gridTransforms.value = new Map();
+  hoveredView.value = null;
+  connection.value = "connecting";
+  freezeStatus.value = null;
+  fidelity.value = "exact";
+  isOutdated.value = false;
+  members.value = [];
+  selfNumber.value = null;
+  page.value = "editor";
+}
+
+/** The room that an address names. */
+function joinStateOf(scene: string, { room, watch, share }: UrlState): JoinState | null {
+  return room === null && watch === null ? null : { scene, room, watch: room === null ? watch : null, share };
+}
+
+/** Restore the state of a scene that this tab stored. */
+function restoreSavedState(id: string): void {
+  const saved = loadSceneState(id);
+  if (saved === null) return;
+  look.value = saved.look;
+  loadHistory(id, saved.look);
+  soloMaterial.value = saved.solo ?? null;
+  soloLight.value = saved.soloLight ?? null;
+  pathOverride.value = saved.paths ?? null;
+  singleTransforms.value = new Map(saved.single);
+  gridTransforms.value = new Map(saved.grid);
+}
+
+/** Show and select what an address says, as far as the scene has it. */
+function restoreUrlState({ views, materials }: SceneBody, urlState: UrlState): void {
+  const names = views.map((view) => view.name);
+  const active = urlState.view ?? names[0] ?? "";
+  const visibleViews = availableViews(urlState.sideBySide.length > 1 ? urlState.sideBySide : [active], names, active);
+  shownViews.value = visibleViews;
+  activeViewName.value = visibleViews.includes(active) ? active : (visibleViews[0] as string);
+  if (materials.some((material) => material.name === urlState.material)) {
+    selectedMaterial.value = urlState.material;
+    selectedTerm.value = urlState.term;
+    selectedCurve.value = urlState.curve;
+  } else selectedLight.value = urlState.light;
+}
+
+/** Call back when there is a look of the scene: a stored one at once, the scene's own with the first hello. */
+function whenLookAvailable(expectedScene: SceneBody, callback: () => void): void {
+  let waits = true;
+  const stop = look.subscribe((current) => {
+    if (!waits || (current === null && scene.peek() === expectedScene)) return;
+    waits = false;
+    queueMicrotask(() => stop());
+    if (scene.peek() === expectedScene) callback();
+  });
+}
+
+export async function openScene(
+  id: string,
+  urlState: UrlState = parseUrl(`?scene=${id}`),
+  choice?: BakeSettings,
+  /** Called once, when there is a look to be changed. */
+  onLook?: () => void,
+): Promise<void> {
+  await reportErrors(async () => {
+    const [opened, sceneModels] = await Promise.all([getScene(id), listModels(), loadColor()]);
+    models.value = sceneModels;
+    resetEditor(opened);
+    joinState.value = joinStateOf(opened.id, urlState);
+    restoreSavedState(opened.id);
+    restoreUrlState(opened, urlState);
+    if (onLook !== undefined) whenLookAvailable(opened, onLook);
+    bakes.value = await listBakesByQuality(opened);
+    await openBestBake(opened, urlState.bake, choice);
+  });
+}
+
+/** Show the bake of this id, or else the finest; where there is none, or a choice was made, one is started. */
+async function openBestBake(openedScene: SceneBody, id: string | null, choice: BakeSettings | undefined): Promise<void> {
+  const ready = bakes.peek().filter((each) => each.state === "ready");
+  const bestBake = ready.find((each) => each.id === id) ?? ready[0];
+  const running = bakes.peek().find((each) => each.state === "running" || each.state === "queued");
+  const settings = choice ?? { method: DEFAULT_BAKE_METHOD, preset: "good", views: viewsToBake(openedScene) };
+  openBake(bestBake?.id ?? (await bakePreview(openedScene, settings)));
+  if (choice === undefined && running !== undefined) trackBake(running);
+  else if (choice !== undefined || bestBake === undefined) await startFullBake(openedScene, settings);
+}
+
+export function closeScene(): void {
+  saveSceneState();
+  disconnectAll();
+  stopTrackingBake();
+  joinState.value = null;
+  page.value = "start";
+  window.history.pushState(null, "", "/");
+}

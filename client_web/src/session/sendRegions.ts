@@ -1,0 +1,35 @@
+/** The visible region of each image: the server makes it exact first. */
+import { effect } from "@preact/signals";
+import { stage } from "../render/renderStage";
+import { visibleRegion } from "../render/zoomTransform";
+import { transformOf } from "../render/viewTransforms";
+import { displayedFrames } from "../state/display";
+import { connections, type BakeConnection } from "./connections";
+import { shownViewsOf } from "./sendViews";
+
+/** A zoom or pan is sent when it settles. */
+const SETTLE_MS = 150;
+
+/** Say it of the views whose images are baked, where it is news. */
+export function sendRegions(bakeConnection: BakeConnection | null): void {
+  if (!bakeConnection?.hello) return;
+  const connection = shownViewsOf(bakeConnection.hello);
+  for (const { name, eye: cameraMode, width, height } of bakeConnection.hello.views) {
+    const screen = stage.imageOf(name).screen;
+    if (cameraMode === "free" || screen === null || !connection.includes(name)) continue;
+    const canvas = { ...screen.size(), aspect: width / height };
+    const rect = visibleRegion(transformOf(name), canvas, width, height);
+    const text = JSON.stringify(rect);
+    if (text === (bakeConnection.sentRegions.get(name) ?? "null")) continue;
+    if (bakeConnection.session.send({ type: "region", view: name, rect })) bakeConnection.sentRegions.set(name, text);
+  }
+}
+
+effect(() => {
+  displayedFrames.value;
+  const timer = setTimeout(() => {
+    sendRegions(connections.shown);
+    sendRegions(connections.incoming);
+  }, SETTLE_MS);
+  return () => clearTimeout(timer);
+});

@@ -1,0 +1,26 @@
+/** A scene without an image: whether its first bake is under way, and how far. */
+import { useEffect, useState } from "preact/hooks";
+import { subscribeToBake } from "../session/net/bakeEvents";
+import type { BakeBody, SceneBody } from "../protocol";
+import { bakeProgressText, hasProgress, useElapsedSeconds } from "../session/scene/bakeStatus";
+
+export function BakeProgress({ scene, onReady }: { scene: SceneBody; onReady(): void }) {
+  const [bake, setBake] = useState<BakeBody | null>(null);
+  const elapsed = useElapsedSeconds(bake);
+  const newest = scene.bakes[0];
+  useEffect(() => {
+    if (newest === undefined) return undefined;
+    return subscribeToBake(newest, (update) => {
+      setBake(update);
+      if (update.state === "ready") onReady();
+    });
+  }, [newest]);
+  return (
+    <span class="no-picture">
+      {bake === null ? (newest === undefined ? "not baked yet" : "…") : bakeProgressText(bake, elapsed)}
+      {bake?.state === "running" && (
+        <progress max={1} value={hasProgress(bake) ? bake.progress : undefined} aria-label={`Bake of ${scene.name}`} />
+      )}
+    </span>
+  );
+}

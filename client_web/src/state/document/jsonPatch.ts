@@ -1,0 +1,75 @@
+/** Changes of the look: what it was and becomes, and the JSON Patches (RFC 6902) that lead there and back. */
+import { applyPatches, enablePatches, produceWithPatches, type Draft, type Patch } from "immer";
+import type { Look, PatchOp } from "../../protocol";
+import { diffLooks, isDeepEqual } from "./difference";
+import { getAt, jsonPointer, pointerTokens } from "./pointer";
+
+enablePatches();
+
+export interface LookChange {
+  before: Look;
+  after: Look;
+  /** Leads from `before` to `after`. */
+  patch: readonly PatchOp[];
+  /** Leads back. */
+  inverse: readonly PatchOp[];
+}
+
+type DraftNode = Record<string, unknown>;
+
+function toPatchOp({ op, path, value }: Patch): PatchOp {
+  const targetPath = jsonPointer(...path);
+  return op === "remove" ? { op, path: targetPath } : { op, path: targetPath, value };
+}
+
+type DraftRecipe = (draft: Draft<Look>) => void;
+
+/** What a recipe does to a look; what is not changed is shared. */
+function makeChange(before: Look, recipe: DraftRecipe): LookChange {
+  const [after, patch, inverse] = produceWithPatches(before, recipe);
+  return { before, after, patch: patch.map(toPatchOp), inverse: inverse.map(toPatchOp) };
+}
+
+/** Set the value at a pointer (undefined removes it), and make the objects that are missing on the way. Nothing changes
+ * where it is the same already. */
+export function changeValue(look: Look, path: string, value: unknown): LookChange {
+  return makeChange(look, (draft) => {
+    if (isDeepEqual(getAt(look, path), value)) return;
+    const pathTokens = pointerTokens(path);
+    const lastToken = pathTokens.pop() as string;
+    let node = draft as unknown as DraftNode;
+    for (const token of pathTokens) {
+      if (!Object.hasOwn(node, token)) node[token] = {};
+      node = node[token] as DraftNode;
+    }
+    if (value === undefined) delete node[lastToken];
+    else node[lastToken] = value;
+  });
+}
+
+/** The change by a patch; several operations on one path are merged. */
+export function changeByPatch(look: Look, patch: readonly PatchOp[]): LookChange {
+  const steps = patch.map(({ op, path, value }) => ({ op, path: pointerTokens(path), value }) as Patch);
+  return makeChange(look, (draft) => void applyPatches(draft, steps));
+}
+
+/** The change to another look. */
+export function changeToLook(look: Look, next: Look): LookChange {
+  return { ...changeByPatch(look, diffLooks(look, next)), after: next };
+}
+
+/** Two changes in a row as one. */
+export function joinChanges(first: LookChange, second: LookChange): LookChange {
+  return { ...changeByPatch(first.before, [...first.patch, ...second.patch]), after: second.after };
+}
+
+/** A look after a patch that was made for another state of it: operations whose path no longer exists are dropped. */
+export function rebasePatch(look: Look, patch: readonly PatchOp[]): Look {
+  return patch.reduce((rebasedLook, operation) => {
+    try {
+      return changeByPatch(rebasedLook, [operation]).after;
+    } catch {
+      return rebasedLook; // somebody else has removed what it is in
+    }
+  }, look);
+}

@@ -1,0 +1,19 @@
+/** Storage of a tab over a reload of its page. */
+
+export function saveInTab(key: string, value: unknown): void {
+  try {
+    if (value === null) sessionStorage.removeItem(key);
+    else sessionStorage.setItem(key, JSON.stringify(value));
+  } catch {
+    // full or forbidden: a reload forgets it
+  }
+}
+
+/** Null if nothing was stored. */
+export function loadFromTab<T>(key: string): T | null {
+  try {
+    return JSON.parse(sessionStorage.getItem(key) ?? "null") as T | null;
+  } catch {
+    return null;
+  }
+}

@@ -1,0 +1,16 @@
+/** A color below its visible label. */
+import { ColorField, type ColorProps } from "./ColorField";
+
+interface Props extends ColorProps {
+  /** Short label shown, if the panel gives the context. */
+  shortLabel: string;
+}
+
+export function LabeledColor({ shortLabel, ...color }: Props) {
+  return (
+    <div class="param alone">
+      <span class="param-label">{shortLabel}</span>
+      <ColorField {...color} />
+    </div>
+  );
+}

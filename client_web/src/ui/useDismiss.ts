@@ -1,0 +1,14 @@
+/** Menus that a press beside them closes. */
+import { useEffect } from "preact/hooks";
+
+/** Call `close` on a press outside of a menu that is open. */
+export function useDismiss(open: boolean, menu: { current: HTMLElement | null }, close: () => void): void {
+  useEffect(() => {
+    if (!open) return undefined;
+    const press = (event: PointerEvent) => {
+      if (!menu.current?.contains(event.target as Node)) close();
+    };
+    window.addEventListener("pointerdown", press, { capture: true });
+    return () => window.removeEventListener("pointerdown", press, { capture: true });
+  }, [open]);
+}

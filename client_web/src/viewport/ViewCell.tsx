@@ -1,0 +1,159 @@
+/** One view: its canvas, what is laid over it, and the pointer's and keys' ways to move in it. */
+import { useEffect, useRef, useState } from "preact/hooks";
+import { freeCameraOf } from "./cameras/freeCamera";
+import { dollyOrbit } from "./cameras/orbit";
+import { zoomIn, orbitKeyStep } from "./cameras/useCameraControl";
+import { CommentPins } from "../panels/collaboration/CommentPins";
+import { acceptImageDrops } from "../panels/inspector/images/dropImages";
+import { acceptMaterialDrops } from "../panels/library/dropMaterial";
+import { LightHandles } from "../panels/lights/LightHandles";
+import { requestPixelProbe } from "../session/pixelProbe";
+import { pickMaterial } from "../render/materialPicking";
+import { ImageCanvas } from "../render/canvas";
+import { stage } from "../render/renderStage";
+import { zoomAt } from "../render/zoomTransform";
+import { setTransform, transformOf } from "../render/viewTransforms";
+import type { Triple } from "../protocol";
+import { wipe } from "../state/display";
+import { scene } from "../state/scene";
+import { showSingleView, sideBySide, activeViewName, views, setFocus } from "../state/views";
+import { reportErrors, showError } from "../ui/toasts";
+import { BusyOverlay } from "./BusyOverlay";
+import { WipeHandle } from "./WipeHandle";
+import { panView, useViewPointer } from "./usePointer";
+
+const PAN_PX = 48;
+
+function onWheel(screen: ImageCanvas, event: WheelEvent): void {
+  event.preventDefault();
+  const { view } = screen.image;
+  const freeCamera = freeCameraOf(view);
+  if (freeCamera !== null && !event.ctrlKey) return freeCamera.change((orbit) => dollyOrbit(orbit, zoomIn(event), freeCamera.bounds));
+  const { x, y } = pickMaterial(screen, event);
+  const lines = event.deltaMode === 1 ? 30 : 1;
+  const factor = Math.exp((-event.deltaY * lines * (event.ctrlKey ? 4 : 1)) / 500);
+  setTransform(view, zoomAt(transformOf(view), screen.size(), factor, x, y));
+}
+
+/** Keep the screen as large as its canvas, and take what is not the framework's to hear; returns how to stop. */
+function connectScreen(screen: ImageCanvas): () => void {
+  const { canvas } = screen;
+  const fit = () => {
+    const ratio = window.devicePixelRatio || 1;
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+    screen.resize(canvas.clientWidth, canvas.clientHeight);
+  };
+  const observer = new ResizeObserver(fit);
+  const wheel = (event: WheelEvent) => onWheel(screen, event);
+  const rejections = [acceptMaterialDrops(screen), acceptImageDrops(screen)];
+  fit();
+  observer.observe(canvas);
+  // Preact's own wheel listeners are passive, and the page must not scroll
+  canvas.addEventListener("wheel", wheel, { passive: false });
+  return () => {
+    observer.disconnect();
+    canvas.removeEventListener("wheel", wheel);
+    for (const rejectContextMenu of rejections) rejectContextMenu();
+    screen.close();
+  };
+}
+
+/** The screen of a canvas, once there is one; it shows the image of `view`. */
+function useScreen(view: string) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const [screen, setScreen] = useState<ImageCanvas | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
+  useEffect(() => {
+    try {
+      const createdScreen = new ImageCanvas(canvas.current as HTMLCanvasElement, stage.imageOf(view));
+      setScreen(createdScreen);
+      return connectScreen(createdScreen);
+    } catch (error) {
+      setFailure((error as Error).message);
+      showError(error);
+      return undefined;
+    }
+  }, []);
+  const image = stage.imageOf(view);
+  useEffect(() => {
+    if (screen !== null && screen.image !== image) screen.setImage(image);
+  }, [screen, image]);
+  return { canvas, screen, failure };
+}
+
+/** Look at what a pixel shows; beside others, the view is shown alone first. */
+async function onDoubleClick(screen: ImageCanvas, view: string, event: MouseEvent): Promise<void> {
+  const freeCamera = freeCameraOf(view);
+  if (sideBySide.peek() || freeCamera === null) return sideBySide.peek() ? showSingleView(view) : undefined;
+  const { px, py } = pickMaterial(screen, event);
+  const { position } = await requestPixelProbe(view, px, py);
+  if (position !== null) freeCamera.lookAt(position as Triple);
+}
+
+function onViewKey(screen: ImageCanvas, event: KeyboardEvent): void {
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const freeCamera = freeCameraOf(screen.image.view);
+  if (freeCamera !== null && event.key === "Home") return (freeCamera.restart(), event.preventDefault());
+  if (freeCamera !== null && event.key !== "Enter") {
+    if (orbitKeyStep(freeCamera.change, freeCamera.bounds, event.key, event.shiftKey)) {
+      event.preventDefault();
+      event.stopPropagation();
+    }
+    return;
+  }
+  const pans = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  if (pans !== undefined) panView(screen, (pans[0] as number) * PAN_PX, (pans[1] as number) * PAN_PX);
+  else if (event.key === "Enter" && sideBySide.value) showSingleView(screen.image.view);
+  else return;
+  event.preventDefault();
+}
+
+/** The view's name, which also marks the focused view; a press shows the view alone. */
+function ViewName({ view }: { view: string }) {
+  return (
+    <button
+      class="cell-name"
+      title={`Show “${view}” alone (double-click in the picture, or Enter)`}
+      onClick={() => showSingleView(view)}
+    >
+      {view}
+    </button>
+  );
+}
+
+export function ViewCell({ view }: { view: string }) {
+  scene.value; // another scene has other images, also under the same name
+  const { canvas, screen, failure } = useScreen(view);
+  const pointer = useViewPointer(screen, view);
+  const isGrid = sideBySide.value;
+  const moves = views.value.find(({ name }) => name === view)?.eye === "free";
+  const label = isGrid ? `The view ${view}. Enter shows it alone.` : "The picture.";
+  return (
+    <div class={`cell ${isGrid && view === activeViewName.value ? "active" : ""}`}>
+      <canvas
+        ref={canvas}
+        tabIndex={0}
+        role="img"
+        aria-label={`${label} ${moves ? "Arrow keys turn the eye, with Shift they slide it, plus and minus go nearer and farther, Home goes back" : "Arrow keys pan, plus and minus zoom"}; choose materials in the list.`}
+        onKeyDown={(event) => screen !== null && onViewKey(screen, event)}
+        onFocus={() => setFocus(view)}
+        onDblClick={(event) => screen !== null && void reportErrors(() => onDoubleClick(screen, view, event))}
+        onContextMenu={(event) => freeCameraOf(view) !== null && event.preventDefault()}
+        {...pointer}
+      />
+      {failure !== null && <p class="failure">{failure}</p>}
+      {screen?.isLost.value === true && (
+        <p class="failure" role="status">
+          The browser took the graphics memory away. The picture returns with it, or when you reload the page; nothing of
+          your work is lost.
+        </p>
+      )}
+      {screen !== null && <LightHandles screen={screen} />}
+      {screen !== null && <CommentPins screen={screen} />}
+      {wipe.value.isOn && screen !== null && <WipeHandle screen={screen} />}
+      <BusyOverlay image={stage.imageOf(view)} />
+      {isGrid && <ViewName view={view} />}
+    </div>
+  );
+}

@@ -1,0 +1,87 @@
+/** Under the image: the probed pixel on the left, zoom on the right. */
+import { toDisplay } from "../render/color/tonemap";
+import { stage } from "../render/renderStage";
+import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../render/zoom";
+import { toneMap } from "../state/color";
+import { openComments } from "../state/comments";
+import { displayedFrames, falseColor } from "../state/display";
+import { exposure } from "../state/look";
+import { histogramOpen } from "../state/panels";
+import { pixelProbe } from "../state/pointerPixel";
+import { shownPanels, togglePanel } from "../state/panelWidths";
+import { formatNumber } from "../ui/scale";
+
+function PixelProbe() {
+  displayedFrames.value;
+  const probed = pixelProbe.value;
+  const image = probed === null ? null : stage.imageOf(probed.view);
+  const radiance = probed === null ? null : (image?.radiance(probed.x, probed.y) ?? null);
+  if (probed === null || radiance === null) return <span class="probe quiet">Point at the picture to read a pixel</span>;
+  const displayed = toDisplay(radiance, exposure.value, toneMap.value).map((v) => Math.round(255 * v));
+  const material = image?.ids ? image.material(probed.x, probed.y) : probed.answer?.material;
+  return (
+    <span class="probe">
+      <i class="chip" style={{ background: `rgb(${displayed.join(" ")})` }} />
+      <span class="where">
+        {probed.x}, {probed.y}
+      </span>
+      <span class="linear" title="Linear radiance">
+        {radiance.map((v, c) => (
+          <b key={c} class={["red", "green", "blue"][c]}>
+            {formatNumber(v)}
+          </b>
+        ))}
+      </span>
+      <span class="display" title="After exposure and tone mapping, 0 to 255">
+        {displayed.map((v) => String(v).padStart(3, "\u2007")).join(" ")}
+      </span>
+      <span class="material">{material ?? "background"}</span>
+    </span>
+  );
+}
+
+export function ViewportBar() {
+  displayedFrames.value;
+  return (
+    <div class="picture-bar">
+      <PixelProbe />
+      <span class="spacer" />
+      <button
+        aria-pressed={shownPanels.value.includes("comments")}
+        title="Words that people pinned to pixels (N: a new one)"
+        onClick={() => togglePanel("comments")}
+      >
+        Comments{openComments.value.length > 0 && <span class="count">{openComments.value.length}</span>}
+      </button>
+      <button
+        aria-pressed={histogramOpen.value}
+        title="How often each brightness occurs (H)"
+        onClick={() => (histogramOpen.value = !histogramOpen.value)}
+      >
+        Histogram
+      </button>
+      <button
+        aria-pressed={falseColor.value}
+        title="Luminance in stops, as colours (E)"
+        onClick={() => (falseColor.value = !falseColor.value)}
+      >
+        False colour
+      </button>
+      <button class="icon" aria-label="Zoom out" title="Zoom out (−)" onClick={() => zoomBy(1 / 1.25)}>
+        −
+      </button>
+      <span class="zoom" aria-live="off">
+        {stage.active.hasPixels ? `${Math.round(100 * zoomFactor())} %` : "–"}
+      </span>
+      <button class="icon" aria-label="Zoom in" title="Zoom in (+)" onClick={() => zoomBy(1.25)}>
+        +
+      </button>
+      <button title="Fit the picture (F)" onClick={zoomFit}>
+        Fit
+      </button>
+      <button title="One to one (1)" onClick={zoomActual}>
+        1:1
+      </button>
+    </div>
+  );
+}

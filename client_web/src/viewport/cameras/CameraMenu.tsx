@@ -1,0 +1,116 @@
+/** Menu of a free camera: field of view, image size, and the cameras saved with the scene:
+ * to look from, to rename, to delete. */
+import { useEffect, useRef, useState } from "preact/hooks";
+import { MAX_EYE_PIXELS, type CameraEntry } from "../../protocol";
+import { activeView } from "../../state/views";
+import { IconButton } from "../../ui/IconButton";
+import { EditableName } from "../../ui/EditableName";
+import { LabeledSlider } from "../../ui/LabeledSlider";
+import { NumberField } from "../../ui/NumberField";
+import { reportErrors } from "../../ui/toasts";
+import { useDismiss } from "../../ui/useDismiss";
+import { nextCameraName, listCameras, MAX_NAME } from "./cameraRequests";
+import { moveFreeCamera, type FreeCamera } from "./freeCamera";
+import { saveCameraAs, removeCamera } from "./savedCameras";
+import { levelOrbit, MAX_YFOV, MIN_YFOV, withFieldOfView } from "./orbit";
+
+const MIN_SIDE = 16;
+const MAX_SIDE = 4096;
+const UPRIGHT = 1e-3; // radians
+
+/** Width and height; what would be too many pixels takes from the other side. */
+function ImageSizeFields({ freeCamera }: { freeCamera: FreeCamera }) {
+  const [width, height] = freeCamera.size;
+  const maxSide = (otherSide: number) => Math.floor(MAX_EYE_PIXELS / otherSide);
+  const field = (label: string, value: number, onChange: (value: number) => void) => (
+    <NumberField label={label} value={value} minimum={MIN_SIDE} maximum={MAX_SIDE} step={10} isInteger onChange={onChange} />
+  );
+  return (
+    <div class="camera-size">
+      <span>Picture</span>
+      {field("Width of the picture, pixels", width, (next) => freeCamera.resize([next, Math.min(height, maxSide(next))]))}×
+      {field("Height of the picture, pixels", height, (next) => freeCamera.resize([Math.min(width, maxSide(next)), next]))}
+      <button title="As large as was baked" onClick={() => freeCamera.resize(null)}>
+        As baked
+      </button>
+    </div>
+  );
+}
+
+interface ListProps {
+  scene: string;
+  freeCamera: FreeCamera;
+  name: string;
+}
+
+function CameraList({ scene, freeCamera, name }: ListProps) {
+  const [cameras, setCameras] = useState<CameraEntry[]>([]);
+  const read = async () => setCameras(await listCameras(scene));
+  const run = (work: () => Promise<void>) => void reportErrors(work).then(() => reportErrors(read));
+  useEffect(() => void reportErrors(read), [scene]);
+  const save = () => run(() => saveCameraAs(scene, nextCameraName(cameras.map((camera) => camera.name)), freeCamera.pose, null));
+  const remove = (camera: CameraEntry) => run(() => removeCamera(scene, camera, () => void reportErrors(read)));
+  return (
+    <>
+      <ul aria-label="Cameras of the scene">
+        {cameras.map((camera) => (
+          <li key={camera.name}>
+            <IconButton icon="eye" label={`Look from ${camera.name}`} onClick={() => moveFreeCamera(name, camera)} />
+            {camera.is_placed ? (
+              <EditableName
+                class="name"
+                name={camera.name}
+                maximum={MAX_NAME}
+                onRename={(to) => run(() => saveCameraAs(scene, to, camera, camera.name))}
+              />
+            ) : (
+              <span class="name">{camera.name}</span>
+            )}
+            {camera.is_placed && (
+              <IconButton icon="trash" label={`Delete ${camera.name}`} onClick={() => remove(camera)} />
+            )}
+          </li>
+        ))}
+      </ul>
+      <IconButton icon="plus" label="Keep this camera with the scene" onClick={save}>
+        Keep this camera
+      </IconButton>
+    </>
+  );
+}
+
+export function CameraMenu({ scene, freeCamera, name }: ListProps) {
+  const [open, setOpen] = useState(false);
+  const menu = useRef<HTMLDivElement>(null);
+  useDismiss(open, menu, () => setOpen(false));
+  activeView.value; // the camera has moved
+  const escape = (event: KeyboardEvent) => event.key === "Escape" && setOpen(false);
+  return (
+    <div class="menu" ref={menu} onKeyDown={escape}>
+      <button aria-expanded={open} title="Angle, size, and cameras of the scene" onClick={() => setOpen(!open)}>
+        Camera ▾
+      </button>
+      {open && (
+        <div class="menu-body camera-menu" role="dialog" aria-label="Camera">
+          <LabeledSlider
+            label="Angle"
+            unit="°"
+            title="Vertical field of view"
+            value={freeCamera.orbit.yfov}
+            minimum={MIN_YFOV}
+            maximum={MAX_YFOV}
+            scale="log"
+            onChange={(yfov) => freeCamera.change((now) => withFieldOfView(now, yfov))}
+          />
+          {Math.abs(freeCamera.orbit.roll) > UPRIGHT && (
+            <button title="Stand the picture upright" onClick={() => freeCamera.change(levelOrbit)}>
+              Level
+            </button>
+          )}
+          <ImageSizeFields freeCamera={freeCamera} />
+          <CameraList scene={scene} freeCamera={freeCamera} name={name} />
+        </div>
+      )}
+    </div>
+  );
+}

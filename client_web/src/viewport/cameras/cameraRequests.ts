@@ -1,0 +1,42 @@
+/** Cameras of a scene over REST, and its image in plain colors from anywhere. */
+import { getJson, json, request } from "../../session/net/api";
+import type { CameraEntry, ViewportBody, PickBody, Triple } from "../../protocol";
+import type { BakeSize } from "../../session/scene/recipe";
+import type { CameraPose } from "./orbit";
+
+export const MAX_NAME = 80;
+
+const cameraUrl = (scene: string) => `/api/scenes/${encodeURIComponent(scene)}`;
+const namedCameraUrl = (scene: string, name: string) => `${cameraUrl(scene)}/cameras/${encodeURIComponent(name)}`;
+
+export const listCameras = (scene: string) => getJson<CameraEntry[]>(`${cameraUrl(scene)}/cameras`);
+export const getPlacementView = (scene: string) => getJson<ViewportBody>(`${cameraUrl(scene)}/finder`);
+
+export async function saveCamera(scene: string, name: string, { to_world, yfov }: CameraPose): Promise<void> {
+  await request(namedCameraUrl(scene, name), json("PUT", { to_world, yfov }));
+}
+
+export async function deleteCamera(scene: string, name: string): Promise<void> {
+  await request(namedCameraUrl(scene, name), { method: "DELETE" });
+}
+
+export async function renderPlacement(scene: string, { to_world, yfov }: CameraPose, size: BakeSize): Promise<Blob> {
+  return (await request(`${cameraUrl(scene)}/finder`, json("POST", { to_world, yfov, size }))).blob();
+}
+
+/** The surface point that a pixel shows; null for the background. */
+export async function pickTarget(
+  scene: string,
+  { to_world, yfov }: CameraPose,
+  size: BakeSize,
+  x: number,
+  y: number,
+): Promise<Triple | null> {
+  const answer = await request(`${cameraUrl(scene)}/finder/place`, json("POST", { to_world, yfov, size, x, y }));
+  return ((await answer.json()) as PickBody).position as Triple | null;
+}
+
+/** The first of "View 1", "View 2" … that no camera has. */
+export function nextCameraName(usedNames: readonly string[]): string {
+  for (let number = 1; ; number++) if (!usedNames.includes(`View ${number}`)) return `View ${number}`;
+}

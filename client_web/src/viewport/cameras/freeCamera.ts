@@ -1,0 +1,244 @@
+/** Free cameras of views: placed by the user, sent to the server, stored over a reload. */
+import { effect } from "@preact/signals";
+import { sendToShown } from "../../session/connections";
+import { renderIfPossible, limitRenderSize, isMoving, setMoving, setCameraSeq } from "../../session/clientRendering";
+import { requestPixelProbe } from "../../session/pixelProbe";
+import type { HelloMessage, Triple } from "../../protocol";
+import { bake } from "../../state/bakes";
+import { connection } from "../../state/connection";
+import { storeCamera } from "../../state/cameras";
+import { scene } from "../../state/scene";
+import { shownViews, views } from "../../state/views";
+import { CameraMotion } from "./cameraMotion";
+import { poseOf, isClose, orbitOf, type Bounds, type CameraPose, type Orbit } from "./orbit";
+
+type View = HelloMessage["views"][number];
+
+const DEGREES = 180 / Math.PI;
+
+export type ViewSize = [width: number, height: number];
+
+/** Of one view of one bake. */
+export class FreeCamera {
+  readonly first: CameraPose;
+  readonly bounds: Bounds;
+  private readonly initialOrbit: Orbit;
+  private motion: CameraMotion;
+  private number = 0;
+  private hasMoved = false;
+  /** Its pose during playback. */
+  private playbackPose: CameraPose | null = null;
+  /** Of its images; null: as large as was baked. */
+  private sizeOverride: ViewSize | null = null;
+
+  constructor(
+    readonly bake: string,
+    private readonly view: View,
+  ) {
+    const [lowest, highest] = view.bounds ?? [
+      [0, 0, 0],
+      [1, 1, 1],
+    ];
+    this.bounds = { lowest: lowest as Triple, highest: highest as Triple };
+    this.first = { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES };
+    this.initialOrbit = orbitOf(this.first, this.bounds);
+    const { orbit, size } = this.load();
+    this.hasMoved = orbit !== null;
+    this.sizeOverride = size;
+    this.motion = this.createMotion(orbit ?? this.initialOrbit);
+  }
+
+  get orbit(): Orbit {
+    return this.motion.target;
+  }
+
+  /** Of its images, where somebody chose it. */
+  get customSize(): ViewSize | null {
+    return this.sizeOverride;
+  }
+
+  get size(): ViewSize {
+    return this.sizeOverride ?? [this.view.width, this.view.height];
+  }
+
+  /** Make images of this size, or, of null, as large as was baked. */
+  resize(size: ViewSize | null): void {
+    this.sizeOverride = size;
+    this.save();
+    this.report(this.pose);
+  }
+
+  change = (update: (orbit: Orbit) => Orbit): void => {
+    this.hasMoved = true;
+    this.playbackPose = null;
+    this.motion.change(update);
+    this.save();
+  };
+
+  /** From now on turn about what the middle of the image shows; where nobody says what that is, about what it was. */
+  async grab(): Promise<void> {
+    const [width, height] = limitRenderSize(...this.size);
+    const middle = requestPixelProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
+    const position = await middle.then((answer) => answer.position, () => null);
+    if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position as Triple));
+  }
+
+  /** Look at a point. */
+  lookAt(target: Triple): void {
+    this.change((now) => ({ ...now, target }));
+  }
+
+  /** Go back to where it began; its first camera may look straight down, which no orbit does. */
+  restart(): void {
+    this.motion.end();
+    this.motion = this.createMotion(this.initialOrbit);
+    this.hasMoved = false;
+    this.save();
+    this.report(this.first);
+  }
+
+  /** Move to a pose of a playback. */
+  play(playedPose: CameraPose): void {
+    this.motion.end();
+    this.motion = this.createMotion(orbitOf(playedPose, this.bounds));
+    this.hasMoved = true;
+    this.playbackPose = playedPose;
+    this.report(playedPose, false);
+  }
+
+  /** That way has ended. */
+  stop(): void {
+    if (this.playbackPose === null) return;
+    this.save();
+    this.report(this.playbackPose);
+    this.playbackPose = null;
+  }
+
+  /** Tell the server again, which may know nothing of it. */
+  resend(): void {
+    if (this.hasMoved || this.sizeOverride !== null) this.report(this.pose);
+  }
+
+  /** Its pose, or the pose in which it will stop. */
+  get pose(): CameraPose {
+    return this.hasMoved ? poseOf(this.motion.target) : this.first;
+  }
+
+  end(): void {
+    this.motion.end();
+    setMoving(this.view.name, false);
+  }
+
+  private createMotion(orbit: Orbit): CameraMotion {
+    return new CameraMotion(orbit, (displayed, isLast) => this.report(poseOf(displayed), isLast));
+  }
+
+  private report({ to_world, yfov }: CameraPose, isLast = true): void {
+    const { name } = this.view;
+    const camera = { to_world, yfov: yfov / DEGREES };
+    const [width, height] = this.size;
+    // what is laid over the image, as the handles of lights are, follows
+    views.value = views.peek().map((current) => (current.name === name ? { ...current, camera, width, height } : current));
+    const hasOwnPose = this.hasMoved || this.sizeOverride !== null;
+    storeCamera(name, hasOwnPose ? { camera, size: limitRenderSize(width, height) } : null);
+    const isRenderedHere = !isLast && renderIfPossible(name);
+    if (!isRenderedHere) this.sendPose(camera, "exact");
+    else if (!isMoving(name)) this.sendPose(camera, "stay"); // nothing is to be traced of where it is passing
+    setMoving(name, isRenderedHere);
+    if (isLast) renderIfPossible(name);
+  }
+
+  private sendPose(camera: View["camera"], rest: "exact" | "stay"): void {
+    const { name } = this.view;
+    this.number = Math.max(this.number + 1, Date.now());
+    setCameraSeq(name, this.number);
+    sendToShown({ type: "eye", view: name, eye: this.number, ...camera, size: limitRenderSize(...this.size), hand: null, rest });
+  }
+
+  private get key(): string {
+    return `relume.eye.${scene.peek()?.id}.${this.view.name}`; // other bakes of the scene use it, too
+  }
+
+  private save(): void {
+    const stored: StoredCamera = { orbit: this.hasMoved ? this.motion.target : null, size: this.sizeOverride };
+    try {
+      sessionStorage.setItem(this.key, JSON.stringify(stored));
+    } catch {
+      // storage is full or forbidden: a reload then goes back to where it began
+    }
+  }
+
+  private load(): StoredCamera {
+    try {
+      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as Partial<StoredCamera>;
+      const isSize = Array.isArray(size) && size.length === 2 && size.every((side) => Number.isInteger(side) && side > 0);
+      return { orbit: orbit && isClose(orbit, orbit) ? orbit : null, size: isSize ? size : null };
+    } catch {
+      return { orbit: null, size: null };
+    }
+  }
+}
+
+interface StoredCamera {
+  orbit: Orbit | null;
+  size: ViewSize | null;
+}
+
+const freeCameras = new Map<string, FreeCamera>();
+
+/** The free camera of a shown view; null with a fixed camera. */
+export function freeCameraOf(name: string): FreeCamera | null {
+  const currentBakeId = bake.peek();
+  const view = views.peek().find((candidate) => candidate.name === name);
+  if (currentBakeId === null || view?.eye !== "free") return null;
+  const existing = freeCameras.get(name);
+  if (existing?.bake === currentBakeId) return existing;
+  existing?.end();
+  const created = new FreeCamera(currentBakeId, view);
+  freeCameras.set(name, created);
+  return created;
+}
+
+/** Current pose of a view; null with a fixed camera. */
+export function cameraOf(name: string): CameraPose | null {
+  const view = views.peek().find((candidate) => candidate.name === name);
+  return view?.eye === "free" ? { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES } : null;
+}
+
+/** See a view from there, if its camera is free, in an image of a size; null: as large as was baked, undefined: as it is. */
+export function moveFreeCamera(name: string, camera: CameraPose, size?: ViewSize | null): void {
+  const freeCamera = freeCameraOf(name);
+  if (size !== undefined) freeCamera?.resize(size);
+  freeCamera?.change(() => orbitOf(camera, freeCamera.bounds));
+}
+
+/** Poses of free-camera views, by name, and their chosen image sizes. */
+export interface CameraSet {
+  poses: Record<string, CameraPose>;
+  sizes: Record<string, ViewSize>;
+}
+
+/** Of the shown views; those with a fixed camera have none. */
+export function currentCameras(): CameraSet {
+  const [poses, sizes]: [Record<string, CameraPose>, Record<string, ViewSize>] = [{}, {}];
+  for (const name of shownViews.value) {
+    const [camera, size] = [cameraOf(name), freeCameraOf(name)?.customSize ?? null];
+    if (camera !== null) poses[name] = camera;
+    if (size !== null) sizes[name] = size;
+  }
+  return { poses, sizes };
+}
+
+/** See views from there; a camera that is there already stays as it is. */
+export function applyCameras({ poses, sizes }: CameraSet): void {
+  const current = currentCameras();
+  const keyOf = (cameras: CameraSet, name: string) => JSON.stringify([cameras.poses[name], cameras.sizes[name]]);
+  for (const [name, camera] of Object.entries(poses)) {
+    if (keyOf({ poses, sizes }, name) !== keyOf(current, name)) moveFreeCamera(name, camera, sizes[name] ?? null);
+  }
+}
+
+effect(() => {
+  if (connection.value !== "open" || bake.value === null) return;
+  for (const name of shownViews.value) freeCameraOf(name)?.resend();
+});

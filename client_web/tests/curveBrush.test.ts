@@ -1,0 +1,40 @@
+/** Pointing at a curve: of a view with a free camera nothing is asked before that has come to rest. */
+import { expect, test, vi } from "vitest";
+
+const send = vi.hoisted(() => vi.fn());
+vi.hoisted(() => vi.stubGlobal("window", { setTimeout: (run: () => void, ms: number) => setTimeout(run, ms) }));
+vi.mock("../src/session/connections", () => ({ sendToShown: send, connections: { shown: null, incoming: null } }));
+vi.mock("../src/render/renderStage", () => ({ stage: { clearBrush: () => undefined } }));
+vi.mock("../src/state/selection", () => ({ curvePath: { peek: () => "/materials/A/terms/0/curves/theta_h" } }));
+vi.mock("../src/state/views", () => ({ hasFreeCamera: { peek: () => true } }));
+
+test("a stretch is asked about when the eye rests, and not at all where the pointer has left", async () => {
+  vi.useFakeTimers();
+  const [{ requestBrush, clearBrush }, { fidelity }] = [await import("../src/curve/curveBrush"), await import("../src/state/fidelity")];
+  fidelity.value = "approximate";
+  for (let k = 0; k < 2; k += 1) {
+    requestBrush(3, 7);
+    vi.advanceTimersByTime(5000);
+    expect(send).not.toHaveBeenCalled();
+    clearBrush();
+  }
+  requestBrush(3, 7);
+  fidelity.value = "exact";
+  vi.advanceTimersByTime(1000);
+  expect(send.mock.calls).toEqual([[{ type: "brush", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }]]);
+});
+
+test("a stretch of a curve that is being frozen is asked about when it is there", async () => {
+  const [{ requestBrush, clearBrush }, { fidelity }] = [await import("../src/curve/curveBrush"), await import("../src/state/fidelity")];
+  const { freezeStatus } = await import("../src/state/connection");
+  send.mockClear();
+  fidelity.value = "exact";
+  freezeStatus.value = { state: "freezing", view: "front", label: "A, half angle", progress: 0.2 };
+  requestBrush(3, 7);
+  vi.advanceTimersByTime(5000);
+  expect(send).not.toHaveBeenCalled();
+  freezeStatus.value = null;
+  vi.advanceTimersByTime(1000);
+  expect(send).toHaveBeenCalledOnce();
+  clearBrush();
+});

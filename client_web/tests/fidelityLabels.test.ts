@@ -1,0 +1,65 @@
+/** What is said of a free-camera image: how far it is off, where it rested last or as its bake was measured. */
+import { beforeEach, expect, test, vi } from "vitest";
+import { method } from "../src/state/bakes";
+import { bakedFreeCameraError, fidelity, isOutdated, freeCameraError, isConverged } from "../src/state/fidelity";
+import { shownViews, activeViewName, views } from "../src/state/views";
+import { isPlaying } from "../src/panels/timeline/playback";
+import { fidelityMarks } from "../src/viewport/fidelityLabels";
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  shownViews.value = ["front"];
+  views.value = [{ name: "front", eye: "free" } as never];
+  activeViewName.value = "front";
+  fidelity.value = "exact";
+  fidelity.value = "approximate";
+  vi.advanceTimersByTime(1000);
+});
+
+const labels = () => fidelityMarks().map((mark) => mark.label);
+
+test("until the eye has rested it is what the bake has measured, with its standard error", () => {
+  [bakedFreeCameraError.value, freeCameraError.value] = [null, null];
+  expect(labels()).toContain("Moving view, approximate");
+  bakedFreeCameraError.value = { value: 0.0312, standard_error: 0.0021 };
+  expect(labels()).toContain("Moving view, about 3.1 % off");
+  expect(fidelityMarks()[0]?.title).toContain("3.1 ± 0.2 %");
+  freeCameraError.value = 0.217;
+  expect(labels()).toContain("Moving view, about 22 % off");
+  expect(fidelityMarks()[0]?.title).toContain("3.1 ± 0.2 %");
+});
+
+test("while a time line plays it is said to play, whichever way its frames come", () => {
+  isPlaying.value = true;
+  for (const rough of ["preview", "approximate", "followed"] as const) {
+    fidelity.value = rough;
+    vi.advanceTimersByTime(1000);
+    expect(labels()).toEqual(["Playing"]);
+  }
+  isPlaying.value = false;
+  expect(labels()).toEqual(["Followed closely"]);
+});
+
+test("a bake of direct light says that objects are not reflected, also where its picture is exact", () => {
+  fidelity.value = "exact";
+  isConverged.value = true;
+  method.value = "direct";
+  expect(labels()).toEqual(["Direct light only"]);
+  expect(fidelityMarks()[0]?.title).toContain("Objects are not reflected");
+  method.value = "gather";
+  expect(labels()).toEqual([]);
+});
+
+test("a picture of before the newest edit says so until one of after it is there", () => {
+  fidelity.value = "exact";
+  [isConverged.value, isConverged.value] = [false, true];
+  views.value = [{ name: "front", eye: "baked" } as never];
+  isOutdated.value = true;
+  vi.advanceTimersByTime(200);
+  expect(labels()).toEqual([]); // nothing flickers during a drag
+  vi.advanceTimersByTime(200);
+  expect(labels()).toEqual(["Updating…"]);
+  fidelity.value = "preview";
+  isOutdated.value = false;
+  expect(labels()).toEqual(["Preview"]);
+});

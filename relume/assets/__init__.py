@@ -1,0 +1,4 @@
+"""Assets that looks name: environments, measured materials, BTFs; each kind has a store of its own.
+
+Read first: `asset_store`.
+"""

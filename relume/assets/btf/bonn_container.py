@@ -1,0 +1,200 @@
+"""The container of the Bonn measurements of 2014, ".btf": a BTF as products of two matrices for each colour channel.
+
+    "!DFMF08FCR"                                 then everything little-endian, without gaps
+    u32 bytes of this part, u32 version          three texts of 80 bytes, 4 f32 (pixels per mm, scale of RGB);
+                                                 version > 1: u32, whether the light's cosine is in the values;
+                                                 > 2: u32 bytes, XML; > 3: u32 channels, of each u32 bytes, its name
+    u32 views, of each 2 f32 θ φ                 and u32 lights, of each 2 f32 θ φ; the same lights for each view
+    u32 width, u32 height                        u32 rotations, of each 9 f32
+    u32 components, i32 colour model             3 f32 mean, 9 f32 matrix, of models that have one
+    of each channel: u8 bytes of a number        u32 components C, u32 rows N, u32 columns M, C singular values,
+                                                 N × C, M × C that these are in
+
+N are pairs of directions, light after light for each view, and M texels, row after row, or the other way about. This is
+what Bonn's own btflib and the reader that PyPI's btf-extractor is made of agree on.
+
+All sizes are held against the file's before anything is read by them; matrices stay on the disk.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.btf.compress import MAX_TEXELS
+from relume.assets.btf.direction_rings import MAX_DIRECTIONS
+from relume.core.errors import MaterialError
+
+F64 = NDArray[np.float64]
+Matrix = NDArray[Any]
+
+FIRST_BYTE = b"!"
+"""Of all containers of the Bonn measurements; a zip has another."""
+_SIGNATURE = b"!DFMF08FCR"
+_TEXTS = 3 * 80
+_MAX_COMPONENTS = 1024
+_FLOATS = {2: "<f2", 4: "<f4", 8: "<f8"}
+_CHANNELS = 3
+
+
+class Channel(NamedTuple):
+    """Values of pairs of directions and of texels: their product. (V · L, C), (texels, C), on the disk"""
+
+    pairs: Matrix
+    texels: Matrix
+
+
+class BonnContainer(NamedTuple):
+    """What a file holds.
+
+    Attributes:
+        has_cosine: whether the light's cosine is in its values.
+        views, lights: θ and φ, radians. (V, 2), (L, 2)
+        size: height and width, texels. model: of its colours. channels: three.
+    """
+
+    has_cosine: bool
+    views: F64
+    lights: F64
+    size: tuple[int, int]
+    model: int
+    channels: tuple[Channel, ...]
+
+
+class _Reader:
+    """Parts of a file, one after another.
+
+    Args:
+        path: of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._bytes = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.zeros(0, np.uint8)
+        self._offset = 0
+
+    @property
+    def remaining_bytes(self) -> int:
+        """Bytes."""
+        return len(self._bytes) - self._offset
+
+    @property
+    def offset(self) -> int:
+        """Bytes before what comes next."""
+        return self._offset
+
+    def skip(self, count: int) -> NDArray[np.uint8]:
+        """The next bytes, on the disk."""
+        if count > self.remaining_bytes:
+            raise damaged_error(f"{count:,} bytes are to follow, {self.remaining_bytes:,} do")
+        self._offset += count
+        return self._bytes[self._offset - count : self._offset]
+
+    def read_numbers(self, kind: str, *shape: int) -> Matrix:
+        """The next numbers, on the disk."""
+        dtype, count = np.dtype(kind), 1
+        for extent in shape:
+            count *= extent
+        data = self.skip(count * dtype.itemsize)
+        return np.ndarray(shape, dtype, data)
+
+    def read_count(self, label: str, maximum: int, minimum: int = 1) -> int:
+        """The next number of things, bounded."""
+        value = int(self.read_numbers("<u4", 1)[0])
+        if not minimum <= value <= maximum:
+            raise MaterialError(
+                f"the .btf file says that it has {value:,} {label}; {minimum:,} to {maximum:,} can be read: choose a "
+                f"smaller "
+                "version of it, or download it again"
+            )
+        return value
+
+
+def damaged_error(detail: str) -> MaterialError:
+    """What is wrong with a file that is not whole."""
+    return MaterialError(f"the .btf file is cut off or damaged: {detail}; download it again")
+
+
+def read_container(path: Path) -> BonnContainer:
+    """Read what a file says of itself, and find its matrices.
+
+    Args:
+        path: of the file.
+    Raises:
+        MaterialError: it is another kind of container, damaged, or larger than what can be kept.
+    """
+    file = _Reader(path)
+    _check_kind(file)
+    has_cosine = _read_description(file)
+    views, lights = _directions(file)
+    width, height = (file.read_count(label, MAX_TEXELS) for label in ("texels a row", "rows of texels"))
+    if width * height > MAX_TEXELS:
+        raise MaterialError(
+            f"the BTF has {width}×{height} texels; at most {MAX_TEXELS:,} can be kept, choose a smaller version of it"
+        )
+    file.read_numbers("<f4", file.read_count("rotations", MAX_TEXELS, 0), 9)
+    file.read_count("components", _MAX_COMPONENTS)
+    model = int(file.read_numbers("<i4", 1)[0])
+    file.read_numbers("<f4", 12)
+    pairs = len(views) * len(lights)
+    channels = tuple(_channel(file, pairs, width * height) for _ in range(_CHANNELS))
+    if file.remaining_bytes:
+        raise damaged_error(f"{file.remaining_bytes:,} bytes follow where it should end")
+    return BonnContainer(has_cosine, views, lights, (height, width), model, channels)
+
+
+def _check_kind(file: _Reader) -> None:
+    """Pass the signature."""
+    kind = bytes(file.skip(min(len(_SIGNATURE), file.remaining_bytes)))
+    if kind != _SIGNATURE:
+        raise MaterialError(
+            "the .btf file is no decorrelated full matrix factorization (DFMF), as those of UBO2014 are, but "
+            f"{kind.decode('ascii', 'replace')!r}; write its images into a zip, named by their directions such as "
+            "'tl030 pl060 tv045 pv270.png', and import that"
+        )
+
+
+def _read_description(file: _Reader) -> bool:
+    """Pass what people wrote. Whether the light's cosine is in the values."""
+    start = file.offset
+    size, version = (int(number) for number in file.read_numbers("<u4", 2))
+    file.skip(_TEXTS)
+    file.read_numbers("<f4", 4)
+    has_cosine = version > 1 and file.read_count("marks of the cosine", 2**32 - 1, 0) != 0
+    if version > 2:
+        file.skip(file.read_count("bytes of XML", file.remaining_bytes, 0))
+    if version > 3:
+        file.read_count("colour channels", _CHANNELS, _CHANNELS)
+        for _ in range(_CHANNELS):
+            file.skip(file.read_count("bytes of a channel's name", file.remaining_bytes, 0))
+    if file.offset - start != size:
+        raise damaged_error(f"its description has {file.offset - start:,} bytes, not {size:,}")
+    return has_cosine
+
+
+def _directions(file: _Reader) -> tuple[F64, F64]:
+    """Views and lights: θ and φ."""
+    views: list[Matrix] = []
+    lights: Matrix | None = None
+    for _ in range(file.read_count("view directions", MAX_DIRECTIONS)):
+        views.append(file.read_numbers("<f4", 2))
+        view_lights = file.read_numbers("<f4", file.read_count("light directions", MAX_DIRECTIONS), 2)
+        if lights is not None and not np.array_equal(lights, view_lights, equal_nan=True):
+            raise MaterialError("light directions of the BTF differ from view to view; resample it")
+        lights = view_lights
+    return np.array(views, np.float64), np.array(lights, np.float64)
+
+
+def _channel(file: _Reader, pairs: int, texels: int) -> Channel:
+    kind = _FLOATS.get(int(file.read_numbers("u1", 1)[0]))
+    if kind is None:
+        raise damaged_error("its numbers have neither two, four nor eight bytes")
+    components = file.read_count("components", _MAX_COMPONENTS)
+    rows, columns = (int(number) for number in file.read_numbers("<u4", 2))
+    if (rows, columns) not in ((pairs, texels), (texels, pairs)):
+        raise damaged_error(f"{rows:,} × {columns:,} values, not {pairs:,} pairs of directions × {texels:,} texels")
+    file.read_numbers(kind, components)  # singular values, which the second matrix contains
+    left, right = file.read_numbers(kind, rows, components), file.read_numbers(kind, columns, components)
+    return Channel(left, right) if rows == pairs else Channel(right, left)

@@ -1,0 +1,182 @@
+"""What places of a BTF send: by kernels, for brute force; and place by place in NumPy, the oracle of all kernels."""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.btf.direction_rings import interpolation_weights, interpolation_weights_numpy
+from relume.assets.btf.local_pca_btf import F32, LocalPcaBtf
+from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection, parallax_intersection_numpy
+from relume.core.numba_options import UNCOUNTED
+
+F64 = NDArray[np.float64]
+
+_CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+
+
+def sample_btf_numpy(btf: LocalPcaBtf, texel_positions: F64, wo: F64) -> F64:
+    """The mean over places of what they send to an eye of light from each side in which the BTF is known.
+
+    Args:
+        btf: the BTF. wo: to the eye, in the texture's frame, unit. (3,)
+        texel_positions: column and row, in texels of the finest level, from the middle of the first. (n, 2)
+    Returns:
+        (L, 3) float64, the cosine of the light in it
+    """
+    size, shears = np.array(btf.size[::-1]), compute_shears(btf.grid)
+    shear = wo[:2] / max(wo[2], np.hypot(wo[0], wo[1]) / np.tan(btf.grid.theta[-1]))
+    height = np.array(
+        [parallax_intersection_numpy(btf.height, (position + 0.5) / size, shear) for position in texel_positions]
+    )
+    view, view_weight, _ = interpolation_weights_numpy(btf.grid, wo[None])
+    values_by_light = np.zeros((btf.grid.num_directions, 3))
+    for side, side_weight in zip(view[0], view_weight[0], strict=True):
+        shifted_positions = texel_positions + height[:, None] * (shear - shears[side]) * [1, -1] * size
+        first = np.floor(shifted_positions).astype(int)
+        corner_weight = np.abs(1 - _CORNERS - (shifted_positions - first)[:, None]).prod(axis=2) / len(texel_positions)
+        column, row = np.moveaxis((first[:, None] + _CORNERS) % size, 2, 0)
+        values_by_light += side_weight * btf.evaluate(side, (row * size[0] + column).ravel(), corner_weight.ravel())
+    return values_by_light
+
+
+def outgoing_radiance_numpy(btf: LocalPcaBtf, values_by_light: F64, wi: F64) -> F64:
+    """What is sent of light from some directions, one unit of irradiance across each.
+
+    Args:
+        btf: the BTF. values_by_light: from `sample_btf_numpy`. wi: in the texture's frame, unit. (m, 3)
+    Returns:
+        (m, 3) float64
+    """
+    light, light_weight, cosine_ratio = interpolation_weights_numpy(btf.grid, wi)
+    return np.asarray(np.einsum("mk,m,mkc->mc", light_weight, cosine_ratio, values_by_light[light]))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used_clusters, factors):  # type: ignore[no-untyped-def]
+    """Add the four texels about a place to the factors of their clusters' means and components.
+
+    Args:
+        size: height and width. u, v: the place, in texels from the middle of the first. position_weight: of the place.
+        cluster, weight: of the texels. cluster_slot: row of `factors` of each cluster, below 0 where it has none yet.
+        used_clusters: clusters that have one; as many are filled as the last entry says.
+    """
+    left, upper = math.floor(u), math.floor(v)
+    for corner in range(4):
+        right, down = corner & 1, corner >> 1
+        corner_weight = position_weight * abs(1 - right - (u - left)) * abs(1 - down - (v - upper))
+        texel = (np.int64(upper) + down) % size[0] * size[1] + (np.int64(left) + right) % size[1]
+        k = cluster[texel]
+        if cluster_slot[k] < 0:
+            cluster_slot[k] = used_clusters[-1]
+            used_clusters[used_clusters[-1]] = k
+            factors[used_clusters[-1]] = 0
+            used_clusters[-1] += 1
+        row = factors[cluster_slot[k]]
+        row[0] += corner_weight
+        for j in range(weight.shape[1]):
+            row[1 + j] += corner_weight * weight[texel, j]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texel_positions, wo, out):  # type: ignore[no-untyped-def]
+    """Do as `seen` of its arrays. side: slants of the directions. size: height and width in texels."""
+    lowest, highest = height.min(), height.max()
+    view, view_weight = np.empty(4, np.int32), np.empty(4, np.float32)
+    cluster_slot, used_clusters = np.full(256, -1, np.int64), np.empty(4 * texel_positions.shape[1] + 1, np.int64)
+    factors, total = np.empty((len(used_clusters), tables.shape[2]), np.float32), np.empty(tables.shape[3:], np.float32)
+    heights, width = np.empty(texel_positions.shape[1], np.float32), np.float32(size[1])
+    rows = np.float32(size[0])
+    for p in range(len(texel_positions)):
+        total[:] = 0
+        interpolation_weights(grid, wo[p, 0], wo[p, 1], wo[p, 2], view, view_weight)
+        shear = compute_shear(grid, wo[p, 0], wo[p, 1], wo[p, 2])
+        for k in range(len(heights)):
+            u, v = (texel_positions[p, k, 0] + 0.5) / size[1], (texel_positions[p, k, 1] + 0.5) / size[0]
+            heights[k] = parallax_intersection(
+                height, lowest, highest, np.float32(u - math.floor(u)), np.float32(v - math.floor(v)), shear
+            )
+        for tap in range(4):
+            if view_weight[tap] == 0:
+                continue
+            side_index, used_clusters[-1] = view[tap], 0
+            sx, sy = shear[0] - shears[side_index, 0], shear[1] - shears[side_index, 1]
+            for k in range(len(heights)):
+                u, v = (
+                    texel_positions[p, k, 0] + heights[k] * sx * width,
+                    texel_positions[p, k, 1] - heights[k] * sy * rows,
+                )
+                _add_texels(
+                    size,
+                    u,
+                    v,
+                    view_weight[tap] / len(heights),
+                    cluster[side_index],
+                    weight[side_index],
+                    cluster_slot,
+                    used_clusters,
+                    factors,
+                )
+            for row in range(used_clusters[-1]):
+                table = tables[side_index, used_clusters[row]]
+                cluster_slot[used_clusters[row]] = -1
+                for j in range(table.shape[0]):
+                    factor = factors[row, j]
+                    for channel in range(3):
+                        for light in range(table.shape[2]):
+                            total[channel, light] += factor * table[j, channel, light]
+        for light in range(total.shape[1]):
+            for channel in range(3):
+                out[p, light, channel] = total[channel, light]
+
+
+def sample_btf(btf: LocalPcaBtf, tables: F32, texel_positions: F64, wo: F64) -> F32:
+    """Do as `sample_btf_numpy` of many points at once.
+
+    Args:
+        btf: the BTF. tables: of it, see `LocalPcaBtf.tables`.
+        wo: to the eye, above the horizon. (n, 3). texel_positions: of each point. (n, places, 2)
+    Returns:
+        (n, L, 3) float32
+    """
+    out = np.empty((len(wo), btf.grid.num_directions, 3), np.float32)
+    _sample_btf_kernel(
+        btf.grid, compute_shears(btf.grid), btf.height, btf.size, btf.cluster, btf.weight, tables, texel_positions,
+        wo.astype(np.float32), out,
+    )  # fmt: skip
+    return out
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _outgoing_radiance_kernel(grid, values_by_light, axes, point_index, wi, out):  # type: ignore[no-untyped-def]
+    """Do as `sent` of its arrays."""
+    index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
+    for m in range(len(wi)):
+        p, x, y, z = point_index[m], np.float32(wi[m, 0]), np.float32(wi[m, 1]), np.float32(wi[m, 2])
+        tx, ty = axes[p, 0, 0] * x + axes[p, 0, 1] * y, axes[p, 1, 0] * x + axes[p, 1, 1] * y
+        cosine_ratio = interpolation_weights(grid, np.float32(tx), np.float32(ty), z, index, weight)
+        for channel in range(3):
+            total = np.float32(0)
+            for k in range(4):
+                total += weight[k] * values_by_light[p, index[k], channel]
+            out[m, channel] = cosine_ratio * total
+
+
+def outgoing_radiance(
+    btf: LocalPcaBtf, values_by_light: F32, axes: F64, point_index: NDArray[np.int64], wi: F64
+) -> F64:
+    """Do as `outgoing_radiance_numpy` of many points at once.
+
+    Args:
+        btf: the BTF. values_by_light: from `values_by_light`. (n, L, 3)
+        axes: of the texture, in the frames of the points. (n, 2, 2)
+        point_index: point of each direction. (m,). wi: in the frames of their points, unit. (m, 3)
+    Returns:
+        (m, 3) float64
+    """
+    out = np.empty((len(wi), 3))
+    _outgoing_radiance_kernel(btf.grid, values_by_light, axes, point_index, np.ascontiguousarray(wi, np.float64), out)
+    return out

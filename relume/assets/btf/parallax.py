@@ -1,0 +1,109 @@
+"""Where what is seen at a place of a BTF's plane is seen from another side: the height of the relief tells.
+
+A ray towards w, which crosses the plane at x, is at height z over x + z s(w), s(w) = (w_x, w_y) / w_z. Where it meets
+the relief, at height h, a ray towards v meets it too that crosses the plane at
+
+    x_v = x + h (s(w) − s(v)) .
+
+So values that are known from v are looked up there, when they are to be seen from w: else a mean of several directions
+would show relief several times.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.btf.direction_rings import DirectionGrid, directions
+from relume.core.numba_options import UNCOUNTED
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_STEPS_PER_TEXEL = np.float32(2)  # steps, along a ray
+_MAX_STEPS = 256
+
+
+def compute_shears(grid: DirectionGrid) -> F32:
+    """s of every direction: how far its rays go sideways for each unit that they rise. (V, 2) float32"""
+    w = directions(grid)
+    return np.asarray(w[:, :2] / w[:, 2:], np.float32)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
+    """s of a direction; beyond the last ring it is the last ring's.
+
+    Args:
+        grid: the `DirectionGrid`. x, y, z: the direction, unit, above the horizon.
+    """
+    across = math.sqrt(x * x + y * y)
+    max_slope = np.float32(math.tan(grid.theta[grid.theta.shape[0] - 1]))
+    denominator: Any = max(z, np.float32(1e-6), across / max_slope)
+    return x / denominator, y / denominator
+
+
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+def _interpolate_height(height, u, v):  # type: ignore[no-untyped-def]
+    """Interpolate heights between texels, which repeat without end."""
+    rows, columns = height.shape
+    x, y = u * np.float32(columns) - np.float32(0.5), v * np.float32(rows) - np.float32(0.5)
+    left, upper = math.floor(x), math.floor(y)
+    fx, fy = np.float32(x - left), np.float32(y - upper)
+    column, row = np.int64(left) % columns, np.int64(upper) % rows
+    next_column, next_row = (column + 1) % columns, (row + 1) % rows
+    above = (np.float32(1) - fx) * height[row, column] + fx * height[row, next_column]
+    return (np.float32(1) - fy) * above + fy * (
+        (np.float32(1) - fx) * height[next_row, column] + fx * height[next_row, next_column]
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore[no-untyped-def]
+    """Find how high the relief is where a ray meets it first, in steps of half a texel, linear on the last.
+
+    Args:
+        height: of the relief, sides of the texture. (height, width) float32. lowest, highest: of them.
+        u, v: where the ray crosses the plane, in repeats. shear: s of it.
+    """
+    rows, columns = height.shape
+    sideways = max(abs(shear[0]) * np.float32(columns), abs(shear[1]) * np.float32(rows)) * (highest - lowest)
+    steps: Any = min(max(np.int64(math.ceil(_STEPS_PER_TEXEL * sideways)), 1), _MAX_STEPS)
+    step, previous_z = (lowest - highest) / np.float32(steps), highest
+    clearance = highest - _interpolate_height(height, u + highest * shear[0], v - highest * shear[1])
+    for k in range(steps):
+        z = highest + step * np.float32(k + 1)
+        next_clearance = z - _interpolate_height(height, u + z * shear[0], v - z * shear[1])
+        if next_clearance <= 0:
+            return previous_z + step * clearance / max(clearance - next_clearance, np.float32(1e-9))
+        clearance, previous_z = next_clearance, z
+    return lowest
+
+
+def parallax_intersection_numpy(height: F32, uv: F64, shear: F64) -> float:
+    """Do as `parallax_intersection`, in plain NumPy: its oracle.
+
+    Args:
+        height: of the relief. (height, width). uv: u and v, in repeats. (2,). shear: s of the ray. (2,)
+    """
+    size = np.array(height.shape[::-1])
+    low, high = float(height.min()), float(height.max())
+    steps = int(np.clip(np.ceil(2 * np.max(np.abs(shear) * size) * (high - low)), 1, _MAX_STEPS))
+    z = np.linspace(high, low, steps + 1)
+    texel_positions = (uv + z[:, None] * shear * [1, -1]) * size - 0.5
+    first = np.floor(texel_positions).astype(int)
+    fraction = texel_positions - first
+    surface_height = np.zeros(len(z))
+    for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        weight = np.abs(1 - right - fraction[:, 0]) * np.abs(1 - down - fraction[:, 1])
+        surface_height += weight * height[(first[:, 1] + down) % size[1], (first[:, 0] + right) % size[0]]
+    clearance = z - surface_height
+    hits = np.flatnonzero(clearance[1:] <= 0)
+    if not len(hits):
+        return low
+    k = hits[0]
+    return float(z[k] + (z[k + 1] - z[k]) * clearance[k] / max(clearance[k] - clearance[k + 1], 1e-9))

@@ -1,0 +1,53 @@
+"""What a compression has found so far, on the disk: one file for each view, so that a killed one goes on.
+
+<folder>/recipe.json    what is compressed, and how: files of another one do not count
+         <name>.npz     arrays that were found
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.filesystem import atomic_write
+
+_FORMAT = 2
+Arrays = Mapping[str, NDArray[Any]]
+
+
+class PartialCompression:
+    """Parts of a compression, by name.
+
+    Args:
+        folder: where they are, or will be. recipe: JSON that says what is compressed, and how.
+    """
+
+    def __init__(self, folder: Path, recipe: Mapping[str, Any]) -> None:
+        self._folder = folder
+        text, path = json.dumps({"format": _FORMAT, **recipe}, sort_keys=True), folder / "recipe.json"
+        if path.exists() and path.read_text() == text:
+            return
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        with atomic_write(path) as unfinished:
+            unfinished.write_text(text)
+
+    def load(self, name: str) -> Arrays | None:
+        """The arrays of a part; None where it is not there, or damaged."""
+        try:
+            with (self._folder / f"{name}.npz").open("rb") as file, np.load(file, allow_pickle=False) as archive:
+                return {key: archive[key] for key in archive.files}
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return None
+
+    def save(self, name: str, arrays: Arrays) -> None:
+        """Keep a part."""
+        with atomic_write(self._folder / f"{name}.npz") as unfinished, unfinished.open("wb") as file:
+            np.savez(file, allow_pickle=False, **arrays)

@@ -1,0 +1,109 @@
+"""Environments that were imported; `relume.assets.asset_store` keeps them.
+
+    <folder>/<id>/radiance.npy        as `relume.assets.environments.read_environment` reads the file, at most 2048
+    texels wide
+                  thumbnail.png
+                  environment.json    name, and what had to be changed
+
+Look documents name one as "env:<id>".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.assets.asset_store import AssetStore
+from relume.assets.environments.environment import Environment
+from relume.assets.environments.read_environment import read_environment
+from relume.core.cache import asset_cached
+from relume.core.errors import SceneError
+from relume.core.import_warnings import ImportRemark, warning_of
+
+STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
+MAX_WIDTH = 2048  # a texel of 0.18°: finer than what a bake divides light into, and weighed in seconds
+_RADIANCE, _THUMBNAIL = "radiance.npy", "thumbnail.png"
+
+
+@dataclass(frozen=True)
+class EnvironmentRecord:
+    """What lists show of an imported environment.
+
+    Attributes:
+        created: seconds since 1970. warnings: what was changed when it was read, one sentence each.
+    """
+
+    id: str
+    name: str
+    created: float
+    warnings: tuple[ImportRemark, ...]
+
+    @property
+    def map(self) -> str:
+        """The name by which look documents mean this environment."""
+        return STORE.prefix + self.id
+
+
+def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecord:
+    """Import an equirectangular .hdr or .exr file; the same content twice is the same, its newest name wins.
+
+    Args:
+        folder: of the asset store.
+        source: the file to import.
+        name: what people call it.
+    Raises:
+        SceneError: the file cannot be used, or the store is full.
+    """
+    from relume.assets.environments.thumbnail import (
+        write_thumbnail,  # compiled kernels, which readers of scenes do without
+    )
+
+    environment = read_environment(source, name, MAX_WIDTH)
+
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        np.save(staged_folder / _RADIANCE, environment.radiance)
+        write_thumbnail(staged_folder / _THUMBNAIL, environment.radiance)
+        return {"warnings": [remark.document() for remark in environment.warnings]}
+
+    return get_record(folder, STORE.store(folder, source, name, fill))
+
+
+def records(folder: Path) -> list[EnvironmentRecord]:
+    """All environments of a folder, newest first."""
+    return STORE.records(folder, get_record)
+
+
+def get_record(folder: Path, identity: str) -> EnvironmentRecord:
+    """One environment. Raises NotFoundError; SceneError where its files are damaged."""
+    path = STORE.path(folder, identity)
+    document = STORE.load_record(path)
+    warnings = document.get("warnings")
+    if not isinstance(warnings, list):
+        raise STORE.damaged_error(path)
+    return EnvironmentRecord(identity, document["name"], document["created"], tuple(map(warning_of, warnings)))
+
+
+def thumbnail_path(folder: Path, identity: str) -> Path:
+    """A small picture of one. Raises NotFoundError."""
+    return STORE.path(folder, identity) / _THUMBNAIL
+
+
+def load_imported(name: str) -> Environment:
+    """What a look's `map` names; its texels stay on the disk and are read where they are needed.
+
+    Raises:
+        NotFoundError: it is not here. SceneError: its files are damaged.
+    """
+    return _load(STORE.resolve(name))
+
+
+@asset_cached("environment file")
+def _load(path: Path) -> Environment:
+    radiance = STORE.open_array(path, _RADIANCE)
+    height = len(radiance) if radiance.ndim else 0
+    if height == 0 or radiance.shape != (height, 2 * height, 3) or radiance.dtype != np.float32:
+        raise STORE.damaged_error(path)
+    return Environment(STORE.load_record(path)["name"], radiance)

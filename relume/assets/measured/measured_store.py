@@ -1,0 +1,135 @@
+"""Measured materials that were imported; `relume.assets.asset_store` keeps them.
+
+    <folder>/<id>/measured.binary    the file as it came
+                  table.npy          the same as `relume.assets.measured.interpolate` reads it
+                  material.json      name, curves and how well they do without the quotient
+
+Look documents name one as "merl:<id>".
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.assets.asset_store import AssetStore
+from relume.assets.measured.factorize import factorize
+from relume.assets.measured.interpolate import F32, NUM_KNOTS, build_table
+from relume.assets.measured.merl import F64, SHAPE, read_merl
+from relume.core.cache import asset_cached
+from relume.core.errors import MaterialError
+
+STORE = AssetStore("measured material", "merl:", "material.json", MaterialError, max_entries=500)
+_SOURCE, _TABLE = "measured.binary", "table.npy"
+Rgb = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class MaterialRecord:
+    """What lists show of a measured material.
+
+    Attributes:
+        created: seconds since 1970.
+        lobes_error, homomorphic_error: of the curves alone, see `relume.assets.measured.factorize.MeasuredFactors`.
+    """
+
+    id: str
+    name: str
+    created: float
+    lobes_error: Rgb
+    homomorphic_error: Rgb
+
+    @property
+    def data(self) -> str:
+        """The name by which look documents mean this material."""
+        return STORE.prefix + self.id
+
+    def terms(self) -> list[dict[str, Any]]:
+        """The unedited material as terms of a look, without textures: what was measured is the whole colour."""
+        return [{"model": model, "data": self.data, "texture": None} for model in ("measured_lv", "measured_hd")]
+
+
+@dataclass(frozen=True)
+class MeasuredBrdf:
+    """What the quotients and curves of a material read. lobes, homomorphic: as in `MeasuredFactors`. (4, 3, 90) each"""
+
+    table: F32
+    lobes: F64
+    homomorphic: F64
+
+
+def store_material(folder: Path, source: Path, name: str, file_name: str | None = None) -> MaterialRecord:
+    """Import a MERL file; the same content twice is the same material, its newest name wins.
+
+    Args:
+        folder: of the asset store.
+        source: the file to import.
+        name: what people call it.
+        file_name: what errors call the file; None: its name in the path.
+    Raises:
+        MaterialError: the file cannot be used, or the store is full.
+    Cost: some seconds, 0.5 GB of memory.
+    """
+    planes = read_merl(source, file_name)
+
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        table = build_table(planes)
+        shutil.copyfile(source, staged_folder / _SOURCE)
+        np.save(staged_folder / _TABLE, table)
+        return {key: np.asarray(value).tolist() for key, value in asdict(factorize(planes, table)).items()}
+
+    return get_record(folder, STORE.store(folder, source, name, fill))
+
+
+def records(folder: Path) -> list[MaterialRecord]:
+    """All materials of a folder, newest first."""
+    return STORE.records(folder, get_record)
+
+
+def get_record(folder: Path, identity: str) -> MaterialRecord:
+    """One material. Raises NotFoundError; MaterialError where its files are damaged."""
+    path = STORE.path(folder, identity)
+    document = STORE.load_record(path)
+    try:
+        errors = [_rgb(document[key]) for key in ("lobes_error", "homomorphic_error")]
+    except (KeyError, TypeError, ValueError) as error:
+        raise STORE.damaged_error(path) from error
+    return MaterialRecord(identity, document["name"], document["created"], *errors)
+
+
+def source_path(data: str) -> Path:
+    """The file that a material was imported from. Raises NotFoundError."""
+    return STORE.resolve(data) / _SOURCE
+
+
+def load_material(data: str) -> MeasuredBrdf:
+    """What a look's `data` names; its table stays on the disk and is read where it is needed.
+
+    Raises:
+        NotFoundError: it is not here. MaterialError: its files are damaged.
+    """
+    return _load(STORE.resolve(data))
+
+
+@asset_cached("measured material")
+def _load(path: Path) -> MeasuredBrdf:
+    document, table = STORE.load_record(path), STORE.open_array(path, _TABLE)
+    try:
+        curves = [np.array(document[key], np.float64) for key in ("lobes", "homomorphic")]
+    except (ValueError, KeyError, TypeError) as error:
+        raise STORE.damaged_error(path) from error
+    if table.shape != (*SHAPE, 3) or table.dtype != np.float32:
+        raise STORE.damaged_error(path)
+    for curve in curves:
+        if curve.shape != (4, 3, NUM_KNOTS) or not (np.isfinite(curve) & (curve > 0)).all():
+            raise STORE.damaged_error(path)
+    return MeasuredBrdf(table, *curves)
+
+
+def _rgb(values: Any) -> Rgb:
+    red, green, blue = (float(value) for value in values)
+    return red, green, blue

@@ -1,0 +1,108 @@
+"""What a highlight sends of light that comes straight to a surface, tabulated: few functions make it 30° wide.
+
+    T(b, s) = ∫_s f(ω_b, ωo) cos θo dωo / ∫_s cos θo dωo
+
+over squares s of the grid by which gather cells send (`relume.math.direction_grid`), for light from the middles ω_b of
+finer bins; all squares together send what the term does. A term that looks the same from all around and in a mirror is
+known from one eighth of all bins.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.quadrature import Quadrature
+from relume.brdf.symmetry import is_isotropic, rotational_symmetry
+from relume.math.direction_grid import NUM_DIRECTION_BINS, bin_centers, bin_index, bin_solid_angles, fine_bin_centers
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_NUM_RADII, _NUM_AROUND = 48, 48
+_CENTER_WEIGHT = 1e-6  # weight of the middle of a square, which counts where nothing else lies in it
+_ROTATIONS = [rotational_symmetry(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term that looks different from there
+
+
+@lru_cache(maxsize=64)
+def lobe_table(term_text: str) -> F32:
+    """T of a term: the mean over turns about the normal where it looks different from there.
+
+    Args:
+        term_text: one term of a complete look, as JSON, its colour white (`relume.brdf.albedo.white_material_key`).
+    Returns:
+        1/sr. (bins, 3 channels, `NUM_DIRECTION_BINS`) float32
+    """
+    document, pairs = json.loads(term_text), _pairs()
+    value = _values(document, pairs.quadrature)
+    table = np.empty((len(value[0]), 3, NUM_DIRECTION_BINS), np.float32)
+    for channel in range(3):
+        weighted = value[channel % len(value)] * pairs.weight
+        for b, bin_indices in enumerate(pairs.bin_indices):
+            mean = np.bincount(bin_indices, weighted[b], NUM_DIRECTION_BINS) / np.maximum(pairs.total[b], 1e-30)
+            table[b, channel] = mean * (weighted[b].sum() / (mean @ pairs.area))
+    return table
+
+
+def _values(document: Mapping[str, Any], pairs: Quadrature) -> F64:
+    """f at pairs of directions. (1 or 3, bins, n)"""
+    if is_isotropic(document):
+        return pairs.values(document)
+    rotated = [eval_brdf(document, pairs.wi @ rotation.T, pairs.wo @ rotation.T) for rotation in _ROTATIONS]
+    return np.moveaxis(np.mean(rotated, axis=0), -1, 0)
+
+
+class _DirectionPairs:
+    """Directions ωo about where light from each bin is mirrored to, and the middles of all squares.
+
+    With θr the angle from the mirror direction, θr = π u³ and dωo = 3π u² sin θr du dφr, as narrow highlights want it.
+
+    Attributes:
+        weight: cos θo dωo. (bins, n). bin_indices: that each ωo is in. (bins, n)
+        total: Σ cos θo dωo of each square. (bins, squares). area: ∫ cos θo dωo over it. (squares,)
+    """
+
+    def __init__(self) -> None:
+        wi = fine_bin_centers()
+        u = (np.arange(_NUM_RADII) + 0.5) / _NUM_RADII
+        theta, phi = np.pi * u**3, 2 * np.pi * (np.arange(_NUM_AROUND) + 0.5) / _NUM_AROUND
+        solid_angle = np.repeat(3 * np.pi * u**2 * np.sin(theta), _NUM_AROUND) * (
+            2 * np.pi / (_NUM_RADII * _NUM_AROUND)
+        )
+        local_directions = np.stack([np.outer(np.sin(theta), np.cos(phi)), np.outer(np.sin(theta), np.sin(phi)),
+                          np.repeat(np.cos(theta)[:, None], _NUM_AROUND, axis=1)], axis=-1).reshape(-1, 3)  # fmt: skip
+        reflected = np.einsum("nj,bji->bni", local_directions, _frames(wi * [-1, -1, 1]))
+        centers = np.broadcast_to(bin_centers(), (len(wi), NUM_DIRECTION_BINS, 3))
+        wo = np.concatenate([reflected, centers], axis=1)
+        above = np.maximum(reflected[..., 2], 0)
+        self.area = bin_solid_angles()
+        center_weight = np.broadcast_to(_CENTER_WEIGHT * self.area, (len(wi), NUM_DIRECTION_BINS))
+        self.weight = np.concatenate([solid_angle * above, center_weight], axis=1)
+        at_centers = np.broadcast_to(np.arange(NUM_DIRECTION_BINS), center_weight.shape)
+        self.bin_indices = np.concatenate([bin_index(reflected), at_centers], axis=1)
+        self.total = np.stack(
+            [
+                np.bincount(bin_indices, weight, NUM_DIRECTION_BINS)
+                for bin_indices, weight in zip(self.bin_indices, self.weight, strict=True)
+            ]
+        )
+        self.quadrature = Quadrature(wi[:, None], wo)
+
+
+@lru_cache(maxsize=1)
+def _pairs() -> _DirectionPairs:
+    return _DirectionPairs()
+
+
+def _frames(axis: F64) -> F64:
+    """Frames whose z axes are given directions, their rows the axes. axis: (b, 3). (b, 3, 3)"""
+    helper = np.where(np.abs(axis[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
+    x = np.cross(helper, axis)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)

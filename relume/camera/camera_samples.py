@@ -1,0 +1,164 @@
+"""What an eye sees through the pixels of its picture: which are edges, and the rays that samples are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.camera.edge_detection import (
+    find_edge_pixels,
+    is_normal_edge,
+    is_partial_coverage,
+    is_radiance_edge,
+    radiance_edge_threshold,
+)
+from relume.camera.merge_rays import MergedRays, concatenate_rays, merge_rays, unmerged
+from relume.camera.specular_hits import MAX_MIRROR_BOUNCES
+from relume.camera.tiling import MAX_CONCURRENT_TILES, ImageTile, image_tiles
+from relume.camera.transparency_layers import TransparencyLayer, trace_layers
+from relume.core.thread_pools import map_ordered
+from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
+from relume.raytrace.camera_rays import camera_directions
+from relume.raytrace.scene_buffers import SceneBuffers
+from relume.scene.model import Camera, Scene
+
+F32 = NDArray[np.float32]
+
+_GOLDEN_RATIO_CONJUGATE = (5**0.5 - 1) / 2
+_PIXEL_CENTER = np.full((1, 2), 0.5)
+
+
+@dataclass(frozen=True)
+class EdgePixels:
+    """Of a picture.
+
+    Attributes:
+        is_edge: whether a pixel wants more rays than the one through its middle. (pixels,)
+        num_single_samples: what the others show together. num_rays: that found it.
+    """
+
+    is_edge: NDArray[np.bool_]
+    num_single_samples: int
+    num_rays: int
+
+
+@dataclass(frozen=True)
+class CameraSetup:
+    """A camera before a scene.
+
+    Attributes:
+        scene: what is seen. geometry: its triangles. camera: the eye. size: width and height of its picture, pixels.
+        traces_mirrors: whether there are rays of what is seen in mirrors.
+    """
+
+    scene: Scene
+    geometry: SceneBuffers
+    camera: Camera
+    size: tuple[int, int]
+    traces_mirrors: bool = True
+
+    @property
+    def pixel_angle(self) -> float:
+        """That a pixel spans, radians."""
+        return self.camera.yfov / self.size[1]
+
+    @cached_property
+    def _origin(self) -> F32:
+        return self.camera.to_world[:3, 3].astype(np.float32)
+
+    @cached_property
+    def _edge_threshold(self) -> float:
+        return radiance_edge_threshold(self.scene.environment.radiance)
+
+    def _directions(self, pixel: NDArray[np.int64], positions: NDArray[np.float64] = _PIXEL_CENTER) -> F32:
+        """Of rays through some positions (n, 2) of pixels (p,), those of a pixel in a row. (p · n, 3)"""
+        y, x = np.divmod(pixel, self.size[0])
+        at_x, at_y = ((a[:, None] + positions[:, k]).astype(np.float32).ravel() for k, a in enumerate((x, y)))
+        return camera_directions(self.camera, self.size, at_x, at_y)
+
+    def _trace_layers(
+        self, directions: F32, alpha_sample: F32 | np.float32 = STOP_AT_OPAQUE
+    ) -> list[TransparencyLayer]:
+        return trace_layers(
+            self.geometry, self.scene.materials, self._origin, directions, alpha_sample, self.pixel_angle,
+            traces_mirrors=self.traces_mirrors,
+        )  # fmt: skip
+
+    def find_edges(self, *, smooths: bool) -> EdgePixels:
+        """Look at all pixels. smooths: else none is an edge."""
+        num_pixels = self.size[0] * self.size[1]
+        is_edge, num_visible = np.zeros(num_pixels, np.bool_), np.zeros(num_pixels, np.uint8)
+        cosine = np.ones(num_pixels, np.float32)
+
+        def inspect_tile(tile: ImageTile) -> int:
+            padded, pixel = tile.padded(self.size), tile.pixels(self.size)
+            directions = self._directions(padded.pixels(self.size))
+            layers = self._trace_layers(directions)
+            visible_counts = sum(
+                np.bincount(layer.ray[layer.is_visible], minlength=len(directions)) for layer in layers
+            )
+            num_visible[pixel] = tile.crop_from(padded, np.asarray(visible_counts))
+            if smooths:
+                tile_edges, tile_cosine = self._find_tile_edges(padded, layers, directions)
+                is_edge[pixel], cosine[pixel] = tile.crop_from(padded, tile_edges), tile.crop_from(padded, tile_cosine)
+            return sum(len(layer.ray) for layer in layers)
+
+        num_rays = sum(map_ordered(inspect_tile, image_tiles(self.size), MAX_CONCURRENT_TILES))
+        is_edge |= is_normal_edge(cosine)
+        return EdgePixels(is_edge, int(num_visible[~is_edge].sum(dtype=np.int64)), num_rays)
+
+    def _find_tile_edges(
+        self, tile: ImageTile, layers: list[TransparencyLayer], directions: F32
+    ) -> tuple[NDArray[np.bool_], F32]:
+        """Find edges but for those that turn, and the cosines of these, by rays through the middles of pixels."""
+        size = tile.width, tile.height
+        is_edge, cosine = np.zeros(len(directions), np.bool_), np.ones(len(directions), np.float32)
+        for layer in layers:
+            is_layer_edge, layer_cosine = find_edge_pixels(self.geometry, layer, size)
+            is_edge |= is_layer_edge
+            cosine = np.minimum(cosine, layer_cosine)
+            if layer.chain is not None:
+                is_edge |= is_radiance_edge(layer, self.scene.environment.radiance, self._edge_threshold, size)
+        alpha_test = self.geometry.embree.alpha_test
+        if alpha_test is not None and alpha_test.blends:
+            is_edge |= is_partial_coverage(self.geometry, self._origin, directions)
+        return is_edge, cosine
+
+    def trace_tile(
+        self, tile: ImageTile, is_edge: NDArray[np.bool_], positions: NDArray[np.float64]
+    ) -> tuple[MergedRays, int, int]:
+        """What samples are made of in a window.
+
+        Args:
+            tile: of the picture. is_edge: of all its pixels. positions: of the rays of one that is an edge. (n, 2)
+        Returns:
+            Rays; how many of them are of edges; how many were traced.
+        """
+        pixel = tile.pixels(self.size)
+        interior, edges = pixel[~is_edge[pixel]], pixel[is_edge[pixel]]
+        interior_layers = self._trace_layers(self._directions(interior))
+        edge_layers = self._trace_layers(
+            self._directions(edges, positions), _stratified_alpha_samples(edges, len(positions))
+        )
+        merged_layers = [merge_rays(self.geometry, layer, edges, positions) for layer in edge_layers]
+        num_edge_samples, num_rays = (
+            sum(len(rays.pixel) for rays in merged_layers),
+            sum(len(layer.ray) for layer in interior_layers + edge_layers),
+        )
+        return (
+            concatenate_rays(
+                [*(unmerged(layer, interior) for layer in interior_layers), *merged_layers], MAX_MIRROR_BOUNCES
+            ),
+            num_edge_samples,
+            num_rays,
+        )
+
+
+def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:
+    """Chances of as many rays of each of p pixels, evenly apart: a surface that blends has its share. (p · num,)"""
+    order = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # not in the order of the rows that the positions lie in
+    offset = (pixel[:, None] * _GOLDEN_RATIO_CONJUGATE) % 1  # eighths alone would be seen as steps
+    return np.asarray((order[order < num] + offset) / num + 1e-6, np.float32).ravel()

@@ -1,0 +1,71 @@
+"""What an eye sees in mirrors: surfaces whose own look has a highlight that is sharp enough send its rays on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.specular import is_mirror
+from relume.camera.ray_paths import RayPaths, SpecularChain
+from relume.raytrace.camera_rays import Hits
+from relume.raytrace.scene_buffers import SceneBuffers
+from relume.raytrace.surface_interaction import surface_at
+from relume.scene.model import Material
+
+MAX_MIRROR_BOUNCES = 2  # that a ray is sent on by; what the last one reflects is as coarse as lobes are
+
+
+def is_mirror_material(materials: Sequence[Material]) -> NDArray[np.bool_]:
+    """Tell which materials are mirrors by themselves. (materials,)"""
+    return np.array([is_mirror(material.terms) for material in materials], np.bool_)
+
+
+def reflect_rays(
+    geometry: SceneBuffers,
+    materials: Sequence[Material],
+    paths: RayPaths,
+    hits: Hits,
+    rows: NDArray[np.intp],
+    pixel_angle: float,
+    num_keys: int,
+) -> RayPaths:
+    """Send rays that met mirrors on.
+
+    Args:
+        geometry: the triangles. materials: of the scene.
+        paths: of the rays. hits: what they met. rows: those that met mirrors. (k,)
+        pixel_angle: that a ray stands for, radians. num_keys: more than the numbers of meshes.
+    Returns:
+        How they go on.
+    """
+    mirror_hits, directions = hits.rows(rows), paths.directions[rows]
+    length = paths.length[rows] + mirror_hits.distance
+    surface = surface_at(geometry, replace(mirror_hits, distance=length), directions, materials, pixel_angle)
+    reflected = _reflect(surface.points.normal, directions)
+    face_normal = geometry.face_normals[mirror_hits.face]
+    face_normal = face_normal * -np.sign(np.einsum("nc,nc->n", face_normal, directions))[:, None]
+    is_below_face = (
+        np.einsum("nc,nc->n", reflected, face_normal) <= 0
+    )  # by bumps, or where smooth normals turn from the triangle
+    reflected[is_below_face] = _reflect(face_normal[is_below_face], directions[is_below_face])
+    cosine = np.clip(-np.einsum("nc,nc->n", surface.points.normal, directions), 0, 1)
+    last_segment = SpecularChain(
+        geometry.face_material[mirror_hits.face][:, None].astype(np.uint16),
+        cosine[:, None].astype(np.float32),
+        surface.specular[:, None],
+    )
+    chain = last_segment if paths.chain is None else paths.chain.rows(rows).append(last_segment)
+    path_key = paths.path_key[rows] * num_keys + geometry.face_mesh[mirror_hits.face] + 1
+    transmittance, num_glass = paths.transmittance[rows], paths.num_glass
+    return RayPaths(
+        paths.ray[rows], surface.points.position, reflected, transmittance, length, num_glass, chain, path_key
+    )
+
+
+def _reflect(normal: NDArray[np.float32], directions: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Mirror directions by planes with these unit normals. (n, 3) each"""
+    reflected = directions - 2 * np.einsum("nc,nc->n", normal, directions)[:, None] * normal
+    return np.asarray(reflected / np.linalg.norm(reflected, axis=1, keepdims=True), np.float32)

@@ -1,0 +1,138 @@
+"""Parts of Numba intrinsics on LLVM vectors of eight floats, for inner sums that the compiler does not vectorise well.
+
+It cannot know that arrays are not the same memory, and looks before each short loop. LLVM lowers these vectors to
+whatever registers the machine has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+NUM = 8
+
+FLOAT, WORD = ir.FloatType(), ir.IntType(64)
+VECTOR = ir.VectorType(FLOAT, NUM)
+_INDEX = ir.IntType(32)
+_BYTE = ir.IntType(8)
+_BYTE_VECTOR, _INDEX_VECTOR = ir.VectorType(_BYTE, NUM), ir.VectorType(_INDEX, NUM)
+FAST = ("fast",)
+_L2_LOCALITY = 2  # the second cache: what 64 rays read would not all stay in the first
+_builders: Any = cgutils  # carries no types
+untyped_intrinsic: Any = intrinsic  # its declared type is that of the generator, not of what kernels call
+
+
+def constant_index(value: int) -> Any:
+    """A constant index."""
+    return ir.Constant(WORD, value)
+
+
+class ArrayPointer:
+    """A contiguous array that an intrinsic was handed.
+
+    Args:
+        context, builder: of the intrinsic. array_type: type of the array. array: itself.
+    """
+
+    def __init__(self, context: Any, builder: Any, array_type: Any, array: Any) -> None:
+        struct = context.make_array(array_type)(context, builder, array)
+        self._context, self._builder, self._data = context, builder, struct.data
+        self._shape = _builders.unpack_tuple(builder, struct.shape)
+        self._strides = _builders.unpack_tuple(builder, struct.strides)
+
+    def pointer(self, index: Sequence[Any]) -> Any:
+        """Where an item stands."""
+        return _builders.get_item_pointer2(
+            self._context, self._builder, self._data, self._shape, self._strides, "C", index
+        )
+
+    def load(self, *index: Any) -> Any:
+        """An item."""
+        return self._builder.load(self.pointer(index))
+
+    def vector_pointer(self, *index: Any) -> Any:
+        """Where the eight floats from an index on stand, in the last dimension."""
+        return self._builder.bitcast(self.pointer(index), VECTOR.as_pointer())
+
+    def load_vector(self, *index: Any) -> Any:
+        """The eight floats from an index on."""
+        return self._builder.load(self.vector_pointer(*index), align=4)
+
+    def load_int8_vector(self, *index: Any) -> Any:
+        """Eight int8 from an index on, as floats."""
+        loaded = self._builder.load(self._builder.bitcast(self.pointer(index), _BYTE_VECTOR.as_pointer()), align=1)
+        return self._builder.sitofp(self._builder.sext(loaded, _INDEX_VECTOR), VECTOR)
+
+
+def shuffle(builder: Any, a: Any, b: Any, lanes: Iterable[int]) -> Any:
+    """Take lanes of two vectors, `a` and `b`; places of the second are counted from eight on. builder: LLVM's"""
+    return builder.shuffle_vector(a, b, ir.Constant(_INDEX_VECTOR, list(lanes)))
+
+
+def broadcast(builder: Any, value: Any) -> Any:
+    """Put the same float into all lanes."""
+    undefined = ir.Constant(VECTOR, ir.Undefined)
+    return shuffle(builder, builder.insert_element(undefined, value, ir.Constant(_INDEX, 0)), undefined, [0] * NUM)
+
+
+def extract_lane(builder: Any, vector: Any, lane: int) -> Any:
+    """One lane of a vector. builder: LLVM's"""
+    return builder.extract_element(vector, ir.Constant(_INDEX, lane))
+
+
+def multiply(builder: Any, a: Any, b: Any) -> Any:
+    """Multiply a · b, floats or all lanes. builder: LLVM's"""
+    return builder.fmul(a, b, flags=FAST)
+
+
+def subtract(builder: Any, a: Any, b: Any) -> Any:
+    """Subtract a − b, floats or all lanes. builder: LLVM's"""
+    return builder.fsub(a, b, flags=FAST)
+
+
+def sum_values(builder: Any, values: Sequence[Any]) -> Any:
+    """Σ of some floats or vectors."""
+    accumulator = values[0]
+    for value in values[1:]:
+        accumulator = builder.fadd(accumulator, value, flags=FAST)
+    return accumulator
+
+
+def dot(builder: Any, a_values: Iterable[Any], b_values: Iterable[Any]) -> Any:
+    """Sum a · b over a_values and b_values, floats or vectors, lane by lane. builder: LLVM's"""
+    return sum_values(builder, [multiply(builder, a, b) for a, b in zip(a_values, b_values, strict=True)])
+
+
+def sum_lanes(builder: Any, vector: Any) -> Any:
+    """Sum of all lanes."""
+    function_type = ir.FunctionType(FLOAT, [FLOAT, VECTOR])
+    add_up = _builders.get_or_insert_function(builder.module, function_type, f"llvm.vector.reduce.fadd.v{NUM}f32")
+    return builder.call(add_up, [ir.Constant(FLOAT, 0.0), vector], fastmath=FAST)
+
+
+@untyped_intrinsic
+def prefetch(typing_context, array, index):  # type: ignore[no-untyped-def]
+    """Ask for the line of the cache that an item is in, which is read soon.
+
+    Args:
+        typing_context: Numba's. array: contiguous. index: of the item, a tuple.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        index = _builders.unpack_tuple(builder, arguments[1])
+        index_types = signature.args[1]
+        indices = [
+            context.cast(builder, *typed_index, types.int64) for typed_index in zip(index, index_types, strict=True)
+        ]
+        pointer = ArrayPointer(context, builder, signature.args[0], arguments[0]).pointer(indices)
+        function_type = ir.FunctionType(ir.VoidType(), [_BYTE.as_pointer(), *[_INDEX] * 3])
+        prefetch_function = _builders.get_or_insert_function(builder.module, function_type, "llvm.prefetch.p0i8")
+        hints = [ir.Constant(_INDEX, value) for value in (0, _L2_LOCALITY, 1)]  # to be read; how near; data
+        builder.call(prefetch_function, [builder.bitcast(pointer, _BYTE.as_pointer()), *hints])
+        return context.get_dummy_value()
+
+    return types.void(array, index), generate

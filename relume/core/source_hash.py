@@ -1,0 +1,92 @@
+"""Which code made what is kept on disk: a hash over the sources that decide it, part of the names of images and bakes.
+
+What decides a number is a module and all that it imports, so the sources are found by following imports, and a new
+module or a moved one is never forgotten. Comments count: telling them apart would cost more than making things anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Collection, Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parents[1]
+_IMPORT = re.compile(r"^\s*(?:from (\w[\w.]*) import (\([^)]*\)|[^\n#]*)|import (\w[\w.]*))", re.MULTILINE)
+
+_IMAGES = ("methods", "operators", "live.fixed_camera")
+_COMPARISONS = (*_IMAGES, "reference")
+_BAKES = ("methods.registry", "scene.scene_folder", "store.run_bake")
+_AFTER_BAKES = (  # methods import these to open what was baked, and to look at it
+    "operators", "live.fixed_camera", "transport",
+    "methods.local_lights", "methods.free_camera_error", "methods.free_camera_transfer", "methods.indirect_solver",
+    "methods.opened", "methods.retrace",
+)  # fmt: skip
+
+
+@cache
+def image_code() -> str:
+    """Names the code that makes images of terms from a bake. 16 hexadecimal digits"""
+    return code_hash(collect_sources(_IMAGES))
+
+
+@cache
+def comparison_code() -> str:
+    """Names the code that compares images with brute force. 16 hexadecimal digits"""
+    return code_hash(collect_sources(_COMPARISONS))
+
+
+@cache
+def bake_code() -> str:
+    """Names the code that makes bakes from scenes. 16 hexadecimal digits"""
+    return code_hash(collect_sources(_BAKES, exclude=_AFTER_BAKES))
+
+
+def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
+    """Hash over the names and contents of sources. 16 hexadecimal digits"""
+    digest = hashlib.sha256()
+    for path in sorted(sources):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def collect_sources(names: Iterable[str], exclude: Collection[str] = (), package: Path = _PACKAGE) -> set[Path]:
+    """Sources of modules of a package, and of all those of its modules that they import, directly or through others.
+
+    Args:
+        names: without the package's own, "store.fill"; of a package inside it, all of its modules.
+        exclude: packages and modules inside it that are left out, with what only they import.
+        package: folder of the package.
+    Raises:
+        ModuleNotFoundError: one of `names` or `exclude` is not there.
+    """
+    excluded = {source.with_suffix("") for name in exclude for source in _roots(package, name)}
+    sources: set[Path] = set()
+    todo = [source for name in names for source in _roots(package, name)]
+    while todo:
+        path = todo.pop()
+        if path not in sources and path.with_suffix("") not in excluded:
+            sources.add(path)
+            todo.extend(imported_modules(package, path))
+    return sources
+
+
+def _roots(package: Path, name: str) -> list[Path]:
+    folder = package.joinpath(*name.split("."))
+    sources = sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]
+    if not sources or not all(path.is_file() for path in sources):
+        raise ModuleNotFoundError(f"{package.name}.{name} has no sources; what is kept on disk cannot be named")
+    return sources
+
+
+def imported_modules(package: Path, path: Path) -> Iterator[Path]:
+    """Modules of a package that a source imports: `from a.b import c` may mean module a.b, or a.b.c."""
+    for origin, names, module in _IMPORT.findall(path.read_text("utf-8")):
+        top, _, inside = (origin or module).partition(".")
+        if top != package.name:
+            continue
+        folder = package.joinpath(*inside.split(".")) if inside else package
+        within = (folder / name for name in re.findall(r"\w+", names))
+        for candidate in (folder, *within):
+            yield from (p for p in (candidate.with_suffix(".py"), candidate / "__init__.py") if p.is_file())

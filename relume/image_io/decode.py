@@ -1,0 +1,58 @@
+"""Decodes PNG, JPEG and WebP, which may be hostile: nothing before its header has said that it is small enough."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import PIL.Image
+from numpy.typing import NDArray
+
+from relume.core.errors import SceneError
+
+U8 = NDArray[np.uint8]
+MAX_SIDE = 8_192
+MAX_TEXELS = 1_000_000_000  # of all images of a scene together, as often as they are decoded
+MAX_JPEG_SCANS = 200  # each scan of a progressive JPEG costs a pass over all texels
+FORMATS = ("PNG", "JPEG", "WEBP")
+
+
+class Decoder:
+    """Decodes images within one budget for all of them."""
+
+    def __init__(self) -> None:
+        self._remaining_texels = MAX_TEXELS
+
+    def decode(self, data: bytes, label: str) -> U8:
+        """The texels as bytes, RGBA. (height, width, 4)
+
+        Raises:
+            SceneError: the image is too large, damaged, or of another format than PNG, JPEG and WebP.
+        """
+        if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_JPEG_SCANS:
+            raise SceneError(f"{label} is a JPEG of more than {MAX_JPEG_SCANS} scans; save it again")
+        try:
+            with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
+                self._check_size(*image.size, label)
+                return _rgba(image)
+        except SceneError:
+            raise
+        except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
+            raise SceneError(f"{label} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
+        except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
+            raise SceneError(f"{label} is damaged, or of a format that is not read here; save it as PNG") from None
+
+    def _check_size(self, width: int, height: int, label: str) -> None:
+        if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+            raise SceneError(f"{label} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down")
+        self._remaining_texels -= width * height
+        if self._remaining_texels < 0:
+            raise SceneError(f"the scene's images have more than {MAX_TEXELS:,} texels together; scale them down")
+
+
+def _rgba(image: PIL.Image.Image) -> U8:
+    """8-bit RGBA, colours not multiplied by alpha; 16-bit grey is scaled."""
+    if image.mode.startswith("I"):
+        gray = np.clip(np.asarray(image, np.int64) // 257, 0, 255).astype(np.uint8)
+        return np.stack([gray, gray, gray, np.full_like(gray, 255)], axis=-1)
+    return np.asarray(image.convert("RGBA"), np.uint8)

@@ -1,0 +1,50 @@
+"""The config of this process: one at most, read when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from relume.core.errors import ParameterError
+from relume.image_io.ocio.config import Config
+
+_requested: tuple[str, str | None] | None = None
+_active_config: Config | None = None
+
+
+def use_config(source: str | None, working: str | None = None) -> None:
+    """Use a config from now on, as `Config` takes it; None: none."""
+    global _requested, _active_config
+    _requested, _active_config = None if source is None else (source, working), None
+
+
+@contextmanager
+def using_config(source: str | None, working: str | None = None) -> Iterator[None]:
+    """The same for as long as the block runs."""
+    previous = _requested
+    use_config(source, working)
+    try:
+        yield
+    finally:
+        use_config(*previous or (None,))
+
+
+def config_source() -> tuple[str, ...]:
+    """What `use` was told, for another process that is to use the same; nothing where there is none."""
+    return () if _requested is None else tuple(value for value in _requested if value is not None)
+
+
+def get_config() -> Config | None:
+    """The config in use; None where there is none. Raises ParameterError where it cannot be read."""
+    global _active_config
+    if _requested is not None and _active_config is None:
+        _active_config = Config(*_requested)
+    return _active_config
+
+
+def require_config() -> Config:
+    """The config in use. Raises ParameterError where there is none."""
+    config = get_config()
+    if config is None:
+        raise ParameterError("RELUME_OCIO", "not set", "an OpenColorIO config, which this needs")
+    return config

@@ -1,0 +1,84 @@
+"""Writing pictures: EXR keeps linear radiance, PNG and WebP hold what the screen shows."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+
+from relume.core.errors import ParameterError, ShapeMismatchError
+from relume.core.filesystem import atomic_write
+from relume.image_io.exr_writer import image_channels, write_scanlines
+from relume.image_io.ocio.view import OcioView
+from relume.image_io.tone_mapping import tone_map
+
+F32 = NDArray[np.float32]
+
+
+def to_bytes(display: F32) -> NDArray[np.uint8]:
+    """Display values in [0, 1], rounded to 0…255. (...)"""
+    return (np.clip(display, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+def png_bytes(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """A PNG file, 8 or 16 bits as the pixels have: grey, RGB or RGBA. (height, width[, 3 or 4])"""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: str | OcioView = "agx") -> None:
+    """Write a picture in the format that its name ends in; the file appears whole or not at all.
+
+    Args:
+        path: ends in .exr (linear radiance, float32; exposure and tone map do not apply), .png or .webp (8 bit).
+        image: linear Rec. 709 radiance, top row first, with coverage as a fourth channel where it is not opaque: the
+            others are multiplied by it, as EXR has them; the other formats hold them without it.
+            (height, width, 3 or 4) float32
+        exposure: stops. tone_map_name: as for `tone_map`.
+    Raises:
+        ParameterError: another format, or no such tone map. ShapeMismatchError: neither RGB nor RGB with coverage.
+        RelumeError: the file cannot be written.
+    """
+    write = _WRITERS.get(path.suffix.lower())
+    if write is None:
+        raise ParameterError("the image format", path.suffix, f"a file name ending in {', '.join(_WRITERS)}")
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or image.size == 0:
+        raise ShapeMismatchError(f"an image has the shape (height, width, 3 or 4), not {image.shape}; reshape it")
+    with atomic_write(path) as unfinished:
+        write(unfinished, image, exposure, tone_map_name)
+
+
+def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
+    write_scanlines(path, image_channels(image), {"oiio:ColorSpace": "lin_rec709_scene"}, "float")
+
+
+def _to_display_bytes(image: F32, exposure: float, tone_map_name: str | OcioView) -> NDArray[np.uint8]:
+    """What the screen shows of the surfaces themselves, and how much of each pixel they cover."""
+    alpha = np.clip(image[..., 3:], 0, 1)
+    surfaces = image[..., :3] if image.shape[2] == 3 else image[..., :3] / np.maximum(alpha, 1e-6)
+    display = tone_map(np.asarray(surfaces, np.float32), exposure, tone_map_name)
+    return np.concatenate([to_bytes(display), to_bytes(alpha)], axis=-1)
+
+
+def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
+    tags = PngInfo()
+    if isinstance(tone_map_name, str) or "sRGB" in tone_map_name.display:
+        tags.add(b"sRGB", b"\x00")  # to be shown perceptually
+    Image.fromarray(_to_display_bytes(image, exposure, tone_map_name)).save(path, "PNG", pnginfo=tags)
+
+
+def _write_webp(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
+    Image.fromarray(_to_display_bytes(image, exposure, tone_map_name)).save(path, "WEBP", quality=92, method=4)
+
+
+_WRITERS: dict[str, Callable[[Path, F32, float, str | OcioView], None]] = {
+    ".exr": _write_exr,
+    ".png": _write_png,
+    ".webp": _write_webp,
+}

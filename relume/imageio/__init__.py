@@ -1,1 +1,0 @@
-"""Pictures as files: EXR keeps linear radiance, PNG and WebP hold what the screen shows."""

@@ -1,0 +1,262 @@
+"""Images that were sent for materials; `relume.assets.asset_store` keeps them.
+
+An image in the place of a map of roughness says by its green how rough each texel is, as files of glTF do: the number
+itself, no display value. One in the place of a normal map says x, y and z by its colours, from −1 to 1.
+
+    <folder>/<id>/texels.npy       bytes of display values, or reflectances. (height, width, 3) uint8 or float16
+                  thumbnail.png
+                  image.json       name, and what had to be changed; of those that `relume.images.metalness` makes what
+                  of,
+                                   what their values are multiplied by, and how they continue outside
+
+Look documents name one as "image:<id>".
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from relume.brdf.texture_slots import IMAGES, NormalMap, is_user_image
+from relume.core.cache import asset_cached
+from relume.core.color import srgb_encode
+from relume.core.import_warnings import ImportRemark, warning_of
+from relume.image_io.write_image import png_bytes, to_bytes
+from relume.images.read_image import MAX_SIDE, read_image
+from relume.scene.model import WRAPS, Texture, TextureEncoding
+
+THUMBNAIL_SIDE = 96
+_TEXELS, _THUMBNAIL = "texels.npy", "thumbnail.png"
+_MIN_MEAN_ROUGHNESS = 1 / 255  # of a mean: black images are smooth everywhere
+
+
+class ImageRecipe(NamedTuple):
+    """What an image was made of that nobody sent, see `relume.images.metalness`.
+
+    Attributes:
+        channel: whose place it takes.
+        metalness: the image that says where the material is metal. base: that of the base colour; or "diffuse" or
+            "scene" where the scene's own textures say that colour; None where it is the same everywhere.
+        scene, material: whose textures these are; empty where they were not needed.
+        factor: what multiplies the base colour. dielectric: reflectance head-on of what is no metal. Three numbers each
+    """
+
+    channel: str
+    metalness: str
+    base: str | None
+    scene: str
+    material: str
+    factor: tuple[float, float, float]
+    dielectric: tuple[float, float, float]
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """The images among them."""
+        return tuple(name for name in (self.metalness, self.base) if is_user_image(name))
+
+
+@dataclass(frozen=True)
+class ImageRecord:
+    """What lists show of an image.
+
+    Attributes:
+        created: seconds since 1970. size: width and height. warnings: what was changed, one sentence each.
+        roughness: the mean of it, as a map of roughness. recipe: other images; None where it was sent.
+    """
+
+    id: str
+    name: str
+    created: float
+    size: tuple[int, int]
+    warnings: tuple[ImportRemark, ...]
+    roughness: float
+    recipe: ImageRecipe | None = None
+
+    @property
+    def texture(self) -> str:
+        """The name by which terms of looks mean this image."""
+        return IMAGES.prefix + self.id
+
+
+def store(folder: Path, source: Path, name: str) -> ImageRecord:
+    """Keep an image under the hash of its file; the same content twice is the same, its newest name wins.
+
+    Args:
+        folder: of the asset store. source: a .png, .jpg, .webp or .exr file. name: what people call it.
+    Raises:
+        SceneError: the file cannot be used, or the store is full.
+    """
+    texture, warnings = read_image(source, name)
+
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        return _write(staged_folder, texture) | {"warnings": [remark.document() for remark in warnings]}
+
+    return get_record(folder, IMAGES.store(folder, source, name, fill))
+
+
+def store_derived(folder: Path, name: str, recipe: ImageRecipe, compute: Callable[[], Texture]) -> ImageRecord:
+    """Keep an image that is made of others under the hash of what it is made of; one that is here is not made again.
+
+    Args:
+        folder: of the asset store. name: what people call it. recipe: the others. compute: its texels, bytes.
+    Raises:
+        SceneError: the store is full. And what `compute` raises.
+    """
+
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        texture = compute()
+        scale = (texture.encoding or TextureEncoding("srgb")).scale
+        return _write(staged_folder, texture) | {
+            "warnings": [],
+            "made_of": recipe._asdict(),
+            "scale": scale,
+            "wrap": texture.wrap,
+        }
+
+    with tempfile.TemporaryDirectory() as unfinished:
+        source = Path(unfinished) / "made_of.json"
+        source.write_text(json.dumps(recipe._asdict(), sort_keys=True))
+        return get_record(folder, IMAGES.store(folder, source, name, fill))
+
+
+def _write(folder: Path, texture: Texture) -> dict[str, Any]:
+    """Write an image's files; returns what its record says of them."""
+    height, width = texture.pixels.shape[:2]
+    np.save(folder / _TEXELS, texture.pixels)
+    (folder / _THUMBNAIL).write_bytes(_thumbnail(texture))
+    return {"size": [width, height], "roughness": _mean_fraction(_roughness_bytes(texture))}
+
+
+def records(folder: Path) -> list[ImageRecord]:
+    """All images of a folder, newest first."""
+    return IMAGES.records(folder, get_record)
+
+
+def get_record(folder: Path, identity: str) -> ImageRecord:
+    """One image. Raises NotFoundError; SceneError where its files are damaged."""
+    path = IMAGES.path(folder, identity)
+    document = IMAGES.load_record(path)
+    size, warnings = document.get("size"), document.get("warnings")
+    if not isinstance(warnings, list) or not isinstance(size, list) or [*map(type, size)] != [int, int]:
+        raise IMAGES.damaged_error(path)
+    parsed_warnings, roughness = tuple(map(warning_of, warnings)), document.get("roughness")
+    if not isinstance(roughness, float):  # kept before images were maps of roughness
+        roughness = mean_roughness(IMAGES.prefix + identity)
+    recipe = _parse_recipe(document, path)
+    return ImageRecord(
+        identity, document["name"], document["created"], (size[0], size[1]), parsed_warnings, roughness, recipe
+    )
+
+
+def get_recipe(name: str) -> ImageRecipe | None:
+    """What the image that a look names was made of; None where it was sent. Raises what `load_texture` raises."""
+    path = IMAGES.resolve(name)
+    return _parse_recipe(IMAGES.load_record(path), path)
+
+
+def _parse_recipe(document: dict[str, Any], path: Path) -> ImageRecipe | None:
+    """Written by `store_derived`: damaged where anything of it is missing."""
+    fields = document.get("made_of")
+    try:
+        if fields is None:
+            return None
+        recipe = ImageRecipe(**fields)
+        (red, green, blue), (r, g, b) = recipe.factor, recipe.dielectric
+        return recipe._replace(factor=(red, green, blue), dielectric=(r, g, b))
+    except (TypeError, ValueError) as error:
+        raise IMAGES.damaged_error(path) from error
+
+
+def thumbnail_path(folder: Path, identity: str) -> Path:
+    """A small picture of one. Raises NotFoundError."""
+    return IMAGES.path(folder, identity) / _THUMBNAIL
+
+
+def load_texture(name: str) -> Texture:
+    """What a term's `texture` names; its texels stay on the disk and are read where they are needed.
+
+    Raises:
+        NotFoundError: it is not here. SceneError: its files are damaged.
+    """
+    return _load(IMAGES.resolve(name))
+
+
+def load_roughness_map(name: str) -> Texture:
+    """What a term's `roughness_map` names: roughness over its mean. Raises what `load_texture` raises."""
+    return _load_roughness(IMAGES.resolve(name))
+
+
+def load_normal_map(map_: NormalMap) -> Texture:
+    """What a material's `normal_map` names, `map_`: normals of tangent space. Raises what `load_texture` raises."""
+    return _load_normals(IMAGES.resolve(map_.image), map_.scale)
+
+
+def mean_roughness(name: str) -> float:
+    """The mean of it, before it was divided by that. Raises what `load_texture` raises."""
+    return _load_mean(IMAGES.resolve(name))
+
+
+@asset_cached("image of normals")
+def _load_normals(path: Path, scale: float) -> Texture:
+    texture = _load(path)
+    return Texture(_raw_bytes(texture), texture.wrap, TextureEncoding("normal", (scale, scale, 1.0)))
+
+
+@asset_cached("image of roughness")
+def _load_roughness(path: Path) -> Texture:
+    inverse_mean = 1 / max(_load_mean(path), _MIN_MEAN_ROUGHNESS)
+    return Texture(
+        _roughness_bytes(_load(path)), encoding=TextureEncoding("share", (inverse_mean, inverse_mean, inverse_mean))
+    )
+
+
+@lru_cache(maxsize=1_000)
+def _load_mean(path: Path) -> float:
+    return _mean_fraction(_roughness_bytes(_load(path)))
+
+
+def _roughness_bytes(texture: Texture) -> NDArray[np.uint8]:
+    """Roughness as bytes. (height, width, 1)"""
+    return np.ascontiguousarray(_raw_bytes(texture, slice(1, 2)))
+
+
+def _raw_bytes(texture: Texture, channels: slice = slice(None)) -> NDArray[np.uint8]:
+    """The numbers of its file, no display values, as bytes. (height, width, channels)"""
+    values = texture.pixels[..., channels]
+    return values if texture.encoding else np.rint(255 * values.astype(np.float32)).astype(np.uint8)
+
+
+def _mean_fraction(roughness_bytes: NDArray[np.uint8]) -> float:
+    return float(roughness_bytes.mean() / 255)
+
+
+@asset_cached("image file")
+def _load(path: Path) -> Texture:
+    texels = IMAGES.open_array(path, _TEXELS)
+    is_image = texels.ndim == 3 and texels.shape[2] == 3 and min(texels.shape[:2]) >= 1
+    if not is_image or max(texels.shape[:2]) > MAX_SIDE or texels.dtype not in (np.uint8, np.float16):
+        raise IMAGES.damaged_error(path)
+    if texels.dtype == np.float16:
+        return Texture(texels)
+    document = IMAGES.load_record(path)
+    scale, wrap = document.get("scale", [1.0, 1.0, 1.0]), document.get("wrap", ["repeat", "repeat"])
+    if [*map(type, scale)] != 3 * [float] or len(wrap) != 2 or not set(wrap) <= set(WRAPS):
+        raise IMAGES.damaged_error(path)
+    return Texture(texels, (wrap[0], wrap[1]), TextureEncoding("srgb", (scale[0], scale[1], scale[2])))
+
+
+def _thumbnail(texture: Texture) -> bytes:
+    """A square of what it shows, as a list has room for. PNG"""
+    pixels = texture.pixels
+    display = pixels if texture.encoding else to_bytes(srgb_encode(pixels.astype(np.float32)))
+    size = THUMBNAIL_SIDE, THUMBNAIL_SIDE
+    return png_bytes(np.asarray(Image.fromarray(display).resize(size, Image.Resampling.BOX)))

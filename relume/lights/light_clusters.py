@@ -1,0 +1,112 @@
+"""Light triangles merged into a few larger ones, for operators that are to be there soon.
+
+Tiles are leaves of a hierarchy; merged are those under an inner node that a coarser division would not have split.
+What a point sees of a merged triangle is the share of its light that comes from the parts it sees
+(docs/adr/0089-operators-of-merged-lights.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.color import luminance
+from relume.core.numba_options import UNCOUNTED
+from relume.lights.sphere_tiles import SOLID_ANGLE_EXPONENT, UNIFORM_FRACTION, Tiles
+from relume.lights.spherical_triangles import TriangleLights, TriangleSubset, merge_groups
+from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
+
+F64 = NDArray[np.float64]
+Codes = NDArray[np.uint64]
+
+_LIGHTS_PER_CLUSTER, _MIN_CLUSTERS = 8, 400  # lights that are merged into one; merged ones
+
+
+def num_clusters(num_lights: int) -> int:
+    """How many lights an operator is made of that is to be there soon. num_lights: of the bake."""
+    return max(_MIN_CLUSTERS, num_lights // _LIGHTS_PER_CLUSTER)
+
+
+def cluster_lights(lights: TriangleLights, tiles: Tiles, num_clusters: int) -> TriangleLights:
+    """Merge the light of tiles into about `num_clusters` triangles, which know their parts.
+
+    Args:
+        lights: of the tiles. tiles: M of them. num_clusters: of the merged ones (8 + 3k, the next below), if there are
+            more.
+    """
+    luminous = luminance(lights.irradiance).astype(np.float64)
+    codes, group = np.unique(_coarser_codes(tiles, luminous, num_clusters), return_inverse=True)
+    clusters = merge_groups(lights, group, codes)
+    cluster_light = np.bincount(group, luminous, len(codes))
+    fraction = np.divide(luminous, cluster_light[group], out=np.zeros_like(luminous), where=luminous > 0)
+    return replace(clusters, parts=TriangleSubset(group.astype(np.int32), fraction.astype(np.float32)))
+
+
+def _coarser_codes(tiles: Tiles, luminous: F64, num_clusters: int) -> Codes:
+    """Find the tile of a division into about `num_clusters` that each tile is in. (M,)
+
+    A node's metric is never below that of its children, so the nodes that are split are those of the largest metrics.
+    """
+    uniform = UNIFORM_FRACTION * float(luminous.sum()) / (4 * np.pi)
+    inner, (light, extent) = sum_inner_nodes(tiles.codes, np.stack([luminous, tiles.solid_angles]))
+    metric = light * extent**SOLID_ANGLE_EXPONENT + uniform * extent  # by which `choose_tiles` splits them
+    num_split = min(len(inner), max(0, num_clusters - 8) // 3)
+    return highest_ancestors(tiles.codes, inner[np.argsort(-metric, kind="stable")[:num_split]])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def visible_fraction(visible, group, fraction, start, stop, visible_fractions):  # type: ignore[no-untyped-def]
+    """Sum up how much of each merged triangle's light comes from parts that points [start, stop) see.
+
+    Args:
+        visible: part m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
+        group, fraction: see `Parts`. visible_fractions: written, points last: they are done together. (C, ≥ stop -
+        start) float32
+    """
+    num_points = stop - start
+    bits = np.empty(num_points, np.uint8)
+    visible_fractions[:, :num_points] = 0
+    for byte in range(visible.shape[1]):
+        any_bit = np.uint8(0)
+        for p in range(num_points):
+            bits[p] = visible[start + p, byte]
+            any_bit |= bits[p]
+        if any_bit == 0:  # many in a row are hidden from neighbours
+            continue
+        for m in range(8 * byte, min(8 * byte + 8, group.shape[0])):
+            cluster, part_fraction, shift = np.uint64(group[m]), fraction[m], np.uint8(m & 7)
+            for p in range(num_points):
+                visible_fractions[cluster, p] += np.float32((bits[p] >> shift) & np.uint8(1)) * part_fraction
+
+
+def visible_fraction_numpy(visible: NDArray[np.uint8], subset: TriangleSubset, num_clusters: int) -> F64:
+    """Do as `visible_fraction` for all points, in plain NumPy: its oracle.
+
+    Args:
+        visible: bits of all parts. (n, bytes) uint8
+        subset: which merged triangle each is of, and its share. num_clusters: of merged triangles, C.
+    Returns:
+        (n, C)
+    """
+    bits = np.unpackbits(visible, axis=1, count=len(subset.group), bitorder="little")
+    fractions = np.zeros((len(subset.group), num_clusters))
+    fractions[np.arange(len(subset.group)), subset.group] = subset.fraction
+    return np.asarray(bits @ fractions)
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def weight_by_visibility(first, light, visible_fractions, shading):  # type: ignore[no-untyped-def]
+    """Weigh what listed merged lights bring by the share that is seen of them.
+
+    Args:
+        first, light: from `relume.transport.light_culling.list_lights`. visible_fractions: from `visible_fraction`. (C,
+        ≥ points)
+        shading: of each entry, multiplied. (1 or 3, K) float32
+    """
+    for p in range(first.shape[0] - 1):
+        for row in range(shading.shape[0]):
+            for entry in range(first[p], first[p + 1]):
+                shading[row, entry] *= visible_fractions[light[entry], p]

@@ -1,0 +1,95 @@
+"""First and second moments of the light in tiles, each in the plane that touches the sphere where the tile's light is.
+
+    x = d · t / (d · n),   m = Σ w x,   S = Σ w (x − m)(x − m)ᵀ + Σ w Ω / 12
+
+with d the direction of a texel, n the mean one of its tile, t two directions across n, and w the texel's share of the
+tile's light. A texel is no point: its own extent counts, as that of a square of its solid angle Ω.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+
+F64 = NDArray[np.float64]
+
+
+class LightTexels(NamedTuple):
+    """The texels of an environment, or other small places, and the tiles they lie in.
+
+    Attributes:
+        tile: that each lies in. (n,) luminous: luminance × solid angle. (n,) directions: unit. (n, 3)
+        solid_angles: (n,)
+    """
+
+    tile: NDArray[np.int32]
+    luminous: F64
+    directions: F64
+    solid_angles: F64
+
+    def sums(self, values: F64, num_tiles: int) -> F64:
+        """Sum values (n,) over the texels of each of M tiles. (M,)"""
+        return np.asarray(np.bincount(self.tile, values, num_tiles), np.float64)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+def _sum_moments(tile, luminous, directions, solid_angles, fitted_index, inverse_light, mean, frames, out):  # type: ignore[no-untyped-def]
+    """Sum w x, w x xᵀ and w Ω of the texels of each fitted tile. out: added to. (F, 6)"""
+    for n in range(tile.shape[0]):
+        row = fitted_index[tile[n]]
+        if row < 0:
+            continue
+        x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
+        height = x * mean[row, 0] + y * mean[row, 1] + z * mean[row, 2]
+        u = (x * frames[row, 0, 0] + y * frames[row, 0, 1] + z * frames[row, 0, 2]) / height
+        v = (x * frames[row, 1, 0] + y * frames[row, 1, 1] + z * frames[row, 1, 2]) / height
+        weight = luminous[n] * inverse_light[row]
+        out[row, 0] += weight * u
+        out[row, 1] += weight * v
+        out[row, 2] += weight * u * u
+        out[row, 3] += weight * u * v
+        out[row, 4] += weight * v * v
+        out[row, 5] += weight * solid_angles[n]
+
+
+def compute_moments(
+    texels: LightTexels, total: F64, mean: F64, frames: F64, fitted: NDArray[np.intp]
+) -> tuple[F64, F64]:
+    """Find m and S of some tiles.
+
+    Args:
+        texels: of all tiles. total: luminous light of each fitted tile. (F,)
+        mean: its direction n. (F, 3) frames: the two directions t across it. (F, 2, 3)
+        fitted: the tiles in question. (F,)
+    Returns:
+        m (F, 2) and S (F, 2, 2)
+    """
+    fitted_index = np.full(int(max(texels.tile.max(initial=-1), fitted.max(initial=-1))) + 1, -1, np.int32)
+    fitted_index[fitted] = np.arange(len(fitted))
+    sums = np.zeros((len(fitted), 6))
+    tile, luminous, directions, solid_angles = map(np.ascontiguousarray, texels)
+    _sum_moments(tile, luminous, directions, solid_angles, fitted_index, 1 / total, mean, frames, sums)
+    (x, y), (xx, xy, yy, extent) = sums.T[:2], sums.T[2:]
+    texel_variance = extent / 12
+    return sums[:, :2], np.stack(
+        [xx - x * x + texel_variance, xy - x * y, xy - x * y, yy - y * y + texel_variance], axis=1
+    ).reshape(-1, 2, 2)
+
+
+def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:
+    """Do as `compute_moments` for one tile, in plain NumPy: its oracle.
+
+    Args:
+        texels: of all tiles. mean: n of this one. (3,) frame: its t. (2, 3) tile: its number.
+    """
+    _, luminous, directions, solid_angles = (each[texels.tile == tile] for each in texels)
+    weight = luminous / luminous.sum()
+    position = directions @ frame.T / (directions @ mean)[:, None]
+    center = weight @ position
+    offset = position - center
+    return center, np.einsum("n,ni,nj->ij", weight, offset, offset) + np.eye(2) * (weight @ solid_angles) / 12

@@ -1,0 +1,226 @@
+"""Local lights: what a light of unit emission gives to a point, along one or several samples of it.
+
+    E(x) = Σ_k V_k · w_k · cos θi,k
+
+    point        w = 1 / d²                                        emission W/sr
+    spot         w = s² / d²,  s = clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)   (KHR_lights_punctual)
+    directional  w = 1                                             emission W/m²
+    surface      w = A cos θl / (N d²),  N samples spread evenly   emission W/m²/sr
+
+A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are spread over its strata and shifted in
+these for each receiver (`relume.lights.light_sampling`): what noise is left is as fine as the pixels.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.lights.light_sampling import (
+    EmitterParts,
+    LightStrata,
+    make_strata,
+    morton_order,
+    split_axes,
+    subdivide_emitter,
+)
+from relume.look import LightGeometry
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+POINT, DIRECTIONAL, SURFACE = 0, 1, 2
+MIN_DISTANCE = np.float32(1e-3)  # metres: a point light is no smaller
+_INFINITE = np.float32(np.inf)
+_SEED = 1
+_SAMPLE_FACTORS = {"rectangle": 1, "mesh": 4}  # of a mesh most samples face away from a point, or are far from it
+_PI = np.float32(math.pi)
+_MIN_CONE_COSINES = 1e-3  # of cosines, as KHR_lights_punctual has it
+_PARALLEL_TOLERANCE = 1e-6
+
+
+class LocalLight(NamedTuple):
+    """A light as the kernels want it.
+
+    Attributes:
+        kind: `POINT_LIGHT` (spots too), `DIRECTIONAL` or `SURFACE`.
+        position: of points. (3,) float32. axis: unit, of spots, and the way that directional light goes. (3,)
+        cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
+        corner, edges, normal: of parallelograms or triangles. (T, 3), (T, 2, 3), (T, 3) float32; the last unit
+        power_cdf: of the power, up to each piece and with it. (T,) float32. area: of all, m², where it shines evenly.
+        is_rectangle: a parallelogram, else triangles. is_two_sided: shines to both sides.
+    """
+
+    kind: int
+    position: F32
+    axis: F32
+    cone_scale: np.float32
+    cone_offset: np.float32
+    corner: F32
+    edges: F32
+    normal: F32
+    power_cdf: F32
+    area: np.float32
+    is_rectangle: bool
+    is_two_sided: bool
+
+
+class LightTriangles(NamedTuple):
+    """Triangles that shine.
+
+    Attributes:
+        corners: (T, 3, 3) float32. relative_radiance: how brightly each shines, over the mean of all. (T,) float32
+        is_two_sided: whether they do to both sides.
+    """
+
+    corners: F32
+    relative_radiance: F32
+    is_two_sided: bool
+
+
+def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
+    """Tell how many samples a light has where a rectangle has `num_rectangle_samples`."""
+    return _SAMPLE_FACTORS.get(geometry.kind, 0) * num_rectangle_samples or 1
+
+
+def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
+    """Make the samples of a light. of_rectangle: how many a rectangle has, a power of four"""
+    factor = _SAMPLE_FACTORS["rectangle" if light.is_rectangle else "mesh"]
+    num_light_samples = factor * num_rectangle_samples if light.kind == SURFACE else 1
+    return make_strata(split_axes(len(light.power_cdf), num_light_samples), _SEED)
+
+
+def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
+    """Find the parts of a lamp's surface that samples stand for. strata: from `make_light_strata`"""
+    split_axis = split_axes(len(light.power_cdf), len(strata.uv))
+    return subdivide_emitter(split_axis, light.corner, light.edges, light.power_cdf, is_rectangle=light.is_rectangle)
+
+
+def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | None = None) -> LocalLight:
+    """Make a light of a look. triangles: those of a light of kind "mesh"; a surface without area gives no light."""
+    is_rectangle = geometry.kind == "rectangle"
+    corner, edges = _outline(geometry, triangles)
+    piece_normals = np.cross(edges[:, 0], edges[:, 1])
+    areas = np.linalg.norm(piece_normals, axis=1) * (1.0 if is_rectangle else 0.5)
+    if triangles is not None:
+        areas = areas * triangles.relative_radiance
+    pieces, area = np.flatnonzero(areas > 0), areas.sum()
+    pieces = pieces[morton_order((corner + edges.sum(axis=1) / 3)[pieces])]
+    piece_normals = piece_normals[pieces] / np.linalg.norm(piece_normals[pieces], axis=1, keepdims=True)
+    scale, offset = _cone(*geometry.cone) if geometry.kind == "spot" else (0.0, 1.0)
+    return LocalLight(
+        kind={"point": POINT, "spot": POINT, "directional": DIRECTIONAL}.get(geometry.kind, SURFACE),
+        position=np.array(geometry.position, np.float32),
+        axis=_unit(geometry.direction).astype(np.float32),
+        cone_scale=np.float32(scale),
+        cone_offset=np.float32(offset),
+        corner=corner[pieces].astype(np.float32),
+        edges=edges[pieces].astype(np.float32),
+        normal=piece_normals.astype(np.float32),
+        power_cdf=(np.cumsum(areas[pieces]) / max(area, 1e-300)).astype(np.float32),
+        area=np.float32(area),
+        is_rectangle=is_rectangle,
+        is_two_sided=triangles is not None and triangles.is_two_sided,
+    )
+
+
+def emitter_geometry(geometry: LightGeometry) -> LightGeometry:
+    """Reduce a light to what its shadows depend on: a spot has those of a point."""
+    return LightGeometry("point", geometry.position) if geometry.kind == "spot" else geometry
+
+
+def _outline(geometry: LightGeometry, triangles: LightTriangles | None) -> tuple[F64, F64]:
+    """Find a corner (T, 3) and two edges (T, 2, 3) of each piece of a surface."""
+    if geometry.kind == "rectangle":
+        corner, edges = rectangle(geometry)
+        return corner[None], edges[None]
+    corners = np.zeros((0, 3, 3)) if triangles is None else triangles.corners.astype(np.float64)
+    return corners[:, 0], corners[:, 1:] - corners[:, :1]
+
+
+def rectangle(geometry: LightGeometry) -> tuple[F64, F64]:
+    """Place a rectangle: a corner (3,) and its edges (2, 3), whose cross product points the way it faces; metres."""
+    facing = _unit(geometry.direction)
+    up_hint = np.array([0.0, 1.0, 0.0]) if abs(facing[1]) < 1 - _PARALLEL_TOLERANCE else np.array([0.0, 0.0, 1.0])
+    up = up_hint - (up_hint @ facing) * facing
+    up /= np.linalg.norm(up)
+    horizontal = np.cross(up, facing)
+    angle = math.radians(geometry.rotation)
+    width, height = geometry.size
+    edges = np.stack(
+        [
+            width * (math.cos(angle) * horizontal + math.sin(angle) * up),
+            height * (math.cos(angle) * up - math.sin(angle) * horizontal),
+        ]
+    )
+    return np.array(geometry.position, np.float64) - edges.sum(axis=0) / 2, edges
+
+
+def _unit(direction: tuple[float, float, float]) -> F64:
+    vector = np.array(direction, np.float64)
+    vector /= np.abs(vector).max()  # first, so that squares of tiny numbers do not vanish
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _cone(inner: float, outer: float) -> tuple[float, float]:
+    """Compute scale and offset of the falloff between two half-angles, degrees."""
+    cos_outer = math.cos(math.radians(outer))
+    scale = 1 / max(_MIN_CONE_COSINES, math.cos(math.radians(inner)) - cos_outer)
+    return scale, -cos_outer * scale
+
+
+# inlined: a call would count references to all arrays of the light, which threads share, and take 13 times as long
+@nb.njit(nogil=True, cache=True, inline="always")
+def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
+    """Find a sample of a light as a point sees it.
+
+    Args:
+        light: a `LocalLight`. strata: its samples, from `make_light_strata`. sample: which of them.
+        shift_u, shift_v: the point's shift within the strata, from `cranley_patterson_offset`. px, py, pz: the point,
+        metres.
+    Returns:
+        Unit direction towards it (three), distance, w, and the normal of its surface on the point's side (three; zeros
+        where it has none).
+    """
+    zero, unity = np.float32(0), np.float32(1)
+    if light.kind == DIRECTIONAL:
+        return -light.axis[0], -light.axis[1], -light.axis[2], _INFINITE, unity, zero, zero, zero
+    if light.kind == POINT:
+        dx, dy, dz = light.position[0] - px, light.position[1] - py, light.position[2] - pz
+        distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), np.float32(1e-20))
+        inverse_distance = unity / distance
+        dx, dy, dz = dx * inverse_distance, dy * inverse_distance, dz * inverse_distance
+        along = -(dx * light.axis[0] + dy * light.axis[1] + dz * light.axis[2])
+        falloff = min(max(light.cone_scale * along + light.cone_offset, zero), unity)
+        clamped_distance = max(distance, MIN_DISTANCE)
+        return dx, dy, dz, distance, falloff * falloff / (clamped_distance * clamped_distance), zero, zero, zero
+    if light.area == 0:
+        return unity, zero, zero, unity, zero, zero, zero, zero
+    u, v = strata.uv[sample, 0] + shift_u, strata.uv[sample, 1] + shift_v
+    u = strata.corner[sample, 0] + strata.size[0] * (u - np.float32(u >= unity))
+    v = strata.corner[sample, 1] + strata.size[1] * (v - np.float32(v >= unity))
+    piece = 0
+    if not light.is_rectangle:
+        piece = min(np.searchsorted(light.power_cdf, u, side="right"), light.power_cdf.shape[0] - 1)
+        piece_start = light.power_cdf[piece - 1] if piece > 0 else zero
+        root = np.float32(math.sqrt(min((u - piece_start) / (light.power_cdf[piece] - piece_start), unity)))
+        u, v = root * (unity - v), root * v
+    e, f = light.edges[piece, 0], light.edges[piece, 1]
+    dx = light.corner[piece, 0] + u * e[0] + v * f[0] - px
+    dy = light.corner[piece, 1] + u * e[1] + v * f[1] - py
+    dz = light.corner[piece, 2] + u * e[2] + v * f[2] - pz
+    distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), np.float32(1e-20))
+    inverse_distance = unity / distance
+    dx, dy, dz = dx * inverse_distance, dy * inverse_distance, dz * inverse_distance
+    nx, ny, nz = light.normal[piece, 0], light.normal[piece, 1], light.normal[piece, 2]
+    cosine = -(dx * nx + dy * ny + dz * nz)
+    if cosine < 0 and light.is_two_sided:
+        nx, ny, nz, cosine = -nx, -ny, -nz, -cosine
+    area = light.area / np.float32(strata.uv.shape[0])
+    # a patch of this area that is as near as it is wide fills the half space: it gives no more than that
+    weight = area * max(cosine, zero) / max(distance * distance, area / _PI)
+    return dx, dy, dz, distance, weight, nx, ny, nz

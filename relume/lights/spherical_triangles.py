@@ -1,0 +1,265 @@
+"""The environment as spherical triangles of pre-integrated radiance: what light lies in each tile of the sphere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.environments.equirect import rotate_about_y, texel_directions, texel_solid_angles
+from relume.core.color import luminance
+from relume.lights.light_moments import LightTexels, compute_moments
+from relume.lights.sphere_tiles import Tiles, choose_tiles, solid_angles, unit
+from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_MIN_TANGENT_COSINE = (
+    0.8  # triangles within 37° of their light are matched in its tangent plane; larger ones stay as they are
+)
+_MAX_LIGHTS_PER_GROUP = 12
+_MIN_GROUPED_LIGHTS = 200  # of fewer lights, groups would save nothing
+
+
+class TriangleSubset(NamedTuple):
+    """What merged triangles are made of: M of a finer division, which points see or do not.
+
+    Attributes:
+        group: the merged triangle that each is in. (M,) int32
+        fraction: of that triangle's light. (M,) float32
+    """
+
+    group: NDArray[np.int32]
+    fraction: F32
+
+
+@dataclass(frozen=True)
+class TriangleLights:
+    """M spherical triangles with the environment's light.
+
+    The sphere is tiled by a hierarchy of triangles. What is kept of a tile is the triangle with the same light, whose
+    mean direction and spread (first and second moments) are those of the light in the tile: the same tile where the
+    light is uniform, a smaller one around a lamp. Highlights then err in the third order of the tile's size instead
+    of the first (docs/adr/0011-moment-matched-lights.md).
+
+    Attributes:
+        nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca. (3 axes, 6, M) float32
+        direction: mean direction of the light; shadow rays go there. (M, 3) float32
+        irradiance: ∫ L dω over the tile, what the light brings to a surface across its way; per channel. (M, 3) float32
+        parts: where each is merged of several, which are what points see.
+        codes: where each tile is in the hierarchy, see `Tiles`. (M,) uint64; none where that is of no use.
+    """
+
+    nodes: F32
+    direction: F32
+    irradiance: F32
+    parts: TriangleSubset | None = None
+    codes: NDArray[np.uint64] | None = None
+
+    @property
+    def num_lights(self) -> int:
+        """Their number M."""
+        return int(self.nodes.shape[2])
+
+    def empty(self) -> TriangleLights:
+        """Keep none of them, as where no light comes from the environment itself."""
+        return self.select(np.empty(0, np.intp), self.irradiance[:0])
+
+    def select(self, rows: NDArray[np.intp], irradiance: F32) -> TriangleLights:
+        """Choose some of them, with other light. chosen: (N,). irradiance: (N, 3) float32"""
+        codes = None if self.codes is None else self.codes[rows]
+        return TriangleLights(self.nodes[:, :, rows], self.direction[rows], irradiance, codes=codes)
+
+    @cached_property
+    def nodes_by_light(self) -> F32:
+        """The nodes, those of one light together. (M, 6, 3)"""
+        return np.ascontiguousarray(self.nodes.transpose(2, 1, 0))
+
+    @cached_property
+    def radius(self) -> F32:
+        """The angle from each light's direction to its farthest corner, within which all of it lies; radians. (M,)"""
+        chords = np.linalg.norm(self.nodes[:, :3].transpose(2, 1, 0) - self.direction[:, None], axis=2)
+        return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
+
+    @cached_property
+    def variance(self) -> F64:
+        """Of directions in each light, but for a factor that is the same for all. (M,)"""
+        middles = self.nodes[:, 3:].astype(np.float64)
+        return np.asarray(np.square(middles - middles.mean(axis=1, keepdims=True)).sum(axis=(0, 1)))
+
+    @cached_property
+    def groups(self) -> LightGroups | None:
+        """Lights that lie together; of few lights there are none."""
+        if self.codes is None or self.num_lights < _MIN_GROUPED_LIGHTS:
+            return None
+        return _group_lights(self, self.codes, _MAX_LIGHTS_PER_GROUP)
+
+
+class LightGroups(NamedTuple):
+    """Lights that lie together, as one light for a point that sees all of them.
+
+    Attributes:
+        lights: one for each of G groups.
+        first: where the parts of each begin. (G + 1,) int64. light_index: the lights in them. (P,) int64
+        between_variance: the share of its variance that is between its parts; the others are the parts' own. (G,)
+            float32
+    """
+
+    lights: TriangleLights
+    first: NDArray[np.int64]
+    light_index: NDArray[np.int64]
+    between_variance: F32
+
+
+NO_LIGHTS = TriangleLights(np.empty((3, 6, 0), np.float32), *np.empty((2, 0, 3), np.float32))
+
+
+def _sum_by_index(index: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
+    """Sum the values (n,) that have the same place (n,), in [0, num). (num,)"""
+    return np.asarray(np.bincount(index, values, num), np.float64)
+
+
+def _tangent_frames(normals: F64) -> F64:
+    """Find for each of M unit vectors two that are across it and across each other. (M, 2, 3)"""
+    axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    first = unit(np.cross(normals, axis))
+    return np.stack([first, np.cross(normals, first)], axis=1)
+
+
+def _on_tangent_plane(directions: F64, normals: F64, frames: F64) -> F64:
+    """Project directions (n, 3) gnomonically, each onto the plane that touches the sphere at its normal. (n, 2)"""
+    height = np.einsum("ni,ni->n", directions, normals)
+    return np.asarray(np.einsum("ni,nki->nk", directions, frames) / height[:, None])
+
+
+def _matrix_power(moments: F64, exponent: float) -> F64:
+    """Raise symmetric positive matrices (M, 2, 2) to a power; a vanishing extent is held above rounding."""
+    values, vectors = np.linalg.eigh(moments)
+    powers = np.maximum(values, 1e-14) ** exponent
+    return np.asarray((vectors * powers[:, None]) @ vectors.transpose(0, 2, 1))
+
+
+def match_moments(corners: F64, texels: LightTexels) -> tuple[F64, F64]:
+    """Find the triangles (M, 3, 3) whose light, uniform, has the moments of the tiles', and its mean directions (M, 3).
+
+    Args:
+        corners: of the tiles. (M, 3, 3)
+    """
+    num_tiles = len(corners)
+    total = texels.sums(texels.luminous, num_tiles)
+    weighted_direction = np.stack(
+        [texels.sums(texels.luminous * axis, num_tiles) for axis in texels.directions.T], axis=1
+    )
+    is_lit = (total > 0) & weighted_direction.any(axis=1)
+    mean = unit(np.where(is_lit[:, None], weighted_direction, corners.mean(axis=1)))
+    is_small = np.einsum("mci,mi->mc", corners, mean).min(axis=1) >= _MIN_TANGENT_COSINE
+    fitted = np.nonzero(is_lit & is_small)[0]
+    matched_corners = corners.copy()
+    frames = _tangent_frames(mean[fitted])
+    center, spread = compute_moments(texels, total[fitted], mean[fitted], frames, fitted)
+    corner = np.stack([_on_tangent_plane(corners[fitted, c], mean[fitted], frames) for c in range(3)], axis=1)
+    corner -= corner.mean(axis=1, keepdims=True)
+    uniform = corner.transpose(0, 2, 1) @ corner / 12  # second moment of a uniform triangle about its centroid
+    tangent_corners = corner @ _matrix_power(uniform, -0.5) @ _matrix_power(spread, 0.5) + center[:, None]
+    matched_corners[fitted] = unit(mean[fitted, None] + tangent_corners @ frames)
+    return matched_corners, mean
+
+
+def merge_groups(lights: TriangleLights, group: NDArray[np.integer[Any]], codes: NDArray[np.uint64]) -> TriangleLights:
+    """Merge lights, so that each group has one with the same light, mean direction and spread.
+
+    Light is what a surface across its way receives: a little less of the parts than each of them brings across its own,
+    so that Σ L Ω cos θi is that of the parts wherever all are above the horizon.
+
+    Args:
+        lights: M of them. group: that each is in. (M,) codes: of nodes above them, one for each group. (G,)
+    """
+    luminous = luminance(lights.irradiance).astype(np.float64)
+    corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)
+    directions = lights.direction.astype(np.float64)
+    texels = LightTexels(group.astype(np.int32), luminous, directions, solid_angles(corners))
+    merged_corners, mean = match_moments(Tiles(codes).corners, texels)
+    cosine = np.einsum("mi,mi->m", directions, mean[group])
+    irradiance = np.stack([texels.sums(light * cosine, len(codes)) for light in lights.irradiance.T], axis=1)
+    return TriangleLights(pack_nodes(merged_corners), mean.astype(np.float32), irradiance.astype(np.float32))
+
+
+def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights: int) -> LightGroups:
+    """Group lights below one node each, at most `max_lights` together and two at least. codes: of their tiles. (M,)"""
+    inner, (num_below,) = sum_inner_nodes(codes, np.ones((1, len(codes))))
+    group_codes, group, group_size = np.unique(
+        highest_ancestors(codes, inner[num_below > max_lights]), return_inverse=True, return_counts=True
+    )
+    group_number = np.cumsum(group_size > 1) - 1
+    light_index = np.argsort(group, kind="stable")
+    light_index = light_index[group_size[group[light_index]] > 1]
+    group_index = group_number[group[light_index]]
+    members = lights.select(light_index, lights.irradiance[light_index])
+    group_lights = merge_groups(members, group_index, group_codes[group_size > 1])
+    first, luminous = (
+        np.searchsorted(group_index, np.arange(group_number[-1] + 2)),
+        luminance(members.irradiance).astype(float),
+    )
+    within_variance = _sum_by_index(group_index, luminous * members.variance, group_lights.num_lights)
+    total = _sum_by_index(group_index, luminous, group_lights.num_lights) * group_lights.variance
+    within_fraction = np.divide(within_variance, total, out=np.ones_like(within_variance), where=total > 0)
+    between_variance = np.clip(1 - within_fraction, 0, 1).astype(np.float32)
+    return LightGroups(group_lights, first.astype(np.int64), light_index.astype(np.int64), between_variance)
+
+
+def pack_nodes(corners: F64) -> F32:
+    """Lay out corners (M, 3, 3) and the midpoints of their edges as kernels read them. (3 axes, 6, M) float32"""
+    nodes = np.concatenate([corners, unit(corners + np.roll(corners, -1, axis=1))], axis=1)
+    return np.ascontiguousarray(nodes.transpose(2, 1, 0), np.float32)
+
+
+@dataclass(frozen=True)
+class RotatedEnvironment:
+    """The texels of an environment before anybody turns it: what stays while a hand does.
+
+    Attributes:
+        light: radiance × solid angle. (n, 3) luminous: its luminance. (n,) directions: unit. (n, 3)
+        solid_angles: (n,)
+    """
+
+    light: F64
+    luminous: F64
+    directions: F64
+    solid_angles: F64
+
+    @classmethod
+    def from_radiance(cls, radiance: F32) -> Self:
+        """Those of an equirectangular map, top row first. (height, width, 3) float32"""
+        height, width, _ = radiance.shape
+        directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64)
+        texel_angles = np.repeat(texel_solid_angles(height, width), width)
+        light = radiance.reshape(-1, 3).astype(np.float64) * texel_angles[:, None]
+        luminous = luminance(light.astype(np.float32)).astype(np.float64)
+        return cls(light, luminous, directions, texel_angles)
+
+
+def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotation: float = 0.0) -> TriangleLights:
+    """Weigh the light of an environment in each tile; it need not be the one that the tiles were chosen for.
+
+    Args:
+        tiles: M tiles of the sphere.
+        environment: its texels.
+        rotation: of the environment about +Y, degrees, counter-clockwise seen from above.
+    Cost: O(texels · depth) time.
+    """
+    directions = rotate_about_y(environment.directions, rotation)
+    texels = LightTexels(tiles.locate(directions), environment.luminous, directions, environment.solid_angles)
+    irradiance = np.stack([texels.sums(light, len(tiles.codes)) for light in environment.light.T], axis=1)
+    corners, mean = match_moments(tiles.corners, texels)
+    return TriangleLights(
+        pack_nodes(corners), mean.astype(np.float32), irradiance.astype(np.float32), codes=tiles.codes
+    )
+
+
+def tessellate_environment(radiance: F32, num_lights: int) -> TriangleLights:
+    """Divide an environment into about `num_lights` triangles. Raises as `choose_tiles` does."""
+    return integrate_environment(choose_tiles(radiance, num_lights), RotatedEnvironment.from_radiance(radiance))

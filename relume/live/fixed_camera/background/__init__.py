@@ -1,0 +1,1 @@
+"""Background compositing: the environment behind the image, shadow catchers, alpha."""

@@ -1,0 +1,60 @@
+"""What would arrive at the samples of a material if nothing else were there: nothing hidden, nothing reflected."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.material_image import MaterialImage
+from relume.live.fixed_camera.view_images import ViewImages
+from relume.look import BAKED_ENVIRONMENT, LightGeometry
+from relume.operators.shade import shade
+
+F32 = NDArray[np.float32]
+
+
+class UnoccludedLight:
+    """Of a material whose samples face few ways, as those of a level ground do.
+
+    Attributes:
+        directions: unit, in which the camera sees its samples. (n, 3)
+    """
+
+    def __init__(self, images: ViewImages, material: MaterialImage) -> None:
+        self._images, self._transfer, self._material = images, images.transfer, material
+        self._points = images.view.surface_points(material.index)
+        self.directions = images.view.directions_to(material.index)
+        _, first, normal_index = np.unique(self._points.normal, axis=0, return_index=True, return_inverse=True)
+        self._distinct_normals = self._points.rows(first)
+        self._normal_index = normal_index.ravel()
+
+    def image(self, light: Illumination, *, is_preview: bool) -> F32:
+        """The image of the material's first term, which is diffuse, under a light whose way is free.
+
+        Surfaces that shine are among what is not there.
+
+        Args:
+            is_preview: from a small map where another environment than the baked one must be weighed.
+        Returns:
+            (n, 3) float32
+        """
+        is_coarse = is_preview and light.environment != BAKED_ENVIRONMENT
+        image = self._from_triangles(light, is_preview=is_coarse)[self._normal_index]
+        for geometry, gain in light.local:
+            if geometry.kind != "mesh":
+                image += np.outer(self._unoccluded(geometry), np.array(gain, np.float32) / np.float32(np.pi))
+        return np.asarray(image, np.float32)
+
+    def _unoccluded(self, geometry: LightGeometry) -> F32:
+        transfer, view = self._transfer, self._images.view
+        key = transfer.key, "unhidden light", view.name, self._material.index, geometry
+        return self._images.cache.transient.get_value(key, lambda: transfer.local.unoccluded(geometry, self._points))
+
+    def _from_triangles(self, light: Illumination, *, is_preview: bool) -> F32:
+        """Of the environment, for each of the normals. (normals, 3) float32"""
+        term = self._material.terms[0]
+        incident = self._transfer.unoccluded_environment(light, self._distinct_normals, is_preview=is_preview)
+        return shade(term.term, term.target_bands, *incident, lambda share: None, lambda: False).rows(
+            self._distinct_normals.num_points
+        )

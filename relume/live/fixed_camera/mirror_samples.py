@@ -1,0 +1,103 @@
+"""What mirrors send on of a picture: how samples that are seen in them count for their pixels, as the look has it; and
+rectangles that shine, which nothing but a mirror shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.specular import specular_terms
+from relume.camera.ray_paths import NO_MIRROR
+from relume.lights.local_lights import rectangle
+from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.views.mirror_samples import MirrorSamples
+from relume.views.view import View
+
+F32 = NDArray[np.float32]
+Documents = Sequence[Mapping[str, Any]]
+
+
+def lit_rectangles(light: Illumination) -> tuple[LightSource, ...]:
+    """The rectangles that are lit in a light."""
+    return tuple(source for source in light.local if source.geometry.kind == "rectangle" and light.paths.direct)
+
+
+class MirrorFactors:
+    """Of one picture.
+
+    Attributes:
+        gains: what the radiance of each sample is multiplied by for its pixel, in the view's order; see
+            `View.throughput`.
+        materials: those that anything is seen in.
+    """
+
+    def __init__(self, view: View) -> None:
+        self._mirror_samples, self._documents = view.mirrored, dict[int, Documents | None]()
+        self.gains = view.throughput if view.mirrored is None else view.throughput.copy()
+        chain = None if view.mirrored is None else view.mirrored.chain
+        self._emitters: tuple[tuple[LightSource, ...], F32 | None] = (), None
+        self._specular_factors = None if chain is None else np.ones((*chain.material.shape, 3), np.float32)
+        self.materials: list[int] = [] if chain is None else np.setdiff1d(chain.material, [NO_MIRROR]).tolist()
+
+    def mirror_emitters(self, light: Illumination) -> F32 | None:
+        """Radiance of the rectangles between mirrors and what is seen in them; the same array while they stay as they
+        are. (3, m) float32, None where there are none."""
+        sources = lit_rectangles(light)
+        if self._mirror_samples is not None and sources != self._emitters[0]:
+            self._emitters = sources, _emitter_radiance(self._mirror_samples, sources) if sources else None
+        return self._emitters[1]
+
+    def update_emission(self, documents: Mapping[int, Documents | None]) -> list[int]:
+        """Bring mirrors to a look.
+
+        Args:
+            documents: terms of the materials that anything is seen in; None where none of them is shown.
+        Returns:
+            Those of the materials that send on something else than before.
+        """
+        changed = [
+            index for index in documents if index not in self._documents or documents[index] != self._documents[index]
+        ]
+        if self._mirror_samples is None or self._specular_factors is None or not changed:
+            return []
+        chain = self._mirror_samples.chain
+        for index in changed:
+            terms = self._documents[index] = documents[index]
+            is_of_material = chain.material == index
+            self._specular_factors[is_of_material] = (
+                0
+                if terms is None
+                else specular_terms(terms, chain.cos_theta_i[is_of_material], chain.tint[is_of_material])
+            )
+        self.gains[self._mirror_samples.order_index] = self._mirror_samples.throughput * self._specular_factors.prod(
+            axis=1
+        )
+        return changed
+
+
+def _emitter_radiance(mirror_samples: MirrorSamples, sources: Sequence[LightSource]) -> F32:
+    """Radiance of rectangles on the ways from mirrors to what is seen in them. (3, m)"""
+    radiance = np.zeros((3, len(mirror_samples.sample)), np.float32)
+    for geometry, gain in sources:
+        corner, edges = rectangle(geometry)
+        normal = np.cross(*edges)
+        cosine = -(mirror_samples.direction @ normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = -((corner - mirror_samples.origin) @ normal) / cosine
+            offset = mirror_samples.origin + distance[:, None] * mirror_samples.direction - corner
+            u, v = (offset @ edge / (edge @ edge) for edge in edges)
+        is_hit = (
+            (cosine > 0)
+            & (distance > 0)
+            & (distance < mirror_samples.distance)
+            & (u >= 0)
+            & (u <= 1)
+            & (v >= 0)
+            & (v <= 1)
+        )
+        radiance[:, is_hit] += np.array(gain, np.float32)[:, None]
+    return radiance

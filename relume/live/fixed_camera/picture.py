@@ -1,0 +1,242 @@
+"""One live picture: a view under a look that changes while somebody drags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.curves import curve_bands, generated_bands
+from relume.core.cache import Cache
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.active_control import ActiveControl, HeldControl
+from relume.live.fixed_camera.background.background import Background
+from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
+from relume.live.fixed_camera.fidelity import FidelityLabel, worst
+from relume.live.fixed_camera.illumination import Solo
+from relume.live.fixed_camera.jobs import Job, PrecomputeOperator, TermTarget
+from relume.live.fixed_camera.pixel_probe import highlight_pixels, probe
+from relume.live.fixed_camera.priority_region import fidelity_label_in
+from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.fixed_camera.scheduler import StrategyScheduler
+from relume.live.fixed_camera.view_images import ViewImages, material_documents
+from relume.look import Look
+from relume.operators.shade import shaded_bytes
+from relume.views.resolve import encode, encode_coverage, resolve
+from relume.views.view import Tile
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What one step changed.
+
+    Attributes:
+        tiles: x, y, width, height of the picture's tiles that are new. exact: the picture shows its look exactly.
+        fidelity: how nearly it shows it, in what is seen of it. complete: something of every term is shown.
+        was_off: how far the picture that an exact one replaces was from it, relative RMS, where its eye moved.
+    """
+
+    tiles: list[Tile]
+    exact: bool
+    fidelity: FidelityLabel
+    complete: bool
+    was_off: float | None = None
+
+    @property
+    def changed(self) -> bool:
+        """Whether any pixel may be new."""
+        return bool(self.tiles)
+
+
+class Picture:
+    """State of one session's picture; used from one thread at a time, while a `Job` is made in another.
+
+    Args:
+        is_watched: somebody looks at it while it opens, and sees a rough picture first where a better one takes long.
+    """
+
+    def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache, *, is_watched: bool = False) -> None:
+        self._images = ViewImages(transfer, view_name, cache)
+        self._view = self._images.view
+        self._look = self._images.default
+        self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
+        self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
+        self._background = Background(self._images)
+        self._prepared_pointer: CurvePointer | ParameterPointer | None = None
+        self._edited_pointer: CurvePointer | ParameterPointer | None = None
+        self._active_pointer: Pointer | None = None
+        self._scheduler = StrategyScheduler(self._images, is_watched=is_watched)
+
+    def check(self, look: Look) -> None:
+        """Whether a look can be shown at all, before any picture is given it; nothing changes.
+
+        Raises:
+            MemoryBudgetError: the images of its terms are larger than the memory may be.
+        """
+        samples = ((m.num_samples, len(material_documents(look, name))) for name, m in self._images.by_name.items())
+        self._images.cache.check(sum(shaded_bytes(num) * terms for num, terms in samples if num))
+
+    def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
+        """A new target; nothing is computed yet.
+
+        Args:
+            active_pointer: pointer to what the user's hand is on while it makes this look, see `parse_pointer`; None
+                where that is not known, as after an undo.
+            solo: names of sources of light that alone are shown, see `light_of`; None: all.
+        Raises:
+            ParameterError: `active_pointer` points to nothing that a hand may hold. NotFoundError, SceneError: the
+                environment or an image cannot be had. StoreError: the bake is too old for images. The picture stays as
+                it was.
+        """
+        edited = None if active_pointer is None else parse_pointer(active_pointer)
+        before, images = self._images.light, self._images.view_with_overrides(look)
+        images.set_look(look, solo)
+        if images is not self._images:
+            self._switch_images(images)
+        self._edited_pointer = edited if isinstance(edited, CurvePointer | ParameterPointer) else None
+        self._active_pointer = edited or self._active_pointer
+        if (images.light.environment, images.light.local) != (before.environment, before.local):
+            self._prepared_pointer = None  # the hand has moved on to a light
+        self._look = look
+
+    def _switch_images(self, images: ViewImages) -> None:
+        """Go on with other images of the same view."""
+        self._images, self._view = images, images.view
+        for material in images.by_name.values():
+            material.set_view(images.view)
+        self._background = Background(images)
+        self._scheduler.adopt(images)
+
+    def look_at(self, region: Tile | None) -> None:
+        """What is seen of the picture, and is to be exact first: x, y, width, height in pixels; None: all."""
+        self._images.region = region
+
+    def prepare(self, pointer: str) -> None:
+        """Prepare what a hand takes hold of ahead of its first edit.
+
+        Args:
+            pointer: e.g. "/materials/Teapot/terms/1/curves/theta_h"; see `parse_pointer`.
+        Raises:
+            ParameterError: there is no such curve or parameter in this look.
+        """
+        prepared = parse_pointer(pointer)
+        if isinstance(prepared, CurvePointer | ParameterPointer):
+            self._images.material_term(prepared)
+            self._prepared_pointer = prepared
+        self._active_pointer = prepared
+
+    def next_job(self) -> Job | None:
+        """What must be made next, for the look or for what was touched; None where nothing is lacking.
+
+        The picture may be advanced meanwhile: all that does not depend on it follows the look.
+        """
+        return self._scheduler.next_job(self._active_control(), self._look)
+
+    def install(self, job: Job, result: Any) -> None:
+        """Go on with what a job has made, unless the look has moved on to where it is of no use."""
+        self._scheduler.install(job, result)
+        prepared = self._active_control().prepared_control
+        if not isinstance(job, PrecomputeOperator) or prepared is None or prepared.target.live is not job.target.live:
+            return
+        if prepared.basis != job.basis and prepared.target.live.ready.basis == job.basis:
+            self._prepared_pointer = None  # the hand has moved on to something else of this term
+
+    def run_next_job(self, progress: Callable[[float], None], is_canceled: Callable[[], bool]) -> None:
+        """Make what `next_job` names and install it.
+
+        Raises:
+            CancelledError: `is_canceled` said so; the picture stays as it was.
+            MemoryBudgetError: it is larger than the cache may be.
+        """
+        job = self.next_job()
+        if job is not None:
+            self.install(job, job.run(progress, is_canceled))
+
+    def advance(self, max_coefficients: int | None) -> Progress:
+        """Bring the picture towards its look: R += T · Δc with the most important coefficients, None for all."""
+        images, scheduler = self._images, self._scheduler
+        scheduler.advance(max_coefficients)
+        tiles: set[Tile] = set()
+        light, gain = scheduler.light, self._background.clamped_gain(scheduler.gain, self._look.background)
+        is_background_new = self._background.update(self._look, light, gain, self._radiance)
+        emitter_radiance = images.mirrors.mirror_emitters(light)
+        for index, material in enumerate(images.by_name.values()):
+            material.set_mirror_emission(emitter_radiance)
+            if material.num_samples and material.compose(self._radiance):
+                tiles.update(self._view.material_tiles[index])
+        for index in images.update_mirrors(self._look):
+            tiles.update(self._view.material_tiles[index])
+        if is_background_new or not np.array_equal(self._gain, gain):
+            self._gain = gain
+            tiles.update(self._view.all_tiles)
+        exact = all(live.fidelity_label == "exact" for _, live in images.terms())
+        fidelity = worst(
+            fidelity_label_in(TermTarget(images, *material_term), images.region) for material_term in images.terms()
+        )
+        complete = not any(live.is_empty for _, live in images.terms())
+        in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
+        return Progress(in_order, exact, fidelity, complete)
+
+    def all_tiles(self) -> list[Tile]:
+        """Tiles that cover the picture."""
+        return self._view.all_tiles
+
+    def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
+        """Payload of a frame, "rgb9e5" or "f32": the tiles one after another, row-major."""
+        return encode(self._view, self._radiance, tiles, form, self._gain, self._images.mirrors.gains)
+
+    def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
+        """How much each pixel of tiles hides of display values behind it, a byte each; None where it hides all."""
+        if not self._background.is_transparent:
+            return None
+        alpha = self._background.alpha(for_display=True)
+        return encode_coverage(alpha, tiles)
+
+    def alpha(self, *, for_display: bool) -> F32 | None:
+        """The same of the whole picture, or how much it hides of linear radiance. (height, width) float32"""
+        return self._background.alpha(for_display=for_display) if self._background.is_transparent else None
+
+    def image(self) -> F32:
+        """Linear radiance, nothing where it is transparent. (height, width, 3) float32"""
+        whole = [(0, 0, self._view.width, self._view.height)]
+        pixels = resolve(self._view, self._radiance, whole, self._gain, self._images.mirrors.gains)
+        return pixels.reshape(self._view.height, self._view.width, 3)
+
+    def curve(self, pointer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bands of a curve as displayed and as its parameters alone would give it. (3, J) each"""
+        curve_pointer = parse_curve(pointer)
+        _, term = self._images.material_term(curve_pointer)
+        declared = term.term.curve(curve_pointer.name)
+        return curve_bands(term.document, declared), generated_bands(term.document, declared)
+
+    def inspect(self, x: int, y: int) -> dict[str, Any]:
+        """What makes up a pixel, and where its surface is; see `relume.live.fixed_camera.pixel_probe.inspect`."""
+        return probe(self._images, self._radiance, self._gain, self._prepared_pointer, x, y)
+
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+        """Which pixels a stretch of a curve lights. See `relume.live.fixed_camera.pixel_probe.highlight_pixels`."""
+        return highlight_pixels(self._images, self._radiance, parse_curve(pointer), from_deg, to_deg)
+
+    def _active_control(self) -> ActiveControl:
+        """What the hand is on in the look as it is now."""
+        return ActiveControl(
+            self._resolve_control(self._prepared_pointer),
+            self._resolve_control(self._edited_pointer),
+            self._active_pointer,
+        )
+
+    def _resolve_control(self, pointer: CurvePointer | ParameterPointer | None) -> HeldControl | None:
+        """What a pointer means in the look as it is now; None where an edit has removed it."""
+        if pointer is None:
+            return None
+        try:
+            return HeldControl(
+                TermTarget(self._images, *self._images.material_term(pointer)), self._images.basis(pointer)
+            )
+        except ParameterError:
+            return None

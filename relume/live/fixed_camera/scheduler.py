@@ -1,0 +1,376 @@
+"""The one transition: of the routes to what is wanted, the one of highest fidelity that lacks nothing makes the frame.
+
+What the next better one lacks is made next: first what light needs to be followed, then what shows nothing at all, then
+what the hand is on, then what refines a picture at rest, then what can be made ahead.
+
+One picture, one light: what a picture shows in another light it shows there all at once. When light changes, images of
+terms become ready one after another; until all of them are in one light the picture goes on showing those in the light
+before, with the background, the shining surfaces and the gain of that light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import numpy as np
+
+from relume.live.fixed_camera.active_control import ActiveControl
+from relume.live.fixed_camera.fidelity import Fidelity
+from relume.live.fixed_camera.illumination import Illumination, element_gains, single_source
+from relume.live.fixed_camera.jobs import Job, PrecomputeOperator, Shade, TermTarget, can_resume_from
+from relume.live.fixed_camera.operator_budget import EXACT, MERGED_LIGHT, OperatorForm, operator_form, use_coarse
+from relume.live.fixed_camera.priority_region import is_exact_within, is_visible, make_region_job
+from relume.live.fixed_camera.strategies import operator, texel_sum
+from relume.live.fixed_camera.strategies.base import LightStrategy
+from relume.live.fixed_camera.strategies.cached_image import CachedImage
+from relume.live.fixed_camera.strategies.incremental_light import IncrementalLight
+from relume.live.fixed_camera.strategies.linear_mix import LinearMix
+from relume.live.fixed_camera.strategies.sparse_preview import (
+    SparsePreview,
+    can_preview,
+    is_needed_for_first_frame,
+    is_prepared,
+    should_refine,
+)
+from relume.live.fixed_camera.view_images import ViewImages
+from relume.look import Look
+from relume.look.model import Rgb
+from relume.operators.edit_basis import CurveBasis, EditBasis
+from relume.operators.linear_operator import MergedLightOperator
+from relume.operators.shade import shaded_bytes
+from relume.transport.roughness_ranges import contract_levels
+
+
+class StrategyScheduler:
+    """Of one picture.
+
+    Attributes:
+        light: in which the picture is shown. gain: what multiplies it.
+    """
+
+    def __init__(self, images: ViewImages, *, is_watched: bool) -> None:
+        self._images, self._is_watched = images, is_watched
+        self._linear_mix, self._incremental = LinearMix(), IncrementalLight(images)
+        # highest fidelity first, and of equal ones what costs least
+        self._strategies: Sequence[LightStrategy] = (CachedImage(), self._linear_mix, self._incremental)
+        self._previewed: tuple[Illumination, Rgb] | None = None
+        self.light, self.gain = images.light, images.gain
+        images.set_emission(self.light)
+
+    def adopt(self, images: ViewImages) -> None:
+        """Bring other images of the same picture to what is wanted from now on: some of its samples are sorted anew."""
+        self._images, self._incremental, self._previewed = images, IncrementalLight(images), None
+        self._strategies = (CachedImage(), self._linear_mix, self._incremental)
+        images.set_emission(self.light)
+
+    # what a frame shows
+
+    def advance(self, max_coefficients: int | None) -> None:
+        """Bring every term as near to what is wanted as it can be now."""
+        for target in self._targets():
+            texel_sum.step(target)
+        self._change_light()
+        for target in self._targets():
+            if not target.live.is_exact():
+                operator.step(target, max_coefficients)
+
+    def install(self, job: Job, result: object) -> None:
+        """Go on with what a job has made."""
+        job.install(result)
+        if isinstance(job, SparsePreview):
+            self._previewed = job.light, job.gain
+        self._change_light()
+
+    def _change_light(self) -> None:
+        """Bring terms to the light that is wanted, if all can be; else those that can to the light of a preview."""
+        target_light = self._images.light
+        unconverged = self._unconverged_targets()
+        outdated = [p for p in unconverged if not p.live.is_empty and p.live.ready.light != target_light]
+        if all(self._best_strategy(target, target_light) for target in outdated):
+            self._apply_strategies(unconverged, target_light)
+        elif self._previewed is not None and any(p.live.ready.light == self._previewed[0] for p in unconverged):
+            self._apply_strategies(unconverged, self._previewed[0])
+        self._display_latest()
+
+    def _apply_strategies(self, unconverged: Iterable[TermTarget], light: Illumination) -> None:
+        for target in unconverged:
+            strategy, ready = self._best_strategy(target, light), target.live.ready
+            if strategy is not None and (ready.light != light or ready.fidelity < strategy.fidelity):
+                strategy.evaluate(target, light)
+
+    def _best_strategy(self, target: TermTarget, light: Illumination) -> LightStrategy | None:
+        """The best way to bring a term's curves to a light at once; none where it would not show them exactly."""
+        if not target.live.needs_only_light():
+            return None
+        target_light = self._images.light
+        allowed = (r for r in self._strategies if light == target_light or r.fidelity < Fidelity.NEARLY_EXACT)
+        return next((r for r in allowed if r.applicable(target, light) and not r.prepare(target, light)), None)
+
+    def _display_latest(self) -> None:
+        """Show every term's newest image, if all are in one light; those that show nothing at all are in any."""
+        images, before = self._images, self.light
+        lit = {target.live.latest.light for target in self._targets() if not target.live.is_empty}
+        if lit <= {images.light}:
+            self.light, self.gain, self._previewed = images.light, images.gain, None
+        elif self._previewed is not None and lit == {self._previewed[0]}:
+            self.light, self.gain = self._previewed
+        else:
+            return
+        for target in self._targets():
+            target.live.display_ready()
+        if self.light != before:
+            images.set_emission(self.light)
+
+    # what is made next
+
+    def next_job(self, control: ActiveControl, look: Look) -> Job | None:
+        """The most urgent job; None where nothing is lacking. hand: what the user is on. look: as it is now."""
+        stages: Sequence[Callable[[ActiveControl], Job | None]] = (
+            self._changed_light_job, self._preview_job, self._element_job, self._missing_image_job, self._prepared_job,
+            self._exact_operator_job,
+        )  # fmt: skip
+        for stage in stages:
+            job = stage(control)
+            if job is not None:
+                return job
+        return self._refinement_job() or self._prefetch_job(control, look)
+
+    def _changed_light_job(self, control: ActiveControl) -> Job | None:
+        """Light has changed under a hand, and only rows can follow it."""
+        if not control.edits_light or not self._needs_incremental():
+            return None
+        return self._rows_job()
+
+    def _preview_job(self, control: ActiveControl) -> Job | None:
+        """The picture is in another light than is wanted, or opens; or samples are chosen before the light turns."""
+        images = self._images
+        if self._needs_preview(control):
+            is_opening = all(target.live.is_empty for target in self._targets())
+            missing = [
+                target for target in self._unconverged_targets() if self._best_strategy(target, images.light) is None
+            ]
+            whole = SparsePreview.for_targets(images, missing, "a preview" if is_opening else "the light")
+            paths = images.light.paths
+            return whole.direct_only_first() if is_opening and paths.direct and paths.has_indirect else whole
+        outdated = [p for p in self._targets() if p.live.displays_outdated and not images.is_cached(p.material, p.live)]
+        if outdated and self._is_watched and can_preview(images):
+            return SparsePreview.for_targets(images, outdated, "what was changed")
+        if control.rotates_environment and can_preview(images) and not is_prepared(images):
+            return SparsePreview.for_targets(images, self._targets(), "the light")
+        return None
+
+    def _needs_preview(self, control: ActiveControl) -> bool:
+        images = self._images
+        if all(target.live.is_empty for target in self._targets()):
+            return self._is_watched and is_needed_for_first_frame(images)
+        if self.light == images.light or not can_preview(images):
+            return False
+        is_immediate = all(
+            self._best_strategy(target, images.light) is not None for target in self._unconverged_targets()
+        )
+        return not is_immediate and not (control.edits_light and self._needs_incremental())
+
+    def _needs_incremental(self) -> bool:
+        """Whether every term shows what is wanted, or will, roughly, with rows; and gains alone do not explain it."""
+        target_light, incremental = self._images.light, self._incremental
+        unconverged = self._unconverged_targets()
+        is_reached = all(p.live.needs_only_light() and incremental.applicable(p, target_light) for p in unconverged)
+        is_moved = any(not self._linear_mix.applicable(target, target_light) for target in unconverged)
+        return bool(unconverged) and is_reached and is_moved and incremental.fits_budget()
+
+    def _element_job(self, control: ActiveControl) -> Job | None:
+        """The image of a source that is lacking to mix a term, of a material with few samples first."""
+        unconverged = (target for target in self._targets() if target.live.needs_only_light())
+        return _first_missing_job(self._linear_mix, unconverged, self._images.light)
+
+    def _missing_image_job(self, control: ActiveControl) -> Job | None:
+        """One job for each term whose image is not what is wanted and follows no operator towards it; those first of
+        which something is to be seen that is not exact; of them those of the touched material, and cheap ones."""
+        candidates, region = list(self._missing_bases(control)), self._images.region
+        if not candidates:
+            return None
+
+        def rank(item: tuple[TermTarget, EditBasis | None]) -> tuple[int, ...]:
+            target, basis = item
+            return not is_visible(target, region) or is_exact_within(target, region), *_cost(target, basis, control)
+
+        target, basis = min(candidates, key=rank)
+        form = None if basis is None else self._form(target, basis)
+        if basis is not None and form is not None:
+            return self._operator_job(target, basis, form)
+        # where no operator fits, an image that shows older curves stands until the hand rests
+        whole = Shade.for_target(
+            target, self._images.light, is_refinement=target.live.is_converged or target.live.has_preview()
+        )
+        return self._early_job(whole, [candidate for candidate, basis in candidates if basis is None]) or whole
+
+    def _early_job(self, whole: Shade, candidates: Sequence[TermTarget]) -> Job | None:
+        """What is seen sooner than the whole image of a term, where many samples are to be shaded: what of it is in
+        sight, or all that is lacking in more detail. lacking: terms that are to be shaded, this one among them."""
+        region_job = make_region_job(whole, candidates, self._images.region)
+        own_target = whole.target
+        detail = own_target.live.ready.detail
+        if own_target.live.ready.fidelity != Fidelity.PREVIEW or own_target.live.ready.light != whole.light:
+            return region_job
+        costly = [target for target in candidates if _needs_angles(target) and target.live.ready.detail == detail]
+        if own_target not in costly:
+            return region_job
+        num_left = sum(target.material.num_samples for target in costly)
+        if region_job is not None:
+            num_left = sum(np.count_nonzero(p.material.lies_in(region_job.region)) for p in costly)
+        if not should_refine(num_left, detail):
+            return region_job
+        return SparsePreview.for_targets(self._images, costly, "a preview").with_detail(
+            detail + 1, is_refinement=whole.is_refinement
+        )
+
+    def _missing_bases(self, control: ActiveControl) -> Iterator[tuple[TermTarget, EditBasis | None]]:
+        for target in self._targets():
+            live = target.live
+            changed = set(live.changed_curves())
+            basis = control.edit_basis(live, changed)
+            if not live.is_converged:
+                # its operator along a curve gives the image as well, and exactly
+                is_whole = basis is not None and basis.is_complete and self._form(target, basis) == EXACT
+                yield target, basis if is_whole else None
+            elif changed and not self._continues_with_operator(target, basis):
+                first = next(name for name in live.target_bands if name in changed)
+                new_basis = basis or CurveBasis.from_curve(live.term.curve(first))
+                yield target, new_basis if self._reaches_target(target, new_basis, changed) else None
+
+    def _form(self, target: TermTarget, basis: EditBasis) -> OperatorForm | None:
+        """What the memory may hold an operator of; where of nothing, the term is shaded."""
+        return operator_form(target.material, basis.num_columns, self._images.cache.budget_bytes)
+
+    def _reaches_target(self, target: TermTarget, basis: EditBasis, changed: set[str]) -> bool:
+        """Whether an operator would bring an image to its target; one of some samples does not sum others' curves."""
+        form = self._form(target, basis)
+        return form is not None and (form.step == 1 or can_resume_from(target.live.ready, changed, basis))
+
+    def _continues_with_operator(self, target: TermTarget, basis: EditBasis | None) -> bool:
+        """Whether the operator in use is the one to go on with: what differs is free in it, or some of it, and no other
+        is better."""
+        live = target.live
+        active, changed = live.ready.basis, set(live.changed_curves())
+        if active is None or changed.isdisjoint(active.affected_curves):
+            return False
+        if self._images.operator(target.material, live) is None:
+            return False
+        return changed <= set(active.affected_curves) or basis is None or not changed <= set(basis.affected_curves)
+
+    def _prepared_job(self, control: ActiveControl) -> Job | None:
+        """The operator that a hand must wait for before it can move what it has touched.
+
+        A parameter whose only curve is free in all its wavelets needs no nodes: that curve's operator is there, exact.
+        """
+        prepared = control.prepared_control
+        if prepared is None or not prepared.target.material.num_samples:
+            return None
+        if prepared.basis is None:
+            return texel_sum.job_for(prepared.target)
+        live, basis, active = prepared.target.live, prepared.basis, prepared.target.live.ready.basis
+        form = self._form(prepared.target, basis)
+        if live.changed_curves() or form is None:
+            return None
+        has_operator = active is not None and self._images.operator(prepared.target.material, live) is not None
+        is_enough = active is not None and (
+            active == basis or (active.is_complete and active.affected_curves == basis.affected_curves)
+        )
+        return None if has_operator and is_enough else self._operator_job(prepared.target, basis, form)
+
+    def _exact_operator_job(self, control: ActiveControl) -> Job | None:
+        """The exact operator of what is followed by a rough one; frames go on meanwhile."""
+        for target in self._targets():
+            basis = target.live.ready.basis
+            if basis is not None and isinstance(
+                self._images.operator(target.material, target.live), MergedLightOperator
+            ):
+                return PrecomputeOperator.for_target(target, basis, EXACT)
+        return None
+
+    def _operator_job(self, target: TermTarget, basis: EditBasis, form: OperatorForm) -> PrecomputeOperator:
+        """An operator; the rough one first, where a hand would wait long for the exact one, and can go on by it."""
+        images, (_, material, live) = self._images, target
+        if form != EXACT or images.cache.contains(images.operator_key(material, live, basis, live.target_bands)):
+            return PrecomputeOperator.for_target(target, basis, form)
+        lights = images.transfer.num_lights if live.light.has_direct_environment else 0
+        is_merged_first = use_coarse(material, basis.num_columns, lights, images.cache.budget_bytes)
+        can_go_on = can_resume_from(live.ready, live.changed_curves(), basis)
+        return PrecomputeOperator.for_target(target, basis, MERGED_LIGHT if is_merged_first and can_go_on else form)
+
+    def _refinement_job(self) -> Job | None:
+        """What makes an image exact that is near it already."""
+        for target in self._targets():
+            live = target.live
+            if live.is_converged and not live.changed_curves():
+                job = self._resum_job(target) if live.ready.rounding > 0 else None
+                if job is None and live.ready.fidelity < Fidelity.EXACT:
+                    job = Shade.for_target(target, self._images.light, is_refinement=True)
+                if job is not None:
+                    return job
+        return None
+
+    def _resum_job(self, target: TermTarget) -> Job | None:
+        """What sums an image once that was summed from steps, from where they came."""
+        return self._linear_mix.resum_job(target) if target.live.ready.basis is None else operator.resum_job(target)
+
+    def _prefetch_job(self, control: ActiveControl, look: Look) -> Job | None:
+        """What can be made ahead for what a hand is on, when nothing else is lacking."""
+        if control.edits_light and self._incremental.fits_budget():
+            rows_job = self._rows_job()
+            if rows_job is not None:
+                return rows_job
+        return self._dragged_light_job(control, look)
+
+    def _rows_job(self) -> Job | None:
+        """The next rows to be made, those of few samples first; None where there are all.
+
+        A term whose own curve moves would want other rows after every edit, and could not add them to anything.
+        """
+        extensible = (p for p in self._targets() if p.live.is_converged or p.live.needs_only_light())
+        return _first_missing_job(self._incremental, extensible, self._images.light)
+
+    def _dragged_light_job(self, control: ActiveControl, look: Look) -> Job | None:
+        """An image of the light that a hand is on, of a material with few samples first; it can wait for all else.
+
+        What comes straight from it is taken off as soon as it moves; all that comes from it is what it is dimmed by.
+        None where that light is elsewhere by now, or where the memory has no room to spare.
+        """
+        images = self._images
+        dragged = control.dragged_light(look)
+        if dragged is None or all(source.geometry != dragged for source in images.light.local):
+            return None
+        elements = list(element_gains(single_source(images.light, dragged)))  # what comes straight is first
+        targets = list(self._targets())
+        missing = [(e, p) for e in elements for p in targets if images.image_in(p.material, p.live, e) is None]
+        num_bytes = sum(shaded_bytes(target.material.num_samples) for _, target in missing)
+        if not missing or num_bytes > images.cache.budget_bytes - images.cache.used_bytes:
+            return None
+        element, target = min(missing, key=lambda item: (elements.index(item[0]), item[1].material.num_samples))
+        return Shade.for_target(target, element, is_refinement=True)
+
+    def _targets(self) -> Iterator[TermTarget]:
+        """All terms that this view sees anything of."""
+        return (TermTarget(self._images, material, live) for material, live in self._images.terms())
+
+    def _unconverged_targets(self) -> list[TermTarget]:
+        """Those that show nothing firm in the light that is wanted."""
+        return [target for target in self._targets() if not target.live.is_converged]
+
+
+def _first_missing_job(strategy: LightStrategy, targets: Iterable[TermTarget], light: Illumination) -> Job | None:
+    """The first thing that a route lacks to bring places to a light, of a material with few samples first."""
+    missing = [(target, jobs[0]) for target in targets if (jobs := strategy.prepare(target, light))]
+    return min(missing, key=lambda item: item[0].material.num_samples)[1] if missing else None
+
+
+def _cost(target: TermTarget, basis: EditBasis | None, control: ActiveControl) -> tuple[bool, bool, int]:
+    """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
+    prepared = control.prepared_control
+    is_other_material = prepared is None or prepared.target.material is not target.material
+    return is_other_material, basis is not None or _needs_angles(target), target.material.num_samples
+
+
+def _needs_angles(target: TermTarget) -> bool:
+    """Whether any curve of a term is not flat."""
+    return any(c.kinds.size for c in contract_levels(target.live.term, target.live.target_bands, None))

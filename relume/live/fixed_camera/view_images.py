@@ -1,0 +1,273 @@
+"""The live terms of all materials in one view, and what the memory knows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from copy import copy
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.roughness_levels import uses_roughness_map
+from relume.brdf.term_validation import complete_term
+from relume.brdf.texture_slots import roughness_image
+from relume.core.cache import Cache
+from relume.core.errors import ParameterError
+from relume.lights.spherical_triangles import TriangleLights
+from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer
+from relume.live.fixed_camera.illumination import (
+    Illumination,
+    Solo,
+    illumination_from_look,
+    is_solo,
+    material_emission,
+    picture_gain,
+)
+from relume.live.fixed_camera.live_term import LiveTerm
+from relume.live.fixed_camera.material_image import MaterialImage
+from relume.live.fixed_camera.mirror_samples import MirrorFactors
+from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer
+from relume.look import Look, TermLook, validate
+from relume.operators.edit_basis import CurveBasis, EditBasis
+from relume.operators.operator import Operator
+from relume.operators.parameter_operator import linearize
+from relume.operators.shade import ShadedTerm, shaded_bytes
+from relume.transport.shading_points import ShadingPoints
+from relume.views.map_override import MapOverrides, with_overrides
+from relume.views.view import Tile
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+MERGED_LIGHT_SUFFIX = "roughly"
+"""Ends the names of operators of merged lights."""
+
+_WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None)
+
+
+def material_documents(look: Look, material: str) -> Sequence[TermLook]:
+    """The terms whose images make a material's picture; of a catcher what arrives at it, as a white surface has it."""
+    material_look = look.materials[material]
+    return (cast(TermLook, _WHITE),) if material_look.catcher else material_look.terms
+
+
+class ViewImages:
+    """Found by name, by pointer, and by what the cache knows them as.
+
+    Attributes:
+        default: the scene's own look. by_name: the materials in the scene's order.
+        light: what arrives at them. default_light: what does under the scene's own look.
+        gain: what multiplies the finished picture. mirrors: what they send on of it.
+        region: pixels that are seen of the picture: x, y, width, height; None: all.
+    """
+
+    def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache) -> None:
+        self.transfer, self.cache = transfer, cache
+        self.view = transfer.views[view_name]
+        self.default = validate(transfer.default_look, transfer.default_look)
+        self.light = self.default_light = self._illumination_from_look(self.default)
+        self.by_name = {
+            name: MaterialImage(self.view, index, material_documents(self.default, name), self.light)
+            for index, name in enumerate(transfer.material_names)
+        }
+        self.gain = picture_gain(self.default)
+        self.mirrors = MirrorFactors(self.view)
+        self.region: Tile | None = None
+
+    def view_with_overrides(self, look: Look) -> ViewImages:
+        """The images of the view whose samples wear the images that a look names in the place of maps of roughness and
+        of normals; the same where none is named that was not before. Materials whose images are others go on showing
+        what they do; others are shared.
+
+        Raises what `relume.views.map_override.with_overrides` raises; then nothing has changed.
+        """
+        maps = tuple(self._map_overrides(look, name) for name in self.transfer.material_names)
+        if maps == (self.view.maps or (None,) * len(maps)):
+            return self
+        changed, view = copy(self), with_overrides(self.transfer.views[self.view.name], maps, self.transfer.tracer)
+        changed.view, changed.mirrors, changed.by_name = view, MirrorFactors(view), {}
+        baked_to_view = np.empty(view.num_surface_samples, np.int64)
+        baked_to_view[self.view.unmodified()] = np.arange(
+            len(baked_to_view)
+        )  # of the samples as they were baked, in this view
+        for index, (name, before) in enumerate(self.by_name.items()):
+            image = before
+            if view.sample_key(index) != self.view.sample_key(index):
+                rows = view.rows(index)
+                image = MaterialImage(view, index, before.documents, self.light)
+                image.keep_displayed(before, baked_to_view[view.unmodified()[rows]] - rows.start)
+            changed.by_name[name] = image
+        return changed
+
+    def _map_overrides(self, look: Look, material: str) -> MapOverrides | None:
+        """What a look names in the place of a material's maps; None for nothing."""
+        documents, normals = material_documents(look, material), look.materials[material].normals
+        roughness = roughness_image(documents)
+        if roughness is None and normals is None:
+            return None
+        return MapOverrides(
+            roughness, normals, self._base_roughness(material) if any(map(uses_roughness_map, documents)) else None
+        )
+
+    def _base_roughness(self, material: str) -> float | None:
+        """The roughness of a material's terms in the scene, that bumps below a pixel widen."""
+        values = (term["params"].get("roughness") for term in material_documents(self.default, material))
+        return next((float(np.mean(value)) for value in values if value is not None), None)
+
+    def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
+        """All that this view sees anything of."""
+        materials = self.by_name.values()
+        return ((material, image) for material in materials if material.num_samples for image in material.terms)
+
+    def image_bytes(self) -> int:
+        """Memory of one image of every term."""
+        return sum(shaded_bytes(material.num_samples) for material, _ in self.terms())
+
+    def set_look(self, look: Look, solo: Solo = None) -> None:
+        """A new target for every term, in the light of some sources alone where `solo` names them.
+
+        Raises what `FixedViewTransfer.radiance_of` raises; then nothing has changed.
+        """
+        light = self._illumination_from_look(look, solo)
+        if light != self.light:
+            if light.environment.map is not None:
+                self.transfer.environment_radiance(light.environment.map)
+            self.light = light
+            for material in self.by_name.values():
+                material.set_light(light, is_solo=is_solo(look, solo))
+        for name, material in self.by_name.items():
+            material.set_documents(material_documents(look, name))
+        self.gain = picture_gain(look, solo)
+
+    def set_emission(self, light: Illumination) -> None:
+        """Surfaces send out themselves what they do in this light."""
+        for name, material in self.by_name.items():
+            material.set_emission(material_emission(light, name), self._emission_pattern)
+
+    def update_mirrors(self, look: Look) -> list[int]:
+        """Bring mirrors to a look, as far as their materials are shown in it; returns the materials that send on
+        something else than before."""
+        names = {index: self.transfer.material_names[index] for index in self.mirrors.materials}
+        documents = {
+            k: None if look.materials[name].catcher else self.by_name[name].mirrors for k, name in names.items()
+        }
+        return self.mirrors.update_emission(documents)
+
+    def incident_light(
+        self, material: MaterialImage, light: Illumination, is_canceled: Callable[[], bool]
+    ) -> tuple[TriangleLights, ShadingPoints]:
+        """What arrives at the samples of a material in a light; what the memory lacks is traced.
+
+        Args:
+            material: of these. light: what arrives. is_canceled: asked now and then.
+        Raises:
+            CancelledError: `is_canceled` said so.
+        """
+        if light.paths.has_indirect and material.num_samples:
+            self.view.trace_gather_rays(material.index, is_canceled)
+            self.transfer.solve_indirect_cache(light, is_canceled)
+        return self.transfer.incident_light(self.view, material.index, light, self.cache)
+
+    def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
+        """The samples of a material, without what arrives at them."""
+
+        def read() -> ShadingPoints:
+            return self.view.receivers(material.index, is_lit=False)
+
+        key = self.transfer.key, "receivers", *self.view.sample_key(material.index)
+        return self.cache.get_value(key, read)
+
+    def is_default(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> bool:
+        """Whether a material's live term in some light is of the scene's own look: its image stays beside the store."""
+        name = self.transfer.material_names[material.index]
+        is_without_overrides = not any(self.view.maps[material.index : material.index + 1])
+        return (
+            is_without_overrides
+            and light == self.default_light
+            and live.document in material_documents(self.default, name)
+        )
+
+    def _illumination_from_look(self, look: Look, solo: Solo = None) -> Illumination:
+        has_bounces = EditAxis.BOUNCES in self.transfer.axes
+        return illumination_from_look(look, self.transfer.material_names, has_bounces=has_bounces, solo=solo)
+
+    def _emission_pattern(self, material: int) -> F32:
+        """How brightly the samples of a material shine, over its mean; nothing on sides that do not. (n, 1 or 3)"""
+        return self.transfer.is_emissive_at(self.view, material)[:, None] * self.view.emissive(material)
+
+    def material_term(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, LiveTerm]:
+        """The material and the term of a pointer in the look as it is now.
+
+        Raises:
+            ParameterError: there is no such curve or parameter.
+        """
+        material = self.by_name.get(pointer.material)
+        if material is None or not pointer.term < len(material.terms):
+            raise ParameterError(str(pointer), pointer.material, "a material and term of this look")
+        term = material.terms[pointer.term]
+        declared = term.term.curves if isinstance(pointer, CurvePointer) else term.term.parameters
+        names = [item.name for item in declared]
+        if pointer.name not in names:
+            raise ParameterError(str(pointer), pointer.name, ", ".join(names))
+        return material, term
+
+    def basis(self, pointer: CurvePointer | ParameterPointer) -> EditBasis | None:
+        """What must be free for what a pointer means to be moved; None where light has no part in it.
+
+        Raises:
+            ParameterError: there is no such curve or parameter.
+        """
+        _, term = self.material_term(pointer)
+        if isinstance(pointer, ParameterPointer):
+            return linearize(term.document, pointer.name)
+        curve = term.term.curve(pointer.name)
+        return None if curve.depends_on_view else CurveBasis.from_curve(curve)
+
+    def _sample_key(self, material: MaterialImage) -> tuple[Hashable, ...]:
+        return self.transfer.key, *self.view.sample_key(
+            material.index
+        )  # the store comes first: a memory asks whose it is
+
+    def operator_key(
+        self,
+        material: MaterialImage,
+        live: LiveTerm,
+        basis: EditBasis,
+        bands: Mapping[str, F64],
+        *,
+        is_merged_light: bool = False,
+    ) -> tuple[Hashable, ...]:
+        """Name of the operator of a material's live term along a basis in the memory.
+
+        Args:
+            bands: of the term's curves, (3, J) each; those that it moves are free. is_merged_light: of that of merged
+                lights.
+        """
+        return (
+            *self._sample_key(material),
+            live.operator_key(basis, bands),
+            *((MERGED_LIGHT_SUFFIX,) if is_merged_light else ()),
+        )
+
+    def image_key(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> tuple[Hashable, ...]:
+        """Name of the image of a material's live term, of its target in some light."""
+        return *self._sample_key(material), live.image_key(light)
+
+    def image_in(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> ShadedTerm | None:
+        """The image of a material's live term, of its target in some light, where the memory has it."""
+        return self.cache.get_cached(self.image_key(material, live, light), ShadedTerm)
+
+    def is_cached(self, material: MaterialImage, live: LiveTerm) -> bool:
+        """Whether the image of a term's target need not be made: it is in the memory, or was kept with the store."""
+        key = self.image_key(material, live, self.light)
+        return self.cache.get_cached(key, ShadedTerm) is not None or self.transfer.has_image(key[1:])
+
+    def operator(self, material: MaterialImage, live: LiveTerm) -> Operator | None:
+        """The operator that a term follows now, a rough one until the other is there; none if the memory dropped it."""
+        ready = live.ready
+        if ready.basis is None or not live.is_converged:
+            return None
+        key = self.operator_key(material, live, ready.basis, ready.bands)
+        candidates = (self.cache.get_cached(name, Operator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))  # type: ignore[type-abstract]
+        return next((operator for operator in candidates if operator is not None), None)

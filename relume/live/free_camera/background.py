@@ -1,0 +1,142 @@
+"""What a moving eye sees past surfaces, and on grounds that only catch shadows.
+
+As in fixed views (`relume.live.fixed_camera.background.background`), a catcher shows what lies behind it times what
+arrives there over what would arrive if nothing but the ground were there; where nothing would, nothing is hidden.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.color import LUMINANCE, srgb_encode
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.fixed_camera.background.background import MAX_CATCHER_RATIO
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.free_camera.environment_lookup import sample
+from relume.live.free_camera.primary_visibility import GBuffer
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.look.model import BackgroundLook
+
+F32 = NDArray[np.float32]
+
+_MAX_CATCHER_RATIO = np.float32(MAX_CATCHER_RATIO)
+
+
+class ShadowCatcher(NamedTuple):
+    """What catchers compare with.
+
+    Attributes:
+        is_shadow_catcher: of every material. (materials,) bool
+        unoccluded: what a white surface at each vertex of catchers would send if nothing were in the light's way.
+            (vertices or 0, 3) float32
+    """
+
+    is_shadow_catcher: NDArray[np.bool_]
+    unoccluded: F32
+
+
+def background_radiance(
+    transfer: FreeCameraTransfer,
+    background: BackgroundLook,
+    light: Illumination,
+    gain: F32,
+    gbuffer: GBuffer,
+    is_shadow_catcher: NDArray[np.bool_],
+) -> F32:
+    """Find what lies behind, where the background or a catcher is seen. (rays, 3) float32
+
+    Args:
+        transfer: of the picture. background, light: of its look. gain: of the finished picture, in each channel. (3,)
+        gbuffer: by the rays. is_shadow_catcher: of every material. (materials,)
+    """
+    num_rays = len(gbuffer.directions)
+    if background.kind == "color":
+        return np.tile(np.array(background.color, np.float32), (num_rays, 1))
+    radiance = np.zeros((num_rays, 3), np.float32)
+    if background.kind != "transparent":
+        face, face_material = gbuffer.hits.face, transfer.stored_scene.face_material
+        if is_shadow_catcher.any():
+            face = np.where((face >= 0) & is_shadow_catcher[face_material[np.maximum(face, 0)]], -1, face).astype(
+                np.int32
+            )
+        environment_map = transfer.environment_map(
+            light.environment.map, background.blur if background.kind == "blurred" else 0.0
+        )
+        environment_gain = np.array(light.environment_gain, np.float32) * gain
+        sample(environment_map, light.environment.rotation, environment_gain, face, gbuffer.directions, radiance)
+    return radiance
+
+
+def composite_over(
+    stored_scene: StoredScene,
+    gbuffer: GBuffer,
+    background: F32,
+    shadow_catcher: ShadowCatcher,
+    gain: F32,
+    *,
+    is_direct: bool,
+    out: F32,
+) -> F32:
+    """Put surfaces over what is behind them, and shadows of catchers onto it.
+
+    Args:
+        stored_scene: that is seen. gbuffer: by the rays. background: from `background_radiance`. shadow_catcher: by
+            catchers.
+        gain: that `out` has been multiplied by. (3,) float32
+        is_direct: light that comes straight is shown, and with it the background.
+        out: radiance of surfaces, of catchers as white ones; changed to the picture. (rays, 3) float32
+    Returns:
+        How much of the light behind it is hidden along each ray. (rays,) float32
+    """
+    coverage = np.empty(len(out), np.float32)
+    args = (
+        np.array(LUMINANCE, np.float32), gbuffer.hits.face, stored_scene.face_material,
+        shadow_catcher.is_shadow_catcher, shadow_catcher.unoccluded,
+        gbuffer.lattice_node, gbuffer.weight, background, np.asarray(gain, np.float32), is_direct,
+    )  # fmt: skip
+    parallel_for_chunks(lambda start, stop: _composite_over(*args, start, stop, out, coverage), len(out))
+    return coverage
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _composite_over(  # type: ignore[no-untyped-def]
+    luminance, face, face_material, is_shadow_catcher, unoccluded, lattice_node, weight, background, gain, is_direct,
+    start, stop, out,
+    coverage,
+):  # fmt: skip
+    """Do so for rays [start, stop)."""
+    direct_factor = np.float32(1) if is_direct else np.float32(0)
+    for p in range(start, stop):
+        if face[p] < 0:
+            coverage[p] = 0
+            for channel in range(3):
+                out[p, channel] = direct_factor * background[p, channel]
+        elif not is_shadow_catcher[face_material[face[p]]]:
+            coverage[p] = 1
+        else:
+            coverage[p] = 1
+            for channel in range(3):
+                unoccluded_radiance, is_lit = np.float32(0), gain[channel] > 0
+                for k in range(3):
+                    node_value = unoccluded[lattice_node[p, k], channel]
+                    unoccluded_radiance += weight[p, k] * node_value
+                    is_lit &= node_value > 0
+                # beside the rim of a cone, what surfaces reflect would be held against next to nothing
+                shadow_ratio = (
+                    min(out[p, channel] / (gain[channel] * unoccluded_radiance), _MAX_CATCHER_RATIO)
+                    if is_lit
+                    else direct_factor
+                )
+                out[p, channel] = shadow_ratio * background[p, channel]
+                coverage[p] -= luminance[channel] * min(shadow_ratio, np.float32(1))
+
+
+def alpha(coverage: F32, *, for_display: bool) -> F32:
+    """Tell how much pixels hide of display values (sRGB) behind them, or of linear ones. See `composite_over`."""
+    return np.asarray(1 - srgb_encode(1 - coverage), np.float32) if for_display else coverage

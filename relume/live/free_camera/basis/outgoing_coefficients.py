@@ -1,0 +1,178 @@
+"""Out-factors: what materials send to the eye of each function of the in-basis (Mahajan 2008; Sun 2007).
+
+    p_k(ωo) = ∫ ρ(ωi, ωo) cos θi h_k(ωi) dωi,   B(ωo) = Σ_k p_k(ωo) t_k
+
+Light that comes from a direction φ further round is seen a φ further round, so that the factors of an isotropic term
+are tables over θo alone, times cos mφ and sin mφ. Those of other terms are tables over θo and φo.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.quadrature import Quadrature
+from relume.brdf.symmetry import has_reflection_symmetry, is_isotropic
+from relume.live.free_camera.basis.table_symmetry import expand_quarter
+from relume.math.zernike import DEGREE, NUM_FUNCTIONS, num_functions, project, recurrence
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+NUM_ROWS = 32  # of tables, over sqrt(1 − cos θo) from 0 to 1
+NUM_COLUMNS = 32  # over φo, where a term is not isotropic
+_NUM_RADII, _NUM_AZIMUTHS = 40, 96  # of the quadrature over the disc
+_MIN_COSINE = 1e-3
+_MAX_CACHED = 256
+_WHITE = [1.0, 1.0, 1.0]
+
+
+@dataclass(frozen=True)
+class OutgoingCoefficients:
+    """The table of one term.
+
+    Attributes:
+        table: (`NUM_ROWS`, columns, 3, K) float32; of one column, for φo = 0, where the term is isotropic.
+        residual_by_degree: what the functions up to each degree miss of the term, cosine-weighted RMS over its own, the
+            mean over θo; in [0, 1].
+    """
+
+    table: F32
+    residual_by_degree: tuple[float, ...]
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether the term looks the same when both directions turn about the normal, or are mirrored."""
+        return bool(self.table.shape[1] == 1)
+
+    @property
+    def residual_energy(self) -> float:
+        """What all K functions miss."""
+        return self.residual_by_degree[-1]
+
+
+def cosines() -> F64:
+    """Of θo, in the rows of a table. (`NUM_ROWS`,)"""
+    return np.maximum(1 - np.linspace(0, 1, NUM_ROWS) ** 2, _MIN_COSINE)
+
+
+@lru_cache(maxsize=2)
+def _disk_quadrature(is_half: bool) -> tuple[F64, F64, F64]:
+    """Spread directions over the disc, or over half of it for what is the same on the other.
+
+    Returns:
+        Unit directions (n, 3), weights of cos θ dω (n,), functions (n, K); those that the halves cancel are nothing.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_NUM_RADII)
+    num_azimuths = _NUM_AZIMUTHS // 2 if is_half else _NUM_AZIMUTHS
+    r2, phi = (
+        np.repeat((nodes + 1) / 2, num_azimuths),
+        np.tile((np.arange(num_azimuths) + 0.5) * (2 * np.pi / _NUM_AZIMUTHS), _NUM_RADII),
+    )
+    wi = np.stack([np.sqrt(r2) * np.cos(phi), np.sqrt(r2) * np.sin(phi), np.sqrt(1 - r2)], axis=-1)
+    functions, recurrence_table = project(wi), recurrence()
+    if is_half:
+        functions[:, recurrence_table.sine[recurrence_table.order > 0]] = 0
+    return wi, np.repeat(weights / 4, num_azimuths) * (2 * np.pi / num_azimuths), functions
+
+
+def outgoing_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficients:
+    """Project a term, its colour included, its texture not.
+
+    Args:
+        term_document: one term of a complete look.
+    """
+    white = white_coefficients(term_document)
+    color = np.asarray(term_document["color"], np.float32)
+    return OutgoingCoefficients(white.table * color[:, None], white.residual_by_degree)
+
+
+def white_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficients:
+    """Project a term, its colour and texture left out."""
+    return _white_coefficients(white_term_key(term_document))
+
+
+def white_term_key(term_document: Mapping[str, Any]) -> str:
+    """What tells a term from others, its colour and texture left out."""
+    return json.dumps({**term_document, "color": _WHITE, "texture": None}, sort_keys=True)
+
+
+@lru_cache(maxsize=_MAX_CACHED)
+def _white_coefficients(term_text: str) -> OutgoingCoefficients:
+    document = json.loads(term_text)
+    is_term_isotropic = is_isotropic(document)
+    is_quarter = not is_term_isotropic and has_reflection_symmetry(document)
+    num_columns = 1 if is_term_isotropic else NUM_COLUMNS // 4 + 1 if is_quarter else NUM_COLUMNS
+    phi = np.linspace(0, 2 * np.pi, NUM_COLUMNS + 1)[:num_columns]
+    table, energy = _project_isotropic(document) if is_term_isotropic else _project_anisotropic(document, phi)
+    captured_energy = np.cumsum((table**2).sum(axis=2), axis=-1)[..., [num_functions(n) - 1 for n in range(DEGREE + 1)]]
+    residual = np.sqrt(np.clip(1 - captured_energy / np.maximum(energy, 1e-30)[..., None], 0, 1))
+    ends = (
+        np.where(np.isin(np.arange(num_columns), (0, num_columns - 1)), 0.5, 1.0)
+        if is_quarter
+        else np.ones(num_columns)
+    )
+    by_degree = np.average(np.average(residual, weights=ends, axis=1), weights=cosines(), axis=0)
+    full_table = expand_quarter(table) if is_quarter else table
+    return OutgoingCoefficients(full_table.astype(np.float32), tuple(by_degree.tolist()))
+
+
+def _view_directions(phi: F64) -> F64:
+    """ωo of all rows, from some φo. (`NUM_ROWS`, columns, 3)"""
+    cosine = np.broadcast_to(cosines()[:, None], (NUM_ROWS, len(phi)))
+    sine = np.sqrt(1 - cosine**2)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+
+
+@lru_cache(maxsize=1)
+def _isotropic_quadrature() -> tuple[Quadrature, F32, F32]:
+    """Where isotropic terms are evaluated; weights (n,); weighed functions of the ladder's cosine parts, (n, rungs)."""
+    wi, weight, functions = _disk_quadrature(is_half=True)
+    weighted_functions = weight[:, None] * functions[:, recurrence().cosine]
+    return (
+        Quadrature(wi, _view_directions(np.zeros(1))),
+        weight.astype(np.float32),
+        np.ascontiguousarray(weighted_functions, np.float32),
+    )
+
+
+def _project_isotropic(document: Mapping[str, Any]) -> tuple[F64, F64]:
+    """Project an isotropic term seen from all rows and φo = 0: factors (rows, 1, 3, K), energies (rows, 1)."""
+    quadrature, weight, weighted_functions = _isotropic_quadrature()
+    value = quadrature.values(document).astype(np.float32)  # (channels, rows, n)
+    table = np.zeros((NUM_ROWS, 1, 3, NUM_FUNCTIONS))
+    table[..., recurrence().cosine] = np.swapaxes(value @ weighted_functions, 0, 1)[:, None]
+    return table, np.broadcast_to(value**2 @ weight, (3, NUM_ROWS)).sum(axis=0)[:, None]
+
+
+def _project_anisotropic(document: Mapping[str, Any], phi: F64) -> tuple[F64, F64]:
+    """Project a term seen from all rows and some φo: factors (rows, columns, 3, K), energies (rows, columns)."""
+    wo, (wi, weight, functions) = _view_directions(phi), _disk_quadrature(is_half=False)
+    table, energy = np.empty((NUM_ROWS, len(phi), 3, NUM_FUNCTIONS)), np.empty((NUM_ROWS, len(phi)))
+    weighted_functions = weight[:, None] * functions
+    for row in range(NUM_ROWS):  # so many at once that arrays are of some megabytes
+        value = np.moveaxis(eval_brdf(document, wi, wo[row, :, None]), -1, -2)  # (columns, 3, directions)
+        table[row] = value @ weighted_functions
+        energy[row] = (value**2 @ weight).sum(axis=-1)
+    return table, energy
+
+
+def rotate_coefficients(row: F64, phi: float) -> F64:
+    """Turn the factors of an isotropic term for φo = 0, (..., K), to another φo: what kernels do, in NumPy."""
+    recurrence_table, out = recurrence(), np.array(row, np.float64)
+    for basis_index, m in enumerate(recurrence_table.order):
+        if m > 0:
+            out[..., recurrence_table.sine[basis_index]] = row[..., recurrence_table.cosine[basis_index]] * np.sin(
+                m * phi
+            )
+            out[..., recurrence_table.cosine[basis_index]] = row[..., recurrence_table.cosine[basis_index]] * np.cos(
+                m * phi
+            )
+    return out

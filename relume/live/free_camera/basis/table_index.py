@@ -1,0 +1,43 @@
+"""Where what an eye sees lies in tables over θo and φo."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba as nb
+import numpy as np
+
+from relume.core.numba_options import UNCOUNTED
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
+
+MIN_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
+
+
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+def table_row(cosine):  # type: ignore[no-untyped-def]
+    """Find where cos θo lies in tables: a row, and the share of the next."""
+    row_coordinate = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
+    row: Any = min(np.int64(row_coordinate), NUM_ROWS - 2)
+    return row, np.float32(row_coordinate - row)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def view_direction_local(position, normal, tangent, camera_position):  # type: ignore[no-untyped-def]
+    """Find where a point's wo lies in tables: a row, the share of the next, and cos φo, sin φo.
+
+    Args:
+        position, normal, tangent: of the point. camera_position: where it is.
+    """
+    x, y, z = camera_position[0] - position[0], camera_position[1] - position[1], camera_position[2] - position[2]
+    scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
+    x, y, z = scale * x, scale * y, scale * z
+    n, t = normal, tangent
+    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+    across, along = t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z
+    cosine: Any = min(max(n[0] * x + n[1] * y + n[2] * z, MIN_COSINE), np.float32(1))
+    length = math.sqrt(across * across + along * along)
+    row, fraction = table_row(cosine)
+    if length < np.float32(1e-6):
+        return row, fraction, np.float32(1), np.float32(0)
+    return row, fraction, np.float32(across / length), np.float32(along / length)

@@ -1,0 +1,186 @@
+"""What a shader keeps of a bake: surfaces and points, in arrays of texels of one, two or four numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.live.free_camera.basis.lobe_shapes import NUM_AZIMUTHS, NUM_RINGS, WIDTHS
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS, NUM_ROWS
+from relume.live.free_camera.highlights.light_sum_kernel import LEAST_BITS
+from relume.live.free_camera.highlights.lobe_light_lists import (
+    LIGHTS_PER_BRIGHT_LIGHT,
+    MIN_SIGMA,
+    NUM_LISTED,
+    NUM_WIDTHS,
+    SIDE,
+)
+from relume.live.free_camera.normal_mapping import basis_gradients
+from relume.live.free_camera.probes.stored_scene import StoredScene, Textures
+from relume.live.free_camera.probes.triangle_grids import ProbeGrid, num_nodes
+from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.math.zernike import NUM_FUNCTIONS, recurrence
+
+Texels = NDArray[Any]
+
+MAX_TEXELS = 1 << 24  # of textures, all levels: finer ones are left out, finest first
+
+
+def constants(transfer: FreeCameraTransfer) -> dict[str, Any]:
+    """What shaders are written from: the ladder of the in-basis, expansions of leaning normals, sizes of tables
+    and of lists of lights.
+
+    `first_points` are those of the materials, and one more at the end. `has_alpha_tested_surfaces` says that surfaces
+    have some, which shaders do not know of.
+    """
+    recurrence_fields = {name: field.tolist() for name, field in recurrence()._asdict().items()}
+    sizes = {"functions": NUM_FUNCTIONS, "rows": NUM_ROWS, "columns": NUM_COLUMNS}
+    first = first_probes(transfer).tolist()
+    texts = {"ladder": recurrence_fields, "expansions": basis_gradients().tolist(), "first_points": first}
+    lists: dict[str, float] = {"side": SIDE, "listed": NUM_LISTED, "lights_a_lamp": LIGHTS_PER_BRIGHT_LIGHT}
+    lists |= {"narrowest": MIN_SIGMA, "widths": NUM_WIDTHS}
+    shapes = {"rings": NUM_RINGS, "spokes": NUM_AZIMUTHS, "widths": len(WIDTHS), "least_bits": int(LEAST_BITS)}
+    return {**sizes, **texts, "lobe_lists": lists, "shapes": shapes, "has_holes": transfer.has_alpha_tested_surfaces}
+
+
+def first_probes(transfer: FreeCameraTransfer) -> NDArray[np.int64]:
+    """Find where the points of each material begin, which come one after another. (materials + 1,)"""
+    return np.searchsorted(transfer.stored_scene.material, np.arange(len(transfer.material_names) + 1))
+
+
+def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], Texels]]:
+    """Name the arrays of a bake; each is made when it is called.
+
+    Returns:
+        (texels, 1, 2 or 4) each, float32, float16 or uint32:
+        corners: of faces, three and the material. sides: two of each face, see `node_arrays`. facing: normals of faces,
+        `uv_scale`. positions: of corners. normals, points, weights: of slots. places, point_normals, tangents: of
+        points. seen_lights: bits of the lights that each sees, 128 a texel, which lobes alone need.
+        Of scenes with textures besides: texels; levels: of each texture (first level's row, how many, both wraps),
+        then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the bitangent, 0)
+        and its tangent.
+    """
+    stored_scene, probes = transfer.stored_scene, transfer.stored_scene.probes
+    shader_nodes = node_arrays(stored_scene.probe_grid)
+    lattice_nodes = stored_scene.lattice_nodes
+    factories: dict[str, Callable[[], Texels]] = {
+        "corners": lambda: np.column_stack([stored_scene.faces, stored_scene.face_material]).astype(np.uint32),
+        "sides": lambda: shader_nodes.sides.reshape(-1, 4),
+        "facing": lambda: _to_vec4(stored_scene.face_normal, stored_scene.uv_scale),
+        "positions": lambda: _to_vec4(transfer.positions, 0),
+        "normals": lambda: _to_vec4(lattice_nodes.normal[shader_nodes.lattice_node], 0).astype(np.float16),
+        "points": lambda: lattice_nodes.point[shader_nodes.lattice_node].astype(np.uint32),
+        "weights": lambda: lattice_nodes.weight[shader_nodes.lattice_node].astype(np.float16),
+        "places": lambda: _to_vec4(probes.position, 0),
+        "point_normals": lambda: _to_vec4(probes.normal, 0).astype(np.float16),
+        "tangents": lambda: _to_vec4(probes.tangent, 0).astype(np.float16),
+        "seen_lights": lambda: _bits(transfer.light_visibility_bits),
+    }
+    if len(stored_scene.textures.wraps):
+        factories |= _texture_factories(stored_scene, stored_scene.textures)
+    return factories
+
+
+class NodeArrays(NamedTuple):
+    """Where a shader keeps what vertices send.
+
+    Nodes of a grid have a slot each, one after another, so that they are found without being looked up. Faces with one
+    row, which are many where a mesh is fine, share those of their corners.
+
+    Attributes:
+        sides: of each side of a face, the numbers of its rows last. Of one row: the slots of its corners. Of more: its
+            first slot, 0, 0. A side without any has what the other has. (faces, 2, 4) uint32
+        lattice_node: that each slot is. (slots,) uint32
+    """
+
+    sides: NDArray[np.uint32]
+    lattice_node: NDArray[np.uint32]
+
+
+def node_arrays(probe_grid: ProbeGrid) -> NodeArrays:
+    """Number the slots of a lattice."""
+    rows, first = probe_grid.num_rows.ravel().astype(np.int64), probe_grid.first.ravel().astype(np.int64)
+    counts = num_nodes(rows)
+    is_wide = rows > 1
+    is_wide_node = np.repeat(is_wide, counts)  # nodes are in the order of sides
+    narrow = first[rows == 1, None] + np.array([0, 2, 1])  # i towards the second corner, j towards the third
+    corners, corner_index = np.unique(probe_grid.node[narrow], return_inverse=True)
+    num_wide = int(is_wide_node.sum())
+    side_table = np.zeros((len(rows), 4), np.uint32)
+    side_table[:, 3] = rows
+    side_table[is_wide, 0] = (np.cumsum(counts * is_wide) - counts)[is_wide]
+    side_table[rows == 1, :3] = num_wide + corner_index.reshape(narrow.shape)
+    sides = side_table.reshape(-1, 2, 4)
+    has_none = sides[..., 3] == 0
+    sides = np.where(has_none[..., None], sides[:, ::-1], sides)
+    return NodeArrays(sides, np.concatenate([probe_grid.node[is_wide_node], corners]).astype(np.uint32))
+
+
+def _texture_factories(stored_scene: StoredScene, textures: Textures) -> dict[str, Callable[[], Texels]]:
+    level_indices, first = _select_levels(textures)
+    level_starts = np.cumsum([0, *(textures.levels[k, 1] * textures.levels[k, 2] for k in level_indices)])
+
+    def texels() -> Texels:
+        blocks = [textures.texels[s : s + h * w] for s, h, w in textures.levels[level_indices]]
+        return _to_vec4(np.concatenate(blocks), 0).astype(np.float16)
+
+    num = len(textures.wraps)
+    texture_rows = np.column_stack([first[:-1] + num, np.diff(first), textures.wraps])
+    level_rows = np.column_stack(
+        [level_starts[:-1], textures.levels[level_indices, 1:], np.zeros(len(level_indices), np.int64)]
+    )
+    return {
+        "uvs": lambda: _corner_frames(stored_scene),
+        "texels": texels,
+        "levels": lambda: np.concatenate([texture_rows, level_rows]).astype(np.uint32),
+    }
+
+
+def overridden_texture_arrays(baked: StoredScene, stored_scene: StoredScene) -> dict[str, Texels]:
+    """Find what takes the place of a bake's arrays of textures where a look names images: textures keep their numbers.
+
+    Args:
+        baked: what is seen. stored_scene: it with the images.
+    """
+    factories = _texture_factories(stored_scene, stored_scene.textures)
+    has_frames = len(baked.textures.wraps) and stored_scene.tangents is baked.tangents
+    return {name: factory() for name, factory in factories.items() if name != "uvs" or not has_frames}
+
+
+def _corner_frames(stored_scene: StoredScene) -> Texels:
+    out = np.zeros((len(stored_scene.uvs), 2, 4), np.float32)
+    out[:, 0, :2] = stored_scene.uvs
+    num = len(stored_scene.tangents)  # corners whose places are projected have none of their own
+    out[:num, 0, 2], out[:num, 1, :3] = stored_scene.tangents[:, 3], stored_scene.tangents[:, :3]
+    return out.reshape(-1, 4)
+
+
+def _select_levels(textures: Textures) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Levels of all textures that fit, and where those of each begin: the finest of the largest goes first."""
+    ranges = [list(range(a, b)) for a, b in zip(textures.first[:-1], textures.first[1:], strict=True)]
+    area = textures.levels[:, 1] * textures.levels[:, 2]
+    while sum(int(area[k].sum()) for k in ranges) > MAX_TEXELS:
+        widest = max(ranges, key=lambda levels: int(area[levels[0]]) if len(levels) > 1 else 0)
+        if len(widest) == 1:
+            break
+        widest.pop(0)
+    return np.concatenate(ranges).astype(np.int64), np.cumsum([0, *map(len, ranges)])
+
+
+def _bits(visible: NDArray[np.uint8]) -> Texels:
+    """Put bits of points, low ones first, into whole texels."""
+    num = -(-visible.shape[1] // 16)
+    out = np.zeros((len(visible), 16 * num), np.uint8)
+    out[:, : visible.shape[1]] = visible
+    return out.view("<u4").reshape(-1, 4)
+
+
+def _to_vec4(vectors: NDArray[Any], fourth: Any) -> Texels:
+    """Add a fourth number to each row."""
+    out = np.empty((len(vectors), 4), np.float32)
+    out[:, :3] = vectors
+    out[:, 3] = fourth
+    return out

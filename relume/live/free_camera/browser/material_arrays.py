@@ -1,0 +1,283 @@
+"""What a look makes for a shader: tables of materials, light vectors, the sky; each known by what it follows from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.texture_slots import TEXTURES
+from relume.live.fixed_camera.illumination import material_emission
+from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
+from relume.live.free_camera.browser.geometry_arrays import first_probes, overridden_texture_arrays
+from relume.live.free_camera.browser.highlight_arrays import environment_light_array, lobe_shape_array
+from relume.live.free_camera.environment_lookup import rotation_of
+from relume.live.free_camera.frame import FrameRequestState, MaterialState
+from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, lobe_widths
+from relume.live.free_camera.probes.stored_scene import EMISSION, NORMAL_MAP
+from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.math.zernike import DEGREE, DEGREES, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
+from relume.views.resolve import encode_pixels
+
+F32 = NDArray[np.float32]
+Texels = NDArray[Any]
+
+_NUM_COARSE_FUNCTIONS = num_functions(FAST_DEGREE)  # that are not nothing in what is found quickly
+_FUNCTION_COUNTS = np.array(
+    [1, _NUM_COARSE_FUNCTIONS, NUM_FUNCTIONS]
+)  # how many are sent: a shader is written for each number
+_MAX_RESIDUAL = 1e-3  # of a table's size, by the functions that a shader leaves out
+_MAX_SCALED = 2.0**14  # of light vectors: well inside half precision
+
+
+class ArrayBlock(NamedTuple):
+    """Some arrays that change together.
+
+    Attributes:
+        key: of what they follow from. make: finds them, by name; (texels, 1, 2 or 4) each.
+    """
+
+    key: Hashable
+    make: Callable[[], Mapping[str, Texels]]
+
+
+class ShaderConstants(NamedTuple):
+    """What a frame needs besides: as `SceneUpdate` of the wire says."""
+
+    gain: list[float]
+    sky_gain: list[float]
+    background_gain: list[float]
+    sky_turn: float
+    sky_levels: list[list[int]]
+    lamps: list[list[float]]
+    background: str
+    background_color: list[float]
+    background_size: list[int]
+    is_direct: bool
+
+
+def array_blocks(
+    transfer: FreeCameraTransfer, state: FrameRequestState, versions: tuple[Hashable, Hashable]
+) -> dict[str, ArrayBlock]:
+    """Name what a shader must have to show a look.
+
+    Args:
+        transfer: of the bake. state: what is shown. versions: of its materials, and of its light vectors.
+    """
+    look, light = state.look, state.light
+    lobes, background = state.materials.lobes, look.background
+    catchers = tuple(k for k, name in enumerate(transfer.material_names) if look.materials[name].catcher)
+    blocks = {
+        "materials": ArrayBlock(
+            (versions[0], light.local, light.paths.direct, catchers), lambda: _materials(transfer, state)
+        ),
+    }
+    stored_scene = transfer.stored_scene_with(state.materials.overrides)
+    if stored_scene is not transfer.stored_scene:
+        blocks["images"] = ArrayBlock(
+            state.materials.overrides, lambda: overridden_texture_arrays(transfer.stored_scene, stored_scene)
+        )
+    num_needed = needed_function_counts(state.materials, stored_scene.textures.material_textures[:, NORMAL_MAP] >= 0)
+    incident_vectors, first = (state.incident.total, state.incident.non_environment), first_probes(transfer)
+    for name, vectors, needed in zip(("vectors", "others"), incident_vectors, num_needed, strict=True):
+        function_counts = np.minimum(needed, _NUM_COARSE_FUNCTIONS) if state.is_coarse else needed
+        for k in np.flatnonzero(function_counts * np.diff(first)):
+            probe_vectors, key = vectors[first[k] : first[k + 1]], f"{name}/{k}"
+            blocks[key] = ArrayBlock(
+                (versions[1], function_counts[k]), partial(_vector_arrays, key, probe_vectors, int(function_counts[k]))
+            )
+    blocks |= _highlight_blocks(transfer, state)
+    if len(lobes.max_ratio) or background.kind == "map":
+        blocks["sky"] = ArrayBlock(
+            light.environment.map, lambda: {"sky": _encode_rgb9e5(transfer.prefiltered(light.environment.map).texels)}
+        )
+    if widths := lobe_widths(lobes):
+        blocks["lobe_lights"] = ArrayBlock(
+            (light.environment, widths), lambda: _lobe_light_arrays(transfer.lobe_lights(light.environment, widths))
+        )
+    if background.kind == "blurred":
+        blurred = light.environment.map, background.blur
+        blocks["background"] = ArrayBlock(
+            blurred, lambda: {"background": _encode_rgb9e5(transfer.environment_map(*blurred).reshape(-1, 3))}
+        )
+    if catchers:
+        blocks["unhidden"] = ArrayBlock(
+            (light, catchers, state.is_coarse), lambda: {"unhidden": _unoccluded(transfer, state, catchers)}
+        )
+    return blocks
+
+
+def shader_constants(transfer: FreeCameraTransfer, state: FrameRequestState) -> ShaderConstants:
+    """Find what a shader needs besides its arrays; see `relume.live.free_camera.frame`."""
+    look, light = state.look, state.light
+    environment_gain = light.environment_gain if light.has_direct_environment else (0.0, 0.0, 0.0)
+    radiance, blur = look.background, look.background.blur if look.background.kind == "blurred" else 0.0
+    return ShaderConstants(
+        gain=[float(x) for x in state.gain],
+        sky_gain=[float(x) for x in environment_gain],
+        background_gain=[float(a * b) for a, b in zip(light.environment_gain, state.gain, strict=True)],
+        sky_turn=float(rotation_of(light.environment.rotation)),
+        sky_levels=transfer.prefiltered(light.environment.map).levels.tolist(),
+        lamps=transfer.bright_lights(light.environment).tolist(),
+        background=radiance.kind,
+        background_color=[float(x) for x in radiance.color],
+        background_size=list(transfer.environment_map(light.environment.map, blur).shape[:2]),
+        is_direct=light.paths.direct,
+    )
+
+
+def _materials(transfer: FreeCameraTransfer, state: FrameRequestState) -> dict[str, Texels]:
+    tables, lobes = state.materials.tables, state.materials.lobes
+    return {
+        "even": tables.isotropic.reshape(-1, 4),
+        "uneven": tables.anisotropic.reshape(-1, 4),
+        "lobes": _lobes(lobes),
+        "materials": _material_rows(transfer, state, state.materials),
+    }
+
+
+def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) -> dict[str, ArrayBlock]:
+    """The lights of the sky, and the shape of the highlight of each material that they are summed for."""
+    environment, lobes, is_coarse = state.light.environment, state.materials.lobes, state.is_coarse
+    normal_variation, projected = (
+        transfer.stored_scene_with(state.materials.overrides).normal_variation,
+        state.materials.projected,
+    )
+    shapes = {
+        f"shapes/{k}": ArrayBlock(
+            (json.dumps(projected[k].terms, sort_keys=True), float(normal_variation[k])),
+            partial(lobe_shape_array, lobes, k, normal_variation),
+        )
+        for k in np.flatnonzero(lobes.lobe_index >= 0).tolist()
+        if lobes.max_ratio[lobes.lobe_index[k]] == 1
+    }
+    if not shapes:
+        return {}
+    lights = ArrayBlock(
+        (environment, is_coarse),
+        lambda: environment_light_array(transfer.environment_lights(environment, is_preview=is_coarse)),
+    )
+    return {**shapes, "sky_lights": lights}
+
+
+def _lobes(lobes: Lobes) -> F32:
+    """Of each row of each lobe the albedos by groups, with `most`, σ_2, √(1 − R); then both cosines, s_1 and σ_1.
+    (lobes · rows · (groups + 1), 4)"""
+    num, rows = lobes.first.shape
+    out = np.zeros((num, rows, NUM_GROUPS + 1, 4), np.float32)
+    out[:, :, :NUM_GROUPS, :3] = lobes.albedo
+    out[:, :, 0, 3], out[:, :, 1, 3], out[:, :, 2, 3] = (
+        lobes.max_ratio[:, None],
+        lobes.sigma[..., 1],
+        lobes.single_sigma,
+    )
+    out[:, :, NUM_GROUPS] = np.concatenate([lobes.cosine, lobes.first[..., None], lobes.sigma[..., :1]], axis=-1)
+    return out.reshape(-1, 4)
+
+
+def _lobe_light_arrays(lobe_lights: LobeLightLists) -> dict[str, Texels]:
+    """Lights that lobes look for, two texels each; lists of four a texel, −1 after the last; the first
+    list of each width; of each lamp its lights and their shares."""
+    lights = np.zeros((len(lobe_lights.lights), 8), np.float32)
+    lights[:, :5] = lobe_lights.lights
+    bright_lights = np.stack([lobe_lights.bright_lights.astype(np.float32), lobe_lights.bright_light_weights], axis=-1)
+    return {
+        "lobe_lights": lights.reshape(-1, 4),
+        "lobe_lists": lobe_lights.lists.reshape(-1, 4),
+        "lobe_firsts": lobe_lights.first[:, None],
+        "lights_of_lamps": np.ascontiguousarray(bright_lights.reshape(-1, 2))
+        if bright_lights.size
+        else np.zeros((1, 2), np.float32),
+    }
+
+
+def _material_rows(
+    transfer: FreeCameraTransfer, state: FrameRequestState, materials: MaterialState
+) -> NDArray[np.int32]:
+    """What each material has: of each group its even and its uneven table, whether it sends, its texture; then its
+    lobe, its normal map, whether it is a catcher, −1; then the bits of its emission, and the image of that; then of
+    each group both tables of the sky in its highlights, and both of other light. −1 for none.
+    (materials · (2 groups + 2), 4) int32"""
+    tables, lobes, is_reflective = materials.tables, materials.lobes, materials.is_reflective
+    material_textures = transfer.stored_scene_with(materials.overrides).textures.material_textures
+    out = np.full((len(is_reflective), 2 * NUM_GROUPS + 2, 4), -1, np.int32)
+    out[:, :NUM_GROUPS, :2], out[:, NUM_GROUPS + 2 :] = tables.table_index[..., :2], tables.table_index[..., 2:]
+    out[:, :NUM_GROUPS, 2] = is_reflective
+    out[:, 1:NUM_GROUPS, 3] = material_textures[:, : len(TEXTURES)]
+    out[:, NUM_GROUPS, 0] = lobes.lobe_index
+    out[:, NUM_GROUPS, 1] = material_textures[:, NORMAL_MAP]
+    out[:, NUM_GROUPS, 2] = [state.look.materials[name].catcher for name in transfer.material_names]
+    emission = [(*material_emission(state.light, name), 0) for name in transfer.material_names]
+    out[:, NUM_GROUPS + 1] = np.array(emission, np.float32).view(np.int32)
+    out[:, NUM_GROUPS + 1, 3] = material_textures[:, EMISSION]
+    return out.reshape(-1, 4)
+
+
+def needed_function_counts(
+    materials: MaterialState, has_map: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find how many functions of light vectors materials get: at least up to the degree that their tables know, all
+    where a normal map asks where light comes from.
+
+    Args:
+        materials: what they send. has_map: whether each has a normal map. (materials,)
+    Returns:
+        Of vectors of all light, and of those of others than the sky, which highlights send apart. (materials,) each
+    """
+    tables = materials.tables
+    isotropic_degrees, anisotropic_degrees = (
+        _degrees(tables.isotropic, DEGREES[recurrence().cosine]),
+        _degrees(tables.anisotropic, DEGREES),
+    )
+
+    def needed(columns: slice) -> NDArray[np.int64]:
+        out = np.zeros(len(tables.table_index), np.int64)
+        for k, indices in enumerate(tables.table_index[..., columns]):
+            isotropic, anisotropic = indices[:, ::2], indices[:, 1::2]
+            degrees = [
+                *isotropic_degrees[isotropic[isotropic >= 0]],
+                *anisotropic_degrees[anisotropic[anisotropic >= 0]],
+            ]
+            out[k] = _FUNCTION_COUNTS[np.searchsorted(_FUNCTION_COUNTS, num_functions(max(degrees)))] if degrees else 0
+        return out
+
+    total = needed(slice(0, 4))
+    total[has_map] = NUM_FUNCTIONS
+    return total, needed(slice(2, 6))
+
+
+def _degrees(tables: F32, function_degrees: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The degree up to which functions matter, of each table (tables, …, functions), whose degrees are given."""
+    size = np.square(tables, dtype=np.float64).sum(axis=tuple(range(1, tables.ndim - 1)))
+    energy_by_degree = np.stack(
+        [size[:, function_degrees == degree].sum(axis=1) for degree in range(DEGREE + 1)], axis=1
+    )
+    tail_energy = energy_by_degree[:, ::-1].cumsum(axis=1)[:, ::-1]  # from a degree on
+    is_significant = tail_energy > _MAX_RESIDUAL**2 * np.maximum(tail_energy[:, :1], 1e-30)
+    return np.asarray(is_significant.sum(axis=1) - 1, np.int64).clip(0)
+
+
+def _vector_arrays(name: str, vectors: F32, num: int) -> dict[str, Texels]:
+    """So many functions of light vectors of points in half precision, channel by channel, each point in whole texels;
+    and by how much they were divided, and how many functions there are."""
+    largest = float(max(vectors.max(initial=0), -vectors.min(initial=0), 1e-30))
+    scale = 2.0 ** np.ceil(np.log2(largest / _MAX_SCALED))
+    out = np.zeros((len(vectors), -(-3 * num // 4) * 4), np.float16)
+    out[:, : 3 * num] = np.multiply(vectors[:, :, :num], np.float32(1 / scale)).reshape(len(vectors), -1)
+    return {name: out.reshape(-1, 4), f"{name}/scale": np.array([[scale, num]], np.float32)}
+
+
+def _unoccluded(transfer: FreeCameraTransfer, state: FrameRequestState, catchers: Sequence[int]) -> F32:
+    out = np.zeros((transfer.stored_scene.probes.num_points, 4), np.float32)
+    for material in catchers:
+        out[:, :3] += transfer.unoccluded(state.light, material, is_preview=state.is_coarse)
+    return out
+
+
+def _encode_rgb9e5(pixels: F32) -> NDArray[np.uint32]:
+    """Radiance in words of RGB9_E5. (n, 1) uint32"""
+    return np.frombuffer(encode_pixels(np.ascontiguousarray(pixels), "rgb9e5"), np.uint32)[:, None]

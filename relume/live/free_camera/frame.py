@@ -1,0 +1,455 @@
+"""One frame of a moving picture: what points send, what lies behind, all that an eye sees of both."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.texture_slots import NormalMap, user_images
+from relume.live.fixed_camera.illumination import Illumination, material_emission
+from relume.live.free_camera.antialiasing import resolve
+from relume.live.free_camera.background import ShadowCatcher, background_radiance, composite_over
+from relume.live.free_camera.basis.highlight_lobes import Lobes, build_lobes
+from relume.live.free_camera.basis.material_tables import Tables, build_tables
+from relume.live.free_camera.environment_lookup import rotation_of
+from relume.live.free_camera.glass import adjust_alpha, composite_glass
+from relume.live.free_camera.hard_shadows.shade import add_direct_sharp
+from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.highlights.interpolated_highlights import add_environment_highlights
+from relume.live.free_camera.highlights.light_sum_kernel import sum_lights
+from relume.live.free_camera.highlights.lobe_gradients import gradients_along_lobe
+from relume.live.free_camera.highlights.lobe_light_lists import MAX_BRIGHT_LIGHTS, lobe_widths
+from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
+from relume.live.free_camera.incremental_frame import DirtyPixels, DirtyRegion, resolve_subset
+from relume.live.free_camera.normal_mapping import light_gradient
+from relume.live.free_camera.primary_visibility import GBuffer, interpolate_to_nodes
+from relume.live.free_camera.probe_light.incident import IncidentCoefficients
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.probes.texture_overrides import ProbeMapOverrides
+from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
+from relume.live.free_camera.shade_probes import ProbeRadiance, shade_probes
+from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
+from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterials, find_btf_materials
+from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
+from relume.look import Look
+from relume.scene.model import Camera
+
+F32 = NDArray[np.float32]
+
+
+class ProjectedMaterial(NamedTuple):
+    """The terms of one material, and what the in-basis and lobes make of them."""
+
+    terms: Sequence[Mapping[str, Any]]
+    tables: Tables
+    lobes: Lobes
+
+
+def _project_terms(terms: Sequence[Mapping[str, Any]], cached: ProjectedMaterial | None) -> ProjectedMaterial:
+    """Project the terms of one. before: what has been projected of it."""
+    if cached is not None and cached.terms == terms:
+        return cached
+    return ProjectedMaterial(terms, build_tables([terms]), build_lobes([terms]))
+
+
+class MaterialState(NamedTuple):
+    """What materials send.
+
+    Attributes:
+        tables: of what the in-basis tells. lobes: of the rest.
+        is_reflective: whether a material sends anything of a group of terms. (materials, groups) bool
+        btf_materials: of materials whose every texel sends something else.
+        projected: the terms of each, projected.
+        overrides: what a look names in the place of each one's images.
+    """
+
+    tables: Tables
+    lobes: Lobes
+    is_reflective: NDArray[np.bool_]
+    btf_materials: BtfMaterials
+    projected: Sequence[ProjectedMaterial]
+    overrides: tuple[ProbeMapOverrides, ...]
+
+    @classmethod
+    def from_terms(
+        cls,
+        terms: Sequence[Sequence[Mapping[str, Any]]],
+        previous: Self | None = None,
+        normals: Sequence[NormalMap | None] | None = None,
+        *,
+        is_blocking: bool = True,
+    ) -> Self:
+        """Project the terms of each, of a complete look.
+
+        Args:
+            terms: of each. previous: those of another, which hold what has not changed.
+            normals: in the place of the normal maps of each; None: all have their own.
+            is_blocking: see `find_btf_materials`.
+        """
+        normal_maps = [None] * len(terms) if normals is None else normals
+        overrides = tuple(
+            ProbeMapOverrides(user_images(material_terms), item)
+            for material_terms, item in zip(terms, normal_maps, strict=True)
+        )
+        cached = previous.projected if previous is not None else [None] * len(terms)
+        projected = [_project_terms(material_terms, item) for material_terms, item in zip(terms, cached, strict=True)]
+        btf_materials = find_btf_materials(
+            terms, previous.btf_materials.available if previous is not None else (), is_blocking=is_blocking
+        )
+        if previous is not None and all(map(operator.is_, projected, previous.projected)):
+            is_btf_unchanged = len(btf_materials.missing) == len(previous.btf_materials.missing)
+            if previous.overrides == overrides and is_btf_unchanged:
+                return previous
+            return previous._replace(
+                overrides=overrides, btf_materials=previous.btf_materials if is_btf_unchanged else btf_materials
+            )
+        tables, lobes = (
+            Tables.joined([item.tables for item in projected]),
+            Lobes.joined([item.lobes for item in projected]),
+        )
+        is_reflective, has_lobe = np.asarray((tables.table_index >= 0).any(axis=2)), lobes.lobe_index >= 0
+        is_reflective[has_lobe] |= np.asarray(lobes.albedo.any(axis=(1, 3)))[lobes.lobe_index[has_lobe]]
+        return cls(tables, lobes, is_reflective, btf_materials, projected, overrides)
+
+
+class FrameRequestState(NamedTuple):
+    """What a frame shall show.
+
+    Attributes:
+        look: whose materials and background. light: what arrives, by its sources. gain: of all, in each channel. (3,)
+        incident: light vectors of that light. is_coarse: they were found quickly.
+        texel_light: what was made of them for texels, in frames of before.
+        is_fine: highlights are found for each pixel as for points, and rims of them smoothed
+            (`relume.live.free_camera.highlight_edges`).
+    """
+
+    look: Look
+    materials: MaterialState
+    light: Illumination
+    gain: F32
+    incident: IncidentCoefficients
+    is_coarse: bool
+    texel_light: TexelLight
+    is_fine: bool
+
+
+class ShadingBuffers(NamedTuple):
+    """What a frame was summed from.
+
+    Attributes:
+        lobe_visibility: of points along their lobes. (points, 3) float32. outgoing: by points.
+        gradients: of points, from `relume.live.free_camera.highlights.lobe_gradients`. (points, 4) float32
+        node_values: all three of vertices. light_gradient: of vertices, see `InterpolatedProbes`.
+        radiance: along the rays. (rays, 3) float32
+    """
+
+    lobe_visibility: F32
+    outgoing: ProbeRadiance
+    gradients: F32
+    node_values: tuple[F32, F32, F32]
+    light_gradient: F32
+    radiance: F32
+
+
+class Frame(NamedTuple):
+    """A finished one.
+
+    Attributes:
+        image: linear radiance. (height, width, 3) float32
+        coverage: how much of what is behind it, where the background is transparent, else None. (height, width) float32
+        buffers: what it was summed from.
+    """
+
+    image: F32
+    coverage: F32 | None
+    buffers: ShadingBuffers
+
+
+def render_frame(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    size: tuple[int, int],
+    shadow_visibility: Sequence[F32] = (),
+) -> Frame:
+    """Find what an eye sees, but for rims.
+
+    Args:
+        transfer: of the bake. state: what is shown.
+        gbuffer: by the rays of the camera. size: width and height in pixels.
+        shadow_visibility: of each beam that arrives, seen by the rays. (rays,) float32 each
+    """
+    width, height = size
+    final_frame = finish_rays(transfer, state, gbuffer, camera, height, shadow_visibility)
+    image = resolve(final_frame.radiance, gbuffer.owner, width * height).reshape(height, width, 3)
+    if state.look.background.kind != "transparent":
+        return Frame(image, None, final_frame.buffers)
+    return Frame(
+        image, resolve(final_frame.coverage, gbuffer.owner, width * height).reshape(height, width), final_frame.buffers
+    )
+
+
+class FinalFrame(NamedTuple):
+    """What rays show.
+
+    Attributes:
+        radiance: with the background. (rays, 3) float32. coverage: how much of what is behind them. (rays,) float32
+        buffers: what it was summed from.
+    """
+
+    radiance: F32
+    coverage: F32
+    buffers: ShadingBuffers
+
+
+def finish_rays(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    height: int,
+    shadow_visibility: Sequence[F32] = (),
+) -> FinalFrame:
+    """Find what rays show, glass and background included.
+
+    Args:
+        transfer, state, gbuffer, camera, shadow_visibility: as of `render_frame`. height: of the picture, pixels.
+    """
+    stored_scene, light = transfer.stored_scene, state.light
+    buffers = _shade(transfer, state, gbuffer, DirtyRegion(gbuffer.is_needed, gbuffer.is_visible, None), camera, height)
+    out = buffers.radiance
+    _add_hard_shadow_lights(transfer, state, gbuffer, camera, height, shadow_visibility, None, out)
+    if (state.gain != 1).any():
+        out *= state.gain
+    shadow_catcher = _shadow_catcher(transfer, state, gbuffer)
+    background = background_radiance(
+        transfer, state.look.background, light, state.gain, gbuffer, shadow_catcher.is_shadow_catcher
+    )
+    coverage = composite_over(
+        stored_scene, gbuffer, background, shadow_catcher, state.gain, is_direct=light.paths.direct, out=out
+    )
+    return FinalFrame(composite_glass(gbuffer.glass, out), adjust_alpha(gbuffer.glass, coverage), buffers)
+
+
+def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -> bool:
+    """Whether two frames of one eye differ in what materials send alone, without any whose light comes otherwise."""
+    first, second = before.look, after.look
+    catchers = (material.catcher for look in (first, second) for material in look.materials.values())
+    return (
+        before.incident is after.incident
+        and [first.normals for first in before.materials.overrides]
+        == [first.normals for first in after.materials.overrides]
+        and before.light._replace(reflectances=after.light.reflectances) == after.light
+        and np.array_equal(before.gain, after.gain)
+        and first.background == second.background
+        and not any(catchers)
+        and _same_btf_materials(before.materials, after.materials)
+    )
+
+
+def _same_btf_materials(before: MaterialState, after: MaterialState) -> bool:
+    """Whether the same BTFs lie on the same materials, none of which was edited."""
+    first, second = before.btf_materials.available, after.btf_materials.available
+    return len(first) == len(second) and all(
+        a.material == b.material
+        and a.tables is b.tables
+        and before.projected[a.material] is after.projected[b.material]
+        for a, b in zip(first, second, strict=True)
+    )
+
+
+def shows_btf(transfer: FreeCameraTransfer, materials: MaterialState, gbuffer: GBuffer, region: DirtyRegion) -> bool:
+    """Whether any ray of a part of a picture sees a material that a BTF covers.
+
+    Args:
+        transfer: of the bake. materials: of the look. gbuffer: by the rays of the picture. region: of it.
+    """
+    if not materials.btf_materials.available:
+        return False
+    face = gbuffer.hits.face if region.rays is None else gbuffer.hits.face[region.rays]
+    btf_indices = [btf_material.material for btf_material in materials.btf_materials.available]
+    return bool(np.isin(transfer.stored_scene.face_material[face[face >= 0]], btf_indices).any())
+
+
+def update_for_materials(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    frame: Frame,
+    dirty: DirtyPixels,
+    rgb9e5: NDArray[np.uint32],
+    shadow_visibility: Sequence[F32] = (),
+) -> None:
+    """Bring a frame to what materials send now, where `only_materials_differ` and the part `shows_btf` of no BTF.
+
+    Args:
+        transfer, gbuffer, camera, shadow_visibility: as in `render_frame`. state: what is shown from now on.
+        frame: changed. rgb9e5: its pixels, packed; changed too. (pixels,) uint32
+        dirty: what of it shows those materials.
+    """
+    height, radiance, rays = len(frame.image), frame.buffers.radiance, dirty.region.rays
+    _shade(transfer, state, gbuffer, dirty.region, camera, height, frame.buffers)
+    _add_hard_shadow_lights(transfer, state, gbuffer, camera, height, shadow_visibility, rays, radiance)
+    if (state.gain != 1).any():
+        radiance[rays] *= state.gain
+    resolve_subset(radiance, gbuffer.owner, dirty, frame.image.reshape(-1, 3), rgb9e5)
+
+
+def _shade(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    region: DirtyRegion,
+    camera: Camera,
+    height: int,
+    buffers: ShadingBuffers | None = None,
+) -> ShadingBuffers:
+    """What surfaces send along the rays of a part, and on the way there. into: written there; None: new."""
+    materials, incident = state.materials, state.incident
+    stored_scene = transfer.stored_scene_with(materials.overrides)
+    lobes, camera_position, (probe_mask, node_mask, rays) = (
+        materials.lobes,
+        camera.to_world[:3, 3].astype(np.float32),
+        region,
+    )
+    lobe_visibility, outgoing, gradients, node_values, light_gradient, out = buffers or (
+        None,
+        None,
+        None,
+        (None,) * 3,
+        None,
+        None,
+    )
+    lobe_visibility = _lobe_visibility(transfer, state, camera_position, probe_mask, lobe_visibility)
+    environment = _prefiltered_environment(transfer, state.light)
+    outgoing = shade_probes(
+        stored_scene, incident.total, incident.non_environment, materials.tables, camera_position, probe_mask, outgoing
+    )
+    light_sums = _highlight_light_sums(transfer, state, camera_position, probe_mask)
+    add_environment_highlights(
+        stored_scene,
+        lobes,
+        environment,
+        camera_position,
+        lobe_visibility,
+        light_sums,
+        probe_mask,
+        outgoing,
+        is_fine=state.is_fine,
+    )
+    gradients = gradients_along_lobe(
+        stored_scene, incident.non_environment, materials.tables, lobes, camera_position, probe_mask, gradients
+    )
+    probe_values = outgoing.radiance, lobe_visibility, gradients
+    node_radiance, node_visibility, node_gradients = (
+        interpolate_to_nodes(stored_scene, node_mask, *values) for values in zip(probe_values, node_values, strict=True)
+    )
+    light_gradient = _node_light_gradient(stored_scene, incident, gbuffer) if light_gradient is None else light_gradient
+    emission = np.array([material_emission(state.light, name) for name in transfer.material_names], np.float32)
+    pixel_angle, interpolated_probes = (
+        camera.yfov / height,
+        InterpolatedProbes(node_radiance, materials.is_reflective, light_gradient),
+    )
+    mirror_data = MirrorData(lobes, environment, node_visibility, node_gradients, state.is_fine)
+    out = shade_pixels(stored_scene, gbuffer, pixel_angle, interpolated_probes, emission, mirror_data, rays, out)
+    if rays is None:  # else none of them sees a texel
+        footprint, texel_incident = (
+            TextureFootprint(camera_position, pixel_angle, gbuffer),
+            IncidentTexelLight(incident.total, state.texel_light),
+        )
+        shade_texels(
+            materials.btf_materials.available, transfer.stored_scene, transfer.positions, footprint, texel_incident, out
+        )
+    return ShadingBuffers(
+        lobe_visibility, outgoing, gradients, (node_radiance, node_visibility, node_gradients), light_gradient, out
+    )
+
+
+def _lobe_visibility(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    camera_position: F32,
+    probe_mask: NDArray[np.uint8],
+    out: F32 | None,
+) -> F32:
+    """Look from points along their lobes. out: written; None: new."""
+    lobes, light = state.materials.lobes, state.light
+    widths = lobe_widths(lobes) if light.has_direct_environment else ()
+    if not widths:
+        return np.zeros((len(probe_mask), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
+    lobe_lights = transfer.lobe_lights(light.environment, widths)
+    return trace_lobe_visibility(
+        transfer.stored_scene, transfer.light_visibility_bits, lobe_lights, lobes, camera_position, probe_mask, out
+    )
+
+
+def _highlight_light_sums(
+    transfer: FreeCameraTransfer, state: FrameRequestState, camera_position: F32, probe_mask: NDArray[np.uint8]
+) -> F32:
+    """What points send of the lights that they see in their highlights."""
+    lobes, light = state.materials.lobes, state.light
+    if not (lobes.max_ratio == 1).any() or not light.has_direct_environment:
+        return np.zeros((len(probe_mask), 3), np.float32)
+    lights = transfer.environment_lights(light.environment, is_preview=state.is_coarse)
+    return sum_lights(transfer.stored_scene, transfer.light_visibility_bits, lights, lobes, camera_position, probe_mask)
+
+
+def _add_hard_shadow_lights(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    height: int,
+    shadow_visibility: Sequence[F32],
+    rays: NDArray[np.int32] | None,
+    out: F32,
+) -> None:
+    """Add what beams bring along some rays, None for all. out: added to. (rays, 3)"""
+    if not state.incident.hard_shadow_lights:
+        return
+    hard_shadow_lights, environment = state.incident.hard_shadow_lights, _prefiltered_environment(transfer, state.light)
+    camera_args = gbuffer, camera, camera.yfov / height
+    add_direct_sharp(
+        hard_shadow_lights,
+        shadow_visibility,
+        transfer.stored_scene_with(state.materials.overrides),
+        *camera_args,
+        state.materials,
+        environment,
+        rays,
+        out,
+    )
+
+
+def _node_light_gradient(stored_scene: StoredScene, incident: IncidentCoefficients, gbuffer: GBuffer) -> F32:
+    """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
+    if not len(stored_scene.tangents):
+        return np.empty((0, 3), np.float32)
+    return interpolate_to_nodes(
+        stored_scene, gbuffer.is_visible, light_gradient(stored_scene, incident.total, gbuffer.is_needed)
+    )
+
+
+def _prefiltered_environment(transfer: FreeCameraTransfer, light: Illumination) -> PrefilteredEnvironment:
+    """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
+    gain = np.array(light.environment_gain if light.has_direct_environment else (0.0, 0.0, 0.0), np.float32)
+    environment, bright_lights = transfer.prefiltered(light.environment.map), transfer.bright_lights(light.environment)
+    return PrefilteredEnvironment(environment, bright_lights, rotation_of(light.environment.rotation), gain)
+
+
+def _shadow_catcher(transfer: FreeCameraTransfer, state: FrameRequestState, gbuffer: GBuffer) -> ShadowCatcher:
+    """What would arrive at catchers if nothing were in the way."""
+    is_shadow_catcher = np.array([state.look.materials[name].catcher for name in transfer.material_names])
+    if not is_shadow_catcher.any():
+        return ShadowCatcher(is_shadow_catcher, np.empty((0, 3), np.float32))
+    unoccluded = np.zeros((transfer.stored_scene.probes.num_points, 3), np.float32)
+    for material in np.flatnonzero(is_shadow_catcher):
+        unoccluded += transfer.unoccluded(state.light, int(material), is_preview=state.is_coarse)
+    return ShadowCatcher(is_shadow_catcher, interpolate_to_nodes(transfer.stored_scene, gbuffer.is_visible, unoccluded))

@@ -1,0 +1,459 @@
+"""One live picture whose eye moves, under a look that changes: evaluated whole for every frame."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.errors import ParameterError, ResultUnavailableError
+from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, check_exists, parse_pointer
+from relume.live.fixed_camera.fidelity import FidelityLabel
+from relume.live.fixed_camera.illumination import Illumination, Solo, illumination_from_look, picture_gain
+from relume.live.fixed_camera.picture import Progress
+from relume.live.fixed_camera.view_images import material_documents
+from relume.live.free_camera.background import alpha
+from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants, array_blocks, shader_constants
+from relume.live.free_camera.frame import (
+    Frame,
+    FrameRequestState,
+    MaterialState,
+    only_materials_differ,
+    render_frame,
+    shows_btf,
+    update_for_materials,
+)
+from relume.live.free_camera.hard_shadows.adaptive_shadows import visible_fractions
+from relume.live.free_camera.hard_shadows.lights import HardShadowLight
+from relume.live.free_camera.incremental_frame import DirtyPixels, find_dirty_pixels
+from relume.live.free_camera.occluded_probes import reweight
+from relume.live.free_camera.previous_frame import PreviousImage
+from relume.live.free_camera.primary_visibility import GBuffer, trace_primary
+from relume.live.free_camera.probe_light.incident import IncidentCoefficients
+from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
+from relume.live.free_camera.probe_light.state import LightRequest, ProbeLightState
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.live.free_camera.refine_job import RefineHighlights, render_fine_frame
+from relume.live.free_camera.residual_correction import apply_residual
+from relume.live.free_camera.texel_brdf.job import TablesJob
+from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
+from relume.look import Look
+from relume.scene.model import Camera
+from relume.views.resolve import encode_coverage, encode_pixels
+
+F32 = NDArray[np.float32]
+Tile = tuple[int, int, int, int]
+
+
+class FreeCameraPicture:
+    """State of one session's picture; used from one thread at a time.
+
+    Args:
+        is_watched: somebody looks at it while it changes, and sees a rough picture first where a better one takes long,
+            and its highlights finely only once eye and light rest.
+
+    Attributes:
+        renders_pixels: its pixels are wanted at every step; else a shader elsewhere finds them from `array_blocks`, and
+            they are drawn when somebody asks.
+    """
+
+    def __init__(self, transfer: FreeCameraTransfer, view_name: str, *, is_watched: bool = False) -> None:
+        view = transfer.views[view_name]
+        self._transfer, self._camera, self._size = transfer, view.camera, (view.width, view.height)
+        self._camera_seq = 0  # that it has been given: tells them apart
+        self._look: Look | None = None
+        self._light: Illumination | None = None
+        self._solo: Solo = None
+        self._is_watched = is_watched
+        self._is_coarse = False  # what is shown was found quickly
+        self._displayed: tuple[Any, ...] | None = None
+        self._previous: PreviousImage | None = None
+        self._dirty_cache: tuple[GBuffer, bytes, DirtyPixels] | None = None
+        self._gbuffer: tuple[int, GBuffer] | None = None
+        self._materials: tuple[Look | None, MaterialState | None] = None, None
+        self._probe_light, self._all_probes = ProbeLightState(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
+        self._shadow_visibility: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
+        self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
+        self._texel_light = TexelLight()
+        self._residual_image: F32 | None = None  # what is added to the frame
+        self._is_corrected = False  # what is shown has it
+        self._is_refined = False  # than it was when somebody saw it
+        self.renders_pixels = True
+        self._published_vectors: IncidentCoefficients | None = None
+        self._vectors_version = self._materials_version = 0
+
+    def check(self, look: Look) -> None:
+        """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
+
+    def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
+        """A new target; nothing is computed yet.
+
+        Args:
+            look: that is to be shown. active_pointer: pointer to what the user's hand is on, or None.
+            solo: names of sources of light that alone are shown, see `light_of`; None: all.
+        Raises:
+            ParameterError: `active_pointer` points to nothing that a hand may hold. NotFoundError, SceneError: the
+                environment cannot be had. The picture stays as it was.
+        """
+        if active_pointer is not None:
+            parse_pointer(active_pointer)
+        light = illumination_from_look(look, self._transfer.material_names, has_bounces=True, solo=solo)
+        self._transfer.environment_map(light.environment.map)  # what cannot be had is said now
+        self._look, self._light, self._solo = look, light, solo
+        self._residual_image = None
+
+    def set_camera(self, camera: Camera, size: tuple[int, int]) -> None:
+        """See from elsewhere, in a picture of another size; nothing is computed yet.
+
+        Args:
+            camera: a rigid one. size: width and height in pixels.
+        """
+        self._camera, self._size = camera, size
+        self._camera_seq += 1
+        self._residual_image = None
+
+    def correct(self, residual_image: F32 | None) -> None:
+        """Add what it is off by, see `relume.live.free_camera.residual`, until another look or eye is given.
+
+        Args:
+            residual_image: of each pixel, (height, width, 3) float32; None: nothing.
+        """
+        self._residual_image = residual_image
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether something is added that only this picture knows, no shader elsewhere."""
+        return self._residual_image is not None
+
+    @property
+    def sized_camera(self) -> tuple[Camera, tuple[int, int]]:
+        """Where it is seen from, and the size of the picture."""
+        return self._camera, self._size
+
+    def prepare(self, pointer: str) -> None:
+        """Take note of what a hand holds; nothing needs to be prepared.
+
+        Raises:
+            ParameterError: there is no such thing.
+        """
+        parsed = parse_pointer(pointer)
+        if isinstance(parsed, CurvePointer | ParameterPointer) and self._look is not None:
+            check_exists(parsed, self._look)
+
+    def next_job(self) -> IncrementalProbeLightJob | ProbeLightJob | TablesJob | RefineHighlights | None:
+        """What makes a rough picture as good as it gets: the light vectors that it lacks; BTFs; then its highlights."""
+        if self._is_coarse and self._must_be_coarse():
+            return self._probe_light.next_job(self._light_request(), self._needed_probes)
+        if self._look is not None and (missing := self._material_state(self._look).btf_materials.missing):
+            return TablesJob(missing[0].data, missing[0].components, self._display_btf)
+        return self._refine_job() if self._is_watched and self.renders_pixels else None
+
+    def _display_btf(self) -> None:
+        """Show texels whose tables are there by now."""
+        self._materials, self._displayed = (None, self._materials[1]), None
+
+    def _refine_job(self) -> RefineHighlights | None:
+        """Find highlights finely in what is shown, if they were not."""
+        previous = self._previous
+        if (
+            previous is None
+            or previous.has_highlight_edges
+            or self._is_stale
+            or self._is_coarse
+            or self._target != self._displayed
+        ):
+            return None
+        # made beside frames, which go on with the relief that they have
+        fine_state = previous.state._replace(is_fine=True, texel_light=TexelLight())
+        args = self._transfer, fine_state, previous.gbuffer, self._camera, self._size, previous.shadow_visibility
+
+        def accept_frame(frame: Frame) -> None:
+            if self._previous is previous and not self._is_stale and not previous.has_highlight_edges:
+                self._previous = PreviousImage(
+                    fine_state, previous.gbuffer, frame, previous.shadow_visibility, has_highlight_edges=True
+                )
+                self._is_refined = True
+
+        return RefineHighlights(
+            partial(render_fine_frame, *args), ("finer", self._camera_seq, id(previous.state)), accept_frame
+        )
+
+    @property
+    def _target(self) -> tuple[Any, ...]:
+        """What has been asked for; equal to `_shown` where that is shown."""
+        return self._look, self._solo, self._camera_seq, self._probe_light.version
+
+    def install(self, job: Any, result: Any) -> None:
+        """Go on with what a job has made."""
+        job.install(result)
+
+    def advance(self, max_coefficients: int | None) -> Progress:
+        """Bring the picture to its look and its eye."""
+        target = self._target
+        is_displayed = target == self._displayed and self._is_coarse == self._must_be_coarse()
+        if self._look is None or (is_displayed and self._is_corrected == self.is_corrected and not self._is_refined):
+            return Progress([], exact=False, fidelity=self._fidelity, complete=True)
+        self._is_corrected, self._is_refined = self.is_corrected, False
+        if not is_displayed:
+            self._is_coarse = self._must_be_coarse()
+            self._is_stale, self._displayed = True, target
+        if self.renders_pixels:
+            self._render()
+        return Progress(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
+
+    @property
+    def _fidelity(self) -> FidelityLabel:
+        return "preview" if self._is_coarse else "approximate"
+
+    def _must_be_coarse(self) -> bool:
+        """Whether somebody would wait for light vectors that nobody has."""
+        return self._is_watched and not self._probe_light.is_available(self._light_request())
+
+    def _light_request(self) -> LightRequest:
+        """What is to arrive; pixels find no shadows of beams where a shader draws, nor on BTFs."""
+        assert self._look is not None
+        return LightRequest(
+            self._current_light(), self.renders_pixels and not any(self._material_state(self._look).btf_materials)
+        )
+
+    @property
+    def _needed_probes(self) -> NDArray[np.uint8]:
+        """Points whose light is asked about: those that the eye sees, or all where a shader draws from anywhere."""
+        return self._current_gbuffer().is_needed if self.renders_pixels else self._all_probes
+
+    def _render(self) -> PreviousImage | None:
+        """What is shown, evaluated where that has not been done; None before there is a look."""
+        if not self._is_stale or self._look is None:
+            return self._previous
+        gbuffer, previous = self._current_gbuffer(), self._previous
+        state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))
+        self._is_stale, shadow_visibility = (
+            False,
+            self._trace_shadow_visibility(state.incident.hard_shadow_lights, gbuffer),
+        )
+        if previous is not None and self._can_update(previous, state, gbuffer):
+            state = state._replace(is_fine=previous.state.is_fine)
+            dirty = self._dirty_pixels(previous.state.materials, state.materials, gbuffer)
+            update_for_materials(
+                self._transfer,
+                state,
+                gbuffer,
+                self._camera,
+                previous.frame,
+                dirty,
+                previous.to_rgb9e5(),
+                shadow_visibility,
+            )
+            previous.state, previous.has_highlight_edges = state, False
+        else:
+            render = render_fine_frame if state.is_fine else render_frame
+            frame = render(self._transfer, state, gbuffer, self._camera, self._size, shadow_visibility)
+            self._previous = PreviousImage(state, gbuffer, frame, shadow_visibility, has_highlight_edges=state.is_fine)
+        return self._previous
+
+    def _can_update(self, previous: PreviousImage, state: FrameRequestState, gbuffer: GBuffer) -> bool:
+        """Whether what was drawn may be changed; where nobody waits for it, all rims are found anew."""
+        is_same = (
+            previous.gbuffer is gbuffer and not len(gbuffer.glass.ray) and only_materials_differ(previous.state, state)
+        )
+        if not (is_same and self._is_watched):
+            return False
+        dirty = self._dirty_pixels(previous.state.materials, state.materials, gbuffer)
+        return not shows_btf(self._transfer, state.materials, gbuffer, dirty.region)
+
+    def _dirty_pixels(self, before: MaterialState, after: MaterialState, gbuffer: GBuffer) -> DirtyPixels:
+        """What shows materials that were edited; found once while a hand is on them."""
+        is_changed = np.array([old is not new for old, new in zip(before.projected, after.projected, strict=True)])
+        key = is_changed.tobytes()
+        if self._dirty_cache is None or self._dirty_cache[0] is not gbuffer or self._dirty_cache[1] != key:
+            num_pixels = self._size[0] * self._size[1]
+            self._dirty_cache = (
+                gbuffer,
+                key,
+                find_dirty_pixels(self._transfer.stored_scene, gbuffer, is_changed, num_pixels),
+            )
+        return self._dirty_cache[2]
+
+    def _trace_shadow_visibility(self, hard_shadow_lights: Sequence[HardShadowLight], gbuffer: GBuffer) -> list[F32]:
+        """What the rays of the eye see of each beam, found again where the eye or the beam has moved."""
+        cached = self._shadow_visibility[1] if self._shadow_visibility[0] == self._camera_seq else {}
+        args = self._transfer.occlusion_mesh, gbuffer, self._camera, self._size
+        visibility = [
+            cached[b.key] if b.key in cached else visible_fractions(*args, b.targets) for b in hard_shadow_lights
+        ]
+        self._shadow_visibility = (
+            self._camera_seq,
+            {light.key: fractions for light, fractions in zip(hard_shadow_lights, visibility, strict=True)},
+        )
+        return visibility
+
+    def _request_state(self, look: Look, incident: IncidentCoefficients) -> FrameRequestState:
+        gain = np.array(picture_gain(look, self._solo), np.float32)
+        only_indirect_pending = self._probe_light.only_indirect_pending(self._light_request())
+        is_coarse = self._is_coarse and not only_indirect_pending
+        # what is added to a frame is the error of a fine one
+        is_fine = not self._is_watched or self.is_corrected
+        return FrameRequestState(
+            look,
+            self._material_state(look),
+            self._current_light(),
+            gain,
+            incident,
+            is_coarse,
+            self._texel_light,
+            is_fine,
+        )
+
+    def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants]:
+        """What a shader needs to draw what is shown, from anywhere; after a step."""
+        assert self._look is not None
+        incident = self._current_vectors(self._all_probes)
+        self._vectors_version += incident is not self._published_vectors
+        self._published_vectors = incident
+        state = self._request_state(self._look, incident)
+        # what is exact follows from its light alone: it is not sent again after pictures that were drawn here meanwhile
+        versions = self._materials_version, self._vectors_version if self._is_coarse else self._light_request()
+        return array_blocks(self._transfer, state, versions), shader_constants(self._transfer, state)
+
+    @property
+    def gbuffer(self) -> GBuffer:
+        """What its rays see."""
+        return self._current_gbuffer()
+
+    def render_pixel_centers(self, size: tuple[int, int], *, is_fine: bool = True) -> tuple[F32, GBuffer]:
+        """What it shows along the rays through the middles of the pixels of a picture of another size.
+
+        Args:
+            size: width and height in pixels. is_fine: with highlights as where the eye rests, not as while it moves.
+        Returns:
+            Linear radiance (height, width, 3) float32, and what the rays see.
+        """
+        assert self._look is not None
+        gbuffer = self._trace_gbuffer(size).pixel_centers(size[0] * size[1])
+        state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))._replace(is_fine=is_fine)
+        args = self._transfer.occlusion_mesh, gbuffer, self._camera, size
+        shadow_visibility = [visible_fractions(*args, light.targets) for light in state.incident.hard_shadow_lights]
+        return render_frame(self._transfer, state, gbuffer, self._camera, size, shadow_visibility).image, gbuffer
+
+    @property
+    def stored_scene(self) -> StoredScene:
+        """What is seen."""
+        return self._transfer.stored_scene
+
+    def _current_light(self) -> Illumination:
+        assert self._light is not None
+        return self._light
+
+    def _current_gbuffer(self) -> GBuffer:
+        if self._gbuffer is None or self._gbuffer[0] != self._camera_seq:
+            self._gbuffer = self._camera_seq, self._trace_gbuffer(self._size)
+        return self._gbuffer[1]
+
+    def _trace_gbuffer(self, size: tuple[int, int]) -> GBuffer:
+        gbuffer = trace_primary(self._transfer.stored_scene, self._transfer.embree, self._camera, size)
+        reweight(gbuffer, self._transfer.has_occluded_neighbor, self._transfer.occlusion_mesh)
+        return gbuffer
+
+    def _material_state(self, look: Look) -> MaterialState:
+        previous_look, previous = self._materials
+        if previous is None or previous_look is not look:
+            names = self._transfer.material_names
+            normals = [look.materials[name].normals for name in names]
+            terms = [material_documents(look, name) for name in names]
+            materials = MaterialState.from_terms(terms, previous, normals, is_blocking=not self._is_watched)
+            self._materials_version += materials is not previous
+            self._materials = look, materials
+            return materials
+        return previous
+
+    def _current_vectors(self, is_needed: NDArray[np.uint8]) -> IncidentCoefficients:
+        """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
+        request = self._light_request()
+        return self._probe_light.fast(request, is_needed) if self._is_coarse else self._probe_light.exact(request)
+
+    def all_tiles(self) -> list[Tile]:
+        """Tiles that cover the picture: one, for all of it changes together."""
+        return [(0, 0, *self._size)]
+
+    def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
+        """Payload of a frame: the tiles one after another, row-major."""
+        previous = self._render()
+        if (
+            previous is not None
+            and self._residual_image is None
+            and form == "rgb9e5"
+            and list(tiles) == self.all_tiles()
+        ):
+            return previous.to_rgb9e5().tobytes()
+        image = self._image()
+        pixels = [image[y : y + height, x : x + width].reshape(-1, 3) for x, y, width, height in tiles]
+        return encode_pixels(np.ascontiguousarray(np.concatenate(pixels)), form)
+
+    def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
+        """How much each pixel of tiles hides of display values behind it; see `Picture.encode_alpha`."""
+        alpha = self.alpha(for_display=True)
+        return None if alpha is None else encode_coverage(alpha, tiles)
+
+    def alpha(self, *, for_display: bool) -> F32 | None:
+        """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""
+        previous = self._render()
+        coverage = None if previous is None else previous.frame.coverage
+        return None if coverage is None else alpha(coverage, for_display=for_display)
+
+    def image(self) -> F32:
+        """Linear radiance. (height, width, 3) float32"""
+        return self._image().copy()  # the next edit writes to it
+
+    def _image(self) -> F32:
+        previous = self._render()
+        if previous is None:
+            return np.zeros((*self._size[::-1], 3), np.float32)
+        return (
+            previous.frame.image
+            if self._residual_image is None
+            else apply_residual(previous.frame.image, self._residual_image)
+        )
+
+    def inspect(self, x: int, y: int) -> dict[str, Any]:
+        """What a pixel shows, and where its surface is.
+
+        Raises:
+            ParameterError: it lies outside the picture.
+        """
+        image = self._image()
+        height, width, _ = image.shape
+        if not (0 <= x < width and 0 <= y < height):
+            raise ParameterError("pixel", [x, y], f"x below {width} and y below {height}")
+        info: dict[str, Any] = {"material": None, "position": None, "normal": None, "bands": None, "curve": None}
+        info["radiance"] = image[y, x].copy()
+        if self._gbuffer is None:
+            return info
+        gbuffer, stored_scene = self._gbuffer[1], self._transfer.stored_scene
+        row = gbuffer.first_hit_row(y * width + x)
+        face = int(gbuffer.hits.face[row])
+        if face < 0:
+            return info
+        position = self._camera.to_world[:3, 3] + float(gbuffer.hits.distance[row]) * gbuffer.directions[row]
+        normal = gbuffer.weight[row] @ stored_scene.lattice_nodes.normal[gbuffer.lattice_node[row]]
+        return info | {
+            "material": self._transfer.material_names[int(stored_scene.face_material[face])],
+            "position": position,
+            "normal": normal / max(float(np.linalg.norm(normal)), 1e-12),
+        }
+
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+        """Refuse: no curve is frozen in pictures whose eye moves.
+
+        Args:
+            pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
+
+        Raises:
+            NotMadeError: always.
+        """
+        raise ResultUnavailableError(
+            "which pixels a curve lights is known where the eye rests; ask when its picture is exact"
+        )

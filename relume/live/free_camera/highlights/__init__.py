@@ -1,0 +1,1 @@
+"""Highlights between probes: lobe visibility, prefiltered environment, bright lights."""

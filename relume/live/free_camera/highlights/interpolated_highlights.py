@@ -1,0 +1,138 @@
+"""What is interpolated between points of the sky in highlights: all but the lobe that each pixel has anew.
+
+    B(pixel) = L(pixel) + Σ_points w (B − L),   L(ωo) = a(θo) (V L̄(ωm, σ) + Σ_lamps V_j L̄_j(ωm, σ))
+
+L is the sky in a lobe (`relume.live.free_camera.basis.highlight_lobes`), times what a point sees of it: a control
+variate; in fine frames, and where one lobe would stand for the highlight badly, L_2,
+the sky in two. It is what turns fastest where surfaces are
+curved, twice as fast as their normals. B is summed over lights (`relume.live.free_camera.highlights.sum_over_lights`),
+or it is what the in-basis says, Σ_k p_k t_k of the sky, where that tells as much. Beside what is bright this rings,
+and says what
+cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple. Lights are
+summed for the normal of a point: where a normal map bends it by more than a lobe is wide, L_2 alone is believed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.basis.highlight_lobes import Lobes
+from relume.live.free_camera.highlights.environment_lobe_lookup import (
+    PrefilteredEnvironment,
+    add_environment_in_lobe,
+    evaluate_lobe,
+    evaluate_two_lobes,
+)
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.shade_probes import ProbeRadiance
+
+F32 = NDArray[np.float32]
+
+NORMAL_VARIANCE_FACTOR = np.float32(4)  # σ² of normals over that of a lobe, which turns twice as far
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_highlights(  # type: ignore[no-untyped-def]
+    probes,
+    material,
+    lobes,
+    environment,
+    camera_position,
+    lobe_visibility,
+    light_sums,
+    normal_variation,
+    is_fine,
+    rows,
+    start,
+    stop,
+    outgoing,
+    basis_radiance,
+):
+    """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
+    position, normal, _, _, _ = probes
+    lobe_radiance, two_lobe_radiance = np.empty(3, np.float32), np.empty(3, np.float32)
+    for p in rows[start:stop]:
+        lobe = lobes.lobe_index[material[p]]
+        if lobe < 0:
+            continue
+        n = normal[p, 0], normal[p, 1], normal[p, 2]
+        x, y, z = (
+            position[p, 0] - camera_position[0],
+            position[p, 1] - camera_position[1],
+            position[p, 2] - camera_position[2],
+        )
+        scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
+        d = scale * x, scale * y, scale * z
+        visibility = lobe_visibility[p, 0], lobe_visibility[p, 1], lobe_visibility[p, 2]
+        for channel in range(3):
+            lobe_radiance[channel] = two_lobe_radiance[channel] = 0
+        row, fraction, direction_1, direction_2, weight_1, sigma_1, sigma_2 = evaluate_two_lobes(lobes, lobe, n, d)
+        add_environment_in_lobe(environment, visibility, direction_1, sigma_1, weight_1, two_lobe_radiance)
+        add_environment_in_lobe(
+            environment, visibility, direction_2, sigma_2, np.float32(1) - weight_1, two_lobe_radiance
+        )
+        if is_fine or lobes.is_two[lobe]:
+            lobe_radiance[0], lobe_radiance[1], lobe_radiance[2] = (
+                two_lobe_radiance[0],
+                two_lobe_radiance[1],
+                two_lobe_radiance[2],
+            )
+        else:
+            _, _, direction, single_sigma = evaluate_lobe(lobes, lobe, n, d)
+            add_environment_in_lobe(environment, visibility, direction, single_sigma, np.float32(1), lobe_radiance)
+        max_ratio, lower = lobes.max_ratio[lobe], lobes.lobe_confidence[lobe, row]
+        confidence = lower + fraction * (lobes.lobe_confidence[lobe, row + 1] - lower)
+        sigma_1 = min(sigma_1, sigma_2)
+        normal_factor = sigma_1 * sigma_1 / (sigma_1 * sigma_1 + NORMAL_VARIANCE_FACTOR * normal_variation[material[p]])
+        for channel in range(3):
+            two_lobe_radiance[channel] += normal_factor * (
+                light_sums[p, channel] - (np.float32(1) - confidence) * two_lobe_radiance[channel]
+            )
+        for group in range(outgoing.shape[1]):
+            for channel in range(3):
+                lower = lobes.albedo[lobe, row, group, channel]
+                albedo = environment.gain[channel] * (
+                    lower + fraction * (lobes.albedo[lobe, row + 1, group, channel] - lower)
+                )
+                estimate = albedo * two_lobe_radiance[channel]
+                clamped = min(max(basis_radiance[p, group, channel], estimate / max_ratio), estimate * max_ratio)
+                outgoing[p, group, channel] += clamped - albedo * lobe_radiance[channel]
+
+
+def add_environment_highlights(
+    stored_scene: StoredScene,
+    lobes: Lobes,
+    environment: PrefilteredEnvironment,
+    camera_position: F32,
+    lobe_visibility: F32,
+    light_sums: F32,
+    is_needed: NDArray[np.uint8],
+    outgoing: ProbeRadiance,
+    *,
+    is_fine: bool,
+) -> None:
+    """Add what points know of the sky in highlights, less what pixels find.
+
+    Args:
+        stored_scene: whose points. lobes: of all materials. environment: that they show. camera_position: where it is.
+            (3,) float32
+        lobe_visibility: of the points along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
+            (points, 3)
+        light_sums: by lights, from `relume.live.free_camera.highlights.sum_over_lights`. (points, 3)
+        is_needed: points that are asked. (points,) uint8
+        outgoing: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
+    """
+    rows = np.flatnonzero(is_needed.view(np.bool_))
+    probe_args = (
+        np.ascontiguousarray(camera_position, np.float32),
+        lobe_visibility,
+        light_sums,
+        stored_scene.normal_variation,
+    )
+    args = (stored_scene.probes, stored_scene.material, lobes, environment, *probe_args, is_fine, rows)
+    parallel_for_chunks(lambda start, stop: _add_highlights(*args, start, stop, *outgoing), len(rows))

@@ -1,0 +1,242 @@
+"""What points send of the sky in highlights: summed over the light triangles that each of them sees.
+
+    B / a = (1 − β) (L_2 / a) + Σ_l V_l E_l T(x_l, ψ_l) / (x_h + α²)²
+
+T is a table of the highlight (`relume.live.free_camera.basis.lobe_shapes`), V_l a bit. Nothing is approximated but the
+shape of the table, and that light comes from where triangles are,
+as wide as they are: four that lie beside each other are one light
+where they are seen together, in the middle of those that are seen, and as wide as these are apart.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.basis.highlight_lobes import Lobes
+from relume.live.free_camera.basis.lobe_shapes import (
+    MIN_EXPONENT,
+    NUM_AZIMUTHS,
+    NUM_GRID_DIRECTIONS,
+    NUM_RINGS,
+    WIDTHS,
+    ring_distances,
+)
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
+from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
+from relume.live.free_camera.probes.stored_scene import StoredScene
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+LIGHTS_PER_GROUP = 4  # lights beside each other that are one where a point sees several of them
+_MIN_SQUARED_DISTANCE = np.float32(2.0**MIN_EXPONENT)
+LEAST_BITS = np.int32(np.float32(_MIN_SQUARED_DISTANCE).view(np.int32))
+_HALF_OCTAVE = np.float32(2.0**-22)  # of bits of a float: a ring
+_LAST_RING, _LAST_SPOKE = np.float32(NUM_RINGS - 1.001), np.float32(NUM_AZIMUTHS - 1.001)
+_RADIUS_TO_VARIANCE = 8.0  # a triangle's r² over that of the circle about it: of an equilateral one, along an axis
+_SPOKES_PER_RADIAN = np.float32(NUM_AZIMUTHS / math.pi)
+
+
+class EnvironmentLights(NamedTuple):
+    """The light triangles of a sky, in groups: of each group one light for every combination that is seen.
+
+    Attributes:
+        lights: of each combination the mean direction, unit, then Σ E in each channel. (16 groups, 6) float32
+        table: where the table of its width begins. (16 groups,) int32
+    """
+
+    lights: F32
+    table: NDArray[np.int32]
+
+    @classmethod
+    def from_lights(cls, directions: F32, irradiance: F32, radius: F32) -> EnvironmentLights:
+        """Put lights together that follow each other.
+
+        Args:
+            directions, irradiance: of each light, those beside each other one after another. (lights, 3) float32
+            radius: of a circle about each, radians. (lights,) float32
+        """
+        num_rows = -(-len(directions) // LIGHTS_PER_GROUP) * LIGHTS_PER_GROUP
+        rows = np.zeros((num_rows, 7))
+        rows[: len(directions)] = np.column_stack([directions, irradiance, np.square(radius) / _RADIUS_TO_VARIANCE])
+        towards, light, spread = np.split(rows.reshape(-1, 1, LIGHTS_PER_GROUP, 7), [3, 6], axis=-1)
+        is_in = (np.arange(2**LIGHTS_PER_GROUP)[:, None] >> np.arange(LIGHTS_PER_GROUP)) & 1
+        weight = is_in * np.maximum(light.max(axis=-1), 1e-30)
+        weight /= np.maximum(weight.sum(axis=-1, keepdims=True), 1e-30)
+        mean = np.einsum("gmk,gmkc->gmc", weight, np.broadcast_to(towards, (*weight.shape, 3)))
+        length = np.linalg.norm(mean, axis=-1)
+        variance = (weight * spread[..., 0]).sum(axis=-1) + 1 - length
+        mean /= np.maximum(length, 1e-30)[..., None]
+        lights = np.concatenate([mean, (is_in[..., None] * light).sum(axis=2)], axis=-1)
+        table = np.searchsorted(np.multiply(WIDTHS[1:], WIDTHS[:-1]), variance) * NUM_GRID_DIRECTIONS
+        return cls(lights.reshape(-1, 6).astype(np.float32), table.ravel().astype(np.int32))
+
+
+# In one piece: arrays that are handed to functions, even to inlined ones, are counted as references, at every point.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, camera_position, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Sum the lights of the points that are [start, stop) of rows. out: (points, 3), written there"""
+    position, normal, _, _, _ = probes
+    lights, table_start = environment_lights
+    shape = lobes.shape.reshape(lobes.shape.shape[0], lobes.shape.shape[1], lobes.shape.shape[2] * NUM_GRID_DIRECTIONS)
+    num_groups = lights.shape[0] >> LIGHTS_PER_GROUP
+    visible_lights, ring = np.empty(num_groups, np.int32), np.empty(num_groups, np.float32)
+    spoke, scale = np.empty(num_groups, np.float32), np.empty(num_groups, np.float32)
+    ring_bits = ring.view(np.int32)
+    for p in rows[start:stop]:
+        out[p, 0] = out[p, 1] = out[p, 2] = 0
+        lobe = lobes.lobe_index[material[p]]
+        if lobe < 0 or lobes.max_ratio[lobe] > 1:
+            continue
+        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
+        ox, oy, oz = (
+            camera_position[0] - position[p, 0],
+            camera_position[1] - position[p, 1],
+            camera_position[2] - position[p, 2],
+        )
+        inverse_length = np.float32(1) / math.sqrt(max(ox * ox + oy * oy + oz * oz, np.float32(1e-20)))
+        ox, oy, oz = inverse_length * ox, inverse_length * oy, inverse_length * oz
+        facing: Any = min(max(nx * ox + ny * oy + nz * oz, MIN_COSINE), np.float32(1))
+        row, fraction = table_row(facing)
+        flatness, double = lobes.flatness[lobe], np.float32(2) * facing
+        mx, my, mz = double * nx - ox, double * ny - oy, double * nz - oz
+        # across the mirror direction, in the plane of n and o
+        ex, ey, ez = nx - facing * mx, ny - facing * my, nz - facing * mz
+        inverse_length = np.float32(1) / math.sqrt(max(ex * ex + ey * ey + ez * ez, np.float32(1e-12)))
+        ex, ey, ez = inverse_length * ex, inverse_length * ey, inverse_length * ez
+        num = 0
+        for byte in range(min(visibility_bits.shape[1], (num_groups + 1) >> 1)):
+            byte_value = visibility_bits[p, byte]
+            if byte_value & 15:
+                visible_lights[num] = 32 * byte + (byte_value & 15)
+                num += 1
+            if byte_value >> 4:
+                visible_lights[num] = 32 * byte + 16 + (byte_value >> 4)
+                num += 1
+        for k in range(num):  # put side by side: the loop after this one does sixteen at once
+            light = visible_lights[k]
+            ring[k], spoke[k], scale[k] = lights[light, 0], lights[light, 1], lights[light, 2]
+        for k in range(num):
+            lx, ly, lz = ring[k], spoke[k], scale[k]
+            mirror_cosine, cross_component = mx * lx + my * ly + mz * lz, ex * lx + ey * ly + ez * lz
+            squared_distance: Any = min(
+                max(np.float32(2) - np.float32(2) * mirror_cosine, _MIN_SQUARED_DISTANCE), np.float32(4)
+            )
+            squared_sine = max(
+                squared_distance * (np.float32(1) - np.float32(0.25) * squared_distance), np.float32(1e-12)
+            )
+            cosine: Any = min(max(cross_component / math.sqrt(squared_sine), np.float32(-1)), np.float32(1))
+            size = abs(cosine)
+            arc = np.float32(-0.0187293) * size + np.float32(0.0742610)  # Abramowitz and Stegun 4.4.45, to 1e-4
+            arc = (arc * size - np.float32(0.2121144)) * size + np.float32(1.5707288)
+            arc *= math.sqrt(np.float32(1) - size)
+            psi = arc if cosine >= 0 else np.float32(math.pi) - arc
+            half_squared = max(np.float32(2) + np.float32(2) * (ox * lx + oy * ly + oz * lz), np.float32(1e-6))
+            half = (nx * lx + ny * ly + nz * lz + facing) / math.sqrt(half_squared)
+            denominator = max(np.float32(2) - np.float32(2) * half, np.float32(0)) + flatness
+            ring[k] = squared_distance
+            spoke[k] = min(max(psi * _SPOKES_PER_RADIAN - np.float32(0.5), np.float32(0)), _LAST_SPOKE)
+            scale[k] = np.float32(1) / (denominator * denominator)
+        red = green = blue = np.float32(0)
+        for k in range(num):
+            light = visible_lights[k]
+            ring_coordinate: Any = min(np.float32(ring_bits[k] - LEAST_BITS) * _HALF_OCTAVE, _LAST_RING)
+            r, s = np.int32(ring_coordinate), np.int32(spoke[k])
+            fr, fs = ring_coordinate - np.float32(r), spoke[k] - np.float32(s)
+            at = table_start[light] + r * NUM_AZIMUTHS + s
+            wa, wb = (np.float32(1) - fr) * (np.float32(1) - fs), (np.float32(1) - fr) * fs
+            wc, wd = fr * (np.float32(1) - fs), fr * fs
+            a, b, c, d = at, at + 1, at + NUM_AZIMUTHS, at + NUM_AZIMUTHS + 1
+            lower = wa * shape[lobe, row, a] + wb * shape[lobe, row, b]
+            lower += wc * shape[lobe, row, c] + wd * shape[lobe, row, d]
+            upper = wa * shape[lobe, row + 1, a] + wb * shape[lobe, row + 1, b]
+            upper += wc * shape[lobe, row + 1, c] + wd * shape[lobe, row + 1, d]
+            value = scale[k] * (lower + fraction * (upper - lower))
+            red += value * lights[light, 3]
+            green += value * lights[light, 4]
+            blue += value * lights[light, 5]
+        out[p, 0], out[p, 1], out[p, 2] = red, green, blue
+
+
+def sum_lights(
+    stored_scene: StoredScene,
+    visibility_bits: NDArray[np.uint8],
+    lights: EnvironmentLights,
+    lobes: Lobes,
+    camera_position: F32,
+    is_needed: NDArray[np.uint8],
+) -> F32:
+    """Sum the lights that points see in their highlights.
+
+    Args:
+        stored_scene: whose points. visibility_bits: light l of a point in bit l & 7 of byte l >> 3. (points, bytes)
+            uint8
+        lights: of the sky. lobes: of all materials. camera_position: where it is. (3,) float32
+        is_needed: points that are asked; the others get nothing. (points,) uint8
+    Returns:
+        Σ, of unit albedo, of what neither lobes nor the in-basis are believed. (points, 3) float32
+    """
+    sums = np.zeros((len(visibility_bits), 3), np.float32)
+    rows = np.flatnonzero(is_needed.view(np.bool_))
+    args = (
+        stored_scene.probes,
+        stored_scene.material,
+        visibility_bits,
+        lights,
+        lobes,
+        np.ascontiguousarray(camera_position, np.float32),
+        rows,
+    )
+    parallel_for_chunks(lambda start, stop: _sum_lights(*args, start, stop, sums), len(rows))
+    return sums
+
+
+def sum_lights_numpy(
+    stored_scene: StoredScene,
+    visibility_bits: NDArray[np.uint8],
+    lights: EnvironmentLights,
+    lobes: Lobes,
+    camera_position: F32,
+    probe: int,
+) -> F64:
+    """Do as `sum_lights` for one point with a lobe, in plain NumPy: its oracle.
+
+    Args:
+        stored_scene, visibility_bits, lights, lobes, camera_position: as there. probe: number of the point.
+    Returns:
+        (3,) float64
+    """
+    n, lobe = stored_scene.probes.normal[probe].astype(np.float64), lobes.lobe_index[stored_scene.material[probe]]
+    wo = camera_position.astype(np.float64) - stored_scene.probes.position[probe]
+    wo /= np.linalg.norm(wo)
+    facing = float(np.clip(n @ wo, MIN_COSINE, 1))
+    row_coordinate = np.sqrt(1 - facing) * (NUM_ROWS - 1)
+    row = min(int(row_coordinate), NUM_ROWS - 2)
+    table = (1 - (row_coordinate - row)) * lobes.shape[lobe, row] + (row_coordinate - row) * lobes.shape[lobe, row + 1]
+    table = table.astype(np.float64).reshape(len(WIDTHS), NUM_RINGS, NUM_AZIMUTHS)
+    mirror = 2 * facing * n - wo
+    across = n - facing * mirror
+    across /= max(float(np.linalg.norm(across)), 1e-6)
+    bits = np.unpackbits(visibility_bits[probe], bitorder="little")[: len(lights.table) // 4]
+    nibbles = np.pad(bits, (0, -len(bits) % LIGHTS_PER_GROUP)).reshape(-1, LIGHTS_PER_GROUP) @ (
+        1 << np.arange(LIGHTS_PER_GROUP)
+    )
+    light_indices = (16 * np.arange(len(nibbles)) + nibbles)[nibbles > 0]
+    wi, irradiance = np.split(lights.lights[light_indices].astype(np.float64), 2, axis=1)
+    x = np.clip(2 - 2 * wi @ mirror, ring_distances()[0], 4)
+    psi = np.arccos(np.clip(wi @ across / np.sqrt(np.maximum(x * (1 - x / 4), 1e-12)), -1, 1))
+    half = (wi @ n + facing) / np.linalg.norm(wi + wo, axis=1)
+    ring = np.interp(x, ring_distances(), np.arange(NUM_RINGS))
+    spoke = np.clip(psi / np.pi * NUM_AZIMUTHS - 0.5, 0, NUM_AZIMUTHS - 1)
+    r, s = np.minimum(ring.astype(int), NUM_RINGS - 2), np.minimum(spoke.astype(int), NUM_AZIMUTHS - 2)
+    fr, fs, width = ring - r, spoke - s, lights.table[light_indices] // NUM_GRID_DIRECTIONS
+    lower = (1 - fs) * table[width, r, s] + fs * table[width, r, s + 1]
+    upper = (1 - fs) * table[width, r + 1, s] + fs * table[width, r + 1, s + 1]
+    values = ((1 - fr) * lower + fr * upper) / (np.maximum(2 - 2 * half, 0) + lobes.flatness[lobe]) ** 2
+    return np.asarray(values @ irradiance)

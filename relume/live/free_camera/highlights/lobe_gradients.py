@@ -1,0 +1,273 @@
+"""How other light than the sky's changes in highlights as they look elsewhere: gradients, and halves of them.
+
+    Y(pixel) = Σ_points w (Y_p + ½ G_p · (ωr − ω_p)),   G = ∂Y / ∂ωr
+
+Y is the luminance of Σ_k w_k p_k t_k (`relume.live.free_camera.shade_probes`) for an albedo of one, ωr the mirror
+direction of what is seen. Where weights w give ωr back from those of points, ω_p,
+this is exact for what is square in ωr: the second
+order that the whole gradient adds too much of is what is missing without it (docs/adr/0112-half-gradients.md). ωr turns
+twice as fast as normals do, and reflections with it.
+
+What pixels add is linear in their own ωr: points tell G, and G · ω_p.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.color import LUMINANCE
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.basis.highlight_lobes import Lobes
+from relume.live.free_camera.basis.material_tables import Tables
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
+from relume.live.free_camera.basis.table_index import MIN_COSINE, view_direction_local
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.shade_probes import shade_probes_numpy
+from relume.math.zernike import recurrence
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_LUMINANCE = np.array(LUMINANCE, np.float32)
+_NON_ENVIRONMENT_COLUMN = 4  # the column of `Tables.table_index` for other light in highlights
+_MIN_SINE = np.float32(1e-3)
+_DIFFERENCE_STEP = 1e-5  # radians
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type: ignore[no-untyped-def]
+    """Sum the tables and albedos of a material's terms with a highlight.
+
+    Args:
+        tables, lobes: of all materials. material, row, channel: which one, and where.
+        factors, step: written, w_k p_k in the row and what the next has more. (rungs,)
+    Returns:
+        The albedo in the row, and what the next has more.
+    """
+    albedo = albedo_step = np.float32(0)
+    lobe, num_basis = lobes.lobe_index[material], factors.shape[0]
+    for basis_index in range(num_basis):
+        factors[basis_index] = step[basis_index] = 0
+    for group in range(tables.table_index.shape[1]):
+        table = tables.table_index[material, group, _NON_ENVIRONMENT_COLUMN]
+        if table < 0:
+            continue
+        for basis_index in range(num_basis):
+            factors[basis_index] += tables.isotropic[table, row, channel, basis_index]
+            step[basis_index] += (
+                tables.isotropic[table, row + 1, channel, basis_index]
+                - tables.isotropic[table, row, channel, basis_index]
+            )
+        lower, upper = lobes.albedo[lobe, row, group, channel], lobes.albedo[lobe, row + 1, group, channel]
+        albedo, albedo_step = albedo + lower, albedo_step + (upper - lower)
+    return albedo, albedo_step
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, step, view_coordinates):  # type: ignore[no-untyped-def]
+    """Sum the light of a point with factors, and how that changes.
+
+    Args:
+        recurrence_table: of the ladder. incident: t of the point. (3, K). channel, factors, step: see `_sum_factors`.
+        view_coordinates: from `seen_from`.
+    Returns:
+        Σ_k w_k p_k t_k; what it changes by in a row; and in a radian of φo.
+    """
+    _, fraction, cosine_phi, sine_phi = view_coordinates
+    outgoing = row_derivative = azimuth_derivative = np.float32(0)
+    re, im = np.float32(1), np.float32(0)
+    for basis_index in range(factors.shape[0]):
+        m = recurrence_table.order[basis_index]
+        if recurrence_table.a[basis_index] == 0 and m > 0:
+            re, im = re * cosine_phi - im * sine_phi, re * sine_phi + im * cosine_phi
+        factor = factors[basis_index] + fraction * step[basis_index]
+        light = incident[channel, recurrence_table.cosine[basis_index]]
+        if m > 0:
+            sine_light = incident[channel, recurrence_table.sine[basis_index]]
+            azimuth_derivative += np.float32(m) * factor * (re * sine_light - im * light)
+            light = re * light + im * sine_light
+        outgoing += factor * light
+        row_derivative += step[basis_index] * light
+    return outgoing, row_derivative, azimuth_derivative
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _gradient(recurrence_table, n, t, o, view_coordinates, non_environment, tables, lobes, material, factors, step):  # type: ignore[no-untyped-def]
+    """Find G of a point, in world space.
+
+    Args:
+        n, t, o: its normal, its tangent and where the eye is, unit, tuples. view_coordinates: from `seen_from`.
+        non_environment: t of it. (3, K). factors, step: room. (rungs,)
+    """
+    row, fraction, cosine_phi, sine_phi = view_coordinates
+    facing = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+    cosine: Any = min(max(facing, MIN_COSINE), np.float32(1))
+    sine: Any = max(math.sqrt(max(np.float32(1) - facing * facing, np.float32(0))), _MIN_SINE)
+    # rows of tables for a radian of θo; none where tables end
+    rows_per_radian = np.float32(0.5 * (NUM_ROWS - 1)) * math.sqrt(np.float32(1) + cosine)
+    if facing < MIN_COSINE:
+        rows_per_radian = np.float32(0)
+    by_theta = by_phi = np.float32(0)
+    for channel in range(3):
+        albedo, albedo_step = _sum_factors(tables, lobes, material, row, channel, factors, step)
+        albedo += fraction * albedo_step
+        outgoing, row_derivative, azimuth_derivative = _outgoing_with_derivatives(
+            recurrence_table, non_environment, channel, factors, step, view_coordinates
+        )
+        if outgoing > 0 and albedo > np.float32(1e-6):
+            weight = _LUMINANCE[channel] / albedo
+            by_theta += weight * rows_per_radian * (row_derivative - outgoing * albedo_step / albedo)
+            by_phi += weight * azimuth_derivative / sine
+    # ωr goes down where θo grows, away from the eye, and turns against φ̂
+    tangent_component = sine_phi * by_phi - facing * cosine_phi * by_theta
+    bitangent_component, normal_component = -cosine_phi * by_phi - facing * sine_phi * by_theta, -sine * by_theta
+    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+    return (
+        tangent_component * t[0] + bitangent_component * bx + normal_component * n[0],
+        tangent_component * t[1] + bitangent_component * by + normal_component * n[1],
+        tangent_component * t[2] + bitangent_component * bz + normal_component * n[2],
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _gradient_rows(  # type: ignore[no-untyped-def]
+    recurrence_table,
+    probes,
+    material,
+    non_environment,
+    tables,
+    lobes,
+    camera_position,
+    rows,
+    start,
+    stop,
+    factors,
+    step,
+    out,
+):
+    """Find G and G · ω_p of the points that are [start, stop) of rows. out: (points, 4), written there"""
+    position, normal, tangent, _, _ = probes
+    for row_index in range(start, stop):
+        p = rows[row_index]
+        out[p, 0] = out[p, 1] = out[p, 2] = out[p, 3] = 0
+        has_table = False
+        for group in range(tables.table_index.shape[1]):
+            has_table |= tables.table_index[material[p], group, _NON_ENVIRONMENT_COLUMN] >= 0
+        if lobes.lobe_index[material[p]] < 0 or not has_table:
+            continue
+        n, t = (normal[p, 0], normal[p, 1], normal[p, 2]), (tangent[p, 0], tangent[p, 1], tangent[p, 2])
+        x, y, z = (
+            camera_position[0] - position[p, 0],
+            camera_position[1] - position[p, 1],
+            camera_position[2] - position[p, 2],
+        )
+        inverse_distance = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
+        o = inverse_distance * x, inverse_distance * y, inverse_distance * z
+        view_coordinates = view_direction_local(position[p], normal[p], tangent[p], camera_position)
+        gx, gy, gz = _gradient(
+            recurrence_table, n, t, o, view_coordinates, non_environment[p], tables, lobes, material[p], factors, step
+        )
+        twice = np.float32(2) * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
+        out[p, 0], out[p, 1], out[p, 2] = gx, gy, gz
+        out[p, 3] = gx * (twice * n[0] - o[0]) + gy * (twice * n[1] - o[1]) + gz * (twice * n[2] - o[2])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _gradient_kernel(  # type: ignore[no-untyped-def]
+    recurrence_table, probes, material, non_environment, tables, lobes, camera_position, rows, start, stop, out
+):
+    """Make room, and do as `_gradient_rows`."""
+    factors, step = (
+        np.empty(recurrence_table.order.shape[0], np.float32),
+        np.empty(recurrence_table.order.shape[0], np.float32),
+    )
+    _gradient_rows(
+        recurrence_table,
+        probes,
+        material,
+        non_environment,
+        tables,
+        lobes,
+        camera_position,
+        rows,
+        start,
+        stop,
+        factors,
+        step,
+        out,
+    )
+
+
+def gradients_along_lobe(
+    stored_scene: StoredScene,
+    non_environment: F32,
+    tables: Tables,
+    lobes: Lobes,
+    camera_position: F32,
+    is_needed: NDArray[np.uint8],
+    out: F32 | None = None,
+) -> F32:
+    """Find how points send other light otherwise in their highlights as these look elsewhere.
+
+    Args:
+        stored_scene: whose points. non_environment: t of all light but the sky's own. (points, 3, K) float32
+        tables: of all materials; those over φo too tell nothing of it. lobes: of all materials.
+        camera_position: where it is. (3,) float32
+        is_needed: points that are asked. (points,) uint8
+        out: written where needed; None: the others are nothing.
+    Returns:
+        G, world space, and G · ω_p, radiance. (points, 4) float32
+    """
+    gradients = np.zeros((len(non_environment), 4), np.float32) if out is None else out
+    rows = np.flatnonzero(is_needed.view(np.bool_))
+    probe_args = recurrence(), stored_scene.probes, stored_scene.material, non_environment
+    args = *probe_args, tables, lobes, np.ascontiguousarray(camera_position, np.float32), rows
+    parallel_for_chunks(lambda start, stop: _gradient_kernel(*args, start, stop, gradients), len(rows))
+    return gradients
+
+
+def gradients_along_lobe_numpy(
+    stored_scene: StoredScene, non_environment: F32, tables: Tables, lobes: Lobes, camera_position: F32, probe: int
+) -> F64:
+    """Do as `turning` for one point, by how `shade_probes_numpy` differs a little aside of the eye: its oracle.
+
+    Args:
+        stored_scene, non_environment, tables, lobes, camera_position: as there. probe: number of the point, which has a
+        lobe.
+    Returns:
+        (4,) float64
+    """
+    n, position = (
+        array[probe].astype(np.float64) for array in (stored_scene.probes.normal, stored_scene.probes.position)
+    )
+    to_camera, lobe = camera_position - position, lobes.lobe_index[stored_scene.material[probe]]
+    distance, tangents = float(np.linalg.norm(to_camera)), np.linalg.svd(to_camera[None])[2][1:]
+
+    def outgoing_luminance(direction: F64) -> float:
+        outgoing, _ = shade_probes_numpy(
+            stored_scene,
+            np.zeros_like(non_environment),
+            non_environment,
+            tables,
+            position + distance * direction,
+            probe,
+        )
+        rows = np.sqrt(1 - np.clip(direction @ n, MIN_COSINE, 1)) * (NUM_ROWS - 1)
+        row_albedo = lobes.albedo[lobe].sum(axis=1).astype(np.float64)
+        albedo = [np.interp(rows, np.arange(NUM_ROWS), row_albedo[:, channel]) for channel in range(3)]
+        return float(outgoing.sum(axis=0) / np.maximum(albedo, 1e-30) @ LUMINANCE)
+
+    wo, gradient = to_camera / distance, np.zeros(3)
+    for across in tangents:
+        forward, backward = (wo + sign * _DIFFERENCE_STEP * across for sign in (1, -1))
+        change = outgoing_luminance(forward / np.linalg.norm(forward)) - outgoing_luminance(
+            backward / np.linalg.norm(backward)
+        )
+        gradient += change / (2 * _DIFFERENCE_STEP) * (2 * (n @ across) * n - across)
+    return np.append(gradient, gradient @ (2 * (n @ wo) * n - wo))

@@ -1,0 +1,139 @@
+"""Normal maps where the eye moves: how what points send changes as the normal of a pixel leans away from theirs.
+
+A surface that leans by little sees the same lights under other cosines,
+
+    E(n') = Σ_s w_s n'·ω_s = n' · D,   D = Σ_s w_s ω_s
+
+exact where no light lies between the two horizons. The tangential parts of D are integrals of the light times x and y;
+against light vectors, which hold the cosine already, those of x / z and y / z, expanded in the in-basis. What is
+broad is multiplied by n'·D / n·D, of D's luminance; what is narrow looks along the leaning normal itself.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.color import LUMINANCE
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.probes.texture_kernels import sample_texture
+from relume.math.zernike import NUM_FUNCTIONS, project
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_NUM_QUADRATURE_NODES = 64  # of quadrature along each of θ and φ: exact for what is expanded
+_MAX_RATIO = np.float32(4)  # times: a slope that the light grazes is not blown up
+_EPSILON = np.float32(1e-12)
+
+
+@lru_cache(maxsize=1)
+def basis_gradients() -> F32:
+    """Expand x / z, y / z and 1: their inner products with light vectors are D in the local frame. (3, K) float32"""
+    node, weight = np.polynomial.legendre.leggauss(_NUM_QUADRATURE_NODES)
+    theta, phi = (node + 1) * np.pi / 4, np.arange(_NUM_QUADRATURE_NODES) * 2 * np.pi / _NUM_QUADRATURE_NODES
+    azimuth_vectors = np.stack([np.cos(phi), np.sin(phi), np.ones(_NUM_QUADRATURE_NODES)])
+    wi = np.sin(theta)[:, None, None] * azimuth_vectors.T
+    wi[..., 2] = np.cos(theta)[:, None]
+    # h is expanded under dx dy = cos θ dω, so that x / z leaves x dω
+    solid_angle = np.sin(theta) * weight * np.pi / 4 * (2 * np.pi / _NUM_QUADRATURE_NODES)
+    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, project(wi), solid_angle), np.float32)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _light_gradient(gradients, luminance, normal, tangent, vectors, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
+    """Find D of points [start, stop)."""
+    for p in range(start, stop):
+        if not is_needed[p]:
+            continue
+        x = y = z = np.float32(0)
+        for channel in range(3):
+            for k in range(vectors.shape[2]):
+                value = luminance[channel] * vectors[p, channel, k]
+                x, y, z = x + gradients[0, k] * value, y + gradients[1, k] * value, z + gradients[2, k] * value
+        n, t = normal[p], tangent[p]
+        out[p, 0] = x * t[0] + y * (n[1] * t[2] - n[2] * t[1]) + z * n[0]
+        out[p, 1] = x * t[1] + y * (n[2] * t[0] - n[0] * t[2]) + z * n[1]
+        out[p, 2] = x * t[2] + y * (n[0] * t[1] - n[1] * t[0]) + z * n[2]
+
+
+def light_gradient(stored_scene: StoredScene, vectors: F32, is_needed: NDArray[np.uint8]) -> F32:
+    """Find where light comes from at points: D, its length their irradiance where it comes from one side.
+
+    Args:
+        stored_scene: whose points. vectors: t of each. (points, 3, K) float32
+        is_needed: points that are asked; the others get nothing. (points,) uint8
+    Returns:
+        World space, luminance. (points, 3) float32
+    """
+    out = np.zeros((len(vectors), 3), np.float32)
+    probes = stored_scene.probes
+    args = (basis_gradients(), np.array(LUMINANCE, np.float32), probes.normal, probes.tangent, vectors, is_needed)
+    parallel_for_chunks(lambda start, stop: _light_gradient(*args, start, stop, out), len(vectors))
+    return out
+
+
+def light_gradient_numpy(stored_scene: StoredScene, vectors: F32, probe: int) -> F64:
+    """Do as `light_gradient` for one point, in plain NumPy: its oracle.
+
+    Args:
+        stored_scene, vectors: as there. probe: number of the point.
+    Returns:
+        (3,) float64
+    """
+    n, t = (getattr(stored_scene.probes, name)[probe].astype(np.float64) for name in ("normal", "tangent"))
+    luminance = np.asarray(LUMINANCE) @ vectors[probe].astype(np.float64)
+    assert luminance.shape == (NUM_FUNCTIONS,)
+    return np.asarray((basis_gradients().astype(np.float64) @ luminance) @ np.stack([t, np.cross(n, t), n]))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def normalize(vector):  # type: ignore[no-untyped-def]
+    """Scale a vector, a tuple of three, to length one."""
+    x, y, z = vector
+    scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, _EPSILON))
+    return np.float32(scale * x), np.float32(scale * y), np.float32(scale * z)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
+    """Look up a mapped normal. See `relume.raytrace.surface_interaction`, which does so for fixed views.
+
+    Args:
+        textures: all of them. texture: number of the map. texture_uv, footprint: u and v, and see `sample_texture`.
+        n: the normal, unit. t: tangent, not yet across it. handedness: of the bitangent; its sign counts.
+        outward: the face's normal on the side that is seen. scratch: (3,)
+    Returns:
+        The unit normal; n itself where the map leans it below the face.
+    """
+    sample_texture(textures, texture, texture_uv[0], texture_uv[1], footprint, scratch)
+    tangent_dot_normal: Any = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
+    tx, ty, tz = normalize(
+        (t[0] - tangent_dot_normal * n[0], t[1] - tangent_dot_normal * n[1], t[2] - tangent_dot_normal * n[2])
+    )
+    sign = np.float32(-1) if handedness < 0 else np.float32(1)
+    bx, by, bz = n[1] * tz - n[2] * ty, n[2] * tx - n[0] * tz, n[0] * ty - n[1] * tx
+    a, b, c = scratch[0], sign * scratch[1], scratch[2]
+    x, y, z = normalize((a * tx + b * bx + c * n[0], a * ty + b * by + c * n[1], a * tz + b * bz + c * n[2]))
+    if x * outward[0] + y * outward[1] + z * outward[2] <= 0:
+        return n[0], n[1], n[2]
+    return x, y, z
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def shading_ratio(gradient, n, perturbed):  # type: ignore[no-untyped-def]
+    """Compute n'·D / n·D, bounded.
+
+    Args:
+        gradient: D, a tuple of three. n: the surface's normal. perturbed: n', where it leans to.
+    """
+    irradiance: Any = gradient[0] * n[0] + gradient[1] * n[1] + gradient[2] * n[2]
+    perturbed_irradiance: Any = gradient[0] * perturbed[0] + gradient[1] * perturbed[1] + gradient[2] * perturbed[2]
+    return min(max(perturbed_irradiance, np.float32(0)) / max(irradiance, _EPSILON), _MAX_RATIO)

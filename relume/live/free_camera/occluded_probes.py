@@ -1,0 +1,211 @@
+"""Light of points that something stands before: pixels take it from those of the points about them that they see.
+
+A floor goes on under what stands on it and behind walls. The three nodes about a pixel may lie on both sides of a wall,
+and those beyond it know other light, or none. So nodes that do not see their neighbours in the grid of a face are found
+once; pixels about them look for each of their three nodes, from as little above the surface, and do without those that
+they do not see. Where a pixel sees none, it takes all three. Faces that have no more nodes than corners are left alone:
+what is that fine is curved, and hides a node from the next by itself.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges, parallel_for_chunks
+from relume.live.free_camera.primary_visibility import GBuffer
+from relume.live.free_camera.probes.triangle_grids import ProbeGrid, node_index
+from relume.live.free_camera.ray_scene import OcclusionMesh
+from relume.raytrace.embree import occluded, packet_arguments
+from relume.raytrace.ray_packet import (
+    LANES,
+    enable_first_lanes,
+    is_unoccluded,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_shadows,
+)
+
+F32 = NDArray[np.float32]
+
+_FACES_PER_RANGE = 256
+_RAYS_PER_PACKET = LANES // 3  # whose three nodes are looked for at once
+
+
+class _GridGeometry(NamedTuple):
+    """Grids of faces, as kernels want them; see `OcclusionMesh`."""
+
+    probe_grid: ProbeGrid
+    positions: F32
+    faces: NDArray[np.uint32]
+    face_normal: F32
+    edge_offset: F32
+    surface_offset: np.float32
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _point_on_face(geometry, f, side, u, v, point):  # type: ignore[no-untyped-def]
+    """Find a place in a face, off its surface and its edges, where it would lie in other faces. at: (3,)"""
+    w = max(np.float32(1) - u - v, geometry.edge_offset[f, 0])
+    u, v = max(np.float32(u), geometry.edge_offset[f, 1]), max(np.float32(v), geometry.edge_offset[f, 2])
+    a, b, c = geometry.faces[f, 0], geometry.faces[f, 1], geometry.faces[f, 2]
+    lift = -geometry.surface_offset if side == 1 else geometry.surface_offset
+    for axis in range(3):
+        x, y, z = geometry.positions[a, axis], geometry.positions[b, axis], geometry.positions[c, axis]
+        point[axis] = (w * x + u * y + v * z) / (w + u + v) + lift * geometry.face_normal[f, axis]
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _aim_between(packet, lane, start, end):  # type: ignore[no-untyped-def]
+    """Send a lane from one place to another."""
+    set_origin(packet, lane, start[0], start[1], start[2])
+    set_direction(packet, lane, end[0] - start[0], end[1] - start[1], end[2] - start[2], np.float32(1))
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _flush(occluded, packet, num_pending, ends, has_occluded_neighbor):  # type: ignore[no-untyped-def]
+    """Trace the first lanes, and note both ends of what is blocked. ends: vertices. (`LANES`, 2)"""
+    enable_first_lanes(packet, num_pending)
+    trace_shadows(occluded, packet)
+    for lane in range(num_pending):
+        if not is_unoccluded(packet, lane):
+            has_occluded_neighbor[ends[lane, 0]] = has_occluded_neighbor[ends[lane, 1]] = 1
+
+
+@nb.njit(nogil=True, cache=True)
+def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occluded_neighbor):  # type: ignore[no-untyped-def]
+    """Look along all edges of the grids of faces [start, stop)."""
+    packet, ends, num_pending = new_packet(scene, arguments), np.empty((LANES, 2), np.uint32), 0
+    origin, target = np.empty(3, np.float32), np.empty(3, np.float32)
+    for f in range(start, stop):
+        for side in range(2):
+            num_rows, first = (
+                np.int64(geometry.probe_grid.num_rows[f, side]),
+                np.int64(geometry.probe_grid.first[f, side]),
+            )
+            for i in range(num_rows if num_rows > 1 else 0):
+                for j in range(num_rows - i):
+                    for edge in range(3):  # of the small triangle that begins here
+                        i0, j0 = (i + 1, j) if edge == 2 else (i, j)
+                        i1, j1 = (i + 1, j) if edge == 0 else (i, j + 1)
+                        _point_on_face(geometry, f, side, i0 / num_rows, j0 / num_rows, origin)
+                        _point_on_face(geometry, f, side, i1 / num_rows, j1 / num_rows, target)
+                        _aim_between(packet, num_pending, origin, target)
+                        ends[num_pending, 0] = geometry.probe_grid.node[first + node_index(num_rows, i0, j0)]
+                        ends[num_pending, 1] = geometry.probe_grid.node[first + node_index(num_rows, i1, j1)]
+                        num_pending += 1
+                        if num_pending == LANES:
+                            _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)
+                            num_pending = 0
+    if num_pending:
+        _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)
+
+
+def find_occluded_probes(mesh: OcclusionMesh) -> NDArray[np.uint8]:
+    """Find the vertices that do not see all of their neighbours in the grids of faces. (vertices,) uint8"""
+    stored_scene, arguments = mesh.stored_scene, packet_arguments(coherent=True)
+    has_occluded_neighbor = np.zeros(len(stored_scene.lattice_nodes.normal), np.uint8)
+    args = occluded, mesh.embree.handle, arguments.ctypes.data, _grid_geometry(mesh)
+    # threads may note one twice
+    for_ranges(
+        lambda start, stop: _mark_occluded(*args, start, stop, has_occluded_neighbor),
+        len(stored_scene.faces),
+        _FACES_PER_RANGE,
+    )
+    return has_occluded_neighbor
+
+
+def _grid_geometry(mesh: OcclusionMesh) -> _GridGeometry:
+    stored_scene = mesh.stored_scene
+    face_arrays = stored_scene.faces, stored_scene.face_normal, mesh.edge_offset
+    return _GridGeometry(stored_scene.probe_grid, mesh.positions, *face_arrays, np.float32(mesh.surface_offset))
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _grid_triangle(num_rows, u, v):  # type: ignore[no-untyped-def]
+    """Find the small triangle that a place in a face lies in: i and j of its first node, whether it is turned round.
+
+    Its nodes are (i, j), (i + 1, j), (i, j + 1), or (i + 1, j + 1) instead of the first: in the order of
+    `Seen.lattice_node`.
+    """
+    i = min(max(np.int64(u * np.float32(num_rows)), 0), num_rows - 1)
+    j = min(max(np.int64(v * np.float32(num_rows)), 0), num_rows - 1 - i)
+    is_inverted = u * np.float32(num_rows) - i + (v * np.float32(num_rows) - j) > 1 and i + j < num_rows - 1
+    return i, j, is_inverted
+
+
+@nb.njit(nogil=True, cache=True)
+def _reweight(  # type: ignore[no-untyped-def]
+    occluded, scene, arguments, geometry, has_occluded_neighbor, face, uv, directions, lattice_node, start, stop, weight
+):
+    """Look for the nodes of rays [start, stop) about which some are parted."""
+    packet, num_pending = new_packet(scene, arguments), 0
+    origin, target, normals = np.empty(3, np.float32), np.empty(3, np.float32), geometry.face_normal
+    for p in range(start, stop):
+        f = face[p]
+        if f < 0 or not (
+            has_occluded_neighbor[lattice_node[p, 0]]
+            or has_occluded_neighbor[lattice_node[p, 1]]
+            or has_occluded_neighbor[lattice_node[p, 2]]
+        ):
+            continue
+        side = 0
+        if normals[f, 0] * directions[p, 0] + normals[f, 1] * directions[p, 1] + normals[f, 2] * directions[p, 2] > 0:
+            side = 1
+        num_rows = np.int64(geometry.probe_grid.num_rows[f, side])
+        if num_rows == 0:
+            num_rows = np.int64(geometry.probe_grid.num_rows[f, 1 - side])
+        if num_rows < 2:
+            continue
+        i, j, is_inverted = _grid_triangle(num_rows, uv[p, 0], uv[p, 1])
+        _point_on_face(geometry, f, side, uv[p, 0], uv[p, 1], origin)
+        for k in range(3):
+            inverted_step = 1 if is_inverted and k == 0 else 0
+            a, b = i + (1 if k == 1 else inverted_step), j + (1 if k == 2 else inverted_step)
+            _point_on_face(geometry, f, side, a / num_rows, b / num_rows, target)
+            _aim_between(packet, 3 * num_pending + k, origin, target)
+        packet.owner[num_pending] = p
+        num_pending += 1
+        if num_pending == _RAYS_PER_PACKET:
+            _reweight_traced(occluded, packet, num_pending, weight)
+            num_pending = 0
+    if num_pending:
+        _reweight_traced(occluded, packet, num_pending, weight)
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _reweight_traced(occluded, packet, num_pending, weight):  # type: ignore[no-untyped-def]
+    """Trace three lanes for each ray that waits; weights of nodes that are not seen become nothing."""
+    enable_first_lanes(packet, 3 * num_pending)
+    trace_shadows(occluded, packet)
+    for r in range(num_pending):
+        p, total = packet.owner[r], np.float32(0)
+        for k in range(3):
+            total += weight[p, k] if is_unoccluded(packet, 3 * r + k) else np.float32(0)
+        for k in range(3):
+            if total > 0:
+                weight[p, k] = weight[p, k] / total if is_unoccluded(packet, 3 * r + k) else np.float32(0)
+
+
+def reweight(gbuffer: GBuffer, has_occluded_neighbor: NDArray[np.uint8], mesh: OcclusionMesh) -> None:
+    """Let rays do without the nodes that what they hit does not see.
+
+    Args:
+        gbuffer: by an eye; its weights are changed. has_occluded_neighbor: from `find_occluded_probes`. (vertices,)
+            uint8
+        mesh: that is seen.
+    """
+    if not has_occluded_neighbor.any():
+        return
+    arguments, hits = packet_arguments(coherent=False), gbuffer.hits
+    args = (
+        occluded, mesh.embree.handle, arguments.ctypes.data, _grid_geometry(mesh), has_occluded_neighbor, hits.face,
+        hits.uv,
+        gbuffer.directions, gbuffer.lattice_node,
+    )  # fmt: skip
+    parallel_for_chunks(lambda start, stop: _reweight(*args, start, stop, gbuffer.weight), len(hits.face))

@@ -1,0 +1,246 @@
+"""From what an eye sees to the points about it: which three, with which weights."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, find_edges, samples_per_edge
+from relume.live.free_camera.glass import GlassLayers, find_glass_layers, trace_glass
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.probes.triangle_grids import surrounding_nodes
+from relume.raytrace.alpha_filter import IGNORE_GLASS, STOP_AT_OPAQUE
+from relume.raytrace.camera_rays import Hits, trace_rays
+from relume.raytrace.embree import EmbreeScene
+from relume.scene.model import Camera
+
+F32 = NDArray[np.float32]
+
+_NO_VECTORS = np.empty((0, 3), np.float32)
+_PIXEL_CENTER = np.array([[0.5, 0.5]], np.float32)
+
+
+class GBuffer(NamedTuple):
+    """What the eye's rays see: one through the middle of each pixel, row after row, then more across edges.
+
+    Attributes:
+        hits: of the rays. directions: of these, unit. (n, 3) float32
+        owner: pixels that those beyond one for each belong to. (m,) int32
+        lattice_node: the three about each hit. (n, 3) uint32. weight: of each; all zero where there are none. (n, 3)
+            float32
+        glass: glass before rays, whose own hits come after those of all others.
+        is_visible: whether any ray meets the surface about a vertex. (vertices,) uint8
+        is_needed: whether one that is shown follows from a point. (points,) uint8
+    """
+
+    hits: Hits
+    directions: F32
+    owner: NDArray[np.int32]
+    lattice_node: NDArray[np.uint32]
+    weight: F32
+    glass: GlassLayers
+    is_visible: NDArray[np.uint8]
+    is_needed: NDArray[np.uint8]
+
+    def pixel_centers(self, num_pixels: int) -> GBuffer:
+        """Those through the middles of pixels alone, of what is behind glass. num_pixels: of the picture"""
+        rows = slice(0, num_pixels)
+        return self._replace(
+            hits=self.hits.rows(rows), directions=self.directions[rows], owner=self.owner[:0],
+            lattice_node=self.lattice_node[rows], weight=self.weight[rows], glass=GlassLayers(np.empty(0, np.int64),
+            _NO_VECTORS),
+        )  # fmt: skip
+
+    def first_hit_row(self, pixel: int) -> int:
+        """Which row tells what is met first through the middle of a pixel, glass included."""
+        glass_rays = self.glass.ray
+        glass_index = int(np.searchsorted(glass_rays, pixel))
+        has_glass = glass_index < len(glass_rays) and glass_rays[glass_index] == pixel
+        return len(self.directions) - len(glass_rays) + glass_index if has_glass else pixel
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _aim(rotation, half_width, half_height, width, height, pixels, offsets, start, stop, out):  # type: ignore[no-untyped-def]
+    """Direct rays through places in pixels [start, stop), those of one pixel in a row."""
+    for i in range(start, stop):
+        y = pixels[i] // width
+        x = pixels[i] - y * width
+        for offset_index in range(offsets.shape[0]):
+            r = i * offsets.shape[0] + offset_index
+            a = (np.float32(2) * (x + offsets[offset_index, 0]) / width - np.float32(1)) * half_width
+            b = (np.float32(1) - np.float32(2) * (y + offsets[offset_index, 1]) / height) * half_height
+            scale = np.float32(1) / math.sqrt(a * a + b * b + np.float32(1))
+            for axis in range(3):
+                out[r, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _find_nodes(probe_grid, face_normal, face, uv, directions, start, stop, lattice_node, weight, is_visible):  # type: ignore[no-untyped-def]
+    """Find the vertices about hits [start, stop); of a side without any, those of the other."""
+    for p in range(start, stop):
+        f = face[p]
+        weight[p, 0] = weight[p, 1] = weight[p, 2] = 0
+        if f < 0:
+            continue
+        view_cosine = (
+            face_normal[f, 0] * directions[p, 0]
+            + face_normal[f, 1] * directions[p, 1]
+            + face_normal[f, 2] * directions[p, 2]
+        )
+        side = 1 if view_cosine > 0 else 0
+        if probe_grid.num_rows[f, side] == 0:
+            side = 1 - side
+        if probe_grid.num_rows[f, side] == 0:
+            continue
+        n0, n1, n2, w0, w1, w2 = surrounding_nodes(probe_grid, f, side, uv[p, 0], uv[p, 1])
+        lattice_node[p, 0], lattice_node[p, 1], lattice_node[p, 2] = (
+            probe_grid.node[n0],
+            probe_grid.node[n1],
+            probe_grid.node[n2],
+        )
+        weight[p, 0], weight[p, 1], weight[p, 2] = w0, w1, w2
+        for k in range(3):
+            is_visible[lattice_node[p, k]] = 1
+
+
+def trace_primary(stored_scene: StoredScene, embree: EmbreeScene, camera: Camera, size: tuple[int, int]) -> GBuffer:
+    """Find what every pixel of a picture sees.
+
+    Args:
+        stored_scene: that is seen. embree: its triangles. camera: the eye. size: width and height in pixels.
+    """
+    num_pixels, camera_position = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
+    directions = _directions(camera, size, np.arange(num_pixels, dtype=np.int32), _PIXEL_CENTER)
+    hits, glass_hits = (
+        trace_rays(embree, camera_position, directions, IGNORE_GLASS),
+        trace_glass(embree, camera_position, directions),
+    )
+    edges = find_edges(stored_scene, hits, directions, size)
+    if glass_hits is not None:
+        edges = np.union1d(edges, find_edges(stored_scene, glass_hits, directions, size)).astype(np.int32)
+    num_samples = samples_per_edge(len(edges), num_pixels)
+    owner = np.repeat(edges, num_samples)
+    if len(owner):
+        edge_directions = _directions(camera, size, edges, EDGE_SAMPLE_POSITIONS[:num_samples])
+        hits = Hits.concatenate([hits, trace_rays(embree, camera_position, edge_directions, IGNORE_GLASS)])
+        directions = np.concatenate([directions, edge_directions])
+    if glass_hits is not None:
+        glass_hits = Hits.concatenate(
+            [glass_hits, trace_rays(embree, camera_position, directions[num_pixels:], STOP_AT_OPAQUE)]
+        )
+    return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, owner)
+
+
+def trace_through_glass(
+    stored_scene: StoredScene,
+    embree: EmbreeScene,
+    camera: Camera,
+    size: tuple[int, int],
+    pixels: NDArray[np.int32],
+    offsets: F32,
+) -> GBuffer:
+    """Find what more rays through some pixels see, and none through the middles of others.
+
+    Args:
+        stored_scene, embree, camera, size: as of `look`.
+        pixels: that are looked through. (n,) int32. offsets: in each of them, pixel units. (k, 2) float32
+    Returns:
+        Of k rays for each pixel in a row, as if each were a pixel by itself.
+    """
+    camera_position, directions = camera.to_world[:3, 3].astype(np.float32), _directions(camera, size, pixels, offsets)
+    hits, glass_hits = (
+        trace_rays(embree, camera_position, directions, IGNORE_GLASS),
+        trace_glass(embree, camera_position, directions),
+    )
+    return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, np.empty(0, np.int32))
+
+
+def _make_gbuffer(
+    stored_scene: StoredScene,
+    embree: EmbreeScene,
+    directions: F32,
+    hits: Hits,
+    glass_hits: Hits | None,
+    owner: NDArray[np.int32],
+) -> GBuffer:
+    """Find what is about the hits of rays, and of the glass before them. first: hits of that, None: there is none."""
+    glass = GlassLayers(np.empty(0, np.int64), _NO_VECTORS)
+    if glass_hits is not None:
+        glass = find_glass_layers(embree, stored_scene, glass_hits, directions)
+        hits = Hits.concatenate([hits, glass_hits.rows(glass.ray)])
+        directions = np.concatenate([directions, directions[glass.ray]])
+    num_rays = len(directions)
+    lattice_node, weight = np.zeros((num_rays, 3), np.uint32), np.empty((num_rays, 3), np.float32)
+    is_visible = np.zeros(len(stored_scene.lattice_nodes.normal), np.uint8)
+    args = (stored_scene.probe_grid, stored_scene.face_normal, hits.face, hits.uv, directions)
+    parallel_for_chunks(lambda start, stop: _find_nodes(*args, start, stop, lattice_node, weight, is_visible), num_rays)
+    is_needed = np.zeros(stored_scene.probes.num_points, np.uint8)
+    mark_needed_probes(stored_scene.lattice_nodes, is_visible, is_needed)
+    return GBuffer(hits, directions, owner, lattice_node, weight, glass, is_visible, is_needed)
+
+
+def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32], offsets: F32) -> F32:
+    """Aim rays through places in pixels, those of one pixel in a row. places: pixel units. (k, 2) float32"""
+    width, height = size
+    half_height = np.float32(math.tan(camera.yfov / 2))
+    rotation = np.ascontiguousarray(camera.to_world[:3, :3], np.float32)
+    directions = np.empty((len(pixels) * len(offsets), 3), np.float32)
+    camera_args = (rotation, np.float32(half_height * width / height), half_height, width, height, pixels, offsets)
+    parallel_for_chunks(lambda start, stop: _aim(*camera_args, start, stop, directions), len(pixels))
+    return directions
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def mark_needed_probes(lattice_nodes, is_visible, is_needed):  # type: ignore[no-untyped-def]
+    """Note the points that vertices follow from.
+
+    Args:
+        lattice_nodes: all. is_visible: those that are asked about. (vertices,) uint8. is_needed: written. (points,)
+            uint8
+    """
+    for v in range(is_visible.shape[0]):
+        if is_visible[v]:
+            for k in range(lattice_nodes.point.shape[1]):
+                if lattice_nodes.weight[v, k] > 0:
+                    is_needed[lattice_nodes.point[v, k]] = 1
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+def _interpolate_to_nodes(lattice_nodes, rows, values, start, stop, out):  # type: ignore[no-untyped-def]
+    """Find what the vertices that are [start, stop) of rows take from points."""
+    for v in rows[start:stop]:
+        out[v] = 0
+        for k in range(lattice_nodes.point.shape[1]):
+            w, probe = lattice_nodes.weight[v, k], lattice_nodes.point[v, k]
+            if w > 0:
+                for c in range(values.shape[1]):
+                    out[v, c] += w * values[probe, c]
+
+
+def interpolate_to_nodes(
+    stored_scene: StoredScene, is_visible: NDArray[np.uint8], values: F32, out: F32 | None = None
+) -> F32:
+    """Find what vertices take from the points that they follow from.
+
+    Args:
+        stored_scene: with both. is_visible: vertices that are asked about. (vertices,) uint8
+        values: of points. (points, …) float32. out: written where asked; None: the others get nothing.
+    Returns:
+        (vertices, …) float32
+    """
+    flat = values.reshape(len(values), -1)
+    node_values = np.zeros((len(is_visible), *values.shape[1:]), np.float32) if out is None else out
+    rows, flat_node_values = np.flatnonzero(is_visible.view(np.bool_)), node_values.reshape(len(node_values), -1)
+    parallel_for_chunks(
+        lambda start, stop: _interpolate_to_nodes(
+            stored_scene.lattice_nodes, rows, flat, start, stop, flat_node_values
+        ),
+        len(rows),
+    )
+    return node_values

@@ -1,0 +1,1 @@
+"""Incident radiance coefficients of probes: exact, previewed, or updated during an edit."""

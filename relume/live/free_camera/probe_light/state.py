@@ -1,0 +1,182 @@
+"""The light vectors of one session's moving picture, under a light that changes.
+
+What is exact is found when a hand rests. While it moves, light that comes straight is found at once for the points that
+an eye sees, in every frame. What surfaces send each other takes longer than a frame: it is found beside the frames,
+which show what was found last (`relume.live.free_camera.probe_light.jobs.IncrementalProbeLightJob`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.live.fixed_camera.illumination import Illumination, element_gains, equal_up_to_reflectances
+from relume.live.free_camera.probe_light.incident import IncidentCoefficients, PartialCoefficients, combine, combine_all
+from relume.live.free_camera.probe_light.indirect import (
+    IndirectCoefficients,
+    extend,
+    indirect_of,
+    is_cached,
+    same_indirect,
+    update_reflectances,
+)
+from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
+from relume.live.free_camera.protocol import FreeCameraTransfer
+
+
+class LightRequest(NamedTuple):
+    """What is to arrive.
+
+    Attributes:
+        light: of the look. has_hard_shadows: pixels find the shadows of beams.
+    """
+
+    light: Illumination
+    has_hard_shadows: bool
+
+
+class _UpdatedIncident(NamedTuple):
+    """What is exact, with what surfaces send otherwise.
+
+    Attributes:
+        base: that it was made from. light: that arrives. is_complete: points that know it. (points,) uint8
+    """
+
+    base: IncidentCoefficients
+    light: Illumination
+    is_complete: NDArray[np.uint8]
+    incident: IncidentCoefficients
+
+
+class _CoarseIncident(NamedTuple):
+    """What was found in a frame, and of what."""
+
+    direct: LightRequest
+    is_needed: NDArray[np.uint8]
+    indirect: IndirectCoefficients
+    incident: IncidentCoefficients
+
+
+class ProbeLightState:
+    """State of one picture; used from one thread at a time.
+
+    Attributes:
+        version: another one where what follows a hand has gone on.
+    """
+
+    def __init__(self, transfer: FreeCameraTransfer) -> None:
+        self._transfer = transfer
+        self._exact: tuple[LightRequest, IncidentCoefficients] | None = None
+        self._updated: _UpdatedIncident | None = None
+        self._indirect: IndirectCoefficients | None = None
+        self._coarse: _CoarseIncident | None = None
+        self.version = 0
+
+    def is_available(self, request: LightRequest) -> bool:
+        """Whether nobody has to wait for what is exact."""
+        is_exact = self._exact is not None and self._exact[0] == request
+        return is_exact or all(
+            self._transfer.has_vectors(element, request.has_hard_shadows) for element in element_gains(request.light)
+        )
+
+    def only_indirect_pending(self, request: LightRequest) -> bool:
+        """Whether all that somebody would wait for is what surfaces send each other."""
+        if self._exact is None:
+            return False
+        before, has_hard_shadows = self._exact[0]
+        return has_hard_shadows == request.has_hard_shadows and equal_up_to_reflectances(before, request.light)
+
+    def exact(self, request: LightRequest) -> IncidentCoefficients:
+        """All of it, at all points."""
+        if self._exact is None or self._exact[0] != request:
+            self.restart_from(
+                *request, combine_all(self._transfer, request.light, has_hard_shadows=request.has_hard_shadows)
+            )
+        assert self._exact is not None
+        return self._exact[1]
+
+    def restart_from(self, light: Illumination, has_hard_shadows: bool, incident: IncidentCoefficients) -> None:
+        """Go on from what is exact.
+
+        Args:
+            light, has_hard_shadows: under which, see `Asked`. incident: at all points.
+        """
+        self._exact = LightRequest(light, has_hard_shadows), incident
+        self._updated = self._indirect = self._coarse = None
+
+    def fast(self, request: LightRequest, is_needed: NDArray[np.uint8]) -> IncidentCoefficients:
+        """What is there at once for some points; what surfaces send, as of some frames ago.
+
+        Args:
+            request: what is to arrive. is_needed: points that are asked about. (points,) uint8
+        """
+        if self.only_indirect_pending(request):
+            assert self._exact is not None
+            return self._exact[1] if self._updated is None else self._updated.incident
+        self._indirect = indirect = self._latest_indirect(request.light, is_needed)
+        direct = request._replace(light=request.light._replace(reflectances=()))
+        last = self._coarse
+        is_same = last is not None and last.indirect is indirect and last.is_needed is is_needed
+        if last is None or not is_same or last.direct != direct:
+            self._coarse = last = _CoarseIncident(
+                direct, is_needed, indirect, self._solve_direct(request, is_needed, indirect)
+            )
+        return last.incident
+
+    def _solve_direct(
+        self, request: LightRequest, is_needed: NDArray[np.uint8], indirect: IndirectCoefficients
+    ) -> IncidentCoefficients:
+        """Find what comes straight, and add the rest."""
+        transfer, (light, has_hard_shadows), rows = self._transfer, request, np.flatnonzero(is_needed)
+
+        def get_vectors(element: Illumination) -> PartialCoefficients:
+            if transfer.has_vectors(element, has_hard_shadows):
+                return PartialCoefficients(transfer.vectors(element, has_hard_shadows))
+            return PartialCoefficients(transfer.fast_vectors(element, rows, has_hard_shadows), rows)
+
+        hard_shadow_lights = transfer.hard_shadow_lights(light, rows) if has_hard_shadows else ()
+        return combine(transfer, light, get_vectors, hard_shadow_lights, indirect.contributions, rows)
+
+    def _latest_indirect(self, light: Illumination, is_needed: NDArray[np.uint8]) -> IndirectCoefficients:
+        """What surfaces sent when that was found last, or now where it never was."""
+        transfer, last = self._transfer, self._indirect
+        if last is None or last.light.paths.has_indirect != light.paths.has_indirect:
+            before = light if self._exact is None else self._exact[0].light
+            is_reusable = before.paths.has_indirect == light.paths.has_indirect and is_cached(transfer, before)
+            last = indirect_of(transfer, before if is_reusable else light, is_needed)
+        return extend(transfer, last, is_needed)
+
+    def next_job(self, request: LightRequest, is_needed: NDArray[np.uint8]) -> IncrementalProbeLightJob | ProbeLightJob:
+        """What brings light that is not there: first what surfaces send some points, then all there is.
+
+        Args:
+            request, is_needed: as of `fast`, after it.
+        """
+        transfer, (light, has_hard_shadows) = self._transfer, request
+        if self.only_indirect_pending(request):
+            assert self._exact is not None
+            before, base = self._exact[0].light, self._exact[1]
+            last = self._updated
+            if last is None or last.light != light or (is_needed & ~last.is_complete).any():
+                return IncrementalProbeLightJob(
+                    light, lambda: self._update_reflectances(before, base, light, is_needed), self._set_updated
+                )
+        elif self._indirect is not None and light.paths.has_indirect and not same_indirect(self._indirect.light, light):
+            return IncrementalProbeLightJob(light, lambda: indirect_of(transfer, light, is_needed), self._set_indirect)
+        return ProbeLightJob(transfer, light, has_hard_shadows, self.restart_from)
+
+    def _update_reflectances(
+        self, before: Illumination, base: IncidentCoefficients, light: Illumination, is_needed: NDArray[np.uint8]
+    ) -> _UpdatedIncident:
+        incident = update_reflectances(self._transfer, before, base, light, np.flatnonzero(is_needed))
+        return _UpdatedIncident(base, light, is_needed, incident)
+
+    def _set_updated(self, updated: _UpdatedIncident) -> None:
+        if self._exact is not None and updated.base is self._exact[1]:  # else the light has moved
+            self._updated, self.version = updated, self.version + 1
+
+    def _set_indirect(self, indirect: IndirectCoefficients) -> None:
+        if self._indirect is not None:  # else all is exact by now
+            self._indirect, self.version = indirect, self.version + 1

@@ -1,0 +1,1 @@
+"""Surface probes: their placement, the lattice of interpolation nodes, map overrides."""

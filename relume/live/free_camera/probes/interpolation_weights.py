@@ -1,0 +1,148 @@
+"""How vertices of a lattice follow from points.
+
+A mesh may be much finer than points are dense: its corners take what a few points about them send, by Shepard's weights
+((R − d) / (R d))², where R is the distance of the first point that is left out, changed by as little as it takes for
+light that is linear in the tangent plane to be met. A corner that is a point itself takes its own. Nodes inside a face
+whose points are farther apart than its nodes lie on the straight line between those.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from relume.live.free_camera.probes.triangle_grids import ProbeGrid, enumerate_nodes, find_edge_midpoints
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+PROBES_PER_NODE = 4
+MATERIAL_SEPARATION = 1e3  # spacings between materials, and between sides
+_REGULARIZATION = 0.05  # how far off what is linear may stay, beside how far weights change
+_MIN_WEIGHT = 2e-3
+_NODES_PER_BATCH = 1 << 16  # vertices
+
+
+class NodeWeights(NamedTuple):
+    """Points and weights of vertices.
+
+    Attributes:
+        probe: unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
+        weight: of each, one in sum. (V, `PROBES_PER_NODE`) float32
+    """
+
+    probe: NDArray[np.uint32]
+    weight: F32
+
+
+def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals: F32) -> NodeWeights:
+    """Weigh the points about some places.
+
+    Args:
+        probe_features, node_features: in spacings; coordinates, then what makes them unlike. (n, d), (V, d)
+        normals: at the places, unit. (V, 3)
+    """
+    tree = cKDTree(probe_features)
+    num_neighbors = min(len(probe_features), PROBES_PER_NODE + 1)
+    distance, neighbors = tree.query(node_features, num_neighbors, workers=-1)
+    distance, neighbors = (
+        distance.reshape(len(node_features), num_neighbors),
+        neighbors.reshape(len(node_features), num_neighbors),
+    )
+    reach = np.maximum(distance[:, -1:], 1e-12)
+    inside = np.clip(distance[:, :-1], 1e-6 * reach, None) if num_neighbors > 1 else np.ones((len(node_features), 1))
+    raw = np.square((reach - inside) / (reach * inside)) if num_neighbors > 1 else inside
+    raw[distance[:, : raw.shape[1]] > MATERIAL_SEPARATION / 2] = 0  # another material's, where there are so few
+    raw[:, 0] = np.maximum(raw[:, 0], 1e-12)
+    node_weights = _empty_weights(len(node_features))
+    node_weights.weight[:, : raw.shape[1]] = raw / raw.sum(axis=1, keepdims=True)
+    node_weights.probe[:, : raw.shape[1]] = neighbors[:, : raw.shape[1]]
+    for start in range(0, len(node_features), _NODES_PER_BATCH):
+        rows = slice(start, start + _NODES_PER_BATCH)
+        towards = (probe_features[node_weights.probe[rows], :3] - node_features[rows, None, :3]).transpose(0, 2, 1)
+        node_weights.weight[rows] = make_weights_linear(
+            node_weights.weight[rows].astype(np.float64), towards, normals[rows].astype(np.float64)
+        )
+    return node_weights
+
+
+def make_weights_linear(weight: F64, towards: F64, normal: F64) -> F64:
+    """Change weights as little as it takes for the points' mean to lie under their vertex, Σ w x = 0, nearly.
+
+    With W the weights on a diagonal, F the x, in units of their spread, above a row of ones, and b = (0, 0, 0, 1):
+    w − W Fᵀ (F W Fᵀ + λ)⁻¹ (F w − b).
+
+    Args:
+        weight: of points, one in sum. (V, p) towards: where they are. (V, 3, p) normal: unit. (V, 3)
+    Returns:
+        None below nothing: where points lie on one side alone, what is linear is met less. (V, p)
+    """
+    x = towards - normal[:, :, None] * np.einsum("vc,vcp->vp", normal, towards)[:, None]
+    x *= weight[:, None] > 0
+    x /= np.maximum(np.sqrt(np.einsum("vcp,vp->v", x**2, weight)), 1e-9)[:, None, None]
+    ends = np.concatenate([x, np.ones_like(x[:, :1])], axis=1)
+    weighted_ends = ends * weight[:, None]
+    gram = np.einsum("vcp,vdp->vcd", weighted_ends, ends) + np.diag([_REGULARIZATION] * 3 + [1e-9])
+    residual = np.einsum("vcp,vp->vc", ends, weight) - [0, 0, 0, 1]
+    corrected_weight = weight - np.einsum(
+        "vcp,vc->vp", weighted_ends, np.linalg.solve(gram, residual[..., None])[..., 0]
+    )
+    return _normalize(corrected_weight)
+
+
+def weights_from_edge_ends(
+    seed_weights: NodeWeights, seed_nodes: NDArray[np.intp], node_index: NDArray[np.intp], probe_grid: ProbeGrid
+) -> NodeWeights:
+    """Let the other vertices be the mean of both ends of the edges that they are in the middle of, coarse ones first.
+
+    Args:
+        seed_weights: of the vertices `seed_nodes`. node_index: that each node of the lattice is. (nodes,)
+        probe_grid: whose nodes they are.
+    """
+    num_lattice_nodes, num_probes = int(node_index.max()) + 1, int(seed_weights.probe.max()) + 1
+    coordinates = np.repeat(seed_nodes, PROBES_PER_NODE), seed_weights.probe.ravel().astype(np.intp)
+    weights = csr_array((seed_weights.weight.ravel(), coordinates), shape=(num_lattice_nodes, num_probes))
+    weights.eliminate_zeros()
+    is_solved = np.zeros(num_lattice_nodes, np.bool_)
+    is_solved[seed_nodes] = True
+    steps, step = enumerate_nodes(probe_grid.num_rows), 1 << int(np.log2(probe_grid.num_rows.max()))
+    while step >= 1:
+        node, *ends = find_edge_midpoints(steps, probe_grid.first, np.flatnonzero(~is_solved[node_index]), step)
+        midpoints, first_index = np.unique(node_index[node], return_index=True)
+        edge_ends = np.concatenate([node_index[end[first_index]] for end in ends])
+        means = csr_array(
+            (np.full(len(edge_ends), np.float32(0.5)), (np.tile(midpoints, 2), edge_ends)),
+            shape=(num_lattice_nodes, num_lattice_nodes),
+        )
+        weights = weights + means @ weights
+        is_solved[midpoints] = True
+        step //= 2
+    return _select_heaviest(weights)
+
+
+def _select_heaviest(weights: csr_array) -> NodeWeights:
+    """Keep the points of the greatest weight in each row, as many as a vertex has."""
+    count = np.diff(weights.indptr)
+    row = np.repeat(np.arange(len(count)), count)
+    order = np.lexsort((-weights.data, row))
+    rank = np.arange(len(order)) - np.repeat(weights.indptr[:-1], count)
+    is_heaviest = rank < PROBES_PER_NODE
+    node_weights = _empty_weights(len(count))
+    node_weights.probe[row[is_heaviest], rank[is_heaviest]] = weights.indices[order[is_heaviest]]
+    node_weights.weight[row[is_heaviest], rank[is_heaviest]] = weights.data[order[is_heaviest]]
+    return NodeWeights(node_weights.probe, _normalize(node_weights.weight))
+
+
+def _normalize(weight: NDArray[Any]) -> NDArray[Any]:
+    """Leave out what is below nothing, and what cannot be seen: each point that is asked sums all its lights."""
+    thresholded = np.where(weight < _MIN_WEIGHT, 0, weight)
+    return np.asarray(thresholded / thresholded.sum(axis=1, keepdims=True), weight.dtype)
+
+
+def _empty_weights(num: int) -> NodeWeights:
+    shape = num, PROBES_PER_NODE
+    return NodeWeights(np.zeros(shape, np.uint32), np.zeros(shape, np.float32))

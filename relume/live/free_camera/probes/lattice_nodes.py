@@ -1,0 +1,261 @@
+"""Which nodes of a lattice are one, which of them are points, and how the others follow from points nearby.
+
+Corners of a mesh that is finer than points are dense keep their own normals
+(`relume.live.free_camera.probes.interpolation_weights`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.probes.interpolation_weights import (
+    MATERIAL_SEPARATION,
+    weights_from_edge_ends,
+    weights_from_nearby_probes,
+)
+from relume.live.free_camera.probes.triangle_grids import ProbeGrid
+from relume.raytrace.surface_points import SurfacePoints
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_MERGE_DISTANCE = 0.35  # of the spacing: nodes as near as this are one point
+_SAME_NODE_DISTANCE = 1e-3  # of it: nodes as near as this are one vertex
+_SAME_NODE_NORMAL_STEPS = 50  # steps of a unit normal's components, within which vertices look the same way
+_NORMAL_WEIGHT = 1.5  # spacings that a turn of the normal by a radian is worth
+_POSITION_BITS = 20  # of each coordinate: places finer than a millionth of the scene are one
+_U64 = np.uint64
+_HASH_MULTIPLIERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F], np.uint64)  # odd
+_COMPONENT_SEPARATION = 4.0  # that a surface which does not hang together with another is farther away than it is
+
+
+class LatticeNodes(NamedTuple):
+    """Corners of all grids, each once.
+
+    Attributes:
+        normal: unit, on the side that is seen. (V, 3) float32
+        point: those about it, unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
+        weight: of each, one in sum. (V, `PROBES_PER_NODE`) float32
+    """
+
+    normal: F32
+    point: NDArray[np.uint32]
+    weight: F32
+
+
+class NodeTable(NamedTuple):
+    """Nodes of all grids, before any are shared.
+
+    Attributes:
+        surface_points: where they are. material, side: of each. (n,)
+        spacing: of the points about each, metres; powers of two of one another. (n,)
+        is_candidate: whether it may be a point; others lie in the middle of nodes of coarser grids. (n,)
+        corner, extent: of what holds all of them, from `bounding_cube`.
+    """
+
+    surface_points: SurfacePoints
+    material: NDArray[np.uint16]
+    side: NDArray[np.uint8]
+    component: NDArray[np.int32]
+    spacing: F64
+    is_candidate: NDArray[np.bool_]
+    corner: F32
+    extent: float
+
+    def rows(self, indices: NDArray[np.intp]) -> NodeTable:
+        """Choose some of them."""
+        return self._replace(
+            surface_points=self.surface_points.rows(indices),
+            material=self.material[indices],
+            side=self.side[indices],
+            component=self.component[indices],
+            spacing=self.spacing[indices],
+            is_candidate=self.is_candidate[indices],
+        )
+
+
+def representative_nodes(grid_nodes: NodeTable, normal_steps: int) -> NDArray[np.intp]:
+    """Find nodes that stand for all, material after material, neighbours mostly next to each other.
+
+    Args:
+        normal_steps: steps of a unit normal's components, within which points look the same way.
+    """
+    candidates = np.flatnonzero(grid_nodes.is_candidate)
+    representatives, _ = _merge_nodes(grid_nodes.rows(candidates), _MERGE_DISTANCE, normal_steps)
+    return candidates[representatives]
+
+
+def num_representatives(grid_nodes: NodeTable, normal_steps: int) -> int:
+    """How many `representative_nodes` finds, for whoever tries several spacings.
+
+    Args:
+        grid_nodes: of all grids; their keys are mixed to one number each, which few that differ share by chance.
+        normal_steps: as of `representative_nodes`.
+    """
+    position_key, attribute_key = _keys(
+        grid_nodes.rows(np.flatnonzero(grid_nodes.is_candidate)), _MERGE_DISTANCE, normal_steps
+    )
+    hashes = (position_key ^ position_key >> _U64(31)) * _HASH_MULTIPLIERS[0] ^ (
+        attribute_key ^ attribute_key >> _U64(29)
+    ) * _HASH_MULTIPLIERS[1]
+    hashes.sort()
+    return 1 + int(np.count_nonzero(hashes[1:] != hashes[:-1]))
+
+
+def build_nodes(
+    grid_nodes: NodeTable, probe_nodes: NDArray[np.intp], probe_grid: ProbeGrid
+) -> tuple[LatticeNodes, NDArray[np.uint32]]:
+    """Find the vertices that nodes are, and how they follow from points.
+
+    Args:
+        grid_nodes: of all grids. probe_nodes: those that are points. probe_grid: of the nodes.
+    Returns:
+        The vertices, and which of them each node is. (n,) uint32
+    """
+    first, node_index = _merge_nodes(grid_nodes, _SAME_NODE_DISTANCE, _SAME_NODE_NORMAL_STEPS)
+    features, seed_nodes = _features(grid_nodes), np.flatnonzero(grid_nodes.is_candidate[first])
+    seed_weights = weights_from_nearby_probes(
+        features[probe_nodes], features[first[seed_nodes]], grid_nodes.surface_points.normal[first[seed_nodes]]
+    )
+    node_weights = (
+        seed_weights
+        if len(seed_nodes) == len(first)
+        else weights_from_edge_ends(seed_weights, seed_nodes, node_index, probe_grid)
+    )
+    return LatticeNodes(
+        np.ascontiguousarray(grid_nodes.surface_points.normal[first]), *node_weights
+    ), node_index.astype(np.uint32)
+
+
+def _features(grid_nodes: NodeTable) -> F64:
+    """Where nodes are, in spacings, for what is near to be like. (n, 11)"""
+    position = grid_nodes.surface_points.position.astype(np.float64) / grid_nodes.spacing.min()
+    separation = MATERIAL_SEPARATION * np.column_stack([grid_nodes.material, grid_nodes.side])
+    component_offset = np.random.default_rng(1).normal(size=(int(grid_nodes.component.max()) + 1, 3))
+    component_offset *= _COMPONENT_SEPARATION / np.sqrt(2) / np.linalg.norm(component_offset, axis=1, keepdims=True)
+    return np.column_stack(
+        [
+            position,
+            _NORMAL_WEIGHT * grid_nodes.surface_points.normal,
+            separation,
+            component_offset[grid_nodes.component],
+        ]
+    )
+
+
+def bounding_cube(surface_points: SurfacePoints) -> tuple[F32, float]:
+    """Find the least corner of what holds all points, (3,), and its longest side, metres. points: at least one"""
+    position = surface_points.position
+    return position.min(axis=0), max(float(np.ptp(position, axis=0).max()), 1e-30)
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _key_kernel(  # type: ignore[no-untyped-def]
+    positions_normals, material, side, level, size, corner, normal_steps, start, stop, position_key, attribute_key
+):
+    """Find the keys of nodes [start, stop). size: of the boxes in which they lie together. (n,) float64"""
+    position, normal = positions_normals
+    base = 2 * normal_steps + 1
+    for i in range(start, stop):
+        position_code, normal_code = np.uint64(0), np.int64(0)
+        for axis in range(3):
+            box = np.uint64(math.floor(np.float64(position[i, axis] - corner[axis]) / size[i]))
+            position_code = (position_code << np.uint64(_POSITION_BITS)) | box
+            normal_code = (
+                normal_code * base + np.int64(np.rint(normal[i, axis] * np.float32(normal_steps))) + normal_steps
+            )
+        position_key[i] = position_code
+        attribute_key[i] = (
+            (np.uint64(2 * normal_code + side[i]) << np.uint64(24))
+            | (level[i] << np.uint64(16))
+            | np.uint64(material[i])
+        )
+
+
+def _keys(
+    grid_nodes: NodeTable, merge_distance: float, normal_steps: int
+) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """Two numbers that nodes have alike which lie together. (n,) uint64 each"""
+    surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
+    level = np.rint(np.log2(grid_nodes.spacing / grid_nodes.spacing.min())).astype(np.uint64)
+    size = np.maximum(merge_distance * grid_nodes.spacing, extent / ((1 << _POSITION_BITS) - 1))
+    position_key, attribute_key = np.empty(len(size), np.uint64), np.empty(len(size), np.uint64)
+    args = (
+        (surface_points.position, surface_points.normal),
+        grid_nodes.material,
+        grid_nodes.side,
+        level,
+        size,
+        corner,
+        normal_steps,
+    )
+    parallel_for_chunks(lambda start, stop: _key_kernel(*args, start, stop, position_key, attribute_key), len(size))
+    return position_key, attribute_key
+
+
+def keys_numpy(
+    grid_nodes: NodeTable, merge_distance: float, normal_steps: int
+) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """Find the keys in plain NumPy: the oracle.
+
+    Args:
+        grid_nodes: of all grids. merge_distance: of the spacing, within which they are one.
+        normal_steps: steps of a unit normal's components, within which they look the same way.
+    Returns:
+        Two numbers that nodes have alike which lie together. (n,) uint64 each
+    """
+    surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
+    level = np.rint(np.log2(grid_nodes.spacing / grid_nodes.spacing.min())).astype(np.uint64)
+    size = np.maximum(merge_distance * grid_nodes.spacing, extent / ((1 << _POSITION_BITS) - 1))
+    box = np.floor((surface_points.position - corner) / size[:, None]).astype(np.uint64)
+    normal_code = np.rint(surface_points.normal * np.float32(normal_steps)).astype(np.int64) + normal_steps
+    base = 2 * normal_steps + 1
+    kind = (((normal_code[:, 0] * base + normal_code[:, 1]) * base + normal_code[:, 2]) * 2 + grid_nodes.side).astype(
+        np.uint64
+    )
+    position_key = (box[:, 0] << _U64(2 * _POSITION_BITS)) | (box[:, 1] << _U64(_POSITION_BITS)) | box[:, 2]
+    return position_key, (kind << _U64(24)) | (level << _U64(16)) | grid_nodes.material.astype(np.uint64)
+
+
+def _merge_nodes(
+    grid_nodes: NodeTable, merge_distance: float, normal_steps: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
+    surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
+    position_key, attribute_key = _keys(grid_nodes, merge_distance, normal_steps)
+    order = np.lexsort(
+        (~grid_nodes.is_candidate, attribute_key, position_key)
+    )  # stable: of equals a point, the one with the lowest number
+    is_new = np.concatenate(
+        [
+            [True],
+            (position_key[order[1:]] != position_key[order[:-1]])
+            | (attribute_key[order[1:]] != attribute_key[order[:-1]]),
+        ]
+    )
+    first, group = order[is_new], np.cumsum(is_new) - 1
+    fine_position = np.floor((surface_points.position[first] - corner) / (extent / ((1 << _POSITION_BITS) - 1))).astype(
+        np.uint64
+    )
+    in_order = np.lexsort((_morton_code(fine_position), grid_nodes.material[first]))
+    rank = np.empty(len(first), np.intp)
+    rank[in_order] = np.arange(len(first))
+    merged_index = np.empty(len(order), np.intp)
+    merged_index[order] = rank[group]
+    return first[in_order], merged_index
+
+
+def _morton_code(position: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Order places along a Morton curve: neighbours come mostly next to each other. (n,) uint64"""
+    code = np.zeros(len(position), np.uint64)
+    for bit in range(_POSITION_BITS):
+        for axis in range(3):
+            code |= (position[:, axis] >> _U64(bit) & _U64(1)) << _U64(3 * bit + axis)
+    return code

@@ -1,0 +1,64 @@
+"""The fine frame of a picture whose eye and look rest for a moment, made beside the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.free_camera.frame import Frame, FrameRequestState, render_frame
+from relume.live.free_camera.highlight_edges import add_samples
+from relume.live.free_camera.primary_visibility import GBuffer
+from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.scene.model import Camera
+
+F32 = NDArray[np.float32]
+
+
+def render_fine_frame(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    size: tuple[int, int],
+    shadow_visibility: Sequence[F32],
+) -> Frame:
+    """Find what an eye sees, its rims too.
+
+    Args:
+        transfer, state, gbuffer, camera, size, shadow_visibility: as of `relume.live.free_camera.frame.render_frame`;
+        `state` is fine.
+    """
+    frame = render_frame(transfer, state, gbuffer, camera, size, shadow_visibility)
+    return add_samples(transfer, state, gbuffer, camera, frame, shadow_visibility)
+
+
+@dataclass(frozen=True)
+class RefineHighlights:
+    """Finds it; a `relume.live.fixed_camera.jobs.Job`.
+
+    Attributes:
+        render: makes the frame, of what was shown when the job was begun. key: equal for jobs of one eye and look.
+        on_done: gets it.
+    """
+
+    render: Callable[[], Frame]
+    key: tuple[Hashable, ...]
+    on_done: Callable[[Frame], None]
+
+    label = "finer highlights"
+    state: ClassVar[Literal["shading"]] = "shading"
+    is_refinement = True
+    is_resumable = False
+
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Frame:
+        """Find it: as long as a few frames take."""
+        return self.render()
+
+    def install(self, result: Frame) -> None:
+        """Hand it over."""
+        self.on_done(result)

@@ -1,0 +1,242 @@
+"""A moving picture that becomes exact when its eye rests: a still of that place replaces it, until the eye moves on.
+
+Until the still is there the moving picture is corrected by a few exact samples, which are there at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from copy import copy
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.illumination import Solo
+from relume.live.fixed_camera.picture import Picture, Progress
+from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
+from relume.live.free_camera.refine_job import RefineHighlights
+from relume.live.free_camera.refinement.refinement_jobs import (
+    SizedCamera,
+    SparseExactJob,
+    StaticViewFactory,
+    StaticViewJob,
+    StaticViewState,
+)
+from relume.look import Look
+from relume.scene.model import Camera
+
+F32 = NDArray[np.float32]
+Tile = tuple[int, int, int, int]
+
+
+class ProgressivePicture:
+    """Two pictures of one view that take turns; one session's, used from one thread at a time.
+
+    Args:
+        free_camera_picture: shown while the eye moves, and until there is something better.
+        make_static_view: finds what an eye sees; heavy. cache: of what is made for stills.
+    """
+
+    def __init__(
+        self, free_camera_picture: FreeCameraPicture, make_static_view: StaticViewFactory, cache: Cache
+    ) -> None:
+        self._free_camera_picture, self._make_static_view, self._cache = free_camera_picture, make_static_view, cache
+        self._camera_seq, self._look_seq, self._is_idle = 0, 0, True
+        self._corrected_for: tuple[int, int] | None = (
+            None  # numbers of eye and look that a few exact samples were found for
+        )
+        self._static_picture: Picture | None = None
+        self._has_indirect = False  # the still, if a look wants them
+        self._is_static = False  # the still is what is shown
+        self._must_resend = False  # for a picture from the eye that it has
+        self._look: Look | None = None
+        self._active_pointer: str | None = None
+        self._prepared_pointer: str | None = None
+        self._solo: Solo = None
+
+    @property
+    def _displayed(self) -> FreeCameraPicture | Picture:
+        return (
+            self._static_picture if self._static_picture is not None and self._is_static else self._free_camera_picture
+        )
+
+    def check(self, look: Look) -> None:
+        """Whether a look can be shown at all; see `Picture.check`."""
+        self._displayed.check(look)
+
+    def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
+        """A new target for both; nothing is computed yet.
+
+        Args:
+            look: that is to be shown. active_pointer: pointer to what the user's hand is on, or None.
+            solo: names of sources of light that alone are shown; None: all.
+        Raises:
+            ParameterError, NotFoundError, SceneError: as by `Picture.set_look`; both stay as they were.
+        """
+        static_picture = self._static_picture if self._has_indirect or not _has_indirect(look) else None
+        if static_picture is not None:  # first, for it refuses whatever the other does
+            static_picture.set_look(look, active_pointer=active_pointer, solo=solo)
+        self._free_camera_picture.set_look(look, active_pointer=active_pointer, solo=solo)
+        if static_picture is None:
+            self._static_picture, self._is_static = None, False
+        self._look, self._active_pointer, self._solo = look, active_pointer, solo
+        self._look_seq += 1
+
+    def set_camera(self, camera: Camera, size: tuple[int, int], *, is_idle: bool = True) -> None:
+        """See from elsewhere; nothing is computed yet.
+
+        Args:
+            camera: a rigid one. size: width and height in pixels.
+            is_idle: an exact picture is to follow.
+        """
+        self._is_idle = is_idle
+        if _is_same_camera(self._free_camera_picture.sized_camera, (camera, size)):
+            self._must_resend = True
+            return
+        self._free_camera_picture.set_camera(camera, size)
+        self._camera_seq += 1
+        self._static_picture, self._is_static = None, False
+
+    @property
+    def renders_pixels(self) -> bool:
+        """Whether the pixels of the moving picture are wanted at every step; see `FreeCameraPicture`."""
+        return self._free_camera_picture.renders_pixels
+
+    @renders_pixels.setter
+    def renders_pixels(self, draws: bool) -> None:
+        self._free_camera_picture.renders_pixels = draws
+
+    def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants] | None:
+        """What a shader needs to draw the moving picture; None while it is corrected, or the still is shown."""
+        is_server_rendered = self._displayed is self._static_picture or self._free_camera_picture.is_corrected
+        return None if is_server_rendered else self._free_camera_picture.array_blocks()
+
+    def prepare(self, pointer: str) -> None:
+        """Prepare what a hand takes hold of; see `Picture.touch`."""
+        self._displayed.prepare(pointer)
+        self._prepared_pointer = pointer
+
+    def next_job(self) -> Any:
+        """What must be made next; a still last."""
+        if self._static_picture is not None:
+            return self._static_picture.next_job()
+        job = self._free_camera_picture.next_job()
+        if job is not None or not self._is_idle or self._look is None:
+            return job
+        view_state = StaticViewState(
+            self._make_static_view, self._cache, self._free_camera_picture.sized_camera, self._look, self._solo
+        )
+        request = self._camera_seq, self._look_seq
+        if self._corrected_for != request and SparseExactJob.should_refine(view_state):
+            return SparseExactJob(
+                view_state, copy(self._free_camera_picture), ("sparse", *request), partial(self._correct, request)
+            )
+        return StaticViewJob(view_state, ("still", *request), partial(self._install_static_picture, self._camera_seq))
+
+    def _correct(self, request: tuple[int, int], residual_image: F32 | None) -> None:
+        if request == (self._camera_seq, self._look_seq):  # else the hand has moved on
+            self._corrected_for = request
+            self._free_camera_picture.correct(residual_image)
+
+    def _install_static_picture(self, camera_seq: int, has_indirect: bool, static_picture: Picture | None) -> None:
+        if camera_seq != self._camera_seq or self._look is None:
+            return
+        if static_picture is None:
+            self._is_idle = False
+            return
+        if _has_indirect(self._look) and not has_indirect:  # asked for meanwhile: it goes on from what was traced
+            return
+        static_picture.set_look(self._look, active_pointer=self._active_pointer, solo=self._solo)
+        if self._prepared_pointer is not None:
+            with suppress(ParameterError):  # an edit may have removed it
+                static_picture.prepare(self._prepared_pointer)
+        self._static_picture, self._has_indirect = static_picture, has_indirect
+
+    def install(self, job: Any, result: Any) -> None:
+        """Go on with what a job has made."""
+        if isinstance(
+            job, StaticViewJob | SparseExactJob | IncrementalProbeLightJob | ProbeLightJob | RefineHighlights
+        ):
+            job.install(result)
+        elif self._static_picture is not None:  # else it was made for one that is gone
+            self._static_picture.install(job, result)
+
+    def advance(self, max_coefficients: int | None) -> Progress:
+        """Bring what is shown to its look and its eye; a still is shown once it is exact, and from then on."""
+        step = self._step(max_coefficients)
+        if not self._must_resend:
+            return step
+        self._must_resend = False
+        return replace(step, tiles=self.all_tiles())
+
+    def _step(self, max_coefficients: int | None) -> Progress:
+        if self._static_picture is None:
+            return self._free_camera_picture.advance(max_coefficients)
+        step = self._static_picture.advance(max_coefficients)
+        if self._is_static:
+            return step
+        if not step.exact:
+            return self._free_camera_picture.advance(max_coefficients)
+        self._is_static = True
+        return replace(step, tiles=self._static_picture.all_tiles(), was_off=self._relative_error(self._static_picture))
+
+    def _relative_error(self, static_picture: Picture) -> float | None:
+        """How far the moving picture is from a still, relative RMS; None where it has not caught up, or all is dark."""
+        self._free_camera_picture.correct(None)
+        if self._free_camera_picture.advance(None).fidelity != "approximate":
+            return None
+        exact = static_picture.image()
+        size = float(np.mean(np.square(exact, dtype=np.float64)))
+        return float(np.sqrt(np.mean((self._free_camera_picture.image() - exact) ** 2) / size)) if size else None
+
+    def all_tiles(self) -> list[Tile]:
+        """Tiles that cover the picture."""
+        return self._displayed.all_tiles()
+
+    def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
+        """Payload of a frame; see `Picture.encode`."""
+        return self._displayed.encode(tiles, form)
+
+    def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
+        """How much it hides of what is behind it; see `Picture.encode_alpha`."""
+        return self._displayed.encode_alpha(tiles)
+
+    def image(self) -> F32:
+        """Linear radiance. (height, width, 3) float32"""
+        return self._displayed.image()
+
+    def inspect(self, x: int, y: int) -> dict[str, Any]:
+        """What makes up a pixel; see `Picture.inspect`. Raises ParameterError where it lies outside the picture."""
+        return self._displayed.inspect(x, y)
+
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
+        """Which pixels a stretch of a curve lights; see `Picture.brush`.
+
+        Args:
+            pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
+        Raises:
+            NotMadeError: no still is shown.
+        """
+        return self._displayed.highlight_pixels(pointer, from_deg, to_deg)
+
+
+def _has_indirect(look: Look) -> bool:
+    """Whether a look shows light between surfaces."""
+    return look.transport.paths.has_indirect
+
+
+def _is_same_camera(first: SizedCamera, second: SizedCamera) -> bool:
+    (camera, size), (second_camera, second_size) = first, second
+    return bool(
+        size == second_size
+        and camera.yfov == second_camera.yfov
+        and np.array_equal(camera.to_world, second_camera.to_world)
+    )

@@ -1,0 +1,323 @@
+"""From points to pixels: what is sent is interpolated; textures, slopes and mirrored light are found for each pixel."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.color import LUMINANCE
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
+from relume.live.free_camera.highlights.environment_lobe_lookup import (
+    PrefilteredEnvironment,
+    add_environment_in_lobe,
+    evaluate_lobe,
+    evaluate_two_lobes,
+)
+from relume.live.free_camera.normal_mapping import normal_tilt, normalize, shading_ratio
+from relume.live.free_camera.primary_visibility import GBuffer
+from relume.live.free_camera.probes.stored_scene import EMISSION, NORMAL_MAP, StoredScene
+from relume.live.free_camera.probes.texture_kernels import sample_texture
+
+F32 = NDArray[np.float32]
+
+_MIN_SLANT = np.float32(0.05)  # cosine, below which footprints grow no more
+_CHUNKS_PER_THREAD = 4  # for each thread: a ray that sees a highlight costs five times as much as others
+_MAX_NEGATIVE_RATIO = np.float32(
+    0.5
+)  # by points, of what a pixel's lobe shows: more is an error of theirs, a black patch
+_MAX_GRADIENT_RATIO = np.float32(0.125)  # of what a pixel shows, that turning its lobe may take or add
+_RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
+_FULLY_ABOVE = np.float32(10)  # widths of a lobe, from which on all of it is above: a share of 4e-8 is missing
+
+
+class MirrorData(NamedTuple):
+    """What lobes send.
+
+    Attributes:
+        lobes: of all materials. environment: that they show where points see it.
+        lobe_visibility: of vertices along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
+            (vertices, 3) float32
+        gradients: of vertices, from `relume.live.free_camera.highlights.lobe_gradients`. (vertices, 4) float32
+        is_fine: two lobes stand for each highlight, as at points, not for those alone that ask for it.
+    """
+
+    lobes: Lobes
+    environment: PrefilteredEnvironment
+    lobe_visibility: F32
+    gradients: F32
+    is_fine: bool
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def blend(values, lattice_node, weight):  # type: ignore[no-untyped-def]
+    """Interpolate vectors between the three vertices about a pixel.
+
+    Args:
+        values: of all vertices. (vertices, 3). lattice_node: the three, a tuple. weight: of each, a tuple.
+    """
+    x = y = z = np.float32(0)
+    for k in range(3):
+        v, w = lattice_node[k], weight[k]
+        x, y, z = x + w * values[v, 0], y + w * values[v, 1], z + w * values[v, 2]
+    return x, y, z
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _logistic_tail(x):  # type: ignore[no-untyped-def]
+    """Approximate b, with 1 / (1 + b) the share of a normal distribution above −x."""
+    if x > _FULLY_ABOVE:
+        return np.float32(0)
+    return math.exp(np.float32(-1.702) * max(x, np.float32(-20)))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _lobe_radiance(mirror_data, lattice_node, weight, direction, outward, lobe, n, light):  # type: ignore[no-untyped-def]
+    """Find what the lobe of a pixel sees.
+
+    Args:
+        mirror_data, lattice_node, weight, direction, lobe: see `shade_pixels`; of the pixel.
+        outward: of its face, where it is not the way that `n`, its normal, leans.
+        light: written, radiance. (3,)
+    Returns:
+        A row of the lobe's table and the share of the next, for its albedo.
+    """
+    visibility = blend(mirror_data.lobe_visibility, lattice_node, weight)
+    row, fraction, lobe_direction, sigma_1 = evaluate_lobe(mirror_data.lobes, lobe, n, direction)
+    view_cosine = direction[0] * outward[0] + direction[1] * outward[1] + direction[2] * outward[2]
+    lobe_cosine = (lobe_direction[0] * outward[0] + lobe_direction[1] * outward[1] + lobe_direction[2] * outward[2]) * (
+        np.float32(-1) if view_cosine > 0 else np.float32(1)
+    )
+    # points know what hides the sky from a lobe about their own normal; one that leans may look into its own surface
+    inverse_sigma = np.float32(1) / sigma_1
+    lobe_tail, mirror_tail = (
+        _logistic_tail(inverse_sigma * lobe_cosine),
+        _logistic_tail(inverse_sigma * abs(view_cosine)),
+    )
+    above_fraction = min((np.float32(1) + mirror_tail) / (np.float32(1) + lobe_tail), np.float32(1))
+    light[0] = light[1] = light[2] = 0
+    direction_1, direction_2, weight_1, sigma_2 = lobe_direction, lobe_direction, np.float32(1), sigma_1
+    if mirror_data.is_fine or mirror_data.lobes.is_two[lobe]:
+        row, fraction, direction_1, direction_2, weight_1, sigma_1, sigma_2 = evaluate_two_lobes(
+            mirror_data.lobes, lobe, n, direction
+        )
+    for k in range(2):
+        lobe_weight = weight_1 if k == 0 else np.float32(1) - weight_1
+        if lobe_weight > 0:
+            lobe_axis, width = (direction_1, sigma_1) if k == 0 else (direction_2, sigma_2)
+            add_environment_in_lobe(
+                mirror_data.environment, visibility, lobe_axis, width, above_fraction * lobe_weight, light
+            )
+    for channel in range(3):
+        light[channel] *= mirror_data.environment.gain[channel]
+    return row, fraction
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _albedo(lobes, lobe, row, fraction, group):  # type: ignore[no-untyped-def]
+    """The albedo of a lobe in a group of terms, three numbers; row, share: see `_mirror`."""
+    lower, upper = lobes.albedo[lobe, row, group], lobes.albedo[lobe, row + 1, group]
+    return (
+        lower[0] + fraction * (upper[0] - lower[0]),
+        lower[1] + fraction * (upper[1] - lower[1]),
+        lower[2] + fraction * (upper[2] - lower[2]),
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _gradient_term(gradients, lattice_node, weight, direction, n):  # type: ignore[no-untyped-def]
+    """Find how much more other light a lobe sees than is interpolated: luminance, for an albedo of one.
+
+    Args:
+        gradients: of all vertices. (vertices, 4). lattice_node, weight, direction: of the pixel, see `shade_pixels`.
+        n: its normal, before a normal map bends it, which points know nothing of.
+    """
+    x, y, z = blend(gradients, lattice_node, weight)
+    probe_term = np.float32(0)
+    for k in range(3):
+        probe_term += weight[k] * gradients[lattice_node[k], 3]
+    twice = np.float32(2) * (direction[0] * n[0] + direction[1] * n[1] + direction[2] * n[2])
+    rx, ry, rz = direction[0] - twice * n[0], direction[1] - twice * n[1], direction[2] - twice * n[2]
+    return np.float32(0.5) * (x * rx + y * ry + z * rz - probe_term)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def interpolate_uv(uvs, corners, uv):  # type: ignore[no-untyped-def]
+    """Find the place in textures of a place in a triangle.
+
+    Args:
+        uvs: of all corners. (corners, 2). corners: the triangle's three, a tuple. uv: the place in it, of two of them.
+    """
+    a, b, c = corners
+    w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
+    return w0 * uvs[a, 0] + w1 * uvs[b, 0] + w2 * uvs[c, 0], w0 * uvs[a, 1] + w1 * uvs[b, 1] + w2 * uvs[c, 1]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[no-untyped-def]
+    """Find the side of what a pixel sees of a texture.
+
+    Args:
+        distance: from the eye, metres. pixel_angle: that a pixel spans, radians.
+        uv_scale: side in the texture of a metre of the surface. cosine: cosine of the slant, of either sign.
+    """
+    return distance * pixel_angle * uv_scale / math.sqrt(max(abs(cosine), _MIN_SLANT))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _perturbed_normal(  # type: ignore[no-untyped-def]
+    textures, texture, texture_uv, footprint, tangents, corners, uv, n, outward, is_back_face, scratch
+):
+    """Look up where the normal n of a pixel leans. outward: of the face. is_behind: its other side is seen."""
+    a, b, c = corners
+    w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
+    side = np.float32(-1) if is_back_face else np.float32(1)
+    t = (
+        w0 * tangents[a, 0] + w1 * tangents[b, 0] + w2 * tangents[c, 0],
+        w0 * tangents[a, 1] + w1 * tangents[b, 1] + w2 * tangents[c, 1],
+        w0 * tangents[a, 2] + w1 * tangents[b, 2] + w2 * tangents[c, 2],
+    )
+    out = side * outward[0], side * outward[1], side * outward[2]
+    return normal_tilt(textures, texture, texture_uv, footprint, n, t, tangents[a, 3], out, scratch)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _shade_pixels(  # type: ignore[no-untyped-def]
+    scene_arrays, pixel_angle, hits, directions, lattice_node, weight, node_radiance, is_reflective, light_gradient,
+    emission, mirror_data, rows,
+    start, stop, out,
+):  # fmt: skip
+    """Sum what vertices and lobes send along the rays that are [start, stop) of rows, and what surfaces emit."""
+    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene_arrays
+    face, uv, distance = hits
+    lobes = mirror_data.lobes
+    texture_value, light, radiance = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
+    for r in range(start, stop):
+        p = rows[r]
+        f = face[p]
+        if f < 0:
+            out[p, 0] = out[p, 1] = out[p, 2] = 0
+            continue
+        material = face_material[f]
+        # tuples, and helpers that are inlined: arrays handed over would be counted as references, several times a ray
+        outward = face_normal[f, 0], face_normal[f, 1], face_normal[f, 2]
+        corners = faces[f, 0], faces[f, 1], faces[f, 2]
+        nodes, weights = (
+            (lattice_node[p, 0], lattice_node[p, 1], lattice_node[p, 2]),
+            (weight[p, 0], weight[p, 1], weight[p, 2]),
+        )
+        barycentric = uv[p, 0], uv[p, 1]
+        lobe, row, fraction, ratio = lobes.lobe_index[material], 0, np.float32(0), np.float32(1)
+        d = directions[p, 0], directions[p, 1], directions[p, 2]
+        view_cosine = outward[0] * d[0] + outward[1] * d[1] + outward[2] * d[2]
+        footprint = texture_footprint(distance[p], pixel_angle, uv_scale[f], view_cosine)
+        texture_uv = interpolate_uv(uvs, (uv_faces[f, 0], uv_faces[f, 1], uv_faces[f, 2]), barycentric)
+        is_mapped = textures.material_textures[material, NORMAL_MAP] >= 0
+        n, gradient_term = d, np.float32(0)
+        if is_mapped or lobe >= 0:
+            n = normalize(blend(normals, nodes, weights))
+        if lobe >= 0:
+            gradient_term = _gradient_term(mirror_data.gradients, nodes, weights, d, n)
+        if is_mapped:
+            perturbed = _perturbed_normal(
+                textures, textures.material_textures[material, NORMAL_MAP], texture_uv, footprint, tangents, corners,
+                barycentric,
+                n, outward, view_cosine > 0, texture_value,
+            )  # fmt: skip
+            ratio = shading_ratio(blend(light_gradient, nodes, weights), n, perturbed)
+            n = perturbed
+        if lobe >= 0:
+            row, fraction = _lobe_radiance(mirror_data, nodes, weights, d, outward, lobe, n, light)
+        # by element: assigning a slice is a call
+        texture_value[0] = texture_value[1] = texture_value[2] = 1
+        if textures.material_textures[material, EMISSION] >= 0:
+            image = textures.material_textures[material, EMISSION]
+            sample_texture(textures, image, texture_uv[0], texture_uv[1], footprint, texture_value)
+        for channel in range(3):
+            out[p, channel] = emission[material, channel] * texture_value[channel]
+        for group in range(NUM_GROUPS):
+            if not is_reflective[material, group]:
+                continue
+            texture_value[0] = texture_value[1] = texture_value[2] = 1
+            texture = textures.material_textures[material, group - 1] if group else -1
+            if texture >= 0:
+                sample_texture(textures, texture, texture_uv[0], texture_uv[1], footprint, texture_value)
+            albedo = np.float32(0), np.float32(0), np.float32(0)
+            if lobe >= 0:
+                albedo = _albedo(lobes, lobe, row, fraction, group)
+            for channel in range(3):
+                total = np.float32(0)
+                for k in range(3):
+                    total += weights[k] * node_radiance[nodes[k], group, channel]
+                total *= ratio
+                if lobe >= 0:
+                    lobe_radiance = albedo[channel] * light[channel]
+                    total = max(total, -_MAX_NEGATIVE_RATIO * lobe_radiance) + lobe_radiance
+                radiance[channel] = max(total, np.float32(0))
+            gain = np.float32(1)
+            if gradient_term != 0:
+                luminance = _RED * radiance[0] + _GREEN * radiance[1] + _BLUE * radiance[2]
+                delta = gradient_term * (_RED * albedo[0] + _GREEN * albedo[1] + _BLUE * albedo[2])
+                delta = min(max(delta, -_MAX_GRADIENT_RATIO * luminance), _MAX_GRADIENT_RATIO * luminance)
+                gain += delta / max(luminance, np.float32(1e-20))
+            for channel in range(3):
+                out[p, channel] += texture_value[channel] * gain * radiance[channel]
+
+
+class InterpolatedProbes(NamedTuple):
+    """What vertices send to an eye, and what leaning pixels about them make of it.
+
+    Attributes:
+        radiance: radiance, untextured, then by each of `TEXTURES`. (vertices, groups, 3) float32
+        is_reflective: whether a material sends anything of a group at all, by lobes too. (materials, groups) bool
+        light_gradient: from `relume.live.free_camera.normal_mapping`; empty where no material has a normal map.
+            (vertices, 3) float32
+    """
+
+    radiance: F32
+    is_reflective: NDArray[np.bool_]
+    light_gradient: F32
+
+
+def shade_pixels(
+    stored_scene: StoredScene,
+    gbuffer: GBuffer,
+    pixel_angle: float,
+    interpolated_probes: InterpolatedProbes,
+    emission: F32,
+    mirror_data: MirrorData,
+    rows: NDArray[np.int32] | None = None,
+    out: F32 | None = None,
+) -> F32:
+    """Find the radiance along rays that see a surface; the others are black.
+
+    Args:
+        stored_scene: that is seen. gbuffer: what rays see of it.
+        pixel_angle: angle that a pixel spans, radians.
+        interpolated_probes: by every vertex. mirror_data: what lobes send besides.
+        emission: radiance of each material's own, the mean over its surfaces. (materials, 3) float32
+        rows: rays that are asked; None: all. (n,) int32. out: written there; None: new.
+    Returns:
+        (rays, 3) float32
+    """
+    radiance = np.empty((len(gbuffer.directions), 3), np.float32) if out is None else out
+    ray_indices = np.arange(len(radiance), dtype=np.int32) if rows is None else rows
+    hits = (gbuffer.hits.face, gbuffer.hits.uv, gbuffer.hits.distance)
+    scene_arrays = (
+        stored_scene.textures, stored_scene.uvs, stored_scene.tangents, stored_scene.faces, stored_scene.uv_faces,
+        stored_scene.face_material,
+        stored_scene.face_normal, stored_scene.uv_scale, stored_scene.lattice_nodes.normal,
+    )  # fmt: skip
+    args = (
+        scene_arrays, np.float32(pixel_angle), hits, gbuffer.directions, gbuffer.lattice_node, gbuffer.weight,
+        *interpolated_probes, emission, mirror_data, ray_indices,
+    )  # fmt: skip
+    parallel_for_chunks(
+        lambda start, stop: _shade_pixels(*args, start, stop, radiance), len(ray_indices), _CHUNKS_PER_THREAD
+    )
+    return radiance

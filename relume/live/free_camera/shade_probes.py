@@ -1,0 +1,240 @@
+"""What points send to an eye: B(x, ωo) = Σ_k p_k(ωo) t_k(x), for the points that a picture needs.
+
+What has a highlight sends the sky apart from other light
+(`relume.live.free_camera.highlights.interpolated_highlights`). Of other light it sends Σ_k w_k p_k t_k: functions cut
+off at a degree ring, black beside what is bright, which w takes away for a little blur (docs/adr/0063-highlights.md).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
+from relume.live.free_camera.basis.material_tables import Tables
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS, NUM_ROWS, rotate_coefficients
+from relume.live.free_camera.basis.table_index import MIN_COSINE, view_direction_local
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.math.zernike import NUM_FUNCTIONS, recurrence
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+# In one piece: arrays that are handed to functions, even to inlined ones, are counted as references, at every point.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _shade_probes(  # type: ignore[no-untyped-def]
+    recurrence_table,
+    probes,
+    material,
+    vectors,
+    non_environment,
+    tables,
+    camera_position,
+    rows,
+    start,
+    stop,
+    out,
+    environment,
+):
+    """Evaluate the points that are [start, stop) of rows. out, sky: (points, groups, 3), written there"""
+    position, normal, tangent, _, _ = probes
+    num_groups, num_basis = out.shape[1], recurrence_table.order.shape[0]
+    rotated_light, outgoing = np.empty((3, num_basis), np.float32), np.empty((num_groups, 3), np.float32)
+    for p in rows[start:stop]:
+        row, fraction, cosine_phi, sine_phi = view_direction_local(position[p], normal[p], tangent[p], camera_position)
+        for group in range(num_groups):
+            for channel in range(3):
+                out[p, group, channel] = environment[p, group, channel] = 0
+        for kind in range(0, 6 if non_environment.shape[0] > 0 else 2, 2):
+            is_isotropic = is_anisotropic = False
+            for group in range(num_groups):
+                outgoing[group, 0] = outgoing[group, 1] = outgoing[group, 2] = 0
+                is_isotropic |= tables.table_index[material[p], group, kind] >= 0
+                is_anisotropic |= tables.table_index[material[p], group, kind + 1] >= 0
+            if is_isotropic:
+                re, im = np.float32(1), np.float32(0)
+                for basis_index in range(num_basis):
+                    m = recurrence_table.order[basis_index]
+                    if recurrence_table.a[basis_index] == 0 and m > 0:
+                        re, im = re * cosine_phi - im * sine_phi, re * sine_phi + im * cosine_phi
+                    cosine, sine = recurrence_table.cosine[basis_index], recurrence_table.sine[basis_index]
+                    for channel in range(3):
+                        cosine_light = sine_light = np.float32(0)
+                        if kind < 4:
+                            cosine_light, sine_light = vectors[p, channel, cosine], vectors[p, channel, sine]
+                        if kind == 2:
+                            cosine_light, sine_light = (
+                                cosine_light - non_environment[p, channel, cosine],
+                                sine_light - non_environment[p, channel, sine],
+                            )
+                        elif kind == 4:
+                            cosine_light, sine_light = (
+                                non_environment[p, channel, cosine],
+                                non_environment[p, channel, sine],
+                            )
+                        rotated_light[channel, basis_index] = (
+                            re * cosine_light + im * sine_light if m > 0 else re * cosine_light
+                        )
+                for group in range(num_groups):
+                    table = tables.table_index[material[p], group, kind]
+                    if table < 0:
+                        continue
+                    for channel in range(3):
+                        lower, upper = tables.isotropic[table, row, channel], tables.isotropic[table, row + 1, channel]
+                        total = np.float32(0)
+                        for basis_index in range(num_basis):
+                            total += (
+                                lower[basis_index] + fraction * (upper[basis_index] - lower[basis_index])
+                            ) * rotated_light[channel, basis_index]
+                        outgoing[group, channel] = total
+            if is_anisotropic:  # apart: beside its loop the one above is four times slower
+                view_coordinates = row, fraction, cosine_phi, sine_phi
+                _add_anisotropic(
+                    tables.anisotropic,
+                    tables.table_index,
+                    material[p],
+                    kind,
+                    view_coordinates,
+                    vectors,
+                    non_environment,
+                    p,
+                    outgoing,
+                )
+            for group in range(num_groups):
+                for channel in range(3):
+                    if kind == 0:
+                        out[p, group, channel] = outgoing[group, channel]
+                    elif kind == 2:
+                        environment[p, group, channel] = outgoing[group, channel]
+                    else:  # what rings below black would take from the sky beside it
+                        out[p, group, channel] += max(outgoing[group, channel], np.float32(0))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _add_anisotropic(tables, table_index, material, kind, view_coordinates, vectors, non_environment, p, out):  # type: ignore[no-untyped-def]
+    """Add sums of the light vector of point p with tables over θo and φo. out: (groups, 3)"""
+    row, fraction, cosine_phi, sine_phi = view_coordinates
+    azimuth = math.atan2(sine_phi, cosine_phi) / (np.float32(2) * np.float32(math.pi))
+    column_coordinate = (azimuth - math.floor(azimuth)) * np.float32(NUM_COLUMNS)
+    column: Any = min(np.int64(column_coordinate), NUM_COLUMNS - 1)
+    next_column, column_fraction = (column + 1) % NUM_COLUMNS, np.float32(column_coordinate - column)
+    for group in range(out.shape[0]):
+        if table_index[material, group, kind + 1] < 0:
+            continue
+        table = tables[table_index[material, group, kind + 1]]
+        for channel in range(3):
+            total = np.float32(0)
+            for k in range(vectors.shape[2]):
+                lower = table[row, column, channel, k]
+                lower += column_fraction * (table[row, next_column, channel, k] - lower)
+                upper = table[row + 1, column, channel, k]
+                upper += column_fraction * (table[row + 1, next_column, channel, k] - upper)
+                light = vectors[p, channel, k] if kind < 4 else non_environment[p, channel, k]
+                if kind == 2:
+                    light -= non_environment[p, channel, k]
+                total += (lower + fraction * (upper - lower)) * light
+            out[group, channel] += total
+
+
+class ProbeRadiance(NamedTuple):
+    """What points send, by groups of terms as in `Tables`.
+
+    Attributes:
+        radiance: without the sky in highlights. (points, groups, 3) float32
+        environment: in highlights, as far as the in-basis tells it. (points, groups, 3) float32
+    """
+
+    radiance: F32
+    environment: F32
+
+
+def shade_probes(
+    stored_scene: StoredScene,
+    vectors: F32,
+    non_environment: F32 | None,
+    tables: Tables,
+    camera_position: F32,
+    is_needed: NDArray[np.uint8],
+    out: ProbeRadiance | None = None,
+) -> ProbeRadiance:
+    """Find what points send to an eye.
+
+    Args:
+        stored_scene: whose points. vectors: t of each. (points, 3, K) float32
+        non_environment: t of all light but the sky's own, for terms with a highlight; None: they send nothing.
+        tables: of all materials. camera_position: where it is. (3,) float32
+        is_needed: points that are evaluated. (points,) uint8
+        out: written where needed; None: the others are black.
+    """
+    shape = len(vectors), NUM_GROUPS, 3
+    outgoing = ProbeRadiance(np.zeros(shape, np.float32), np.zeros(shape, np.float32)) if out is None else out
+    rows = np.flatnonzero(is_needed.view(np.bool_))
+    args = (
+        recurrence(),
+        stored_scene.probes,
+        stored_scene.material,
+        vectors,
+        np.empty((0, *vectors.shape[1:]), np.float32) if non_environment is None else non_environment,
+        tables,
+        np.ascontiguousarray(camera_position, np.float32),
+        rows,
+    )
+    parallel_for_chunks(lambda start, stop: _shade_probes(*args, start, stop, *outgoing), len(rows))
+    return outgoing
+
+
+def shade_probes_numpy(
+    stored_scene: StoredScene, vectors: F32, non_environment: F32, tables: Tables, camera_position: F32, probe: int
+) -> tuple[F64, F64]:
+    """Do as `send` for one point, in plain NumPy: its oracle.
+
+    Args:
+        stored_scene, vectors, non_environment, tables, camera_position: as there. probe: number of the point.
+    Returns:
+        Radiance and sky, as there. (groups, 3) float64 each
+    """
+    lights = vectors[probe], vectors[probe] - non_environment[probe], non_environment[probe]
+    plain, environment, highlights = (
+        _sum_numpy(stored_scene, t, tables, camera_position, probe, 2 * kind) for kind, t in enumerate(lights)
+    )
+    return plain + np.maximum(highlights, 0), environment
+
+
+def _sum_numpy(
+    stored_scene: StoredScene, light: F32, tables: Tables, camera_position: F32, probe: int, first: int
+) -> F64:
+    """Sum the light (3, K) of a point with the tables of a kind, which begin at column `first`. (groups, 3)"""
+    probes, recurrence_table = stored_scene.probes, recurrence()
+    n, t = probes.normal[probe].astype(np.float64), probes.tangent[probe].astype(np.float64)
+    wo = camera_position.astype(np.float64) - probes.position[probe]
+    x, y, z = np.array([t, np.cross(n, t), n]) @ wo / np.linalg.norm(wo)
+    row_coordinate = np.sqrt(1 - np.clip(z, MIN_COSINE, 1)) * (NUM_ROWS - 1)
+    row, phi = min(int(row_coordinate), NUM_ROWS - 2), np.arctan2(y, x)
+    row_fraction, column_coordinate = row_coordinate - row, phi / (2 * np.pi) % 1 * NUM_COLUMNS
+    column_index = int(column_coordinate) % NUM_COLUMNS
+    out = np.zeros((NUM_GROUPS, 3))
+    for group, (isotropic, anisotropic) in enumerate(
+        tables.table_index[stored_scene.material[probe], :, first : first + 2]
+    ):
+        factors = np.zeros((3, NUM_FUNCTIONS))
+        if isotropic >= 0:
+            unrotated = np.zeros((3, NUM_FUNCTIONS))
+            unrotated[:, recurrence_table.cosine] = (1 - row_fraction) * tables.isotropic[
+                isotropic, row
+            ] + row_fraction * tables.isotropic[isotropic, row + 1]
+            factors += rotate_coefficients(unrotated, phi)
+        if anisotropic >= 0:
+            row_pair = tables.anisotropic[anisotropic, row : row + 2]
+            interpolated = row_pair[:, column_index] + (column_coordinate - int(column_coordinate)) * (
+                row_pair[:, (column_index + 1) % NUM_COLUMNS] - row_pair[:, column_index]
+            )
+            factors += (1 - row_fraction) * interpolated[0] + row_fraction * interpolated[1]
+        out[group] = np.einsum("ck,ck->c", factors, light.astype(np.float64))
+    return out

@@ -1,0 +1,41 @@
+"""The tables of a BTF that a look shows for the first time, made beside the frames: until then its mean is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.free_camera.texel_brdf.texel_tables import TexelTables, get_texel_tables
+
+
+@dataclass(frozen=True)
+class TablesJob:
+    """Makes them; a `relume.live.fixed_camera.jobs.Job`.
+
+    Attributes:
+        data, components: of `get_texel_tables`. on_done: called when they are there.
+    """
+
+    data: str
+    components: int
+    on_done: Callable[[], None]
+
+    label = "measured texture"
+    state: ClassVar[Literal["freezing"]] = "freezing"
+    is_refinement = False
+    is_resumable = True
+
+    @property
+    def key(self) -> tuple[Hashable, ...]:
+        """Equal for jobs of one BTF."""
+        return "tables of a BTF", self.data, self.components
+
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> TexelTables:
+        """Find the tables, or wait for whoever does: seconds for 128 x 128 texels."""
+        return get_texel_tables(self.data, self.components)
+
+    def install(self, result: TexelTables) -> None:
+        """Have them shown."""
+        self.on_done()

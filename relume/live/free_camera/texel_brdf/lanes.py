@@ -1,0 +1,201 @@
+"""The two sums of a ray that sees a texel, as vectors of eight: of numbers over texels and sides, and under its light.
+
+As plain loops they take twice the time: see `relume.core.simd`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numpy.polynomial import chebyshev, polynomial
+from numpy.typing import NDArray
+
+from relume.core.simd import (
+    NUM,
+    VECTOR,
+    WORD,
+    ArrayPointer,
+    broadcast,
+    constant_index,
+    dot,
+    extract_lane,
+    multiply,
+    shuffle,
+    subtract,
+    sum_lanes,
+    sum_values,
+    untyped_intrinsic,
+)
+from relume.live.free_camera.texel_brdf.coefficient_packing import (
+    COEFFICIENT_AXIS,
+    COEFFICIENT_LANE,
+    EMPTY_LANE,
+    HALF,
+    HAS_ORDER,
+    NUM_COEFFICIENTS,
+    PAIRS,
+)
+
+_tuple: Any = types.UniTuple  # carries no types
+_TEXELS, _SIDES, _CORNERS, _CHANNELS = 4, 4, 3, 3
+_ORDERS = [int(order) for order in HAS_ORDER[:, :HALF].argmax(axis=0)]  # of a channel's pairs of lanes
+_SECONDARY_LANES = [int(lane) for lane in COEFFICIENT_LANE[2 * HALF :]]  # that the second and the third axis count for
+_MAX_ORDER = max(_ORDERS)
+
+
+@untyped_intrinsic
+def add_texels(typing_context, weight, step, view, view_weight, first_view, texel, texel_weight, first, is_more, out):  # type: ignore[no-untyped-def]
+    """Sum the numbers of four texels between four sides.
+
+    Args:
+        typing_context: Numba's. weight: (V, texels, 24) int8. step: (V, 24) float32.
+        view: sides, int32. view_weight: their weights, float32. first_view: the first of the four.
+        texel: int32. texel_weight: of each, float32. first: of the four.
+        is_more: they are added to what is there. out: (24,) float32
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        first_view, first, is_more = (arguments[k] for k in (4, 7, 8))
+        weights, steps, views, view_weights, texels, texel_weights, sums = (
+            ArrayPointer(context, builder, kind, value)
+            for kind, value in zip(signature.args, arguments, strict=True)
+            if isinstance(kind, types.Array)
+        )
+        locations = [builder.add(first, constant_index(k)) for k in range(_TEXELS)]
+        texel_indices = [builder.sext(texels.load(location), WORD) for location in locations]
+        texel_vectors = [broadcast(builder, texel_weights.load(location)) for location in locations]
+        locations = [builder.add(first_view, constant_index(k)) for k in range(_SIDES)]
+        sides = [builder.sext(views.load(location), WORD) for location in locations]
+        side_weights = [broadcast(builder, view_weights.load(location)) for location in locations]
+        zero = ir.Constant(VECTOR, [0.0] * NUM)
+        for lane in map(constant_index, range(0, NUM_COEFFICIENTS, NUM)):
+            location, contributions = sums.vector_pointer(lane), []
+            for side, side_weight in zip(sides, side_weights, strict=True):
+                texel_sum = dot(
+                    builder,
+                    texel_vectors,
+                    [weights.load_int8_vector(side, texel_index, lane) for texel_index in texel_indices],
+                )
+                contributions.append(
+                    multiply(builder, multiply(builder, side_weight, steps.load_vector(side, lane)), texel_sum)
+                )
+            before = builder.select(is_more, builder.load(location, align=4), zero)
+            builder.store(sum_values(builder, [before, *contributions]), location, align=4)
+        return context.get_dummy_value()
+
+    range_types = types.int64, texel, texel_weight, types.int64, types.boolean
+    return types.void(weight, step, view, view_weight, *range_types, out), generate
+
+
+@untyped_intrinsic
+def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes, weights, rotations, side):  # type: ignore[no-untyped-def]
+    """Sum numbers with the light between three vertices, each turned.
+
+    `COEFFICIENT_AXIS` and `COEFFICIENT_LANE` say which.
+
+    Args:
+        typing_context: Numba's. coefficients: (24,) float32. axes: of colours. (3, 3) float32
+        secondary_axes: from `pack_secondary_axes`. vectors: light about vertices, in lanes. (vertices, 3 F) float32
+        nodes: the three vertices, a tuple of uint32. weights: of each, a tuple.
+        rotations: cosine and sine for each, a tuple of six. side: −1 where azimuths run the other way round, else 1.
+    Returns:
+        Of each channel, a tuple of float32.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        coefficients, axes, secondary_axes, vectors = (
+            ArrayPointer(context, builder, kind, value)
+            for kind, value in zip(signature.args[:4], arguments[:4], strict=True)
+        )
+        nodes, weights, rotations, side = arguments[4:]
+        corners = [builder.zext(builder.extract_value(nodes, k), WORD) for k in range(_CORNERS)]
+        ones = ir.Constant(VECTOR, [1.0] * NUM)  # what no order turns is not mirrored either
+        mirror = builder.select(_lane_mask(lambda order: order > 0), broadcast(builder, side), ones)
+        cosines: list[Any] = []
+        sines: list[Any] = []
+        for k in range(_CORNERS):
+            weight = broadcast(builder, builder.extract_value(weights, k))
+            rotation = (
+                broadcast(builder, builder.extract_value(rotations, 2 * k + component)) for component in range(2)
+            )
+            for factors, rotated in zip((cosines, sines), _rotation_factors(builder, *rotation), strict=True):
+                factors.append(multiply(builder, weight, rotated))
+        mirrored = [[multiply(builder, mirror, value) for value in factor_list] for factor_list in (cosines, sines)]
+        low, high, secondary = (coefficients.load_vector(constant_index(k * NUM)) for k in range(3))
+        empty_lane_value, empty_lane_axis = (
+            coefficients.load(constant_index(EMPTY_LANE)),
+            int(COEFFICIENT_AXIS[EMPTY_LANE]),
+        )
+        channel_sums = []
+        for channel in map(constant_index, range(_CHANNELS)):
+            at = builder.mul(channel, constant_index(HALF))
+            a, b = (
+                [vectors.load_vector(corner, offset) for corner in corners]
+                for offset in (at, builder.add(at, constant_index(PAIRS)))
+            )
+            along = subtract(builder, dot(builder, cosines, a), dot(builder, mirrored[1], b))
+            across = sum_values(builder, [dot(builder, sines, a), dot(builder, mirrored[0], b)])
+            # where a lane is empty its light is nothing
+            first = dot(builder, (low, high), (along, across))
+            secondary_product = multiply(builder, secondary, shuffle(builder, along, across, _SECONDARY_LANES))
+            axis_weights = (
+                broadcast(builder, axes.load(channel, constant_index(0))),
+                secondary_axes.load_vector(channel, constant_index(0)),
+            )
+            summed = sum_lanes(builder, dot(builder, axis_weights, (first, secondary_product)))
+            empty_lane_product = multiply(
+                builder, empty_lane_value, extract_lane(builder, along, int(COEFFICIENT_LANE[EMPTY_LANE]))
+            )
+            channel_sums.append(
+                sum_values(
+                    builder,
+                    [
+                        summed,
+                        multiply(builder, axes.load(channel, constant_index(empty_lane_axis)), empty_lane_product),
+                    ],
+                )
+            )
+        return context.make_tuple(builder, signature.return_type, channel_sums)
+
+    triple_type, index_type, six_type = (
+        _tuple(*args) for args in ((types.float32, 3), (types.uint32, 3), (types.float32, 6))
+    )
+    node_types = index_type, triple_type, six_type, types.float32
+    return triple_type(coefficients, axes, secondary_axes, vectors, *node_types), generate
+
+
+def pack_secondary_axes(axes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What numbers of the second and third axis count for in each channel. axes: (3, 3). Returns (3, 8)"""
+    return np.ascontiguousarray(axes[:, COEFFICIENT_AXIS[2 * HALF :]])
+
+
+def _lane_mask(predicate: Callable[[int], bool]) -> Any:
+    """Lanes of some orders."""
+    return ir.Constant(ir.VectorType(ir.IntType(1), NUM), [int(predicate(order)) for order in _ORDERS])
+
+
+def _rotation_factors(builder: Any, cosine: Any, sine: Any) -> tuple[Any, Any]:
+    """cos mφ and sin mφ of every pair of lanes: Chebyshev's T_m(cos φ), and sin φ U_{m−1}(cos φ)."""
+    cosine_polynomials = [_polynomial(chebyshev.cheb2poly(np.eye(order + 1)[order])) for order in _ORDERS]
+    # m U_{m−1} is the derivative of T_m
+    sine_polynomials = [
+        _polynomial(polynomial.polyder(row) / max(order, 1))
+        for row, order in zip(cosine_polynomials, _ORDERS, strict=True)
+    ]
+    polynomial_values = []
+    for rows in (cosine_polynomials, sine_polynomials):
+        powers = [ir.Constant(VECTOR, [float(row[k]) for row in rows]) for k in range(_MAX_ORDER + 1)]
+        value = powers.pop()
+        while powers:
+            value = sum_values(builder, [multiply(builder, value, cosine), powers.pop()])
+        polynomial_values.append(value)
+    return polynomial_values[0], multiply(builder, sine, polynomial_values[1])
+
+
+def _polynomial(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients of a polynomial, up to the highest order of all."""
+    return np.pad(coefficients, (0, _MAX_ORDER + 1 - len(coefficients)))

@@ -1,0 +1,309 @@
+"""From the mean of all texels to each: what one sends more than all do on the mean, in the light that arrives there.
+
+    B(pixel) = B̄ + C Σ_k (p_k(ωo, x) − p̄_k(ωo)) t_k
+
+B̄ is what surfaces send by the mean of texels, by all that is known of light; C the term's colour and gain. At rest,
+each texel is summed over all light (`relume.transport.btf_kernel`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.btf.direction_rings import interpolation_weights_at
+from relume.core.numba_options import UNCOUNTED
+from relume.core.simd import prefetch
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.antialiasing import is_edge
+from relume.live.free_camera.primary_visibility import GBuffer
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.texel_brdf.coefficient_packing import NUM_COEFFICIENTS
+from relume.live.free_camera.texel_brdf.lanes import add_texels, integrate, pack_secondary_axes
+from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterial
+from relume.live.free_camera.texel_brdf.texture_coordinates import (
+    AZIMUTH,
+    BATCH_SIZE,
+    LEVEL,
+    NUM_COLUMNS,
+    SIDE,
+    THETA,
+    U,
+    V,
+    X,
+    Y,
+    dot,
+    gather_hits,
+    get_vector,
+    map_to_texture,
+    vector_row,
+)
+from relume.live.free_camera.texel_brdf.texture_frame_light import NodeLight, TexelLight, rotation_from_vector
+from relume.transport.btf_kernel import texels_at_level
+
+F32 = NDArray[np.float32]
+
+F = np.float32
+_CHUNKS_PER_THREAD = 4  # for each thread: rays that see fine texels cost more
+
+
+class TextureFootprint(NamedTuple):
+    """Whose picture it is.
+
+    Attributes:
+        camera_position: where it is. (3,) float32. pixel_angle: that a pixel spans, radians.
+        gbuffer: by the rays.
+    """
+
+    camera_position: F32
+    pixel_angle: float
+    gbuffer: GBuffer
+
+
+class IncidentTexelLight(NamedTuple):
+    """What arrives at points, and what has been made of it.
+
+    Attributes:
+        vectors: light vectors. (points, 3, K) float32. light: about vertices, kept from frame to frame.
+    """
+
+    vectors: F32
+    light: TexelLight
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _list_rays(face, face_material, has_btf, reuses_center, lattice_node, first, rows, is_requested):  # type: ignore[no-untyped-def]
+    """List rays that see covered materials, material after material, and note the vertices about what they see.
+
+    Args:
+        has_btf: (materials,). reuses_center: of rays, which are left out where it is 1.
+        first: place of each material's in `rows`, written. (materials + 1,). rows: (rays,)
+    """
+    first[:] = 0
+    for ray in range(face.shape[0]):
+        if face[ray] >= 0 and not reuses_center[ray]:
+            first[face_material[face[ray]] + 1] += has_btf[face_material[face[ray]]]
+    for material in range(has_btf.shape[0]):
+        first[material + 1] += first[material]
+    next_row = first.copy()
+    for ray in range(face.shape[0]):
+        if face[ray] >= 0 and not reuses_center[ray] and has_btf[face_material[face[ray]]]:
+            material = face_material[face[ray]]
+            rows[next_row[material]] = ray
+            next_row[material] += 1
+            for k in range(3):
+                is_requested[lattice_node[ray, k]] = 1
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _subtract_center(  # type: ignore[no-untyped-def]
+    owner, num_pixels, has_btf, face_material, face_normal, face, distance, directions, reuses_center, out
+):
+    """Find rays across edges that see the texture of their pixel's middle, and take from them what that shows.
+
+    Args:
+        owner: pixels of the rays. reuses_center: of all rays, written. out: what they show of the mean, written. (rays,
+            3)
+    """
+    for k in range(owner.shape[0]):
+        ray, p = num_pixels + k, owner[k]
+        f = face[ray]
+        if f < 0 or not has_btf[face_material[f]]:
+            continue
+        if not is_edge(face_material, face_normal, face, distance, directions, p, ray):
+            reuses_center[ray] = 1
+            for channel in range(3):
+                out[ray, channel] -= out[p, channel]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyped-def]
+    """Give rays that `_part` found what their pixels' middles show by now."""
+    for k in range(owner.shape[0]):
+        if reuses_center[num_pixels + k]:
+            for channel in range(3):
+                out[num_pixels + k, channel] = max(out[num_pixels + k, channel] + out[owner[k], channel], F(0))
+
+
+# Helpers are inlined, and get arrays, not what holds them: a call, or an attribute, would count references to arrays,
+# which threads share; that was three quarters of the kernel.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffers, batch_buffers, counts):  # type: ignore[no-untyped-def]
+    """Find the texels and the sides that rays show, and call for their numbers: they arrive while others are summed.
+
+    Args:
+        ray_buffers: room for what is found of one ray. batch_buffers: the same of all: texels, 8 a ray; shares of each,
+            8 a ray; sides, 4 a ray; shares of each, 4 a ray; written. counts: texels of each, written.
+    """
+    texel, texel_weight, view, view_weight = ray_buffers
+    texels, texel_weights, views, view_weights = batch_buffers
+    for j in range(num_rays):
+        counts[j] = texels_at_level(levels, columns[U + j], columns[V + j], columns[LEVEL + j], texel, texel_weight)
+        interpolation_weights_at(direction_grid, columns[THETA + j], columns[AZIMUTH + j], view, view_weight)
+        for k in range(8):
+            texels[8 * j + k], texel_weights[8 * j + k] = texel[k], texel_weight[k]
+        for k in range(4):
+            views[4 * j + k], view_weights[4 * j + k] = view[k], view_weight[k]
+            for first in range(0, counts[j], 2):  # two beside each other are two lines of the cache at most
+                prefetch(weights, (view[k], texel[first], 0))
+                prefetch(weights, (view[k], texel[first + 1], NUM_COEFFICIENTS - 1))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, nodes, weights, x, y, side):  # type: ignore[no-untyped-def]
+    """Sum numbers with the light between three vertices, of each channel.
+
+    Args:
+        coefficients, axes, secondary_axes, vectors, nodes, weights, side: of `integrate`. tangents: of vertices.
+        x, y: axes of the texture, tuples.
+    """
+    t, u, v = vector_row(tangents, nodes[0]), vector_row(tangents, nodes[1]), vector_row(tangents, nodes[2])
+    rotation_t, rotation_u, rotation_v = (
+        rotation_from_vector(dot(t, x), dot(t, y)),
+        rotation_from_vector(dot(u, x), dot(u, y)),
+        rotation_from_vector(dot(v, x), dot(v, y)),
+    )
+    rotations = rotation_t[0], rotation_t[1], rotation_u[0], rotation_u[1], rotation_v[0], rotation_v[1]
+    return integrate(coefficients, axes, secondary_axes, vectors, nodes, weights, rotations, side)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _shade_texels(  # type: ignore[no-untyped-def]
+    direction_grid, tables, secondary_axes, scale, rotation, color, pixel_angle, placements, normals, hits, directions,
+    lattice_node, weight,
+    light, camera_position, rows, start, stop, out,
+):  # fmt: skip
+    """Show what rays rows[start:stop] see. out: (rays, 3)"""
+    face, uv, distance = hits
+    levels, weights, step, axes = tables
+    tangents, vectors = light
+    ray_buffers = np.empty(8, np.int32), np.empty(8, np.float32), np.empty(4, np.int32), np.empty(4, np.float32)
+    texels, texel_weights = np.empty(8 * BATCH_SIZE, np.int32), np.empty(8 * BATCH_SIZE, np.float32)
+    views, view_weights = np.empty(4 * BATCH_SIZE, np.int32), np.empty(4 * BATCH_SIZE, np.float32)
+    counts, coefficients = np.empty(BATCH_SIZE, np.int64), np.empty(NUM_COEFFICIENTS, np.float32)
+    columns = np.zeros(NUM_COLUMNS * BATCH_SIZE, np.float32)
+    finest = np.float32(max(levels[0, 1], levels[0, 2]))
+    for batch_start in range(start, stop, BATCH_SIZE):
+        num_rays = min(BATCH_SIZE, stop - batch_start)
+        gather_hits(
+            placements,
+            normals,
+            face,
+            uv,
+            distance,
+            directions,
+            lattice_node,
+            weight,
+            rows,
+            batch_start,
+            num_rays,
+            columns,
+        )
+        map_to_texture(columns, num_rays, camera_position, pixel_angle, rotation, scale, finest)
+        _fetch_texels(
+            levels,
+            direction_grid,
+            weights,
+            columns,
+            num_rays,
+            ray_buffers,
+            (texels, texel_weights, views, view_weights),
+            counts,
+        )
+        for j in range(num_rays):
+            ray = rows[batch_start + j]
+            for first in range(0, counts[j], 4):
+                add_texels(
+                    weights,
+                    step,
+                    views,
+                    view_weights,
+                    4 * j,
+                    texels,
+                    texel_weights,
+                    8 * j + first,
+                    first > 0,
+                    coefficients,
+                )
+            nodes = lattice_node[ray, 0], lattice_node[ray, 1], lattice_node[ray, 2]
+            node_weights = weight[ray, 0], weight[ray, 1], weight[ray, 2]
+            x, y, side = get_vector(columns, X, j), get_vector(columns, Y, j), columns[SIDE + j]
+            texel_term = _integrate_nodes(
+                coefficients, axes, secondary_axes, tangents, vectors, nodes, node_weights, x, y, side
+            )
+            out[ray, 0] = max(out[ray, 0] + color[0] * texel_term[0], F(0))
+            out[ray, 1] = max(out[ray, 1] + color[1] * texel_term[1], F(0))
+            out[ray, 2] = max(out[ray, 2] + color[2] * texel_term[2], F(0))
+
+
+def shade_texels(
+    btf_materials: Sequence[BtfMaterial],
+    stored_scene: StoredScene,
+    positions: F32,
+    footprint: TextureFootprint,
+    incident: IncidentTexelLight,
+    out: F32,
+) -> None:
+    """Turn what rays see of the mean of texels into what each texel shows.
+
+    Rays of one pixel that see the same surface show it more than the mean by as much: texels are as wide as its side.
+
+    Args:
+        btf_materials: what covers materials. stored_scene: that is seen. positions: of its corners, metres. (corners,
+            3) float32
+        footprint: of the eye. incident: at its points.
+        out: radiance along the rays, written. (rays, 3) float32
+    """
+    if not btf_materials:
+        return
+    gbuffer, face = footprint.gbuffer, footprint.gbuffer.hits.face
+    has_btf = np.zeros(
+        1 + max(int(stored_scene.face_material.max()), *(btf_material.material for btf_material in btf_materials)),
+        np.uint8,
+    )
+    has_btf[[btf_material.material for btf_material in btf_materials]] = 1
+    first, rows = np.empty(len(has_btf) + 1, np.int64), np.empty(len(face), np.int32)
+    is_requested, reuses_center = np.zeros(len(gbuffer.is_visible), np.uint8), np.zeros(len(face), np.uint8)
+    pixel_args = gbuffer.owner, len(face) - len(gbuffer.owner) - len(gbuffer.glass.ray)
+    surface_args = has_btf, stored_scene.face_material, stored_scene.face_normal
+    _subtract_center(*pixel_args, *surface_args, face, gbuffer.hits.distance, gbuffer.directions, reuses_center, out)
+    _list_rays(
+        face, stored_scene.face_material, has_btf, reuses_center, gbuffer.lattice_node, first, rows, is_requested
+    )
+    light = incident.light.around_nodes(stored_scene, incident.vectors, is_requested)
+    placements = incident.light.texture_placements(stored_scene, positions)
+    spans = [
+        (
+            int(first[btf_material.material]),
+            int(first[btf_material.material + 1]),
+            _kernel_args(btf_material, stored_scene, placements, footprint, light),
+        )
+        for btf_material in btf_materials
+    ]
+
+    def shade_range(start: int, stop: int) -> None:
+        for span_start, span_stop, args in spans:
+            if max(start, span_start) < min(stop, span_stop):
+                _shade_texels(*args, rows, max(start, span_start), min(stop, span_stop), out)  # type: ignore[call-arg]
+
+    parallel_for_chunks(shade_range, int(first[-1]), _CHUNKS_PER_THREAD)
+    _add_center(*pixel_args, reuses_center, out)
+
+
+def _kernel_args(
+    btf_material: BtfMaterial, stored_scene: StoredScene, placements: F32, footprint: TextureFootprint, light: NodeLight
+) -> tuple[Any, ...]:
+    texels, gbuffer = btf_material.texels, footprint.gbuffer
+    rotation = (np.float32(math.cos(texels.rotation)), np.float32(math.sin(texels.rotation)))
+    return (
+        texels.btf.grid, btf_material.tables, pack_secondary_axes(btf_material.tables.axes), np.float32(texels.scale),
+        rotation, btf_material.color,
+        np.float32(footprint.pixel_angle), placements, stored_scene.lattice_nodes.normal,
+        (gbuffer.hits.face, gbuffer.hits.uv, gbuffer.hits.distance), gbuffer.directions, gbuffer.lattice_node,
+        gbuffer.weight, light, footprint.camera_position,
+    )  # fmt: skip

@@ -1,0 +1,200 @@
+"""Light vectors where texels are: of points, turned into one frame about each vertex, then into the texture's.
+
+Light that is φ further round in one frame is φ + δ in another about the same normal:
+
+    t_m^cos ← cos mδ t_m^cos − sin mδ t_m^sin,   t_m^sin ← sin mδ t_m^cos + cos mδ t_m^sin
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.free_camera.primary_visibility import mark_needed_probes
+from relume.live.free_camera.probes.lattice_nodes import LatticeNodes
+from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.texel_brdf.coefficient_packing import EMPTY_LANE, FUNCTIONS, HALF, HAS_ORDER, PAIRS, WIDTH
+from relume.live.free_camera.texel_brdf.texture_coordinates import cross, dot, face_placements, vector_row
+from relume.math.zernike import recurrence
+
+F32 = NDArray[np.float32]
+U8 = NDArray[np.uint8]
+
+_EPSILON = np.float32(1e-12)
+_NO_VECTORS = np.empty((0, 3), np.float32)
+
+
+class NodeLight(NamedTuple):
+    """What arrives about vertices.
+
+    Attributes:
+        tangent: that azimuths are counted from, about as unit. (vertices, 3) float32
+        vectors: the first functions of the in-basis, in lanes: the cosine parts of the three channels, then their sine
+            parts. (vertices, 3 F) float32
+    """
+
+    tangent: F32
+    vectors: F32
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def rotation_from_vector(x, y):  # type: ignore[no-untyped-def]
+    """Find cos δ and sin δ, of δ as a vector of any length; (0, 0) turns nothing."""
+    squared_length = x * x + y * y
+    if squared_length > _EPSILON:
+        scale = np.float32(1) / math.sqrt(squared_length)
+        return np.float32(x * scale), np.float32(y * scale)
+    return np.float32(1), np.float32(0)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _rotation_powers(x, y):  # type: ignore[no-untyped-def]
+    """Find cos mδ and sin mδ for m of 1 to 4, of δ as `turned_by` has it."""
+    c1, s1 = rotation_from_vector(x, y)
+    c2, s2 = c1 * c1 - s1 * s1, np.float32(2) * c1 * s1
+    return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[no-untyped-def]
+    """Add a light vector, turned.
+
+    Args:
+        lanes: of it. (3 F,) float32. rotation: from `_rotation_powers`. side: −1 where azimuths run the other way
+            round, else 1.
+        weight: that it counts with. is_added: to what is in `out`, which is written. (3 F,) float32
+    """
+    c1, s1, c2, s2, c3, s3, c4, s4 = rotation
+    for i in range(PAIRS):
+        # sums over orders, of which each lane has one: what is looked up in arrays that were just written stalls
+        is0, is1, is2, is3, is4 = HAS_ORDER[0, i], HAS_ORDER[1, i], HAS_ORDER[2, i], HAS_ORDER[3, i], HAS_ORDER[4, i]
+        cosine = weight * (is0 + c1 * is1 + c2 * is2 + c3 * is3 + c4 * is4)
+        sine = weight * (s1 * is1 + s2 * is2 + s3 * is3 + s4 * is4)
+        mirror = is0 + side * (np.float32(1) - is0)  # what no order turns is not mirrored either
+        a, b = lanes[i], mirror * lanes[PAIRS + i]
+        cosine_sum, sine_sum = (out[i], out[PAIRS + i]) if is_added else (np.float32(0), np.float32(0))
+        out[i] = cosine_sum + cosine * a - sine * b
+        out[PAIRS + i] = sine_sum + sine * a + cosine * b
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _fill_lanes(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Lay the light vectors of the points that are [start, stop) of rows into lanes. out: (points, 3 F)"""
+    for p in rows[start:stop]:
+        for channel in range(3):
+            for i in range(WIDTH):
+                if i != EMPTY_LANE:  # what that lane had at first, nothing, stays
+                    lane = i if i < HALF else PAIRS - HALF + i
+                    out[p, channel * HALF + lane] = vectors[p, channel, FUNCTIONS[i]]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _sum_at_nodes(lattice_nodes, tangents, lanes, rows, start, stop, tangent, out):  # type: ignore[no-untyped-def]
+    """Find what arrives about the vertices that are [start, stop) of rows."""
+    normal, probes, weights = lattice_nodes
+    lane_buffer, sums = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
+    for v in rows[start:stop]:
+        heaviest = 0
+        for k in range(1, weights.shape[1]):
+            if weights[v, k] > weights[v, heaviest]:
+                heaviest = k
+        n, t = vector_row(normal, v), vector_row(tangents, probes[v, heaviest])
+        b = cross(n, t)
+        tangent[v, 0], tangent[v, 1], tangent[v, 2] = t
+        for i in range(3 * WIDTH):
+            sums[i] = 0
+        for k in range(weights.shape[1]):
+            weight, probe = weights[v, k], probes[v, k]
+            if weight > 0:
+                probe_tangent = vector_row(tangents, probe)
+                rotation = _rotation_powers(dot(probe_tangent, t), dot(probe_tangent, b))
+                for i in range(3 * WIDTH):  # a row by itself would be counted as a reference
+                    lane_buffer[i] = lanes[probe, i]
+                add_rotated(lane_buffer, rotation, np.float32(1), weight, True, sums)
+        for i in range(3 * WIDTH):
+            out[v, i] = sums[i]
+
+
+class TexelLight:
+    """What arrives about the vertices that a moving picture has seen in a light, and where textures lie.
+
+    Used from one thread at a time.
+    """
+
+    def __init__(self) -> None:
+        self._vectors: F32 | None = None
+        self._texture_placements: F32 | None = None
+        self._lanes, self._node_light, self._is_current = (
+            _NO_VECTORS,
+            NodeLight(_NO_VECTORS, _NO_VECTORS),
+            np.empty(0, np.uint8),
+        )
+
+    def texture_placements(self, stored_scene: StoredScene, positions: F32) -> F32:
+        """Find where the surface's triangles lie in textures, once: it stays as it is.
+
+        Args:
+            stored_scene, positions: as in `face_placements`, which is what is returned.
+        """
+        if self._texture_placements is None:
+            self._texture_placements = face_placements(positions, stored_scene)
+        return self._texture_placements
+
+    def around_nodes(self, stored_scene: StoredScene, vectors: F32, is_requested: U8) -> NodeLight:
+        """Find what arrives about vertices, which is kept as long as the light is.
+
+        Args:
+            stored_scene: with them and their points. vectors: of the points, never written to. (points, 3, K) float32
+            is_requested: vertices that are asked about; the others have anything. (vertices,) uint8
+        """
+        if vectors is not self._vectors:
+            if len(self._is_current) != len(is_requested):
+                num_nodes = len(is_requested)
+                self._lanes = np.zeros((len(vectors), 3 * WIDTH), np.float32)
+                self._node_light = NodeLight(
+                    np.zeros((num_nodes, 3), np.float32), np.zeros((num_nodes, 3 * WIDTH), np.float32)
+                )
+            self._vectors, self._is_current = vectors, np.zeros_like(is_requested)
+        rows = np.flatnonzero(is_requested & ~self._is_current)
+        if len(rows):
+            is_needed = np.zeros(len(vectors), np.uint8)
+            mark_needed_probes(stored_scene.lattice_nodes, is_requested, is_needed)
+            probes = np.flatnonzero(is_needed)
+            parallel_for_chunks(lambda start, stop: _fill_lanes(vectors, probes, start, stop, self._lanes), len(probes))
+            args = (stored_scene.lattice_nodes, stored_scene.probes.tangent, self._lanes, rows)
+            parallel_for_chunks(lambda start, stop: _sum_at_nodes(*args, start, stop, *self._node_light), len(rows))
+            self._is_current[rows] = 1
+        return self._node_light
+
+
+def node_light_numpy(
+    lattice_nodes: LatticeNodes, tangents: F32, vectors: F32, lattice_node: int
+) -> tuple[NDArray[np.float64], F32]:
+    """Do as `TexelLight.about` for one vertex, in plain NumPy: its oracle.
+
+    Args:
+        lattice_nodes: all. tangents, vectors: of points, (points, 3), (points, 3, K). lattice_node: number of it.
+    Returns:
+        Its light vector by functions, (3, K), its tangent (3,).
+    """
+    recurrence_table, weights, probes = (
+        recurrence(),
+        lattice_nodes.weight[lattice_node],
+        lattice_nodes.point[lattice_node],
+    )
+    n, t = lattice_nodes.normal[lattice_node], tangents[probes[weights.argmax()]]
+    out = np.zeros(vectors.shape[1:])
+    for weight, probe in zip(weights, probes, strict=True):
+        angle = np.arctan2(tangents[probe] @ np.cross(n, t), tangents[probe] @ t)
+        for m, cosine, sine in zip(recurrence_table.order, recurrence_table.cosine, recurrence_table.sine, strict=True):
+            phase = vectors[probe, :, cosine] + 1j * (vectors[probe, :, sine] if m else 0)
+            phase = weight * phase * np.exp(1j * m * angle)
+            out[:, sine] += phase.imag
+            out[:, cosine] += phase.real
+    return out, t

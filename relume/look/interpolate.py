@@ -1,0 +1,106 @@
+"""Looks between looks: what an animation shows from one keyframe to the next.
+
+Numbers go evenly from one value to the other, parameters whose sliders are logarithmic evenly in their logarithm. What
+has nothing between, as a model, a map or a light that only one look has, changes half way. Across the navigation map
+(Sun 2007, 4.2) materials of its kind go through those that lie between them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from relume.brdf.registry import TERMS
+
+InterpolationMode = Literal["parameters", "map"]
+
+
+def enclosing_keyframes(num_looks: int, fraction: float) -> tuple[int, int, float]:
+    """Find the two of some looks, at even distances, that a share of the way through them lies between.
+
+    Args:
+        num_looks: at least one. fraction: 0 for the first, 1 for the last.
+    Returns:
+        Their places, the same where it lies on one of them, and the share of the way from the one to the other.
+    """
+    position = fraction * (num_looks - 1)
+    first = min(int(position), num_looks - 1)
+    weight = position - first
+    return (first, first, 0.0) if weight == 0 else (first, first + 1, weight)
+
+
+def interpolate_looks(
+    looks: Sequence[Mapping[str, Any]], fraction: float, mode: InterpolationMode = "parameters"
+) -> Mapping[str, Any]:
+    """The look at a share of the way through some.
+
+    Args:
+        looks: complete documents, at least one, at even distances. fraction: 0 for the first, 1 for the last.
+        mode: of materials: from parameter to parameter, or across the navigation map where both are of its kind.
+    """
+    first, second, weight = enclosing_keyframes(len(looks), fraction)
+    if first == second:
+        return looks[first]
+    start, end = looks[first], looks[second]
+    interpolated: Mapping[str, Any] = _interpolate(start, end, weight)
+    if mode == "map":
+        from relume.look.library.navigation_path import (
+            path_on_map,  # SciPy, which a process that describes its API does without
+        )
+
+        for name, material in interpolated["materials"].items():
+            ends = [look["materials"].get(name) for look in (start, end)]
+            if None not in ends and ends[0] != ends[1]:
+                terms = path_on_map(ends[0]["terms"], ends[1]["terms"], material["terms"], weight)
+                interpolated["materials"][name] = {**material, "terms": terms}
+    return interpolated
+
+
+def _interpolate(start: Any, end: Any, weight: float) -> Any:
+    if start == end:
+        return start
+    if isinstance(start, Mapping) and isinstance(end, Mapping):
+        if "model" in start and "model" in end:
+            return _interpolate_terms(start, end, weight)
+        return _interpolate_fields(start, end, weight)
+    if isinstance(start, list) and isinstance(end, list) and len(start) == len(end):
+        return [_interpolate(a, b, weight) for a, b in zip(start, end, strict=True)]
+    if _is_number(start) and _is_number(end):
+        value = (1 - weight) * start + weight * end
+        return round(value) if isinstance(start, int) and isinstance(end, int) else value
+    return start if weight < 0.5 else end
+
+
+def _interpolate_fields(start: Mapping[str, Any], end: Mapping[str, Any], weight: float) -> dict[str, Any]:
+    """What both have is between; all else is that of the nearer."""
+    nearest = start if weight < 0.5 else end
+    return {
+        name: _interpolate(start[name], end[name], weight) if name in start and name in end else value
+        for name, value in nearest.items()
+    }
+
+
+def _interpolate_terms(start: Mapping[str, Any], end: Mapping[str, Any], weight: float) -> Mapping[str, Any]:
+    if start["model"] != end["model"]:
+        return start if weight < 0.5 else end
+    interpolated = _interpolate_fields(start, end, weight)
+    term = TERMS.get(start["model"])
+    logarithmic = [p.name for p in term.parameters if p.scale == "log"] if term is not None else []
+    for name in logarithmic:
+        if name in start["params"] and name in end["params"]:
+            interpolated["params"][name] = _interpolate_log(start["params"][name], end["params"][name], weight)
+    return interpolated
+
+
+def _interpolate_log(start: Any, end: Any, weight: float) -> Any:
+    if isinstance(start, list) or isinstance(end, list):  # a value for each channel in one of them at least
+        first, second = (value if isinstance(value, list) else [value] * 3 for value in (start, end))
+        return [_interpolate_log(a, b, weight) for a, b in zip(first, second, strict=True)]
+    if start <= 0 or end <= 0:
+        return (1 - weight) * start + weight * end
+    return math.exp((1 - weight) * math.log(start) + weight * math.log(end))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

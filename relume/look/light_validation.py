@@ -1,0 +1,142 @@
+"""The lights of a look, completed and checked; a field of another kind is an error, never ignored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+from relume.core.validation import (
+    MAX_COLOR,
+    Pointer,
+    check_number,
+    check_object,
+    check_triple,
+    invalid_value,
+    names_text,
+)
+from relume.look.model import LightKind
+from relume.scene.model import Light
+from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS
+
+MAX_SCALE = 1e4
+MIN_DIRECTION = 1e-6  # of its longest component
+LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number of a field; metres, degrees
+    "scale": (0.0, MAX_SCALE),
+    "color": (0.0, MAX_COLOR),
+    "emission": (0.0, MAX_EMISSION),
+    "position": (-MAX_METERS, MAX_METERS),
+    "direction": (-MAX_METERS, MAX_METERS),
+    "rotation": (-360.0, 360.0),
+    "size": (1e-4, 1e4),
+    "cone": (0.0, 90.0),
+}
+
+_WHITE = (1.0, 1.0, 1.0)
+_COMMON_DEFAULTS: dict[str, Any] = {"scale": 1.0, "color": list(_WHITE), "on": True, "emission": list(_WHITE)}
+_POSITION = {"position": [0.0, 1.0, 0.0]}
+_DIRECTION = {"direction": [0.0, -1.0, 0.0]}
+_KIND_DEFAULTS: dict[str, dict[str, Any]] = {
+    "point": _POSITION,
+    "spot": {**_POSITION, **_DIRECTION, "cone": [20.0, 30.0]},
+    "directional": _DIRECTION,
+    "rectangle": {**_POSITION, **_DIRECTION, "rotation": 0.0, "size": [0.5, 0.5]},
+    "mesh": {"material": ""},
+}
+_ADDABLE = [kind for kind in get_args(LightKind) if kind != "mesh"]
+
+
+def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> dict[str, Any]:
+    """The lights that a scene brings, complete. Raises ParameterError where one is not valid."""
+    documents = {}
+    for light in lights:
+        pointer: Pointer = ("lights", light.name)
+        kind = light.fields.get("kind")
+        if not isinstance(kind, str) or kind not in _KIND_DEFAULTS:
+            raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(_KIND_DEFAULTS)}")
+        documents[light.name] = _merge(pointer, light.fields, default_light(kind))
+        if kind == "mesh" and documents[light.name]["material"] not in material_names:
+            raise invalid_value((*pointer, "material"), documents[light.name]["material"], names_text(material_names))
+    return documents
+
+
+def complete_lights(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
+    """The scene's own lights as `partial` changes them, then those that it adds. Raises ParameterError.
+
+    Args:
+        default: of the scene. previous: of a valid look; what is part of it, as an object, is not checked again.
+    """
+    pointer: Pointer = ("lights",)
+    if not isinstance(partial, Mapping):
+        raise invalid_value(pointer, partial, "an object with a field for each light to change or to add")
+    names = [*default, *(name for name in partial if name not in default)]
+    if len(names) > MAX_LIGHTS:
+        raise invalid_value(pointer, f"{len(names)} lights", f"at most {MAX_LIGHTS}, those of the scene included")
+    return {name: _complete_light(name, partial, default.get(name), previous.get(name)) for name in names}
+
+
+def _complete_light(name: str, lights: Mapping[str, Any], default: Any, previous: Any) -> Any:
+    partial = lights.get(name, default)
+    if partial is default or partial is previous:
+        return partial
+    pointer: Pointer = ("lights", name)
+    if not 1 <= len(name) <= MAX_LIGHT_NAME:
+        raise invalid_value(pointer, f"a name of {len(name)} characters", f"a name of 1 to {MAX_LIGHT_NAME} characters")
+    if not isinstance(partial, Mapping):
+        raise invalid_value(pointer, partial, "an object")
+    return _merge(pointer, partial, _base_fields(pointer, partial, default))
+
+
+def _base_fields(pointer: Pointer, partial: Mapping[str, Any], default: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """What the fields that are not given are: the scene's light's, or, where the kind is new, that kind's own."""
+    kind = partial.get("kind", default["kind"] if default else None)
+    if default is not None and kind == default["kind"]:
+        return default
+    if default is not None and default["kind"] == "mesh":
+        raise invalid_value((*pointer, "kind"), kind, "'mesh': these surfaces shine; add a light of another name")
+    if kind not in _ADDABLE:
+        raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(_ADDABLE)}")
+    return default_light(kind)
+
+
+def default_light(kind: str) -> dict[str, Any]:
+    """A light of a kind with all that nobody has said of it, complete."""
+    return {"kind": kind, **_COMMON_DEFAULTS, **_KIND_DEFAULTS[kind]}
+
+
+def _merge(pointer: Pointer, partial: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
+    check_object(pointer, partial, base)
+    fields = {**base, **partial}
+    for field, value in fields.items():
+        _check_field((*pointer, field), field, value, base)
+    return fields
+
+
+def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, Any]) -> None:
+    match field:
+        case "scale" | "rotation":
+            check_number(pointer, value, *LIGHT_RANGES[field])
+        case "color" | "emission" | "position":
+            check_triple(pointer, value, *LIGHT_RANGES[field])
+        case "on":
+            if not isinstance(value, bool):
+                raise invalid_value(pointer, value, "true or false")
+        case "direction":
+            check_triple(pointer, value, *LIGHT_RANGES[field])
+            if max(map(abs, value)) < MIN_DIRECTION:
+                raise invalid_value(pointer, list(value), "three numbers that are not all zero")
+        case "size":
+            _check_pair(pointer, value, *LIGHT_RANGES[field])
+        case "cone":
+            _check_pair(pointer, value, *LIGHT_RANGES[field])
+            if not (value[0] <= value[1] and value[1] > 0):
+                raise invalid_value(pointer, f"{value[0]:g} and {value[1]:g}", "inner ≤ outer, and outer above 0")
+        case "material":
+            if base["material"] not in ("", value):
+                raise invalid_value(pointer, value, f"{base['material']!r}: which surfaces shine is the scene's")
+
+
+def _check_pair(pointer: Pointer, value: Any, minimum: float, maximum: float) -> None:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise invalid_value(pointer, value, f"two numbers in [{minimum:g}, {maximum:g}]")
+    for k, number in enumerate(value):
+        check_number((*pointer, k), number, minimum, maximum)

@@ -1,0 +1,372 @@
+"""An opened bake of the method `stored_scene`: what a moving eye sees, and what arrives there under any light."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.core.jackknife import JackknifeEstimate
+from relume.lights.spherical_triangles import TriangleLights
+from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.live.fixed_camera.protocols import CameraMode, EditAxis
+from relume.live.free_camera.environment_lookup import EnvironmentLookup
+from relume.live.free_camera.free_view import FreeView
+from relume.live.free_camera.hard_shadows.lights import HardShadowLight, hard_shadow_lights, local_shadow_targets
+from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
+from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
+from relume.live.free_camera.occluded_probes import find_occluded_probes
+from relume.live.free_camera.probes.stored_scene import StoredScene, ray_pattern, read_surface
+from relume.live.free_camera.probes.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
+from relume.live.free_camera.ray_scene import OcclusionMesh
+from relume.look import EnvironmentKey, LightGeometry
+from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
+from relume.methods.opened.described import read_light_fields
+from relume.methods.opened.fixed_views_indirect import BakedIndirectViews
+from relume.methods.planar_mirror_light import read_mirror_lights
+from relume.methods.prefiltered_environments import PrefilteredEnvironments
+from relume.methods.store_layout import read_patches
+from relume.methods.sun_extraction import SunExtractor
+from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.gather_rays import RayPattern
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.visibility import select_visibility
+from relume.store.bake_protocol import StoreReader
+from relume.transport.clustered_rays import shared_direction_coefficients, weighted_basis
+from relume.transport.direction_bins import DirectionBins, outgoing_bins
+from relume.transport.incident_coefficients import incident_coefficients, ray_incident_coefficients
+from relume.transport.outgoing_patch_light import OutgoingLight
+from relume.transport.shading_points import GatherRays, RayList
+from relume.views.store_io import read_camera
+
+F32 = NDArray[np.float32]
+
+_PROBES_PER_BATCH = 4096  # points whose bits are unpacked at once
+
+
+@dataclass(frozen=True)
+class BakedFreeCamera:
+    """An open bake with a free camera. See `relume.live.free_camera.protocol`.
+
+    Attributes:
+        light_transport: the light of the bake, in which no view was baked.
+        stored_scene: what the eye sees.
+        views: where eyes begin.
+        free_camera_error: how far pictures are off while an eye moves, measured in the bake; None where that is not
+            known.
+    """
+
+    light_transport: BakedIndirectViews
+    stored_scene: StoredScene
+    views: dict[str, FreeView]
+    free_camera_error: JackknifeEstimate | None = None
+
+    camera_mode = CameraMode.FREE
+    axes = BakedIndirectViews.axes | {EditAxis.CAMERA}
+
+    @classmethod
+    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
+        """Open a store.
+
+        Args:
+            store: an open one. key: of the bake in the memory. cache: of all that is made from the bake.
+        Raises:
+            StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
+        """
+        light_fields = read_light_fields(store, key, cache)
+        light_transport = BakedIndirectViews(
+            **light_fields, patches=read_patches(store), mirror_lights=read_mirror_lights(store)
+        )
+        width, height = store.attributes["size"]
+        cameras = (read_camera(store, k) for k in range(len(store.attributes["views"])))
+        stored_scene = read_surface(store)
+        probe_positions = stored_scene.probes.position
+        bounds = probe_positions.min(axis=0).astype(np.float64), probe_positions.max(axis=0).astype(np.float64)
+        return cls(
+            light_transport, stored_scene, {camera.name: FreeView(camera, width, height, bounds) for camera in cameras}
+        )
+
+    @property
+    def cache(self) -> Cache:
+        """Of all that is made from the bake and may be made again."""
+        return self.light_transport.cache
+
+    @property
+    def key(self) -> str:
+        """Path of the store."""
+        return self.light_transport.key
+
+    @property
+    def scene_id(self) -> str:
+        """Of the scene that was baked."""
+        return self.light_transport.scene_id
+
+    @property
+    def method(self) -> str:
+        """That it was baked by."""
+        return self.light_transport.method
+
+    @property
+    def default_look(self) -> dict[str, Any]:
+        """The complete look of the scene as it was imported."""
+        return self.light_transport.default_look
+
+    @property
+    def material_names(self) -> Sequence[str]:
+        """In the scene's order."""
+        return self.light_transport.material_names
+
+    def environment_radiance(self, name: str | None) -> F32:
+        """Radiance of an environment, None for the scene's own. (height, width, 3) float32"""
+        return self.light_transport.environment_radiance(name)
+
+    def stored_scene_with(self, overrides: tuple[ProbeMapOverrides, ...]) -> StoredScene:
+        """What the eye sees where a look names images in the place of the materials' own.
+
+        Args:
+            overrides: what it names, of each material.
+        Raises:
+            NotFoundError, SceneError: an image cannot be had.
+        """
+        if all(override == NO_OVERRIDES for override in overrides):
+            return self.stored_scene
+        key = self.key, "images on surfaces", overrides
+        textures = self.cache.get_value(key, lambda: overridden_textures(self.stored_scene, self.positions, overrides))
+        return replace(self.stored_scene, **textures._asdict())
+
+    @property
+    def has_alpha_tested_surfaces(self) -> bool:
+        """Whether rays may pass some triangles."""
+        return self.light_transport.local.has_alpha_tested_surfaces
+
+    @property
+    def embree(self) -> EmbreeScene:
+        """The triangles' search tree."""
+        return self.light_transport.local.embree
+
+    @property
+    def positions(self) -> F32:
+        """Of the triangles' corners, metres. (corners, 3) float32"""
+        return self.light_transport.local.positions
+
+    @cached_property
+    def occlusion_mesh(self) -> OcclusionMesh:
+        """What rays between places on surfaces meet."""
+        return OcclusionMesh.build(self.stored_scene, self.positions, self.embree)
+
+    @cached_property
+    def has_occluded_neighbor(self) -> NDArray[np.uint8]:
+        """Nodes with an occluded neighbor, from `relume.live.free_camera.occluded_probes`. (nodes,) uint8"""
+        return find_occluded_probes(self.occlusion_mesh)
+
+    @cached_property
+    def visible(self) -> NDArray[np.uint8]:
+        """Which light triangles points see: triangle l in bit l & 7 of byte l >> 3. (points, bytes) uint8"""
+        return np.asarray(self.light_transport.store.read("points/visibility"), np.uint8)
+
+    @cached_property
+    def _gather_hits(self) -> NDArray[np.uint16]:
+        return np.asarray(self.light_transport.store.read("points/links"), np.uint16)
+
+    def vectors(self, element: Illumination, without_sun_disks: bool = False) -> F32:
+        """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32
+
+        Args:
+            element: that light. without_sun_disks: what comes straight from suns of the sky is left out.
+        """
+        key = self._vectors_key(element, without_sun_disks)
+        return self.cache.get_value(key, lambda: self._vectors(element, without_sun_disks))
+
+    def has_vectors(self, element: Illumination, without_sun_disks: bool = False) -> bool:
+        """Whether they have been made."""
+        return self.cache.contains(self._vectors_key(element, without_sun_disks))
+
+    def _vectors_key(self, element: Illumination, without_sun_disks: bool) -> tuple[Hashable, ...]:
+        return self.key, "light vectors", element, without_sun_disks and self.sun_disks.are_in(element)
+
+    def _vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
+        probes = self.stored_scene.probes
+        rays: list[RayList] = list(self.light_transport.local.rays_to(element, probes, is_coarse=True))
+        outgoing = self.light_transport.outgoing_patch_light(element)
+        if outgoing is not None:
+            rays.append(GatherRays(self._gather_hits, self._pattern, outgoing))
+        lights = (
+            self.sun_disks.remaining_lights(element) if without_sun_disks else self.light_transport.lights_for(element)
+        )
+        return incident_coefficients(probes, self.visible, lights, rays)
+
+    def fast_vectors(
+        self, element: Illumination, probe_indices: NDArray[np.intp], without_sun_disks: bool = False
+    ) -> F32:
+        """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32
+
+        Args:
+            element, without_sun_disks: as of `vectors`. probe_indices: the points.
+        """
+        probes, rays = self.stored_scene.probes.rows(probe_indices), list[RayList]()
+        if element.paths.direct:
+            for source in element.local:
+                visible = self.light_transport.local.preview(source.geometry, probes).visible
+                rays.append(self.light_transport.local.preview_rays(source, visible))
+        vectors = ray_incident_coefficients(probes, rays, FAST_DEGREE)
+        find_lights = (
+            self.sun_disks.preview_remaining_lights if without_sun_disks else self.light_transport.preview_lights_for
+        )
+        lights = find_lights(element)
+        if lights.num_lights:
+            vectors += self._preview_environment(lights, probes, probe_indices)
+        if element.paths.has_indirect:
+            vectors += self._ray_vectors(self.light_transport.indirect.fast(element), probe_indices)
+        return vectors
+
+    def indirect_delta(self, before: Illumination, after: Illumination, probe_indices: NDArray[np.intp]) -> F32:
+        """How what surfaces send to some points changes, of a low degree, found quickly. (chosen, 3, functions) float32
+
+        Args:
+            before, after: lights of equal sources. probe_indices: the points.
+        """
+        return self._ray_vectors(self.light_transport.indirect.delta(before, after), probe_indices)
+
+    def _ray_vectors(self, outgoing: OutgoingLight, probe_indices: NDArray[np.intp]) -> F32:
+        return shared_direction_coefficients(
+            self._gather_hits, self._hit_bins, probe_indices, self._ray_basis, outgoing
+        )
+
+    @property
+    def _hit_bins(self) -> DirectionBins:
+        def compute() -> DirectionBins:
+            return outgoing_bins(
+                self.stored_scene.probes, self._gather_hits, self._pattern, self.light_transport.patches.frames
+            )
+
+        return self.cache.get_value((self.key, "squares of links"), compute)
+
+    @cached_property
+    def sun_disks(self) -> SunExtractor:
+        """Suns of environments, and what there is beside them."""
+        return SunExtractor(self.light_transport)
+
+    def hard_shadow_lights(
+        self, light: Illumination, probe_indices: NDArray[np.intp] | None
+    ) -> tuple[HardShadowLight, ...]:
+        """Suns and small lamps of a light, and what they bring to some points, None for all, if nothing hides them."""
+        probes = self.stored_scene.probes if probe_indices is None else self.stored_scene.probes.rows(probe_indices)
+        shadow_lights = [
+            *self.sun_disks.hard_shadow_lights(light, probes),
+            *(self._hard_shadow_light(source, probes) for source in hard_shadow_lights(light)),
+        ]
+        return (
+            tuple(shadow_lights)
+            if probe_indices is None
+            else tuple(shadow_light.scatter(probe_indices, self.vectors_shape) for shadow_light in shadow_lights)
+        )
+
+    def _hard_shadow_light(self, source: LightSource, probes: SurfacePoints) -> HardShadowLight:
+        rays = self.light_transport.local.unoccluded_rays(source.geometry, probes)
+        vectors = ray_incident_coefficients(probes, [rays])
+        return HardShadowLight(
+            source.geometry, local_shadow_targets(source.geometry), vectors, np.array(source.gain, np.float32)
+        )
+
+    def _preview_environment(
+        self, lights: TriangleLights, probes: SurfacePoints, probe_indices: NDArray[np.intp]
+    ) -> F32:
+        """Light vectors of an environment at some points, by harmonics where the bake has them."""
+        harmonic = self.light_transport.harmonic
+        if harmonic is None:
+            return incident_coefficients(probes, self.visible[probe_indices], lights, (), FAST_DEGREE)
+        split = harmonic.frequency_split(lights)
+        visible = select_visibility(self.visible, probe_indices, split.residual_triangles)
+        residual = incident_coefficients(probes, visible, split.residual, (), FAST_DEGREE)
+        return residual + harmonic.probe_transfer.incident_coefficients(split.low_frequency, probe_indices)
+
+    @cached_property
+    def _ray_basis(self) -> F32:
+        return weighted_basis(self._pattern, 0, FAST_DEGREE)  # all points have one seed
+
+    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> F32:
+        """What white points of a material would send if nothing were in the light's way; of others nothing.
+
+        Args:
+            light: straight from the sky and from lamps, not from surfaces that shine, which are not there.
+            material: whose points. is_preview: of another sky than the baked one, quickly.
+        Returns:
+            (points, 3) float32
+        """
+        rows, cache = np.flatnonzero(self.stored_scene.material == material), self.cache.transient
+        key = self.key, "unhidden light", material
+
+        def compute_environment() -> F32:
+            return self._unoccluded_environment(light, self.stored_scene.probes.rows(rows), is_preview=is_preview)
+
+        def compute_local(geometry: LightGeometry) -> F32:
+            return self.light_transport.local.unoccluded(geometry, self.stored_scene.probes.rows(rows))
+
+        radiance = cache.get_value((*key, light.environment, is_preview), compute_environment) * np.array(
+            light.environment_gain, np.float32
+        )
+        for geometry, gain in light.local:
+            if geometry.kind != "mesh":
+                irradiance = cache.get_value((*key, geometry), lambda geometry=geometry: compute_local(geometry))  # type: ignore[misc]
+                radiance += np.outer(irradiance, np.array(gain, np.float32) / np.float32(np.pi))
+        out = np.zeros((self.stored_scene.probes.num_points, 3), np.float32)
+        out[rows] = radiance
+        return out
+
+    def _unoccluded_environment(self, light: Illumination, probes: SurfacePoints, *, is_preview: bool) -> F32:
+        """What white points send under the whole sky, of which there are few that differ. (n, 3) float32"""
+        _, first, normal_index = np.unique(probes.normal, axis=0, return_index=True, return_inverse=True)
+        lights, receivers = self.light_transport.unoccluded_environment(
+            light, probes.rows(first), is_preview=is_preview
+        )
+        # the first function is constant, and its light vector the irradiance
+        constant = incident_coefficients(receivers.points, receivers.visible, lights, (), 0)[:, :, 0]
+        return np.asarray(constant[normal_index.ravel()] / np.float32(np.sqrt(np.pi)), np.float32)
+
+    @cached_property
+    def _pattern(self) -> RayPattern:
+        return ray_pattern(self.light_transport.store, self._gather_hits.shape[1])
+
+    @property
+    def vectors_shape(self) -> tuple[int, int, int]:
+        """Of light vectors: points, channels, K."""
+        return self.stored_scene.probes.num_points, 3, NUM_FUNCTIONS
+
+    @cached_property
+    def _prefiltered(self) -> PrefilteredEnvironments:
+        return PrefilteredEnvironments(self.light_transport)
+
+    @cached_property
+    def light_visibility_bits(self) -> NDArray[np.uint8]:
+        """Which light triangles points see, those beside each other one after another. (points, bytes) uint8"""
+        order, out = self._prefiltered.order, np.empty_like(self.visible)
+        for rows in np.array_split(np.arange(len(out)), len(out) // _PROBES_PER_BATCH + 1):
+            bits = np.unpackbits(self.visible[rows], axis=1, bitorder="little")
+            bits[:, : len(order)] = bits[:, order]
+            out[rows] = np.packbits(bits, axis=1, bitorder="little")
+        return out
+
+    def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLightLists:
+        """The light triangles of an environment, as lobes of some widths look for them."""
+        return self._prefiltered.directional_lights(environment, widths)
+
+    def environment_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
+        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        return self._prefiltered.combined(environment, is_preview=is_preview)
+
+    def bright_lights(self, environment: EnvironmentKey) -> F32:
+        """Bright lights of an environment, turned; see `PrefilteredEnvironment`. (lights, 7) float32"""
+        return self._prefiltered.bright_lights(environment)
+
+    def prefiltered(self, name: str | None) -> EnvironmentLookup:
+        """An environment, None for the scene's own, and what it is when it is blurred without its lamps."""
+        return self._prefiltered.environment_lookup(name)
+
+    def environment_map(self, name: str | None, blur: float = 0) -> F32:
+        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+        return self.light_transport.environment_map(name, blur)

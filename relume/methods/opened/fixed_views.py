@@ -1,0 +1,329 @@
+"""Bakes of fixed views, opened for freezing and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets import environments
+from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
+from relume.core.cache import Cache
+from relume.core.source_hash import image_code
+from relume.lights.light_clusters import cluster_lights, num_clusters
+from relume.lights.local_lights import num_samples
+from relume.lights.prefilter import downsampled, prefiltered
+from relume.lights.sphere_tiles import Tiles
+from relume.lights.spherical_triangles import RotatedEnvironment, TriangleLights, integrate_environment
+from relume.live.fixed_camera.illumination import Illumination, with_baked_normals
+from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightsAndPoints
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry
+from relume.methods.indirect_solver import IndirectSolver
+from relume.methods.local_lights import LocalLights, ShadowCache
+from relume.methods.planar_mirror_light import AddedMirrorLights
+from relume.methods.retrace import NormalRetracer
+from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
+from relume.operators.image_cache import ImageFiles
+from relume.raytrace.surface_points import SurfacePoints
+from relume.store.bake_protocol import StoreReader
+from relume.transport.outgoing_patch_light import OutgoingLight
+from relume.transport.shading_points import GatherRays, RayList, ShadingPoints
+from relume.views.downsampled import DownsampledStore
+from relume.views.view import View, open_view
+
+PREVIEW_WIDTH = 256
+_EDITED_BYTES = 256 << 20
+
+F32 = NDArray[np.float32]
+LightFinder = Callable[[EnvironmentKey], TriangleLights]
+"""Finds the triangles of an environment."""
+
+
+@dataclass(frozen=True)
+class BakedFixedViews:
+    """One bake of fixed views in which light comes straight; a `relume.live.fixed_camera.protocols.FixedViewTransfer`.
+
+    Attributes:
+        cache: of all that is made from the bake and may be made again.
+        key: path of the store; tells this bake's entries from other bakes' in the memory.
+        default_look: the complete look of the scene as it was imported.
+    """
+
+    cache: Cache
+    key: str
+    store: StoreReader
+    scene_id: str
+    method: str
+    num_lights: int
+    default_look: dict[str, Any]
+    material_names: Sequence[str]
+    views: dict[str, View]
+
+    camera_mode = CameraMode.FIXED
+    axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.LIGHT, EditAxis.ENVIRONMENT))
+
+    @cached_property
+    def derived(self) -> ImageFiles:
+        """Images of the default look, made once."""
+        return ImageFiles(Path(self.key) / "derived", image_code())
+
+    @cached_property
+    def edited(self) -> ImageFiles:
+        """Those of other looks, the newest of them, for when the same look is opened after a restart."""
+        return ImageFiles(Path(self.key) / "edited", image_code(), _EDITED_BYTES)
+
+    def has_image(self, key: Hashable) -> bool:
+        """Whether the image of a term is beside the store, under the name of a job without the store's own."""
+        return self.derived.has(key) or self.edited.has(key)
+
+    @cached_property
+    def local(self) -> LocalLights:
+        """What local lights need."""
+        return LocalLights(self.store, self.cache, self.key)
+
+    @cached_property
+    def tracer(self) -> NormalRetracer:
+        """Rays for normals that the bake did not know."""
+        return NormalRetracer(self.store, self.local, None)
+
+    @cached_property
+    def lights(self) -> TriangleLights:
+        """The environment's triangles."""
+        return read_lights(self.store)
+
+    def environment_radiance(self, name: str | None) -> NDArray[np.float32]:
+        """Radiance of an environment, None for the scene's own. (height, width, 3) float32
+
+        Raises:
+            NotFoundError: it is not here. SceneError: its files are damaged.
+        """
+        return environments.load_environment(name).radiance if name is not None else self._scene_radiance()
+
+    def _scene_radiance(self) -> F32:
+        def read() -> F32:
+            return np.asarray(self.store.read("lights/environment"), np.float32)
+
+        return self.cache.get_value((self.key, "environment"), read)
+
+    def light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
+        """The triangles of an environment: the tiles of the bake, weighed again."""
+        return self.lights if environment == BAKED_ENVIRONMENT else self._integrate_environment(environment)
+
+    def lights_for(self, light: Illumination) -> TriangleLights:
+        """Those of them by which light comes straight to the picture."""
+        return displayed_of(self.light_of_environment(light.environment), light)
+
+    def clustered_lights(self, light: Illumination) -> TriangleLights:
+        """The same, merged into a few. See `FixedViewTransfer`."""
+
+        def merge_lights() -> TriangleLights:
+            return cluster_lights(
+                self.light_of_environment(light.environment), self.tiles, num_clusters(self.num_lights)
+            )
+
+        return displayed_of(self.cache.get_value((self.key, "merged lights", light.environment), merge_lights), light)
+
+    def preview_lights_for(self, light: Illumination) -> TriangleLights:
+        """The same, found quickly."""
+        return displayed_of(self.preview_light_of_environment(light.environment), light)
+
+    def _integrate_environment(self, environment: EnvironmentKey) -> TriangleLights:
+        def integrate() -> TriangleLights:
+            return integrate_environment(
+                self.tiles,
+                RotatedEnvironment.from_radiance(self.environment_radiance(environment.map)),
+                environment.rotation,
+            )
+
+        return self.cache.get_value((self.key, "lights", environment), integrate)
+
+    def preview_light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
+        """The triangles of an environment from a map of at most 256 texels' width: a large one takes seconds."""
+        return self.coarse_weights("lights", environment, self.environment_radiance)
+
+    def coarse_weights(
+        self, label: str, environment: EnvironmentKey, find_radiance: Callable[[str | None], F32]
+    ) -> TriangleLights:
+        """The same of a part of an environment; what stays while it is turned is kept.
+
+        Args:
+            label: of it, in words. environment: whose. find_radiance: finds the part by the environment's name.
+        """
+        key = self.cache_owner(environment.map), f"texels of preview {label}", environment.map
+
+        def integrate() -> TriangleLights:
+            rotatable = self.cache.get_value(
+                key,
+                lambda: RotatedEnvironment.from_radiance(halve_to_width(find_radiance(environment.map), PREVIEW_WIDTH)),
+            )
+            return integrate_environment(self.tiles, rotatable, environment.rotation)
+
+        return self.cache.transient.get_value((self.key, f"preview {label}", environment), integrate)
+
+    def cache_owner(self, name: str | None) -> str:
+        """Whose entries in the memory those made of an environment are: the bake's where it is its own."""
+        return self.key if name is None else "environments"
+
+    @cached_property
+    def shadow_ray_directions(self) -> F32:
+        """Where shadow rays went. (M, 3) float32"""
+        return read_shadow_ray_directions(self.store)
+
+    @cached_property
+    def tiles(self) -> Tiles:
+        """Of the sphere, that lights were chosen in."""
+        return read_tiles(self.store)
+
+    @property
+    def indirect(self) -> IndirectSolver | None:
+        """Light between surfaces: none was baked."""
+        return None
+
+    def outgoing_patch_light(self, light: Illumination) -> OutgoingLight | None:
+        """What the gather cells send; None where nothing of it comes to the picture."""
+        return self.indirect.exact(light) if self.indirect is not None and light.paths.has_indirect else None
+
+    def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
+        """Trace what gather cells lack: there are none. See `FixedViewTransfer`."""
+
+    def indirect_rays(
+        self, light: Illumination, gather_rays: GatherRays, mirror_visibility: NDArray[np.uint8] | None
+    ) -> tuple[RayList, ...]:
+        """The rays of samples that bring what surfaces send.
+
+        Args:
+            light: all that shines.
+            gather_rays: their gather rays, of which `sent` does not count. mirror_visibility: what they see in flat
+                mirrors.
+        """
+        outgoing = self.outgoing_patch_light(light)
+        return () if outgoing is None else (replace(gather_rays, outgoing=outgoing),)
+
+    def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
+        """Incident light of a material's samples; shadows that the cache lacks are traced. See `FixedViewTransfer`."""
+        lights = self.lights_for(light)
+        receivers = view.receivers(material, is_lit=lights.num_lights > 0)
+        return lights, replace(receivers, rays=self._rays(view, material, light, cache))
+
+    def _rays(self, view: View, material: int, light: Illumination, cache: Cache) -> Sequence[RayList]:
+        """The rays among what arrives: those of local lights."""
+        if not light.local:
+            return ()
+
+        def cached_shadows(geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
+            key = (self.key, *view.sample_key(material), "shadows", geometry)
+            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.num_samples(geometry)) // 8)
+            return cache.get(key, ShadowCache, num_bytes, lambda: self.local.shadows(geometry, points))
+
+        return self.local.rays_to(light, view.surface_points(material), cached_shadows)
+
+    def mirror_lights_of(self, view: View, material: int) -> NDArray[np.uint8] | None:
+        """Lights that a material's samples see in flat mirrors: none without gather rays. See `FixedViewTransfer`."""
+        return None
+
+    def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
+        """How much more flat mirrors throw after than before: nothing. See `FixedViewTransfer`."""
+        return None
+
+    def subset(
+        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+    ) -> SampledTransfer:
+        """Some of a material's samples. See `FixedViewTransfer`."""
+        shading_points = view.receivers(material, is_lit=False).without_light(sample_indices)
+        visible = np.asarray(view.read_rows("visibility", material, sample_indices), np.uint8)
+        return SampledTransfer(self, replace(shading_points, visible=visible))
+
+    def unoccluded_environment(
+        self, light: Illumination, points: SurfacePoints, *, is_preview: bool
+    ) -> LightsAndPoints:
+        """Unoccluded light of the environment at points, seen along their normals. See `FixedViewTransfer`."""
+        direct_light = light._replace(paths=light.paths._replace(direct=True).without_reflections())
+        above = points.normal @ self.shadow_ray_directions.T > 0
+        visible = np.packbits(above, axis=1, bitorder="little")
+        lights = self.preview_lights_for(direct_light) if is_preview else self.lights_for(direct_light)
+        return lights, ShadingPoints(points, points.normal, visible)
+
+    def downsampled(self, view_name: str, step: int) -> Self:
+        """One view of the bake with 1 / step² of its pixels. Its images are not kept: no folder is beside its key."""
+        index = self.views[view_name].index
+        store, key = DownsampledStore(self.store, index, step), f"{self.key}/{step}"
+        return replace(self, key=key, store=store, views={view_name: open_view(store, index, self.cache, key)})
+
+    def is_emissive_at(self, view: View, material: int) -> NDArray[np.bool_]:
+        """Whether the samples of a material that shines are seen from a side that does."""
+        return self.local.is_emissive_at(
+            material, view.ray_origins(view.rows(material)), view.surface_points(material).position
+        )
+
+    def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
+        """Radiance of a view's samples of an environment. (n, 3) float32"""
+        if environment == BAKED_ENVIRONMENT:
+            return view.background()
+        return self.environment_along(environment, view.background_directions())
+
+    def environment_along(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
+        """Radiance of an environment in unit directions (n, 3), blurred by `blur` degrees. (n, 3) float32"""
+        radiance = self.environment_map(environment.map, blur)
+        return lookup(radiance, rotate_about_y(directions, -environment.rotation).astype(np.float32))
+
+    def environment_map(self, name: str | None, blur: float = 0) -> F32:
+        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+        return self._prefiltered_map(name, blur) if blur else self.environment_radiance(name)
+
+    def _prefiltered_map(self, name: str | None, degrees: float) -> F32:
+        owner = self.cache_owner(name)
+
+        def downsample() -> F32:
+            return downsampled(self.environment_radiance(name))
+
+        def prefilter() -> F32:
+            return prefiltered(self.cache.get_value((owner, "reduced environment", name), downsample), degrees)
+
+        return self.cache.transient.get_value((owner, "blurred environment", name, degrees), prefilter)
+
+
+@dataclass(frozen=True)
+class SampledTransfer:
+    """A few samples of a material, shaded at once in any light; a `relume.live.fixed_camera.protocols.SampledShading`.
+
+    Attributes:
+        receivers: without any rays.
+        gather_rays: their gather rays, where those were baked; they bring nothing yet.
+        mirror_visibility: the lights that they see in flat mirrors, where those were baked. (n, bytes) uint8
+    """
+
+    transfer: BakedFixedViews
+    receivers: ShadingPoints
+    gather_rays: GatherRays | None = None
+    mirror_visibility: NDArray[np.uint8] | None = None
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory they hold."""
+        points, hit_bytes = self.receivers, 0 if self.gather_rays is None else self.gather_rays.gather_hits.nbytes
+        return int(
+            2 * points.normal.nbytes + points.tangent.nbytes + points.wo.nbytes + points.visible.nbytes + hit_bytes
+        )
+
+    def incident_light(self, light: Illumination) -> LightsAndPoints:
+        """What arrives at them in a light; the environment from a small map, local lights exactly, what surfaces send
+        as if they leant as they were baked: tracing how they do now takes longer than a preview."""
+        transfer, indirect_rays = self.transfer, tuple[RayList, ...]()
+        if self.gather_rays is not None:
+            indirect_rays = transfer.indirect_rays(with_baked_normals(light), self.gather_rays, self.mirror_visibility)
+        local = transfer.local.rays_to(light, self.receivers.points)
+        return transfer.preview_lights_for(light), replace(self.receivers, rays=(*indirect_rays, *local))
+
+
+def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:
+    """The triangles of an environment by which light comes straight to the picture, beside local lights."""
+    if not light.has_direct_environment:
+        return lights.empty()
+    if light.environment_gain == (1.0, 1.0, 1.0):
+        return lights
+    return replace(lights, irradiance=lights.irradiance * np.array(light.environment_gain, np.float32))

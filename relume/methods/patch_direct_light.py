@@ -1,0 +1,225 @@
+"""What the lights themselves bring to gather cells, before any surface has reflected it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.lights.light_sampling import LightStrata
+from relume.lights.local_lights import LocalLight, emitter_geometry
+from relume.lights.spherical_triangles import TriangleLights
+from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.look import EnvironmentKey, LightGeometry
+from relume.math.zernike import OUTGOING_DEGREE
+from relume.methods.local_lights import LocalLights
+from relume.methods.spherical_harmonic_transfer import PATCH_DEGREE, HarmonicLight
+from relume.radiosity.highlight_transport import DirectLobes
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
+from relume.raytrace.light_visibility import compute_irradiance
+from relume.raytrace.moving_light import MovingLight
+from relume.transport.incident_coefficients import ray_incident_coefficients
+from relume.transport.outgoing_patch_light import NUM_OUTGOING
+from relume.transport.shading_points import LocalRays
+
+F32 = NDArray[np.float32]
+
+SAMPLES_PER_PATCH_POINT = 16  # of a rectangle, for each point of a cell
+
+
+class LocalPatchLight:
+    """What local lights bring to gather cells, each of unit emission.
+
+    Args:
+        local: the lights. patches: that they shine on.
+        cache: of all that is made from the bake. key: of the bake in it. normal_overrides: see `DirectPatchLight`.
+    """
+
+    def __init__(
+        self, local: LocalLights, patches: PatchLight, cache: Cache, key: str, normal_overrides: tuple[Hashable, ...]
+    ) -> None:
+        self._local, self._patches = local, patches
+        self._cache, self._key, self._normal_overrides = cache, key, normal_overrides
+
+    def irradiance(self, geometry: LightGeometry) -> F32:
+        """What comes to every cell, the mean over its points. (C,) float32"""
+        key = self._key, "light on cells", geometry, *self._normal_overrides
+        return self._cache.get_value(key, lambda: self._irradiance(geometry))
+
+    def _irradiance(self, geometry: LightGeometry) -> F32:
+        point_irradiance = compute_irradiance(
+            *self._sample_light(geometry), self._patches.points, self._visibility(geometry)
+        )
+        shape = self._patches.num_patches, self._patches.points_per_patch
+        return np.asarray(point_irradiance.reshape(shape).mean(axis=1, dtype=np.float64), np.float32)
+
+    def _visibility(self, geometry: LightGeometry) -> NDArray[np.uint8]:
+        def trace() -> NDArray[np.uint8]:
+            return self._local.trace(
+                geometry, self._patches.points, self._local.num_samples(geometry, SAMPLES_PER_PATCH_POINT)
+            )
+
+        return self._cache.get_value(
+            (self._key, "shadows on cells", emitter_geometry(geometry), *self._normal_overrides), trace
+        )
+
+    def rays(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
+        """What comes to the points of some cells, as rays.
+
+        Args:
+            geometry: of the light. rows: the cells. (G,)
+        """
+        visible, points_per_patch = self._visibility(geometry), self._patches.points_per_patch
+        bits = visible.reshape(-1, points_per_patch, visible.shape[1])[rows].reshape(-1, visible.shape[1])
+        return LocalRays(*self._sample_light(geometry), np.ones(3, np.float32), bits)
+
+    def preview_irradiance(self, geometry: LightGeometry) -> F32:
+        """Preview what comes to every cell, at one of its points. (C,) float32"""
+        return self._preview(geometry).irradiance
+
+    def preview_rays(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
+        """The same of some cells as rays, at the first of their points. rows: the cells. (G,)"""
+        return self._local.preview_rays(LightSource(geometry, (1.0, 1.0, 1.0)), self._preview(geometry).visible[rows])
+
+    def _preview(self, geometry: LightGeometry) -> MovingLight:
+        key, patch_rows = (
+            (self._key, "preview light on cells", geometry, *self._normal_overrides),
+            np.arange(self._patches.num_patches),
+        )
+        return self._cache.transient.get_value(
+            key, lambda: self._local.preview(geometry, self._patches.first_points(patch_rows))
+        )
+
+    def _sample_light(self, geometry: LightGeometry) -> tuple[LocalLight, LightStrata]:
+        return self._local.sample_light(geometry, self._local.num_samples(geometry, SAMPLES_PER_PATCH_POINT))
+
+
+class DirectPatchLight:
+    """Found for one source after another, and kept: transport is linear in them.
+
+    Args:
+        patches: that it comes to. local: local lights. find_lights: finds the triangles of an environment.
+        find_preview_lights: finds them quickly.
+        cache: of all that is made from the bake. key: of the bake in it.
+        harmonic: transfer of smooth light, for previews; None where a bake has none.
+        normal_overrides: names how cells lean that lean otherwise than they were baked; empty for those that were.
+    """
+
+    def __init__(
+        self,
+        patches: PatchLight,
+        local: LocalLights,
+        find_lights: Callable[[EnvironmentKey], TriangleLights],
+        find_preview_lights: Callable[[EnvironmentKey], TriangleLights],
+        cache: Cache,
+        key: str,
+        harmonic: HarmonicLight | None = None,
+        normal_overrides: tuple[Hashable, ...] = (),
+    ) -> None:
+        self.patches, self._local = patches, LocalPatchLight(local, patches, cache, key, normal_overrides)
+        self._find_lights, self._find_preview_lights = find_lights, find_preview_lights
+        self._cache, self._key, self._harmonic, self._normal_overrides = cache, key, harmonic, normal_overrides
+
+    def incident_light(
+        self, light: Illumination, reflectance_operator: ReflectanceOperator, *, is_preview: bool
+    ) -> IncidentLight:
+        """Sum what all sources bring.
+
+        Args:
+            light: all that shines. reflectance_operator: tells which cells ask where light comes from.
+            is_preview: local lights by few samples, large environments by small maps, directions roughly.
+        """
+        incident = IncidentLight(
+            np.zeros((self.patches.num_patches, 3), np.float32),
+            np.zeros((len(reflectance_operator.rows), 3, NUM_OUTGOING), np.float32),
+        )
+        local_irradiance = self._local.preview_irradiance if is_preview else self._local.irradiance
+        if light.has_environment:
+            gain = np.array(light.environment_gain, np.float32)
+            incident.irradiance[:] += gain * self._irradiance(light.environment, is_preview)
+            incident.coefficients[:] += gain[:, None] * self._coefficients(
+                light.environment, reflectance_operator, is_preview
+            )
+        for geometry, source_gain in light.local:
+            gain = np.array(source_gain, np.float32)
+            incident.irradiance[:] += gain * local_irradiance(geometry)[:, None]
+            incident.coefficients[:] += gain[:, None] * self._local_coefficients(
+                geometry, reflectance_operator, is_preview
+            )
+        return incident
+
+    def direct(self, light: Illumination, rows: NDArray[np.intp]) -> DirectLobes:
+        """What comes to the points of some cells, exactly, source after source. rows: the cells. (G,)"""
+        local_rays = ((self._local.rays(geometry, rows), gain) for geometry, gain in light.local)
+        rays = [replace(rays, gain=np.array(gain, np.float32)) for rays, gain in local_rays]
+        if not light.has_environment:
+            return DirectLobes(rays=rays)
+        lights = self._find_lights(light.environment)
+        gain = np.array(light.environment_gain, np.float32)
+        return DirectLobes(
+            replace(lights, irradiance=gain * lights.irradiance), self.patches.visibility_bits(rows), rays
+        )
+
+    def _irradiance(self, environment: EnvironmentKey, is_preview: bool) -> F32:
+        key = self._key, "environment on cells", environment, *self._normal_overrides
+        if not is_preview or self._cache.contains(key):
+            return self._cache.get_value(key, lambda: self.patches.irradiance(self._find_lights(environment)))
+        preview_key = *key, "for a preview"
+        return self._cache.transient.get_value(preview_key, lambda: self._preview_irradiance(environment))
+
+    def _preview_irradiance(self, environment: EnvironmentKey) -> F32:
+        lights, harmonic = self._find_preview_lights(environment), self._harmonic
+        if harmonic is None:
+            return self.patches.irradiance(lights)
+        split = harmonic.frequency_split(lights)
+        residual = self.patches.irradiance(split.residual, split.residual_triangles)
+        return residual + harmonic.irradiance @ split.low_frequency
+
+    def _coefficients(
+        self, environment: EnvironmentKey, reflectance_operator: ReflectanceOperator, is_preview: bool
+    ) -> F32:
+        patches, rows = self.patches, reflectance_operator.rows
+        key = (
+            self._key,
+            "environment on cells, by direction",
+            environment,
+            reflectance_operator.has_lobe,
+            *self._normal_overrides,
+        )
+        if is_preview:
+            preview_key = *key, "for a preview"
+            return self._cache.transient.get_value(preview_key, lambda: self._preview_coefficients(environment, rows))
+        return self._cache.get_value(
+            key, lambda: patches.incident_coefficients(rows, self._find_lights(environment), OUTGOING_DEGREE)
+        )
+
+    def _preview_coefficients(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> F32:
+        lights, harmonic, patches = self._find_preview_lights(environment), self._harmonic, self.patches
+        if harmonic is None:
+            return patches.incident_coefficients(rows, lights, PATCH_DEGREE)
+        split = harmonic.frequency_split(lights)
+        residual = patches.incident_coefficients(rows, split.residual, PATCH_DEGREE, split.residual_triangles)
+        low_frequency = np.einsum("gkl,lc->gck", harmonic.patch_coefficients[rows], split.low_frequency)
+        return residual + patches.mean_coefficients(rows, patches.first_points(rows), low_frequency)
+
+    def _local_coefficients(
+        self, geometry: LightGeometry, reflectance_operator: ReflectanceOperator, is_preview: bool
+    ) -> F32:
+        """Of a light of unit emission; for a preview at one point of each cell. (G, 3, J) float32"""
+        patches, rows = self.patches, reflectance_operator.rows
+
+        def compute() -> F32:
+            if is_preview:
+                points, rays = patches.first_points(rows), self._local.preview_rays(geometry, rows)
+            else:
+                points, rays = patches.points_of(rows), self._local.rays(geometry, rows)
+            return patches.mean_coefficients(rows, points, ray_incident_coefficients(points, [rays], OUTGOING_DEGREE))
+
+        cache, label = self._cache.transient if is_preview else self._cache, "light on cells, by direction"
+        return cache.get_value(
+            (self._key, label, geometry, reflectance_operator.has_lobe, is_preview, *self._normal_overrides), compute
+        )

@@ -1,0 +1,293 @@
+"""Light that flat mirrors throw: of the lights whose way over a plane was traced to view samples, exact and sharp.
+
+A gather cell on a mirror sends what comes to it as few functions have it, some 30° wide, a small sun as all else. Of
+lights that were traced it sends nothing to samples that know which of them they see: these get
+
+    E m c F(θ)   in the direction v = d − 2 (d · n) n,   cos θ = |d · n|,
+
+with the irradiance E of lights that lie together in direction d, and what the mirror sends on in the look
+(`relume.brdf.specular`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.albedo import Reflectances, pack_reflectance, unpack_mirrors
+from relume.brdf.specular import specular_terms, split_specular
+from relume.camera.planar_mirrors import MAX_PLANES, FlatMirrors, find_flat_mirrors, has_flat_mirrors, mirrored_lights
+from relume.core.cache import Cache
+from relume.core.color import luminance
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.lights.sphere_tiles import Tiles
+from relume.lights.spherical_triangles import TriangleLights
+from relume.live.fixed_camera.illumination import Illumination
+from relume.look import EnvironmentKey
+from relume.math.zernike import OUTGOING_DEGREE
+from relume.methods.store_layout import read_lights, read_tiles
+from relume.radiosity.highlight_transport import DirectLobes, outgoing_in_highlights
+from relume.radiosity.outgoing_radiance import OutgoingRadiance, first_bounce
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
+from relume.raytrace.scene_buffers import SceneBuffers
+from relume.scene.model import Scene
+from relume.store.bake_protocol import Recipe, StoreReader
+from relume.transport.shading_points import MirrorRays
+
+F32 = NDArray[np.float32]
+
+NO_PLANE = 255  # of cells
+MAX_GROUPS = 128
+_BRIGHT = 8.0  # times the mean radiance of the sky: gather rays find what is dimmer
+
+
+@dataclass(frozen=True)
+class MirrorLights:
+    """What was traced: bright lights, those that lie together as one.
+
+    Attributes:
+        lights: which of the bake's. (T,) int32. group: that each is in. (T,) int32
+        direction: to the groups. (G, 3) float32
+        mirrors: the planes, P of them.
+        plane: that each gather cell lies in, `NO_PLANE` where in none. (C,) uint8
+    """
+
+    lights: NDArray[np.int32]
+    group: NDArray[np.int32]
+    direction: F32
+    mirrors: FlatMirrors
+    plane: NDArray[np.uint8]
+
+    @property
+    def num_mirrored_lights(self) -> int:
+        """Groups in all planes together, P G."""
+        return self.mirrors.num_planes * len(self.direction)
+
+    @classmethod
+    def from_lights(
+        cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: NDArray[np.uint8]
+    ) -> MirrorLights:
+        """Choose the lights that are too bright for few functions.
+
+        Args:
+            lights: of a bake. tiles: that they lie in. mirrors: of its scene. plane: of its cells.
+        """
+        brightness = luminance(lights.irradiance).astype(np.float64)
+        bright_indices = np.flatnonzero(brightness > _BRIGHT * brightness.sum() / (4 * np.pi) * tiles.solid_angles)
+        bright_indices = bright_indices[
+            np.argsort(tiles.traversal_key[bright_indices], kind="stable")
+        ]  # neighbours beside each other
+        num_groups = min(len(bright_indices), MAX_GROUPS)
+        group = np.arange(len(bright_indices)) * num_groups // max(1, len(bright_indices))
+        summed_direction = np.zeros((num_groups, 3))
+        np.add.at(summed_direction, group, brightness[bright_indices, None] * lights.direction[bright_indices])
+        direction = (summed_direction / np.linalg.norm(summed_direction, axis=1, keepdims=True)).astype(np.float32)
+        selected_groups = bright_indices.astype(np.int32), group.astype(np.int32), direction
+        return cls(*selected_groups, mirrors, plane)
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """As a store keeps them."""
+        fields = {**vars(self), **self.mirrors._asdict()}
+        del fields["mirrors"]
+        return {f"thrown/{name}": array for name, array in fields.items()}
+
+
+def max_mirror_lights(scene: Scene, recipe: Recipe) -> int:
+    """The most lights that a sample may see in flat mirrors, P G."""
+    return MAX_PLANES * min(MAX_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
+
+
+def make_mirror_lights(
+    scene: Scene, geometry: SceneBuffers, store: StoreReader, patch_positions: F32
+) -> dict[str, NDArray[Any]]:
+    """Find the arrays of a store from which `read_mirror_lights` reads; none where nothing is thrown.
+
+    Args:
+        scene: that is baked. geometry: its triangles. store: with its lights.
+        patch_positions: where the points of gather cells are. (C, points, 3)
+    """
+    if not has_flat_mirrors(scene):
+        return {}
+    mirrors = find_flat_mirrors(scene, geometry)
+    mirror_lights = MirrorLights.from_lights(
+        read_lights(store), read_tiles(store), mirrors, mirrors.containing_plane(patch_positions, geometry.epsilon)
+    )
+    return mirror_lights.arrays if mirror_lights.num_mirrored_lights else {}
+
+
+def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
+    """What a store knows of flat mirrors; None where there is none, or no bright light."""
+    try:
+        store.shape("thrown/offset")
+    except StoreError:
+        return None
+
+    def read(name: str) -> NDArray[Any]:
+        return store.read(f"thrown/{name}")
+
+    mirrors = FlatMirrors(*map(read, FlatMirrors._fields))
+    mirror_lights = MirrorLights(read("lights"), read("group"), read("direction"), mirrors, read("plane"))
+    limits: list[tuple[NDArray[Any], int]] = [
+        (mirror_lights.lights, store.shape("lights/power")[0]),
+        (mirror_lights.group, len(mirror_lights.direction)),
+        (mirrors.material, len(store.attributes["materials"])),
+    ]
+    are_valid = all(len(indices) == 0 or 0 <= indices.min() <= indices.max() < limit for indices, limit in limits)
+    if not are_valid or mirror_lights.plane.shape != store.shape("cells/material"):
+        raise ChunkDamagedError("thrown", "it does not fit the lights, materials and cells of the bake")
+    return mirror_lights
+
+
+@dataclass(frozen=True)
+class AddedMirrorLights:
+    """Change of the light of planar mirrors; a `relume.live.fixed_camera.protocols.MirrorLightsDelta`.
+
+    Attributes:
+        direction: of what is thrown. (K, 3) float32 normal_irradiance: what comes across it. (K, 3) float32
+        patch_radiance: what other cells see of the same in the mean, which is no part of what samples get. (C, 3)
+            float32
+    """
+
+    direction: F32
+    normal_irradiance: F32
+    patch_radiance: F32
+
+    def rays(self, visible: NDArray[np.uint8]) -> MirrorRays:
+        """What comes to samples. visible: of the lights by the planes. (n, bytes) uint8"""
+        return MirrorRays(self.direction, self.normal_irradiance, visible)
+
+
+class MirrorLightTransfer:
+    """Of one bake, in any look; safe to use from several threads.
+
+    Args:
+        mirror_lights: what was traced. patches: that have sent it. find_lights: finds the triangles of an environment.
+        cache: of all that is made from the bake. key: of the bake in it.
+    """
+
+    def __init__(
+        self,
+        mirror_lights: MirrorLights,
+        patches: PatchLight,
+        find_lights: Callable[[EnvironmentKey], TriangleLights],
+        cache: Cache,
+        key: str,
+    ) -> None:
+        self._mirror_lights, self._patches, self._find_lights = mirror_lights, patches, find_lights
+        self._cache, self._key = cache, key
+        self._directions = mirrored_lights(mirror_lights.mirrors.normal, mirror_lights.direction).reshape(-1, 3)
+
+    @staticmethod
+    def is_in(light: Illumination) -> bool:
+        """Whether anything of it may be in a light: it is reflected once before it comes."""
+        return light.paths.has_indirect and light.paths.first == 1 and light.has_environment
+
+    def rays(self, light: Illumination, visible: NDArray[np.uint8]) -> MirrorRays:
+        """What comes to samples.
+
+        Args:
+            light: that `is_in` says has any. visible: see `relume.camera.find_flat_mirrors.Seen`. (n, bytes) uint8
+        """
+        return MirrorRays(self._directions, self._reflected_irradiance(light), visible)
+
+    def delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
+        """What changes of it where surfaces do, as when a hand drags a mirror's colour; None for nothing.
+
+        Args:
+            before, after: in the same environment.
+        """
+        irradiance_before, irradiance_after = (
+            self._reflected_irradiance(light) if self.is_in(light) else np.float32(0) for light in (before, after)
+        )
+        change = np.asarray(irradiance_after - irradiance_before, np.float32)
+        if not change.any():
+            return None
+        patch_radiances = [
+            self._fast_patch_part(light).mean_to_others(self._patches) if self.is_in(light) else 0
+            for light in (before, after)
+        ]
+        return AddedMirrorLights(
+            self._directions, change, np.asarray(patch_radiances[1] - patch_radiances[0], np.float32)
+        )
+
+    def _reflected_irradiance(self, light: Illumination) -> F32:
+        """What each group sends by each plane, across its way. (P G, 3) float32"""
+        mirror_lights, gain = self._mirror_lights, np.array(light.environment_gain)
+        incident = np.zeros((len(mirror_lights.direction), 3))
+        np.add.at(
+            incident, mirror_lights.group, gain * self._find_lights(light.environment).irradiance[mirror_lights.lights]
+        )
+        cosine, tints = np.abs(mirror_lights.mirrors.normal @ mirror_lights.direction.T), self._patches.textures[1]
+        mirror_reflectance = np.zeros((*cosine.shape, 3))
+        for p, material in enumerate(mirror_lights.mirrors.material):
+            on_plane = mirror_lights.plane == p
+            tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
+            terms = unpack_mirrors(light.reflectances[material])
+            mirror_reflectance[p] = specular_terms(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
+        return np.asarray((mirror_reflectance * incident).reshape(-1, 3), np.float32)
+
+    def patch_part(self, light: Illumination) -> OutgoingRadiance:
+        """What cells in the planes send of the same lights, as exact pictures have it."""
+        mirror_reflectances, lights = _mirror_reflectances(light.reflectances), self._bright_lights(light.environment)
+        reflectance_operator, incident = self._patch_light(light, mirror_reflectances)
+        highlights = self._patches.highlight_tables(mirror_reflectances, reflectance_operator)
+        lights = replace(lights, irradiance=np.array(light.environment_gain, np.float32) * lights.irradiance)
+        direct_lobes = DirectLobes(lights, self._patches.visibility_bits(highlights.rows, self._light_indices))
+        return first_bounce(
+            reflectance_operator,
+            incident,
+            (highlights, outgoing_in_highlights(self._patches, highlights, direct_lobes)),
+        )
+
+    def _fast_patch_part(self, light: Illumination) -> OutgoingRadiance:
+        """The same as functions have it."""
+        return first_bounce(*self._patch_light(light, _mirror_reflectances(light.reflectances)))
+
+    def _patch_light(
+        self, light: Illumination, mirror_reflectances: Reflectances
+    ) -> tuple[ReflectanceOperator, IncidentLight]:
+        """What cells in the planes make of light, and what comes to them. alone: what mirrors reflect"""
+        all_patches = self._patches.reflectance_operator(mirror_reflectances)
+        is_on_plane = self._mirror_lights.plane[all_patches.rows] != NO_PLANE
+        rows = all_patches.rows[is_on_plane]
+        incident, gain = self._incident_light(light.environment, rows), np.array(light.environment_gain, np.float32)
+        reflectance = all_patches.reflectance * (self._mirror_lights.plane != NO_PLANE)[:, None]
+        plane_patches = replace(
+            all_patches,
+            reflectance=reflectance,
+            rows=rows,
+            reflectance_matrix=all_patches.reflectance_matrix[:, is_on_plane],
+        )
+        return plane_patches, IncidentLight(gain * incident.irradiance, gain[:, None] * incident.coefficients)
+
+    @property
+    def _light_indices(self) -> NDArray[np.intp]:
+        return self._mirror_lights.lights.astype(np.intp)
+
+    def _bright_lights(self, environment: EnvironmentKey) -> TriangleLights:
+        """The lights that were traced, in an environment."""
+        all_lights = self._find_lights(environment)
+        return all_lights.select(self._light_indices, all_lights.irradiance[self._light_indices])
+
+    def _incident_light(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> IncidentLight:
+        def compute() -> IncidentLight:
+            light_indices, patches, bright_lights = self._light_indices, self._patches, self._bright_lights(environment)
+            return IncidentLight(
+                patches.irradiance(bright_lights, light_indices),
+                patches.incident_coefficients(rows, bright_lights, OUTGOING_DEGREE, light_indices),
+            )
+
+        return self._cache.get_value((self._key, "thrown light on cells", environment, rows.tobytes()), compute)
+
+
+def _mirror_reflectances(reflectances: Reflectances) -> Reflectances:
+    """Of materials as far as they are mirrors."""
+    return tuple(
+        pack_reflectance(list(map(split_specular, unpack_mirrors(reflectance)))) for reflectance in reflectances
+    )

@@ -1,0 +1,290 @@
+"""Method `stored_scene`: pictures whose eye moves (Mahajan 2008, Sun 2007); light is kept at points of all surfaces.
+
+What is baked is what `gather` bakes for view samples, for points that no view owns: which light triangles each sees,
+and which cells its gather rays hit. Nothing of it knows a BRDF or an eye. Stages: "points" (the light triangles, the
+points, the cells), then "visibility and gather rays" (rows of cells and of points), then "harmonics of light", then
+"error of moving pictures", which looks at the bake.
+
+    scene/positions, faces, face_material, uvs, textures, …  what the eye sees:
+    relume.live.free_camera.probes.stored_scene lights/…                                                 as in
+    relume.methods.view_stages cells/…                                                  as in relume.methods.gather
+    lattice/num_rows, first, node                            relume.live.free_camera.probes.triangle_grids.ProbeGrid
+    vertices/normal, point, weight                           relume.live.free_camera.probes.lattice_nodes.LatticeNodes
+    points/position, normal, tangent, material               relume.live.free_camera.probes.mesh_lattice.PlacedProbes
+    points/visibility, points/links                          lights that a point sees, cells that its rays hit
+    harmonics/…                                              relume.methods.spherical_harmonic_transfer
+    thrown/…                                                 as in relume.methods.gather, for stills
+    error/moving                                             relume.methods.free_camera_error
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.core.errors import PlanError
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.live.free_camera.probes.density import density_from_distance, density_from_shadows
+from relume.live.free_camera.probes.interpolation_weights import PROBES_PER_NODE
+from relume.live.free_camera.probes.mesh_lattice import MAX_PROBES, make_corner_grid, max_grid_nodes, place_probes
+from relume.live.free_camera.probes.stored_scene import collect_textures, corner_tangents, ray_pattern, read_probes
+from relume.live.free_camera.probes.visible_sides import visible_sides
+from relume.methods import free_camera_error, plan_estimates
+from relume.methods.free_camera_transfer import BakedFreeCamera
+from relume.methods.planar_mirror_light import make_mirror_lights
+from relume.methods.read_cache import ReadCache
+from relume.methods.spherical_harmonic_transfer import harmonic_bytes, make_harmonic_light
+from relume.methods.store_layout import FREE_CAMERA_ERROR, read_free_camera_error, read_patch_points, read_tree
+from relume.methods.view_stages import CHUNK_ROWS, SampledViews, light_arrays, read_targets, triangle_arrays
+from relume.patches.gather_hits import trace_gather_rays
+from relume.patches.patches import POINTS_PER_PATCH, choose_patches
+from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.scene_buffers import SceneBuffers
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.visibility import VisibilityBits, trace_visibility
+from relume.raytrace.visibility_masks import LightTargets, trace_visibility_masks
+from relume.scene.model import Scene
+from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
+
+ROWS_PER_SHARD = 4096
+RAYS_PER_PROBE = 377  # a point alone then errs by less than 1 % of its radiance (`surface.points_rmse`)
+RAYS_PER_PATCH_POINT = 55
+_MIN_PATCHES, _MAX_PATCHES, _PROBES_PER_PATCH = 512, 8192, 6
+_MAX_REQUESTED_PATCHES = 4 * _MAX_PATCHES
+MIN_PROBES = 64
+_MAX_UNSHARED_PROBES = 54  # points of a material, on both sides, in each of 27 directions
+_PROBE_MARGIN = 1.05  # than asked for, at most
+_PROBE_BYTES = 3 * 12 + 2
+_NODE_BYTES = 12 + 2 * 4 * PROBES_PER_NODE
+_NODE_BUILD_BYTES = 600  # while nodes are shared: their surface, their keys, and the order of these
+_PATCH_BYTES = POINTS_PER_PATCH * (56 + 2 * RAYS_PER_PATCH_POINT) + 64
+_PATCH_BUILD_BYTES = 4000
+_RAY_NS, _TRIANGLE_US = 2000.0, 40.0  # of one core, on scenes of 200 to a million triangles
+
+
+class ProbesMethod:
+    """Implements `relume.methods.base.TransferMethod`."""
+
+    name = "surface"
+    stages = ("points", "visibility and gather rays", "harmonics of light", "error of moving pictures")
+
+    def __init__(self) -> None:
+        self._views = SampledViews()
+        self._patch_tree, self._shadow_targets = ReadCache(read_tree), ReadCache(read_targets)
+
+    def prepare(self, scene: Scene) -> None:
+        """Build the triangles' search tree."""
+        self._views.prepare(scene)
+
+    def open(self, store: StoreReader, key: str, cache: Cache) -> BakedFreeCamera:
+        """Views from anywhere, lit by the environment, by local lights, and by surfaces. See `TransferMethod`."""
+        return replace(BakedFreeCamera.from_store(store, key, cache), free_camera_error=read_free_camera_error(store))
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        """Upper bounds from the recipe alone."""
+        plan_estimates.check_gathering(recipe, _MAX_REQUESTED_PATCHES)
+        views_plan = self._views.plan(scene, recipe)
+        if not MIN_PROBES <= recipe.num_points <= MAX_PROBES:
+            raise PlanError(f"{recipe.num_points} points were asked for; give {MIN_PROBES} to {MAX_PROBES:,}")
+        num_probes = _max_probes(scene, recipe)
+        num_patches, rays = _num_patches(recipe), _num_rays(recipe)
+        num_patch_points = POINTS_PER_PATCH * num_patches
+        num_nodes = max_grid_nodes(plan_estimates.num_triangles(scene), recipe.num_points)
+        textures = plan_estimates.texture_bytes(scene)
+        peak_task_bytes = max(
+            num_nodes * _NODE_BUILD_BYTES, free_camera_error.BYTES + num_probes * free_camera_error.PROBE_BYTES
+        )
+        num_rays = num_probes * (recipe.num_lights + rays) + num_patch_points * (
+            recipe.num_lights + RAYS_PER_PATCH_POINT
+        )
+        return Plan(
+            num_view_samples=num_probes,
+            num_rays=num_rays,
+            work_s=plan_estimates.estimated_work(scene, num_rays, _RAY_NS, _TRIANGLE_US),
+            store_bytes=sum(bound_store_bytes(scene, recipe)) + textures + (1 << 20),
+            peak_bytes=views_plan.peak_bytes
+            + peak_task_bytes
+            + num_patches * _PATCH_BUILD_BYTES
+            + ROWS_PER_SHARD * 3 * 2 * rays  # links: traced, joined, written
+            + textures,
+            lone_bytes=peak_task_bytes,
+        )
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        """What opening the store needs besides its arrays."""
+        return {
+            **self._views.attributes(scene, recipe),
+            "gather_seed": int(scene.id[:7], 16),
+            "has_harmonics": True,
+            "has_moving_error": True,
+            **collect_textures(scene).attributes,
+        }
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """The lights, the points, the cells; then whole shards of cells and of points. See `BakeMethod`."""
+        if stage == 0:
+            return [Task(0, index, group, 0, 0) for index, group in enumerate(("lights", "points", "cells"))]
+        if stage == 2:
+            return [Task(2, 0, "harmonics", 0, 0)]
+        if stage == 3:
+            return [Task(3, 0, "moving error", 0, 0)]
+        rows = {group: store.shape(f"{group}/material")[0] for group in ("cells", "points")}
+        ranges = [
+            (group, start, min(start + ROWS_PER_SHARD, num))
+            for group, num in rows.items()
+            for start in range(0, num, ROWS_PER_SHARD)
+        ]
+        return [Task(1, index, *task_range) for index, task_range in enumerate(ranges)]
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """What cells and points see, and their links; the first stage makes its own. See `BakeMethod`."""
+        if stage != 1:
+            return []
+        bits = (store.shape("lights/power")[0] + 7) // 8
+        widths = {
+            "cells": (POINTS_PER_PATCH * bits, POINTS_PER_PATCH * RAYS_PER_PATCH_POINT),
+            "points": (bits, _num_rays(recipe)),
+        }
+        return [
+            ArraySpec(
+                f"{group}/{name}",
+                (store.shape(f"{group}/material")[0], width),
+                dtype,
+                (CHUNK_ROWS, width),
+                (ROWS_PER_SHARD, width),
+            )
+            for group, group_widths in widths.items()
+            for name, width, dtype in zip(("visibility", "links"), group_widths, ("uint8", "uint16"), strict=True)
+        ]
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
+        """One task; seeds are the scene's and the numbers of rows: the same bits anywhere. See `BakeMethod`."""
+        if task.stage == 0:
+            bake_functions = {"lights": self._bake_lights, "points": self._bake_probes, "cells": self._bake_patches}
+            return TaskOutput(bake_functions[task.group](scene, recipe), 0, 0.0)
+        if task.group == "harmonics":
+            mirror_light_arrays = make_mirror_lights(
+                scene, self._views.geometry_of(scene), store, store.read("cells/position")
+            )
+            return TaskOutput(make_harmonic_light(store, int(scene.id[:7], 16)) | mirror_light_arrays, 0, 0.0)
+        if task.group == "moving error":
+            return TaskOutput({FREE_CAMERA_ERROR: free_camera_error.measure_error(store, scene, recipe.size)}, 0, 0.0)
+        if task.group not in ("cells", "points"):
+            raise ValueError(f"{task.group!r} is not in the stage")
+        return self._bake_rows(scene, recipe, task, store)
+
+    def _bake_lights(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        geometry = self._views.geometry_of(scene)
+        vertex_arrays: dict[str, NDArray[Any]] = {
+            "scene/uvs": geometry.uvs,
+            "scene/tangents": corner_tangents(scene, geometry),
+        }
+        return {
+            **light_arrays(scene, recipe),
+            **triangle_arrays(geometry, scene),
+            **vertex_arrays,
+            **collect_textures(scene).arrays,
+        }
+
+    def _bake_probes(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        geometry = self._views.geometry_of(scene)
+        cameras = [camera for camera in scene.cameras if camera.name in recipe.views]
+        is_open = visible_sides(geometry, cameras, int(scene.id[:7], 16))
+        camera_positions = np.array([camera.to_world[:3, 3] for camera in cameras])
+        lights = tessellate_environment(scene.environment.radiance, recipe.num_lights)
+        density = density_from_distance(geometry, camera_positions, make_corner_grid(is_open))
+        density = density_from_shadows(
+            geometry, place_probes(geometry, is_open, density, recipe.num_points), camera_positions, lights
+        )
+        placed_probes = place_probes(geometry, is_open, density, recipe.num_points)
+        fields = {name: getattr(placed_probes.probes, name) for name in ("position", "normal", "tangent")}
+        return {
+            **{f"lattice/{name}": array for name, array in placed_probes.probe_grid._asdict().items()},
+            **{f"vertices/{name}": array for name, array in placed_probes.lattice_nodes._asdict().items()},
+            **{f"points/{name}": array for name, array in fields.items()},
+            "points/material": placed_probes.material,
+        }
+
+    def _bake_patches(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+        patches = choose_patches(scene, self._views.geometry_of(scene), recipe.views, recipe.size, _num_patches(recipe))
+        fields: dict[str, NDArray[Any]] = {**vars(patches), **patches.tree._asdict()}
+        del fields["tree"]
+        return {f"cells/{name}": array for name, array in fields.items()}
+
+    def _bake_rows(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
+        """What some cells or points see, and what their rays hit."""
+        geometry, seed = self._views.geometry_of(scene), int(store.attributes["gather_seed"])
+        if task.group == "cells":
+            points = read_patch_points(store, task.start, task.stop)
+            pattern = make_pattern(RAYS_PER_PATCH_POINT, 0, seed)
+        else:
+            points = read_probes(store, task.start, task.stop)
+            pattern = ray_pattern(store, _num_rays(recipe))
+        visibility = _trace_visibility(geometry, points, self._shadow_targets(store), is_uniform=task.group == "cells")
+        gather_hits = trace_gather_rays(geometry, self._patch_tree(store), points, points.normal, pattern)
+        num_rows = task.stop - task.start
+        arrays: dict[str, NDArray[Any]] = {
+            f"{task.group}/visibility": visibility.visible.reshape(num_rows, -1),
+            f"{task.group}/links": gather_hits.patch.reshape(num_rows, -1),
+        }
+        return TaskOutput(arrays, visibility.num_rays + gather_hits.num_rays, visibility.trace_s + gather_hits.trace_s)
+
+
+def _trace_visibility(
+    geometry: SceneBuffers, points: SurfacePoints, targets: LightTargets, *, is_uniform: bool
+) -> VisibilityBits:
+    """Find the lights that points see. is_even: they lie evenly, so that much can be predicted; else those that are few
+    about their place would take it from others."""
+    if not is_uniform:
+        return trace_visibility(geometry.embree, points.position, points.normal, targets.directions)
+    visibility = trace_visibility_masks(geometry.embree, points.position, points.normal, targets)
+    return VisibilityBits(visibility.visible, visibility.rays.num_traced, visibility.trace_s)
+
+
+class StoreBytes(NamedTuple):
+    """Numbers of the parts of a store, textures apart."""
+
+    gather_hits: int
+    probes: int
+    patches: int
+    nodes: int
+    harmonics: int
+    triangles: int
+    lights: int
+
+
+def bound_store_bytes(scene: Scene, recipe: Recipe) -> StoreBytes:
+    """Bound the bytes of each part of a store before it is compressed."""
+    num_probes, bits, num_patches = _max_probes(scene, recipe), (recipe.num_lights + 7) // 8, _num_patches(recipe)
+    triangles = plan_estimates.num_triangles(scene)
+    return StoreBytes(
+        gather_hits=num_probes * 2 * _num_rays(recipe),
+        probes=num_probes * (_PROBE_BYTES + bits),
+        patches=POINTS_PER_PATCH * num_patches * bits + num_patches * _PATCH_BYTES,
+        nodes=(4 + _NODE_BYTES) * max_grid_nodes(triangles, recipe.num_points),
+        harmonics=harmonic_bytes(num_probes, num_patches),
+        triangles=triangles * 10 + plan_estimates.triangles_bytes(scene) + plan_estimates.corner_bytes(scene),
+        lights=plan_estimates.lights_bytes(scene, recipe),
+    )
+
+
+def _max_probes(scene: Scene, recipe: Recipe) -> int:
+    unshared_probes = _MAX_UNSHARED_PROBES * len(scene.materials)  # that cannot be shared, however few are asked for
+    return int(_PROBE_MARGIN * recipe.num_points) + unshared_probes
+
+
+def _num_patches(recipe: Recipe) -> int:
+    """Fewer than points, where the recipe does not say: what they send is gathered over hemispheres, which blurs it."""
+    if recipe.gather_samples is not None:
+        return recipe.gather_samples
+    return min(_MAX_PATCHES, max(_MIN_PATCHES, recipe.num_points // _PROBES_PER_PATCH))
+
+
+def _num_rays(recipe: Recipe) -> int:
+    """Of a point."""
+    return recipe.gather_rays or RAYS_PER_PROBE

@@ -1,0 +1,131 @@
+"""Lights, gather cells and ray counts as a store keeps them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.texture_slots import TEXTURES
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.core.jackknife import JackknifeEstimate
+from relume.lights.sphere_tiles import Tiles
+from relume.lights.spherical_triangles import TriangleLights
+from relume.patches.patch_kdtree import PatchTree
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.raytrace.alpha_filter import AlphaTest
+from relume.raytrace.alpha_test import AlphaMasks, check_alpha_masks
+from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.visibility_masks import RayCounts
+from relume.store.bake_protocol import StoreReader
+
+F32 = NDArray[np.float32]
+
+SHARD_ROWS = 16_384
+FREE_CAMERA_ERROR = "error/moving"
+
+
+def read_lights(store: StoreReader) -> TriangleLights:
+    """The light triangles of a store."""
+    nodes, direction, power, codes = (store.read(f"lights/{name}") for name in ("nodes", "direction", "power", "tiles"))
+    return TriangleLights(nodes, direction, power, codes=codes)
+
+
+def read_tiles(store: StoreReader) -> Tiles:
+    """The tiles that its light triangles stand for. Raises StoreError where they do not tile the sphere."""
+    tiles = Tiles(store.read("lights/tiles"))
+    if not tiles.is_whole():
+        raise StoreError("the light tiles of the store do not cover the sphere; bake the scene again")
+    return tiles
+
+
+def read_shadow_ray_directions(store: StoreReader) -> F32:
+    """Where shadow rays went: light that may come to any part of a tile is asked for in its middle. (M, 3) float32"""
+    if store.attributes["relightable"]:
+        return read_tiles(store).centroids.astype(np.float32)
+    return read_lights(store).direction
+
+
+def read_tree(store: StoreReader) -> PatchTree:
+    """The tree over a store's gather cells."""
+    return PatchTree(*(store.read(f"cells/{name}") for name in PatchTree._fields))
+
+
+def read_patch_points(store: StoreReader, start: int = 0, stop: int | None = None) -> SurfacePoints:
+    """The points that stand for gather cells [start, stop) of a store, those of a cell one after another."""
+    position, normal = (store.read(f"cells/{name}", start, stop) for name in ("position", "normal"))
+    return patch_sample_points(position, normal, start)
+
+
+def read_patches(store: StoreReader) -> PatchLight:
+    """The gather cells of a store."""
+    points, visible = read_patch_points(store), store.read("cells/visibility")
+    gather_hits, material = store.read("cells/links"), store.read("cells/material")
+    points_per_patch = store.shape("cells/normal")[1]
+    return PatchLight(
+        points,
+        visible.reshape(len(material), points_per_patch, visible.shape[1] // points_per_patch),
+        gather_hits,
+        make_pattern(gather_hits.shape[1] // points_per_patch, 0, int(store.attributes["gather_seed"])),
+        material,
+        np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
+        _read_optional(store, "cells/uv"),
+        _read_optional(store, "cells/surface_normal"),
+    )
+
+
+def _read_optional(store: StoreReader, path: str) -> F32 | None:
+    """An array that stores of before do not have; None in those."""
+    try:
+        store.shape(path)
+    except StoreError:
+        return None
+    return np.asarray(store.read(path), np.float32)
+
+
+def has_alpha_tested_surfaces(store: StoreReader) -> bool:
+    """Tell whether rays may pass some triangles of a store."""
+    return bool(store.attributes.get("has_holes"))
+
+
+def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) -> AlphaTest | None:
+    """Where triangles of a store have holes; None where all are whole.
+
+    Args:
+        store: an open one. positions: its vertices. (num_vertices, 3) float32. faces: its triangles.
+            (num_faces, 3) uint32
+    Raises:
+        ChunkDamagedError: what says so does not fit the triangles.
+    """
+    if not has_alpha_tested_surfaces(store):
+        return None
+    names = store.attributes["materials"]
+    alpha_masks = check_alpha_masks({name: store.read(f"cutouts/{name}") for name in AlphaMasks._fields}, len(names))
+    uvs, material = store.read("scene/uvs"), store.read("scene/face_material")
+    corner, last = int(faces.max(initial=0)), int(material.max(initial=0))
+    if (
+        corner >= min(len(uvs), len(positions))
+        or len(material) != len(faces)
+        or not 0 <= material.min(initial=0) <= last < len(names)
+    ):
+        raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that the scene has not")
+    return AlphaTest.build(faces, positions, uvs, material, alpha_masks)
+
+
+def read_free_camera_error(store: StoreReader) -> JackknifeEstimate | None:
+    """How far moving pictures of a bake are off, relative RMS; None where that is not known, as of bakes of before."""
+    if not store.attributes.get("has_moving_error"):
+        return None
+    error, standard_error = store.read(FREE_CAMERA_ERROR).tolist()
+    return JackknifeEstimate(error, standard_error) if np.isfinite([error, standard_error]).all() else None
+
+
+def read_rays(store: StoreReader) -> RayCounts:
+    """Shadow rays of the whole bake: traced, saved, and how often a prediction was found wrong."""
+    counts = [
+        store.read(f"views/{k}/rays/{shard}")
+        for k in range(len(store.attributes["views"]))
+        for shard in range(-(-store.shape(f"views/{k}/visibility")[0] // SHARD_ROWS))
+    ]
+    return RayCounts(*(int(count) for count in np.sum(counts, axis=0))) if counts else RayCounts(0, 0, 0, 0)

@@ -1,0 +1,285 @@
+"""Fixed views: their samples, and which light triangles each of those sees; methods share these two stages.
+
+The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
+triangles, and each view's samples), then "visibility" (rows of each view).
+
+    scene/positions, faces, face_material, face_mesh         triangles, for rays of what looks add
+    scene/uvs, cutouts/…                                     where some have holes:
+    relume.raytrace.alpha_test.AlphaMasks lights/environment                                       radiance, to weigh it
+    again lights/tiles                                             relume.lights.sphere_tiles.Tiles
+    lights/nodes, direction, power                           relume.lights.spherical_triangles.TriangleLights
+    views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
+    views/<k>/position, normal, tangent, diffuse, specular, uv
+    scene/face_emission, views/<k>/emission                  where surfaces shine as images say: relume.scene.emission
+    views/<k>/level                                          of roughness: relume.scene.roughness_levels
+    views/<k>/normal_length, surface_normal                  of scenes with bumps:
+    relume.raytrace.surface_interaction.SurfaceInteraction views/<k>/through, eye, is_mirrored, mirror, mirror_cosine,
+    mirror_tint
+                                                             of scenes with glass or mirrors: relume.camera.view_samples
+    views/<k>/chance                                         of scenes with tinted glass:
+    relume.raytrace.surface_points.SurfacePoints views/<k>/visibility                                     samples on
+    surfaces only views/<k>/rays/<shard>                                   relume.raytrace.visibility_masks.RayCounts of
+    a shard's rows
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.camera.spectral_split import num_tints
+from relume.camera.specular_hits import MAX_MIRROR_BOUNCES
+from relume.camera.transparency_layers import has_layers
+from relume.camera.view_samples import BACKGROUND, camera_setup, sample_pixels
+from relume.core.errors import PlanError
+from relume.lights.sphere_tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
+from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment
+from relume.look import default_look
+from relume.methods import plan_estimates
+from relume.methods.read_cache import ReadCache
+from relume.methods.store_layout import SHARD_ROWS, read_lights, read_shadow_ray_directions
+from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
+from relume.raytrace.visibility_masks import LightTargets, make_light_targets, trace_visibility_masks
+from relume.scene.emission import has_emission_images, relative_emission
+from relume.scene.model import Camera, Scene
+from relume.scene.roughness_levels import levels_of_material, min_mean_normal_length
+from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
+from relume.views.store_io import read_alpha_samples
+
+CHUNK_ROWS = 1024
+MIN_SIDE, MAX_PIXELS = 16, 4096 * 4096
+_SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
+_EMISSION_BYTES, _NORMAL_MAP_BYTES = 12, 4 + 12
+_LAYER_BYTES = 12 + 12 + 1 + 4 + MAX_MIRROR_BOUNCES * (2 + 4 + 12)
+_SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
+_METADATA_BYTES = 1 << 20
+_RAY_NS, _TRIANGLE_US = 5.0, 2.0  # of one core, on scenes of 200 to a million triangles
+
+
+class ViewStage(NamedTuple):
+    """What every task of the second stage needs of the first.
+
+    Attributes:
+        targets: of shadow rays. num_surface_samples: of each view.
+    """
+
+    targets: LightTargets
+    num_surface_samples: tuple[int, ...]
+
+
+class SampledViews:
+    """The two stages as a part of a method; a `relume.store.bake_protocol.BakeMethod` but for its name.
+
+    Args:
+        smooths_edges: whether pixels across edges have several samples; see `sample_view`.
+    """
+
+    stages: tuple[str, ...] = ("samples", "visibility")
+
+    def __init__(self, *, smooths_edges: bool = True) -> None:
+        self._smooths_edges = smooths_edges
+        self._lock = threading.Lock()
+        self._geometry: tuple[str, SceneBuffers] | None = None
+        self.view_stage = ReadCache(_read_view_stage)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _make_sampled_views, (self._smooths_edges,)  # travels to workers without what it keeps
+
+    def plan(self, scene: Scene, recipe: Recipe) -> Plan:
+        """Upper bounds from the recipe alone."""
+        width, height = recipe.size
+        view_names = [camera.name for camera in scene.cameras]
+        if unknown := [view for view in recipe.views if view not in view_names]:
+            raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(view_names)}")
+        if not recipe.views or len(set(recipe.views)) != len(recipe.views):
+            raise PlanError("name each view once, and at least one")
+        if not (min(width, height) >= MIN_SIDE and width * height <= MAX_PIXELS):
+            able = f"give at least {MIN_SIDE}×{MIN_SIDE}, at most {MAX_PIXELS} in all"
+            raise PlanError(f"{width}×{height} pixels were asked for; {able}")
+        if not MIN_LIGHTS <= recipe.num_lights <= MAX_LIGHTS:
+            raise PlanError(f"{recipe.num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
+        samples = plan_estimates.max_view_samples(scene, recipe) * len(recipe.views)
+        bits = (recipe.num_lights + 7) // 8
+        surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_emission_images(scene) else 0)
+        surface_bytes += _NORMAL_MAP_BYTES if _has_normal_maps(scene) else 0
+        surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
+        # while samples are sorted, files of them are there twice, and no bits yet
+        in_store = samples * (surface_bytes + max(bits, surface_bytes)) + plan_estimates.lights_bytes(scene, recipe)
+        num_rays = (
+            samples * recipe.num_lights
+            + plan_estimates.num_camera_rays(scene, recipe)
+            + plan_estimates.num_tinted_rays(scene, samples)
+        )
+        sampling, tracing = plan_estimates.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)
+        concurrent_bytes = max(
+            tracing, plan_estimates.light_selection_bytes(scene)
+        )  # while a single view is sampled, others do this at most
+        return Plan(
+            num_view_samples=samples,
+            num_rays=num_rays,
+            work_s=plan_estimates.estimated_work(
+                scene, num_rays * plan_estimates.supersampling_ratio(scene, recipe), _RAY_NS, _TRIANGLE_US
+            ),
+            store_bytes=in_store + plan_estimates.triangles_bytes(scene) + _METADATA_BYTES,
+            peak_bytes=plan_estimates.process_bytes(scene) + max(sampling, tracing),
+            lone_bytes=max(0, sampling - concurrent_bytes) if len(recipe.views) == 1 else 0,
+        )
+
+    def prepare(self, scene: Scene) -> None:
+        """Build the triangles' search tree."""
+        self.geometry_of(scene)
+
+    def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
+        """What opening the store needs besides its arrays."""
+        cameras = {camera.name: camera for camera in scene.cameras}
+        return {
+            "method": recipe.method,
+            "scene": scene.id,
+            "size": list(recipe.size),
+            "num_lights": recipe.num_lights,
+            "relightable": recipe.relightable,
+            "look": default_look(scene.materials, scene.lights),
+            "materials": [material.name for material in scene.materials],
+            "double_sided": [material.double_sided for material in scene.materials],
+            "has_holes": any(material.is_alpha_tested for material in scene.materials),
+            "has_layers": has_layers(scene.materials),
+            "has_tints": num_tints(scene.materials) > 0,
+            "has_emission_images": has_emission_images(scene),
+            "roughness_levels": [list(levels_of_material(material)) for material in scene.materials],
+            "shortest_normals": [min_mean_normal_length(material.normal_map) for material in scene.materials],
+            "views": [_view_attributes(cameras[view]) for view in recipe.views],
+        }
+
+    def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """The lights and each view; then whole shards of each view's surface samples. See `BakeMethod`."""
+        if stage == 0:
+            return [Task(0, 0, "", 0, 0), *(Task(0, k + 1, view, 0, 0) for k, view in enumerate(recipe.views))]
+        ranges = [
+            (view, start, min(start + SHARD_ROWS, rows))
+            for k, view in enumerate(recipe.views)
+            for rows in [self.view_stage(store).num_surface_samples[k]]
+            for start in range(0, rows, SHARD_ROWS)
+        ]
+        return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
+
+    def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """The visibility of each view; the arrays of the first stage are made by its tasks. See `BakeMethod`."""
+        if stage == 0:
+            return []
+        bits = (store.shape("lights/power")[0] + 7) // 8
+        num_surface_samples = self.view_stage(store).num_surface_samples
+        return [
+            ArraySpec(
+                f"views/{k}/visibility",
+                (num_surface_samples[k], bits),
+                "uint8",
+                (CHUNK_ROWS, bits),
+                (SHARD_ROWS, bits),
+            )
+            for k in range(len(recipe.views))
+        ]
+
+    def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
+        """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
+        if task.stage == 1:
+            return self._visibility(scene, recipe.views.index(task.group), task, store)
+        if not task.group:
+            return TaskOutput(
+                {**light_arrays(scene, recipe), **triangle_arrays(self.geometry_of(scene), scene)}, 0, 0.0
+            )
+        camera = camera_setup(scene, self.geometry_of(scene), task.group, recipe.size)
+        columns, num_rays = sample_pixels(camera, store.scratch, _columns(scene), smooths_edges=self._smooths_edges)
+        prefix = f"views/{recipe.views.index(task.group)}"
+        return TaskOutput({f"{prefix}/{name}": column for name, column in columns.items()}, num_rays, 0.0)
+
+    def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> TaskOutput:
+        prefix = f"views/{k}"
+        position = store.read(f"{prefix}/position", task.start, task.stop)
+        normal = store.read(f"{prefix}/normal", task.start, task.stop)
+        alpha_sample, targets = read_alpha_samples(store, k, task.start, task.stop), self.view_stage(store).targets
+        visibility = trace_visibility_masks(self.geometry_of(scene).embree, position, normal, targets, alpha_sample)
+        rays = np.array(
+            [
+                visibility.rays.num_traced,
+                visibility.rays.num_full,
+                visibility.rays.num_checked,
+                visibility.rays.num_wrong,
+            ]
+        )
+        arrays = {f"{prefix}/visibility": visibility.visible, f"{prefix}/rays/{task.start // SHARD_ROWS}": rays}
+        return TaskOutput(arrays, visibility.rays.num_traced, visibility.trace_s)
+
+    def geometry_of(self, scene: Scene) -> SceneBuffers:
+        """The scene's triangles, built once for all tasks of a process."""
+        with self._lock:
+            if self._geometry is None or self._geometry[0] != scene.id:
+                self._geometry = scene.id, build_scene_buffers(scene)
+            return self._geometry[1]
+
+
+def _columns(scene: Scene) -> list[str]:
+    """What is kept of view samples."""
+    names = ["pixel", "weight", "material", "level", "position", "normal", "tangent", "diffuse", "specular", "uv"]
+    if has_layers(scene.materials):
+        names += ["through", "eye", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
+    if num_tints(scene.materials):
+        names.append("chance")
+    if has_emission_images(scene):
+        names.append("emission")
+    return names + ["normal_length", "surface_normal"] * _has_normal_maps(scene)
+
+
+def _has_normal_maps(scene: Scene) -> bool:
+    return any(material.normal_map is not None for material in scene.materials)
+
+
+def _make_sampled_views(smooths_edges: bool) -> SampledViews:
+    return SampledViews(smooths_edges=smooths_edges)
+
+
+def _read_view_stage(store: StoreReader) -> ViewStage:
+    views = range(len(store.attributes["views"]))
+    rows = tuple(int(np.searchsorted(store.read(f"views/{k}/material"), BACKGROUND)) for k in views)
+    return ViewStage(read_targets(store), rows)
+
+
+def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
+    """The light triangles of a scene's environment, as arrays of a store."""
+    radiance = scene.environment.radiance
+    tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
+    lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance))
+    return {
+        "lights/nodes": lights.nodes,
+        "lights/direction": lights.direction,
+        "lights/power": lights.irradiance,
+        "lights/tiles": tiles.codes,
+        "lights/environment": radiance,
+    }
+
+
+def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[Any]]:
+    """The triangles of a scene, merged, as arrays of a store."""
+    arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material", "face_mesh")}
+    if has_emission_images(scene):
+        arrays["scene/face_emission"] = relative_emission(scene)
+    alpha_test = geometry.embree.alpha_test
+    if alpha_test is not None:
+        arrays |= {
+            "scene/uvs": alpha_test.uvs,
+            **{f"cutouts/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()},
+        }
+    return arrays
+
+
+def read_targets(store: StoreReader) -> LightTargets:
+    """What shadow rays of a store are sent to."""
+    return make_light_targets(read_shadow_ray_directions(store), read_lights(store).irradiance)
+
+
+def _view_attributes(camera: Camera) -> dict[str, Any]:
+    """A view among a store's attributes."""
+    return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}

@@ -1,1 +1,0 @@
-"""Pictures whose eye moves: light kept at points of the surfaces, and summed with what materials send to the eye."""

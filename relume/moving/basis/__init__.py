@@ -1,1 +1,0 @@
-"""What a function of direction becomes: the in-basis, out-factors, narrow lobes."""

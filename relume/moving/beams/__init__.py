@@ -1,1 +1,0 @@
-"""Beams: light of suns and small lamps, whose shadows pixels find by themselves."""

@@ -1,1 +1,0 @@
-"""Highlights of moving views: where lobes look, and what points see there."""

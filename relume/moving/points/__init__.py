@@ -1,1 +1,0 @@
-"""Points on surfaces: where they are, what a mesh between them takes from them, textures."""

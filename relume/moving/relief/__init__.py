@@ -1,1 +1,0 @@
-"""Surfaces whose every texel has a BRDF of its own, while the eye moves (Müller 2004)."""

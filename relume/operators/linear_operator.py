@@ -1,0 +1,197 @@
+"""Freezing: a term's transport along one curve, everything dormant contracted, in the wavelet basis.
+
+T_D4 = T_box · S, with S the orthonormal Daubechies-4 synthesis (appendix B, Ben-Artzi 2006).
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.core.thread_pools import parallel_for_cancellable
+from relume.lights.spherical_triangles import TriangleLights
+from relume.math.daubechies import forward
+from relume.operators.operator import Operator
+from relume.operators.quantized import BLOCK_SAMPLES, QuantizedOperator, quantize
+from relume.operators.update_kernel import TILE_SAMPLES, changed_columns, stream
+from relume.transport.roughness_ranges import (
+    contract_levels,
+    num_levels,
+    project_levels,
+    split_by_level,
+    without_free_curves,
+)
+from relume.transport.shading_points import ShadingPoints
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class LinearOperator(Operator):
+    """The linear operator from one curve to the image of one term.
+
+    Attributes:
+        transport: wavelet coefficients, samples padded with zeros to whole tiles. (tiles, 3, J, samples) float32
+        importance: length of each column over all samples; what a coefficient moves in the picture. (3, J) float64,
+            (L, 3, J) over those of each level
+        bounds: where the samples of each level begin and end, where coefficients differ from level to level.
+            (L + 1,) int64
+    """
+
+    transport: F32
+    importance: NDArray[np.float64]
+    bounds: NDArray[np.int64] | None = None
+
+    is_whole = True
+    is_exact = True
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        return self.transport.nbytes
+
+    def add(self, change: NDArray[np.float64], image: F32) -> None:
+        """Add Σ_j Δc_j T_j to an image; see `Operator`."""
+        stream(self.transport, changed_columns(change), image, self.bounds)
+
+    def columns_at(self, sample: int) -> NDArray[np.float64]:
+        """What each coefficient gives to one sample. (3, J)"""
+        tile, offset = divmod(sample, self.transport.shape[3])
+        return self.transport[tile, :, :, offset].astype(np.float64)
+
+
+class MergedLightOperator(LinearOperator):
+    """An operator of merged lights: how an image changes, nearly, until the exact one is there."""
+
+    is_whole = False
+    is_exact = False
+
+
+def tile_layout(num_samples: int) -> tuple[int, int]:
+    """Number of tiles, and samples a tile, that hold so many samples: tiles alike, none much larger than needed."""
+    tiles = max(1, -(-num_samples // TILE_SAMPLES))
+    samples = -(-num_samples // tiles)
+    return tiles, -(-max(1, samples) // 16) * 16
+
+
+def operator_bytes(num_samples: int, num_bands: int) -> int:
+    """Memory that freezing needs to keep."""
+    tiles, samples = tile_layout(num_samples)
+    return tiles * samples * 3 * num_bands * 4
+
+
+def quantized_bytes(num_samples: int, num_bands: int) -> int:
+    """Memory that freezing needs to keep where it packs."""
+    tiles, samples = tile_layout(num_samples)
+    return tiles * 3 * num_bands * (2 * samples + 4 * -(-samples // BLOCK_SAMPLES))
+
+
+def precompute(
+    term: Term,
+    bands: Mapping[str, NDArray[np.float64]],
+    active: str,
+    lights: TriangleLights,
+    receivers: ShadingPoints,
+    progress: Callable[[float], None],
+    is_canceled: Callable[[], bool],
+    *,
+    is_quantized: bool = False,
+) -> LinearOperator | QuantizedOperator:
+    """Project all receivers along a curve.
+
+    Args:
+        bands: of all the term's curves, (3, J) each, or (L, 3, J) where one differs from level to level; the active
+            one's values do not matter.
+        lights, receivers: what arrives, and where.
+        progress: called with the share done. is_canceled: asked now and then.
+        is_quantized: whether the operator is packed.
+    Raises:
+        CancelledError: `is_canceled` said so.
+    """
+    contractions = contract_levels(term, without_free_curves(bands, [active]), active)
+
+    def rows(start: int, stop: int) -> F32:
+        projected = project_levels(term, contractions, lights, receivers, start, stop)
+        coefficients = np.ascontiguousarray(projected.transpose(2, 0, 1))
+        forward(coefficients.reshape(-1, coefficients.shape[2]))
+        return coefficients
+
+    bounds = level_bounds(receivers, bands, [active])
+    return pack_columns(
+        rows, contractions[0].num_columns, receivers, bounds, progress, is_canceled, is_quantized=is_quantized
+    )
+
+
+def pack_columns(
+    rows: Callable[[int, int], F32],
+    num_columns: int,
+    receivers: ShadingPoints,
+    bounds: NDArray[np.int64] | None,
+    progress: Callable[[float], None],
+    is_canceled: Callable[[], bool],
+    *,
+    is_quantized: bool,
+) -> LinearOperator | QuantizedOperator:
+    """Make an operator of its rows, block after block, so that nothing but itself is in memory as a whole.
+
+    Args:
+        rows: columns at samples [begin, end), called from several threads. (3, end - begin, J) float32
+        num_columns: J. receivers: all samples. bounds: from `level_bounds`.
+        progress: called with the share done. is_canceled: asked now and then. is_quantized: whether it is packed.
+    Raises:
+        CancelledError: `is_canceled` said so.
+    """
+    num_samples, lock = len(receivers.normal), threading.Lock()
+    tiles, samples = tile_layout(num_samples)
+    num_blocks = -(-samples // BLOCK_SAMPLES)
+    transport: NDArray[Any] = np.zeros((tiles, 3, num_columns, samples), np.int16 if is_quantized else np.float32)
+    scale = np.zeros((tiles, 3, num_columns, num_blocks if is_quantized else 0), np.float32)
+    squared_norms = np.zeros((1 if bounds is None else len(bounds) - 1, 3, num_columns))
+
+    def step(first: int, last: int) -> None:
+        for tile, block in (divmod(number, num_blocks) for number in range(first, last)):
+            offset = block * BLOCK_SAMPLES
+            start = tile * samples + offset
+            stop = min(start + BLOCK_SAMPLES, (tile + 1) * samples, num_samples)
+            if start >= stop:
+                continue
+            columns = rows(start, stop)
+            for level, a, b in split_by_level(receivers.level, len(squared_norms), start, stop):
+                level_columns = columns[:, a - start : b - start]
+                level_norms = np.einsum("csj,csj->cj", level_columns, level_columns, dtype=np.float64)
+                with lock:
+                    squared_norms[level] += level_norms
+            values: NDArray[Any] = columns
+            if is_quantized:
+                values, scale[tile, :, :, block] = quantize(columns)
+            transport[tile, :, :, offset : offset + stop - start] = values.transpose(0, 2, 1)
+
+    parallel_for_cancellable(step, tiles * num_blocks, 1, progress, is_canceled, "freezing")
+    importance = np.sqrt(squared_norms if bounds is not None else squared_norms[0])
+    return (
+        QuantizedOperator(transport, scale, importance, bounds)
+        if is_quantized
+        else LinearOperator(transport, importance, bounds)
+    )
+
+
+def level_bounds(
+    receivers: ShadingPoints, bands: Mapping[str, NDArray[np.float64]], free_curves: Iterable[str]
+) -> NDArray[np.int64] | None:
+    """Where the samples of each level begin and end, where the curves that move differ; None where they do not.
+
+    Args:
+        receivers: sorted by level. bands: of all curves. free_curves: names of those that are free.
+    Returns:
+        (L + 1,) int64
+    """
+    num_of_levels = num_levels({name: bands[name] for name in free_curves})
+    if num_of_levels == 1 or receivers.level is None:
+        return None
+    return np.searchsorted(receivers.level, np.arange(num_of_levels + 1)).astype(np.int64)

@@ -1,0 +1,237 @@
+"""Freezing along a parameter: a term's image at any value of it, also where it moves several curves at once.
+
+The image of a term is a linear function of the product of its curves (eq. 26, Ben-Artzi 2006). Over a parameter's range
+these products lie almost in a space of few dimensions (Nguyen 2010, section 4): the operator holds the images at a few
+values of the parameter that span it,
+
+    R(p) = Σ_s c_s(p) R(p_s),
+
+with as many as hold every band of the product to `MAX_ERROR`, and so every pixel
+(docs/adr/0032-nodes-that-hold-every-pixel.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.curves import curve_bands, drawn_curves
+from relume.brdf.parameter_sweep import curves_of_parameter, slider_values, solid_angles
+from relume.brdf.registry import TERMS
+from relume.brdf.term import Curve, Term
+from relume.lights.spherical_triangles import TriangleLights
+from relume.math.curve_nodes import CurveNodes, choose_nodes
+from relume.math.pca import joint
+from relume.operators.linear_operator import LinearOperator, level_bounds, pack_columns
+from relume.operators.quantized import QuantizedOperator
+from relume.transport.roughness_ranges import at_roughness, num_levels, project_levels, without_free_curves
+from relume.transport.shading_points import ShadingPoints
+from relume.transport.term_contraction import contract
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+ParameterSettings = tuple[tuple[str, float | tuple[float, ...]], ...]
+
+MAX_ERROR = 2e-2
+MAX_NODES = 36
+_TARGET_ERROR = 0.9 * MAX_ERROR  # at the values that are looked at; between them it is a little more
+_NUM_VALUES = 97
+_MAX_SECONDARY_BANDS = (
+    12  # of every moved curve but the first, at most: those are smooth, and a product with all is large
+)
+
+
+@dataclass(frozen=True)
+class ParameterOperator:
+    """What a parameter does to a term's curves, as a combination of what it does at a few values; an `EditBasis`.
+
+    Attributes:
+        fixed_settings: parameters that move the same curves, with their values.
+        curves: those it moves.
+        nodes: of R, G and B, equally many; their curves are products of those moved (`_product`).
+    """
+
+    model: str
+    parameter: str
+    fixed_settings: ParameterSettings
+    curves: tuple[Curve, ...] = field(compare=False)
+    nodes: tuple[CurveNodes, CurveNodes, CurveNodes] = field(compare=False)
+
+    is_complete = False
+
+    @property
+    def label(self) -> str:
+        """What people read."""
+        return TERMS[self.model].parameter(self.parameter).label
+
+    @property
+    def affected_curves(self) -> tuple[str, ...]:
+        """Names of the curves it moves."""
+        return tuple(curve.name for curve in self.curves)
+
+    @property
+    def num_columns(self) -> int:
+        """S, the number of nodes."""
+        return len(self.nodes[0].values)
+
+    def is_valid_for(self, document: Mapping[str, Any]) -> bool:
+        """Whether a term document differs from the one linearised in the parameter alone, as far as its curves go."""
+        return document["model"] == self.model and _fixed_settings(document, self.parameter) == self.fixed_settings
+
+    def coefficients(self, bands: Mapping[str, F64]) -> F64:
+        """c of a term's curves, (3, J) each. (3, S); (L, 3, S) where moved curves differ from level to level"""
+        moved_bands = {name: bands[name] for name in self.affected_curves}
+        num_of_levels = num_levels(moved_bands)
+        return (
+            self._coefficients_at_level(moved_bands)
+            if num_of_levels == 1
+            else np.stack(
+                [self._coefficients_at_level(at_roughness(moved_bands, level)) for level in range(num_of_levels)]
+            )
+        )
+
+    def _coefficients_at_level(self, bands: Mapping[str, F64]) -> F64:
+        """c at one level. (3, S)"""
+        moved_rows = [bands[curve.name] for curve in self.curves]
+        if all(np.all(rows == rows[0]) for rows in moved_rows) and self.nodes[0] is self.nodes[1] is self.nodes[2]:
+            return np.tile(self.nodes[0].coefficients(_product([rows[0] for rows in moved_rows])), (3, 1))
+        products = [_product([rows[channel] for rows in moved_rows]) for channel in range(3)]
+        return np.array([nodes.coefficients(curve) for nodes, curve in zip(self.nodes, products, strict=True)])
+
+    def node_bands(self) -> dict[str, F64]:
+        """Bands of the moved curves at all nodes. (3, S, J) each"""
+        documents = [
+            _document_at(self.model, self.fixed_settings, self.parameter, values)
+            for values in zip(*(n.values for n in self.nodes), strict=True)
+        ]
+        return {
+            curve.name: np.stack([curve_bands(document, curve) for document in documents], axis=1)
+            for curve in self.curves
+        }
+
+    def precompute(
+        self,
+        term: Term,
+        bands: Mapping[str, F64],
+        lights: TriangleLights,
+        receivers: ShadingPoints,
+        progress: Callable[[float], None],
+        is_canceled: Callable[[], bool],
+        *,
+        is_quantized: bool = False,
+    ) -> LinearOperator | QuantizedOperator:
+        """Contract all curves at all nodes in one pass: the columns are the images there.
+
+        Where the parameter moves a single curve, its nodes are combinations of that curve's bands, which are quicker to
+        share light out to.
+
+        Args:
+            bands: of all the term's curves, (3, J) each; the moved ones' values do not matter.
+            lights, receivers: what arrives, and where.
+            progress: called with the share done. is_canceled: asked now and then.
+            is_quantized: whether the operator is packed.
+        Raises:
+            CancelledError: `is_canceled` said so.
+        """
+        node_bands = self.node_bands()
+        single_curve = self.affected_curves[0] if len(self.affected_curves) == 1 else None
+        fixed_bands = without_free_curves(bands, self.affected_curves)  # nodes are the same at all levels
+        fixed_by_level = [at_roughness(fixed_bands, level) for level in range(num_levels(fixed_bands))]
+        contractions = [
+            contract(term, b if single_curve else {**b, **node_bands}, single_curve) for b in fixed_by_level
+        ]
+        bounds = level_bounds(receivers, bands, self.affected_curves)
+        matrices = None if single_curve is None else node_bands[single_curve].astype(np.float32)
+
+        def rows(start: int, stop: int) -> F32:
+            projected = project_levels(term, contractions, lights, receivers, start, stop)
+            if matrices is not None:
+                return np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)])
+            return np.ascontiguousarray(projected.transpose(2, 0, 1))
+
+        return pack_columns(rows, self.num_columns, receivers, bounds, progress, is_canceled, is_quantized=is_quantized)
+
+
+def linearize(document: Mapping[str, Any], parameter: str) -> ParameterOperator | None:
+    """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or `MAX_NODES` are too few."""
+    fixed_settings = _fixed_settings(document, parameter)
+    return None if fixed_settings is None else _linearize_cached(document["model"], parameter, fixed_settings)
+
+
+def _fixed_settings(document: Mapping[str, Any], parameter: str) -> ParameterSettings | None:
+    """What else the curves that a parameter moves are made from; None where it moves none, or one is drawn."""
+    term = TERMS[document["model"]]
+    curves = curves_of_parameter(term, parameter)
+    if not curves or any(drawn_curves(document, curve) for curve in curves):
+        return None
+    parameter_names = sorted({name for curve in curves for name in curve.parameters} - {parameter})
+    settings = document.get("params") or {}
+    values = ((name, settings.get(name, term.parameter(name).default)) for name in parameter_names)
+    return tuple((name, tuple(value) if isinstance(value, list | tuple) else float(value)) for name, value in values)
+
+
+@lru_cache(maxsize=64)
+def _linearize_cached(model: str, parameter: str, fixed_settings: ParameterSettings) -> ParameterOperator | None:
+    term = TERMS[model]
+    description, curves = term.parameter(parameter), curves_of_parameter(term, parameter)
+    values = slider_values(description, _NUM_VALUES)
+    midpoints = slider_values(description, _NUM_VALUES - 1, at_midpoints=True)
+    documents = [
+        _document_at(model, fixed_settings, parameter, (value, value, value)) for value in (*values, *midpoints)
+    ]
+    # (n, 3, J) of each curve
+    curve_rows = [np.array([curve_bands(document, curve) for document in documents]) for curve in curves]
+    weights = _product([solid_angles(curve) for curve in curves])
+    is_gray = all(bool(np.all(rows == rows[:, :1])) for rows in curve_rows)
+    channel_nodes = _choose_channel_nodes(1 if is_gray else 3, values, curve_rows, weights)
+    if channel_nodes is None:
+        return None
+    red, green, blue = channel_nodes * 3 if is_gray else channel_nodes
+    return ParameterOperator(model, parameter, fixed_settings, curves, (red, green, blue))
+
+
+def _choose_channel_nodes(num: int, values: F64, rows: Sequence[F64], weights: F64) -> list[CurveNodes] | None:
+    """Equally many nodes of each channel, as few as are enough; None where `MAX_NODES` are not.
+
+    Args:
+        rows: of each curve, at the values and between them. (2 n − 1, 3, J) each
+    """
+    products = [np.array([_product(bands) for bands in zip(*(r[:, c] for r in rows), strict=True)]) for c in range(num)]
+
+    def choose(max_error: float, max_nodes: int) -> list[CurveNodes]:
+        num_values = len(values)
+        return [
+            choose_nodes(values, curves[:num_values], curves[num_values:], weights, max_nodes, max_error)
+            for curves in products
+        ]
+
+    channel_nodes = choose(_TARGET_ERROR, MAX_NODES)
+    if any(nodes.error > _TARGET_ERROR for nodes in channel_nodes):
+        return None
+    max_nodes = max(len(nodes.values) for nodes in channel_nodes)
+    if any(len(nodes.values) < max_nodes for nodes in channel_nodes):
+        channel_nodes = choose(0.0, max_nodes)
+    return channel_nodes
+
+
+def _document_at(
+    model: str, fixed_settings: ParameterSettings, parameter: str, values: Sequence[float]
+) -> dict[str, Any]:
+    """A document with one parameter at a value for R, G and B."""
+    return {"model": model, "params": {**dict(fixed_settings), parameter: [float(value) for value in values]}}
+
+
+def _product(bands: Sequence[F64]) -> F64:
+    """Products of bands of all moved curves: all of the first, some of each other. (J_1,), … -> (J,)"""
+    first, *secondary = bands
+    return joint([first, *(rows[_secondary_bands(len(rows))] for rows in secondary)])
+
+
+def _secondary_bands(num: int) -> NDArray[np.intp]:
+    """Some of so many bands, denser towards the horizon, where masking turns."""
+    return num - np.unique(np.geomspace(1, num, _MAX_SECONDARY_BANDS).astype(np.intp))

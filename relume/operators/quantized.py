@@ -1,0 +1,136 @@
+"""An operator in half the memory: columns in 16 bits, with a scale for each column of each block of samples.
+
+    T_ij ≈ s_bj n_ij,   n an integer of 16 bits, s_bj the largest |T_ij| of block b over 32,767
+
+A rest of at most s/2 stays in every number: images of all columns are within 10⁻⁴ of those in float32, for which
+float16 needs as much memory and has three times the error (docs/adr/0083-operators-of-some-samples.md). An operator in
+use adds changes to an exact image, so that the rest is one of the change alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+from relume.operators.operator import Operator
+from relume.operators.update_kernel import Columns, changed_columns, tile_offset
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+BLOCK_SAMPLES = 512
+_MAX_CODE = 32_767
+
+
+@dataclass(frozen=True)
+class QuantizedOperator(Operator):
+    """As `relume.operators.linear_operator.LinearOperator`, in 16 bits.
+
+    Attributes:
+        transport: integers. (tiles, 3, J, samples) int16
+        scale: what they are multiplied by. (tiles, 3, J, blocks) float32
+        importance, bounds: see `LinearOperator`.
+    """
+
+    transport: NDArray[np.int16]
+    scale: F32
+    importance: F64
+    bounds: NDArray[np.int64] | None = None
+
+    is_whole = True
+    is_exact = False
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory it holds."""
+        return self.transport.nbytes + self.scale.nbytes
+
+    def add(self, change: F64, image: F32) -> None:
+        """Add Σ_j Δc_j T_j to an image; see `Operator`."""
+        stream_quantized(self.transport, self.scale, changed_columns(change), image, self.bounds)
+
+    def columns_at(self, sample: int) -> F64:
+        """What each coefficient gives to one sample. (3, J)"""
+        tile, offset = divmod(sample, self.transport.shape[3])
+        scale = self.scale[tile, :, :, offset // BLOCK_SAMPLES].astype(np.float64)
+        return np.asarray(scale * self.transport[tile, :, :, offset])
+
+
+def quantize(rows: F32) -> tuple[NDArray[np.int16], F32]:
+    """Integers of 16 bits for the columns of one block, and their scales.
+
+    Args:
+        rows: of its samples. (channels, samples, J)
+    Returns:
+        (channels, samples, J) int16, (channels, J) float32
+    """
+    scale = np.abs(rows).max(axis=1) / np.float32(_MAX_CODE)
+    inverse_scale = np.divide(1, scale, out=np.zeros_like(scale), where=scale > np.finfo(np.float32).tiny)
+    return np.rint(rows * inverse_scale[:, None]).clip(-_MAX_CODE, _MAX_CODE).astype(np.int16), scale
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _stream(transport, scale, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
+    """Add the changed columns of planes [start, stop), a plane being a channel of a tile; four columns at a time."""
+    samples = image.shape[2]
+    for plane in range(start, stop):
+        tile, channel = plane // 3, plane % 3
+        for level in range(count.shape[0]):
+            first, last = tile_offset(bounds, level, tile, samples)
+            if first >= last:
+                continue
+            weight, column_index, num = change[level, channel], index[level, channel], count[level, channel]
+            columns, scales = transport[tile, channel], scale[tile, channel]
+            for n in range(0, num, 4):
+                for block in range(first // BLOCK_SAMPLES, (last - 1) // BLOCK_SAMPLES + 1):
+                    block_start, block_stop = max(first, block * BLOCK_SAMPLES), min(last, (block + 1) * BLOCK_SAMPLES)
+                    sums = image[tile, channel, block_start:block_stop]
+                    if n + 4 <= num:
+                        a, b = (
+                            columns[column_index[n], block_start:block_stop],
+                            columns[column_index[n + 1], block_start:block_stop],
+                        )
+                        c, d = (
+                            columns[column_index[n + 2], block_start:block_stop],
+                            columns[column_index[n + 3], block_start:block_stop],
+                        )
+                        wa, wb = (
+                            weight[n] * scales[column_index[n], block],
+                            weight[n + 1] * scales[column_index[n + 1], block],
+                        )
+                        wc = weight[n + 2] * scales[column_index[n + 2], block]
+                        wd = weight[n + 3] * scales[column_index[n + 3], block]
+                        for s in range(block_stop - block_start):
+                            sums[s] += wa * a[s] + wb * b[s] + wc * c[s] + wd * d[s]
+                        continue
+                    for m in range(n, num):
+                        a, wa = (
+                            columns[column_index[m], block_start:block_stop],
+                            weight[m] * scales[column_index[m], block],
+                        )
+                        for s in range(block_stop - block_start):
+                            sums[s] += wa * a[s]
+
+
+def stream_quantized(
+    transport: NDArray[np.int16], scale: F32, columns: Columns, image: F32, bounds: NDArray[np.int64] | None = None
+) -> None:
+    """Add T · Δc to an image, in place; see `relume.operators.update_kernel.stream`.
+
+    Args:
+        transport: (tiles, 3, J, samples) int16. scale: of its blocks. (tiles, 3, J, blocks) float32
+        columns: what has changed, from `changed_columns`.
+        image: added to. (tiles, 3, samples) float32
+        bounds: where the samples of each level begin and end, tile after tile; None: there is one. (L + 1,) int64
+    Cost: reads 2 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
+    """
+    if columns.count.any():
+        if bounds is None:
+            bounds = np.array([0, image.shape[0] * image.shape[2]], np.int64)
+        args = (transport, scale, bounds, columns.index, columns.change, columns.count, image)
+        parallel_for_chunks(lambda start, stop: _stream(*args, start, stop), 3 * len(image))

@@ -1,0 +1,105 @@
+"""The update R += T · Δc: streams the columns of a frozen operator that changed (eq. 30, Ben-Artzi 2006).
+
+Memory is laid out for this one access: [tile][channel][coefficient][sample], so that a column of a tile is one run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import parallel_for_chunks
+
+F32 = NDArray[np.float32]
+
+# Long runs keep the memory's prefetchers going: with 30 of 256 columns 16,384 samples read at 0.94 of the machine's
+# bandwidth, 4,096 at 0.70 (docs/performance.md).
+TILE_SAMPLES = 16_384
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The coefficients that change, by level of the samples and by channel.
+
+    Attributes:
+        index: columns of each channel, rising; only the first `count` of a row hold. (L, 3, n) int32
+        change: Δc of each. (L, 3, n) float32
+        count: (L, 3) int64
+    """
+
+    index: NDArray[np.int32]
+    change: F32
+    count: NDArray[np.int64]
+
+
+def changed_columns(change: NDArray[np.float64]) -> Columns:
+    """The columns with a change; change: Δc, zero where nothing is to be done. (3, J), or (L, 3, J) float64"""
+    change = change.reshape(-1, *change.shape[-2:])
+    count = np.count_nonzero(change, axis=2)
+    index = np.zeros((*count.shape, max(1, int(count.max()))), np.int32)
+    values = np.zeros(index.shape, np.float32)
+    for entry in np.ndindex(count.shape):
+        changed = np.nonzero(change[entry])[0]
+        index[entry][: len(changed)] = changed
+        values[entry][: len(changed)] = change[entry][changed]
+    return Columns(index, values, count.astype(np.int64))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def tile_offset(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
+    """Find where the samples of a level begin and end in a tile; there are none where they end before they begin.
+
+    Args:
+        bounds: see `stream`. level, tile: their numbers. samples: of a tile.
+    """
+    return max(bounds[level] - tile * samples, 0), min(bounds[level + 1] - tile * samples, samples)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _stream(transport, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
+    """Add the changed columns of planes [start, stop), a plane being a channel of a tile.
+
+    Four columns at a time, so that the image is read and written less.
+    """
+    samples = image.shape[2]
+    for plane in range(start, stop):
+        tile, channel = plane // 3, plane % 3
+        for level in range(count.shape[0]):
+            first, last = tile_offset(bounds, level, tile, samples)
+            if first >= last:
+                continue
+            sums = image[tile, channel, first:last]
+            weight, column_index, num = change[level, channel], index[level, channel], count[level, channel]
+            num_unrolled = num // 4 * 4
+            for n in range(0, num_unrolled, 4):
+                a = transport[tile, channel, column_index[n], first:last]
+                b = transport[tile, channel, column_index[n + 1], first:last]
+                c = transport[tile, channel, column_index[n + 2], first:last]
+                d = transport[tile, channel, column_index[n + 3], first:last]
+                wa, wb, wc, wd = weight[n], weight[n + 1], weight[n + 2], weight[n + 3]
+                for s in range(sums.shape[0]):
+                    sums[s] += wa * a[s] + wb * b[s] + wc * c[s] + wd * d[s]
+            for n in range(num_unrolled, num):
+                a, wa = transport[tile, channel, column_index[n], first:last], weight[n]
+                for s in range(sums.shape[0]):
+                    sums[s] += wa * a[s]
+
+
+def stream(transport: F32, columns: Columns, image: F32, bounds: NDArray[np.int64] | None = None) -> None:
+    """Add T · Δc to an image, in place.
+
+    Args:
+        transport: (tiles, 3, J, samples) float32. columns: what has changed, from `changed_columns`.
+        image: added to. (tiles, 3, samples) float32
+        bounds: where the samples of each level begin and end, tile after tile; None: there is one. (L + 1,) int64
+    Cost: reads 4 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
+    """
+    if columns.count.any():
+        if bounds is None:
+            bounds = np.array([0, image.shape[0] * image.shape[2]], np.int64)
+        args = (transport, bounds, columns.index, columns.change, columns.count, image)
+        parallel_for_chunks(lambda start, stop: _stream(*args, start, stop), 3 * len(image))

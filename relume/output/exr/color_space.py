@@ -1,0 +1,65 @@
+"""The colour space of an exported picture: ours, or a linear one of the OpenColorIO config in use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.errors import ParameterError
+from relume.image_io.ocio.active_config import get_config
+from relume.image_io.primaries import INTEROP_SPACES, REC_709, Chromaticities, chromaticities_from_matrix, interop_id
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class ExportColorSpace:
+    """A linear colour space.
+
+    Attributes:
+        name: that people read.
+        interop: the id that files name it by; None: it has none.
+        chromaticities: of its primaries and white.
+        convert: turns light into it, in place, (n, 3); None: it is ours.
+    """
+
+    name: str
+    interop: str | None
+    chromaticities: Chromaticities
+    convert: Callable[[F32], None] | None
+
+    def convert_image(self, image: F32) -> F32:
+        """A picture in it. (height, width, 3 or 4), coverage as it is"""
+        if self.convert is None:
+            return image
+        light = np.array(image[..., :3], np.float32, order="C").reshape(-1, 3)
+        self.convert(light)
+        return np.concatenate([light.reshape(*image.shape[:2], 3), image[..., 3:]], axis=-1)
+
+
+REC_709_SPACE = ExportColorSpace("Rec. 709", "lin_rec709_scene", REC_709, None)
+
+
+def find_space(name: str | None) -> ExportColorSpace:
+    """The colour space that a request names; None: ours.
+
+    Raises:
+        ParameterError: there is no config, or it has no linear space that is called so, or no file can say what it is.
+    """
+    if name is None:
+        return REC_709_SPACE
+    config = get_config()
+    if config is None:
+        raise ParameterError("color_space", name, "none: there is no OpenColorIO config here (RELUME_OCIO)")
+    canonical_name = config.canonical_space(name)
+    try:
+        matrix = config.primaries(canonical_name)
+        interop = interop_id(matrix)
+        chromaticities = chromaticities_from_matrix(matrix) if interop is None else INTEROP_SPACES[interop]
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise ParameterError("color_space", name, f"another: {error}") from None
+    return ExportColorSpace(canonical_name, interop, chromaticities, partial(config.convert, space=canonical_name))

@@ -1,0 +1,63 @@
+"""A picture and its layers in one OpenEXR file."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.image_io.exr_writer import MAX_HALF, Attributes, Precision, image_channels, write_exr
+from relume.look import Look
+from relume.output.exr.color_space import REC_709_SPACE, ExportColorSpace
+from relume.output.exr.layers import Layer
+
+Progress = Callable[[float], None]
+Render = Callable[[Look, Progress], NDArray[np.float32]]
+"""Renders a look, (height, width, 3) or with alpha (height, width, 4), and tells the share done."""
+
+
+def export_exr(
+    path: Path,
+    render: Render,
+    look: Look,
+    layers: Sequence[Layer],
+    attributes: Attributes,
+    precision: Precision = "half",
+    progress: Progress = lambda share: None,
+    space: ExportColorSpace = REC_709_SPACE,
+) -> None:
+    """Render a look and its layers, one after another, and write them; no more than one is in memory at a time.
+
+    Args:
+        path: of the file, which appears whole or not at all; parts are kept beside it until then.
+        render: makes the picture of a look, (height, width, 3 or 4), and is told whom to tell its progress.
+        look: of the picture itself. layers: named looks, whose pictures are layers of the file.
+        attributes: of the file, as `build_attributes` makes them.
+        precision: of the values.
+        progress: called with the share done, in [0, 1].
+        space: that the values are written in, as `attributes` says.
+    Raises:
+        RelumeError: the file cannot be written. What `render` raises; then there is no file.
+    """
+    renders = [("", look), *((layer.name, layer.look) for layer in layers)]
+    with tempfile.TemporaryDirectory(prefix=".layers-", dir=path.parent) as folder:
+        channels: list[tuple[str, NDArray[np.floating]]] = []
+        for k, (name, layer_look) in enumerate(renders):
+
+            def report_progress(fraction: float, k: int = k) -> None:
+                progress((k + fraction) / len(renders))
+
+            image = space.convert_image(render(layer_look, report_progress))
+            image = image[..., :3] if name else image  # coverage is the picture's
+            channels += image_channels(_save_as_memmap(Path(folder) / f"{k}.npy", image, precision), name)
+        write_exr(path, channels, attributes, precision)
+
+
+def _save_as_memmap(path: Path, image: NDArray[np.float32], precision: Precision) -> NDArray[np.floating]:
+    """The same picture, in the values that are written, as a file that is read where it is needed."""
+    pixels = np.minimum(image, MAX_HALF).astype(np.float16) if precision == "half" else image
+    np.save(path, pixels, allow_pickle=False)
+    return np.load(path, mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]

@@ -1,0 +1,101 @@
+"""One picture without a session: batch renders, `relume render`, thumbnails."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.errors import PlanError
+from relume.live.fixed_camera.finish import render_exact
+from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import FixedViewTransfer, OpenBake
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.refinement.refinement_jobs import StaticViewState
+from relume.look import Look
+from relume.methods.free_camera_transfer import BakedFreeCamera
+from relume.methods.static_view import StaticViewBuilder
+from relume.scene.model import Camera
+
+
+def render_image(
+    transfer: OpenBake,
+    view_name: str,
+    look: Look,
+    size: tuple[int, int] | None = None,
+    progress: ProgressCallback = lambda share: None,
+    is_canceled: CancelCheck = lambda: False,
+    *,
+    for_display: bool = False,
+    camera_and_size: tuple[Camera, tuple[int, int]] | None = None,
+    static_views: StaticViewBuilder | None = None,
+) -> NDArray[np.float32]:
+    """Render a look exactly; what is made for it is kept in passing in the memory that the bake was opened with.
+
+    Args:
+        transfer: an opened bake. view_name: one of its views.
+        size: width and height; None means the baked one, and none else is possible where the view is fixed.
+        progress: called with about the share done. is_canceled: asked now and then.
+        for_display: coverage is for laying it over display values, as PNG and WebP are; see `Backdrop.alpha`.
+        camera_and_size: of a bake whose eyes move: another camera than the view's, and the size of its picture.
+        static_views: of such a bake: makes the picture exact; None: it is as true as the picture that moves.
+    Returns:
+        Linear radiance; where the look's background is transparent, coverage as a fourth channel, which the others
+        are multiplied by already. (height, width, 3 or 4) float32
+    Raises:
+        PlanError: another size than the baked one.
+        CancelledError: `is_canceled` said so.
+    """
+    view = transfer.views[view_name]
+    if isinstance(transfer, BakedFreeCamera):
+        camera_and_size = camera_and_size or (view.camera, size or (view.width, view.height))
+        if static_views is None:
+            return _pixels(_render_free_camera(transfer, view_name, look, camera_and_size), for_display)
+        cache = transfer.cache.transient
+        exact = StaticViewState(static_views.make_static_view, cache, camera_and_size, look, None).static_picture(
+            progress, is_canceled
+        )
+        return _pixels(exact, for_display)
+    if size is not None and tuple(size) != (view.width, view.height):
+        raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
+    picture = Picture(cast("FixedViewTransfer", transfer), view_name, transfer.cache.transient)
+    picture.set_look(look)
+    render_exact(picture, look, progress, is_canceled)
+    return _pixels(picture, for_display)
+
+
+def _pixels(picture: Picture | FreeCameraPicture, for_display: bool) -> NDArray[np.float32]:
+    image, alpha = picture.image(), picture.alpha(for_display=for_display)
+    return image if alpha is None else np.dstack([image, alpha])
+
+
+def render_small(transfer: OpenBake, view_name: str, look: Look, width: int) -> NDArray[np.float32]:
+    """Render a look at no more pixels than a small picture needs: whole steps of the baked ones are left out.
+
+    Args:
+        transfer: an opened bake. view_name: one of its views.
+        width: of the small picture.
+    Returns:
+        Linear radiance, at least `width` wide where the bake is. (h, w, 3) float32
+    """
+    view = transfer.views[view_name]
+    step = max(1, view.width // width)
+    if isinstance(transfer, BakedFreeCamera):
+        small_size = view.width // step, max(1, view.height // step)
+        return _render_free_camera(transfer, view_name, look, (view.camera, small_size)).image()
+    return render_image(
+        transfer if step < 2 else cast("FixedViewTransfer", transfer).downsampled(view_name, step), view_name, look
+    )
+
+
+def _render_free_camera(
+    transfer: BakedFreeCamera, view_name: str, look: Look, camera_and_size: tuple[Camera, tuple[int, int]]
+) -> FreeCameraPicture:
+    """What is seen while the eye moves."""
+    picture = FreeCameraPicture(transfer, view_name)
+    picture.set_look(look)
+    picture.set_camera(*camera_and_size)
+    picture.advance(None)
+    return picture

@@ -1,0 +1,122 @@
+"""What cameras are placed by: the scene in plain colours, from anywhere, before anything is baked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.albedo import pack_reflectance, scatters_diffusely, unpack_reflectance
+from relume.brdf.texture_slots import TEXTURES, user_images
+from relume.core.color import srgb_encode
+from relume.images.image_store import load_texture
+from relume.look import default_look
+from relume.raytrace.camera_rays import Hits, camera_directions, trace_rays
+from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
+from relume.scene.model import Camera, Material, Scene, Texture
+from relume.scene.texture_encoding import mean_value
+from relume.scene_io.gltf.cameras import framing_camera
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_AMBIENT, _HEADLIGHT, _SKYLIGHT = 0.25, 0.45, 0.4  # shares of what a surface shows at most
+_MIN_COLOR = 0.04  # linear; black surfaces would show no shape
+_BACKGROUND = 0.03
+
+
+@dataclass(frozen=True)
+class Viewport:
+    """A scene as cameras are placed in it.
+
+    Attributes:
+        colors: of the materials, linear. (materials, 3) float32
+        framing: a camera that sees all of it. lowest, highest: its corners, metres. (3,)
+    """
+
+    geometry: SceneBuffers
+    colors: F32
+    framing: Camera
+    lowest: F64
+    highest: F64
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> Viewport:
+        """Build the search tree, and find out what is where."""
+        geometry = build_scene_buffers(scene)
+        terms = default_look(scene.materials, scene.lights)["materials"]
+        colors = [_color(material, terms[material.name]["terms"]) for material in scene.materials]
+        corners = geometry.positions[geometry.faces.ravel()]
+        return cls(
+            geometry,
+            np.array(colors, np.float32),
+            framing_camera(scene.meshes, "framing"),
+            corners.min(axis=0).astype(np.float64),
+            corners.max(axis=0).astype(np.float64),
+        )
+
+    def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Draw what a camera sees, lit from the eye and from above.
+
+        Args:
+            camera: any. size: width and height in pixels.
+        Returns:
+            Display values. (height, width, 3) uint8
+        """
+        width, height = size
+        y, x = np.divmod(np.arange(width * height, dtype=np.int64), width)
+        directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
+        hits = self._trace(camera, directions)
+        visible = np.flatnonzero(hits.face >= 0)
+        colors = np.full((width * height, 3), _BACKGROUND, np.float32)
+        colors[visible] = self._shade(hits.face[visible], hits.uv[visible], directions[visible])
+        return np.asarray(np.rint(255 * srgb_encode(colors)), np.uint8).reshape(height, width, 3)
+
+    def _shade(self, face: NDArray[np.int32], uv: F32, directions: F32) -> F32:
+        """Shade hits by their normals alone; `surface_at` finds more, and takes several times as long. (n, 3)"""
+        corners, (u, v) = self.geometry.normals[self.geometry.faces[face]], uv.T[:, :, None]
+        normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        cosine = -np.einsum("nc,nc->n", normal, directions)
+        upward = normal[:, 1] * np.sign(cosine)  # of the side that is seen
+        shading = _AMBIENT + _HEADLIGHT * np.abs(cosine) + _SKYLIGHT * (0.5 + 0.5 * upward)
+        return np.asarray(self.colors[self.geometry.face_material[face]] * shading[:, None], np.float32)
+
+    def point_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> F64 | None:
+        """Find the place that a position of the picture shows; None where that is the background.
+
+        Args:
+            camera: any. size: width and height in pixels. x, y: pixels from the left and from the top.
+        Returns:
+            World space, metres. (3,)
+        """
+        directions = camera_directions(camera, size, np.array([x], np.float32), np.array([y], np.float32))
+        hits = self._trace(camera, directions)
+        if hits.face[0] < 0:
+            return None
+        return np.asarray(camera.to_world[:3, 3] + float(hits.distance[0]) * directions[0].astype(np.float64))
+
+    def _trace(self, camera: Camera, directions: F32) -> Hits:
+        return trace_rays(self.geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+
+
+def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:
+    """About what a material looks like: its diffuse colour, else that of its highlights. (3,)"""
+    constant, *textured_reflectances = unpack_reflectance(pack_reflectance(list(filter(scatters_diffusely, terms))))[
+        ..., 0
+    ].astype(np.float64)
+    scene_textures = [material.textures.get(channel) for channel in TEXTURES]
+    textures = [scene_textures[k] if name is None else load_texture(name) for k, name in enumerate(user_images(terms))]
+    color = constant + sum(
+        reflectance * _mean(texture) for texture, reflectance in zip(textures, textured_reflectances, strict=True)
+    )
+    if color.max() < _MIN_COLOR:
+        color = np.max([np.asarray(term["color"], np.float64) for term in terms], axis=0)
+    return np.asarray(np.clip(color, _MIN_COLOR, 1.0))
+
+
+def _mean(texture: Texture | None) -> F64:
+    return np.ones(3) if texture is None else mean_value(texture)

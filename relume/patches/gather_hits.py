@@ -1,0 +1,171 @@
+"""Links: which cell each gather ray of a point hits. A pixel, a vertex or a cell may own the point."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges
+from relume.patches.patch_kdtree import NO_PATCH_NODE, PatchTree, locate
+from relume.raytrace.embree import intersect, packet_arguments
+from relume.raytrace.gather_rays import RayPattern, cosine_ray, glossy_ray, lattice_offsets
+from relume.raytrace.ray_packet import (
+    LANES,
+    enable_lane,
+    enable_stochastic_alpha,
+    get_direction,
+    get_hit,
+    get_position,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_hits,
+)
+from relume.raytrace.scene_buffers import SceneBuffers
+from relume.raytrace.surface_points import SurfacePoints
+
+F32 = NDArray[np.float32]
+
+_POINTS_PER_RANGE = 256
+
+
+@dataclass(frozen=True)
+class GatherHits:
+    """What the rays of n points hit.
+
+    Attributes:
+        patch: that each ray hits, `NO_PATCH` where it leaves the scene or was not to be traced. (n, rays) uint16
+        num_rays: traced. trace_s: wall time of the tracing alone.
+    """
+
+    patch: NDArray[np.uint16]
+    num_rays: int
+    trace_s: float
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _load_points(points, wo, pattern, first, width, packet, frame, local_wo, offsets):  # type: ignore[no-untyped-def]
+    """Begin with points [first, first + width): origins of their rays, local frames, shifts; one lane each.
+
+    wo: (n, 3). frame: tangent, bitangent, normal. (3, 3, `LANES`) shifts: (2 sets, 4, `LANES`)
+    """
+    position, normal, tangent, seed, alpha_sample = points
+    for k in range(LANES):
+        p = first + min(k, width - 1)
+        n, t, o = normal[p], tangent[p], wo[p]
+        b = (n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0])
+        set_origin(packet, k, position[p, 0], position[p, 1], position[p, 2])
+        enable_stochastic_alpha(packet, k, alpha_sample[min(p, alpha_sample.shape[0] - 1)])
+        for axis in range(3):
+            frame[0, axis, k], frame[1, axis, k], frame[2, axis, k] = t[axis], b[axis], n[axis]
+        for row in range(3):
+            local_wo[row, k] = frame[row, 0, k] * o[0] + frame[row, 1, k] * o[1] + frame[row, 2, k] * o[2]
+        cosine_offset, glossy_offset = lattice_offsets(pattern, seed[p])
+        for m in range(4):
+            offsets[0, m, k], offsets[1, m, k] = cosine_offset[m], glossy_offset[m]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore[no-untyped-def]
+    """Aim the same ray of all lanes; returns how many of them are above their horizon."""
+    pattern_ray, is_cosine = pattern.rays[ray], ray < pattern.num_cosine
+    cosine, glossy = offsets[0], offsets[1]
+    num_valid = 0
+    for k in range(LANES):
+        if is_cosine:
+            x, y, z = cosine_ray(pattern_ray, (cosine[0, k], cosine[1, k], cosine[2, k], cosine[3, k]))
+        else:
+            offset = (glossy[0, k], glossy[1, k], glossy[2, k], glossy[3, k])
+            x, y, z = glossy_ray(pattern_ray, offset, local_wo[0, k], local_wo[1, k], local_wo[2, k])
+        dx = frame[0, 0, k] * x + frame[1, 0, k] * y + frame[2, 0, k] * z
+        dy = frame[0, 1, k] * x + frame[1, 1, k] * y + frame[2, 1, k] * z
+        dz = frame[0, 2, k] * x + frame[1, 2, k] * y + frame[2, 2, k] * z
+        set_direction(packet, k, dx, dy, dz, np.float32(np.inf))
+        is_above = z > 0 and k < width
+        enable_lane(packet, k, is_above)
+        num_valid += is_above
+    return num_valid
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+def _locate_hits(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
+    """Find the cells that the rays of all lanes have hit, into nodes. (`LANES`,) int32. keys: scratch. (6, `LANES`)"""
+    normals, sides, roots = surfaces[0], surfaces[1], tree.roots
+    for k in range(LANES):
+        nodes[k] = NO_PATCH_NODE
+        face, _ = get_hit(packet, k)
+        if face < 0:
+            continue
+        facing = np.float32(0)
+        for axis in range(3):
+            keys[axis, k] = get_position(packet, k, axis)
+            keys[3 + axis, k] = normals[face, axis]
+            facing += normals[face, axis] * get_direction(packet, k, axis)
+        is_back_face = facing > 0
+        nodes[k] = roots[sides[face] + is_back_face]
+        if is_back_face:
+            for axis in range(3, 6):
+                keys[axis, k] = -keys[axis, k]
+    locate(tree, keys, nodes)
+
+
+@nb.njit(nogil=True, cache=True)
+def _trace(  # type: ignore[no-untyped-def]
+    intersect, scene, arguments, points, wo, surfaces, tree, pattern, start, stop, gather_hits
+):
+    """Trace all rays of points [start, stop), the same ray of `LANES` points at once; returns how many.
+
+    surfaces: normal, and number of the front side, of each face.
+    """
+    packet = new_packet(scene, arguments)
+    frame, local_wo = np.empty((3, 3, LANES), np.float32), np.empty((3, LANES), np.float32)
+    offsets, keys = np.empty((2, 4, LANES), np.float32), np.zeros((6, LANES), np.float32)
+    patches = np.empty(LANES, np.int32)
+    num_rays = 0
+    for first in range(start, stop, LANES):
+        width = min(LANES, stop - first)
+        _load_points(points, wo, pattern, first, width, packet, frame, local_wo, offsets)
+        for ray in range(gather_hits.shape[1]):
+            num_rays += _aim(pattern, ray, frame, local_wo, offsets, packet, width)
+            trace_hits(intersect, packet)
+            _locate_hits(packet, surfaces, tree, keys, patches)
+            for k in range(width):
+                gather_hits[first + k, ray] = patches[k]
+    return num_rays
+
+
+def trace_gather_rays(
+    geometry: SceneBuffers, tree: PatchTree, points: SurfacePoints, wo: F32, pattern: RayPattern
+) -> GatherHits:
+    """Trace all rays of points.
+
+    Args:
+        geometry: the scene's triangles. tree: tells which cell a place on them belongs to.
+        points: where rays leave; their seeds shift the pattern.
+        wo: towards the viewer, unit, world space; glossy rays leave about its mirror direction. (n, 3) float32
+        pattern: directions of the rays of every point.
+    Returns:
+        The cell of each ray, (n, `pattern.num_rays`) uint16, and what it cost.
+    Cost: O(n · rays · (log triangles + log cells)) time.
+    """
+    gather_hits = np.empty((points.num_points, pattern.num_rays), np.uint16)
+    arguments = packet_arguments(coherent=False)
+    surfaces = geometry.face_normals, (2 * geometry.face_mesh).astype(np.int32)
+    counts: list[int] = []
+
+    def kernel(start: int, stop: int) -> None:
+        counts.append(
+            _trace(
+                intersect, geometry.embree.handle, arguments.ctypes.data, points, wo, surfaces, tree, pattern,
+                start, stop, gather_hits,
+            )
+        )  # fmt: skip
+
+    start_time = time.perf_counter()
+    for_ranges(kernel, len(gather_hits), _POINTS_PER_RANGE)
+    return GatherHits(gather_hits, sum(counts), time.perf_counter() - start_time)

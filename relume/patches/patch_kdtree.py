@@ -1,0 +1,206 @@
+"""Which gather cell a point on a surface belongs to: a kd-tree over positions and normals, one for each side of a mesh.
+
+A side of a mesh is a tree of its own, and directions that differ much are told apart before places are, so that no cell
+reaches through a thin wall or round an edge. Cells are numbered in the order of the tree: neighbours have near numbers,
+which is what a Haar transform over them compresses.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.raytrace.ray_packet import LANES
+
+F32 = NDArray[np.float32]
+I32 = NDArray[np.int32]
+
+NO_PATCH = 65_535  # of 16-bit links
+MAX_PATCHES = 65_535
+NO_PATCH_NODE = np.int32(-1 - NO_PATCH)  # a leaf, like those of cells
+_MAX_NORMAL_EXTENT = np.float32(
+    0.5
+)  # extent of a normal's component over a cell, from which on the cell is divided by it
+
+
+class PatchTree(NamedTuple):
+    """Inner nodes, and where the trees of the sides begin.
+
+    Attributes:
+        axis: 0 to 2 for a position's component, 3 to 5 for a normal's. (n,) uint8
+        value: points below go to the first child, the others to the second. (n,) float32
+        children: nodes; −1 − c for cell c. (n, 2) int32
+        roots: of side s of mesh m at 2 m + s, s = 1 where triangles are seen from behind. (2 meshes,) int32
+    """
+
+    axis: NDArray[np.uint8]
+    value: F32
+    children: I32
+    roots: I32
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def locate(tree, keys, nodes):  # type: ignore[no-untyped-def]
+    """Locate the cells of `LANES` points; all go down the tree together, so that none waits for memory alone.
+
+    Args:
+        tree: a `PatchTree`.
+        keys: position and normal of each. (6, `LANES`) float32
+        nodes: the tree's root on each one's side; becomes its cell, `NO_PATCH` where there is none. (`LANES`,) int32
+    """
+    axes, values, children = tree.axis, tree.value, tree.children
+    num_unfinished = LANES
+    while num_unfinished > 0:
+        num_unfinished = 0
+        for k in range(LANES):
+            node = nodes[k]
+            if node >= 0:
+                nodes[k] = children[node, int(keys[axes[node], k] >= values[node])]
+                num_unfinished += 1
+    for k in range(LANES):
+        nodes[k] = -1 - nodes[k]
+
+
+@nb.njit(nogil=True, cache=True)
+def _find_gap(values):  # type: ignore[no-untyped-def]
+    """Count the sorted values below a gap that is as near as possible to their middle.
+
+    Points of one plane differ by rounding, and their light comes from beside it: a plane between points that lie
+    together would put hits on the wrong side of it, so that gaps are no smaller than a quarter of the mean one.
+    """
+    num = values.shape[0]
+    min_gap = np.float32(0.25) * (values[num - 1] - values[0]) / num
+    for offset in range(num):
+        for below in (num // 2 - offset, num // 2 + offset):
+            if 0 < below < num and values[below] - values[below - 1] > min_gap:
+                return below
+    return int(np.argmax(values[1:] - values[:-1])) + 1
+
+
+@nb.njit(nogil=True, cache=True)
+def _split(keys, rows):  # type: ignore[no-untyped-def]
+    """Sort rows along the axis to divide them by.
+
+    Returns:
+        The axis, −1 where all rows are the same point; how many rows go to the first child, and the value between.
+    """
+    low, high = keys[rows[0]].copy(), keys[rows[0]].copy()
+    for row in rows:
+        for axis in range(6):
+            low[axis] = min(low[axis], keys[row, axis])
+            high[axis] = max(high[axis], keys[row, axis])
+    extent = high - low
+    normal_axis = 3 + np.argmax(extent[3:])
+    axis = int(normal_axis if extent[normal_axis] > _MAX_NORMAL_EXTENT else np.argmax(extent[:3]))
+    if extent[axis] <= 0:
+        return -1, 0, np.float32(0)
+    values = keys[rows, axis]
+    order = np.argsort(values, kind="mergesort")
+    rows[:] = rows[order]
+    values = values[order]
+    # directions fall into heaps, of which none is cut; places are divided evenly
+    num_first = np.searchsorted(values, np.float32(0.5) * (low[axis] + high[axis])) if axis >= 3 else _find_gap(values)
+    value = np.float32(0.5) * (values[num_first - 1] + values[num_first])
+    if value <= values[num_first - 1]:  # they are one rounding apart
+        value = values[num_first]
+    return axis, num_first, value
+
+
+@nb.njit(nogil=True, cache=True)
+def _light_variation(keys, reach, rows):  # type: ignore[no-untyped-def]
+    """Estimate how uneven the light on a cell is, times its points: q / (1 + q), q = Var(x) / R² + Var(n).
+
+    Light changes with place by at most about 1 / R and with the normal by about 1, where R is the harmonic mean of the
+    distances of what is seen from there (the split sphere of Ward 1988); what lobes see is told apart by their width.
+
+    Args:
+        keys, reach: as of `grow_tree`. rows: points of the cell.
+    """
+    mean, mean_inverse_reach = np.zeros(6), 0.0
+    for row in rows:
+        mean_inverse_reach += 1 / max(reach[row], np.float32(1e-12))
+        for axis in range(6):
+            mean[axis] += keys[row, axis]
+    mean /= len(rows)
+    mean_inverse_reach /= len(rows)
+    position_variance = normal_variance = 0.0
+    for row in rows:
+        for axis in range(3):
+            position_variance += (keys[row, axis] - mean[axis]) ** 2
+            normal_variance += (keys[row, 3 + axis] - mean[3 + axis]) ** 2
+    variation = (position_variance * mean_inverse_reach * mean_inverse_reach + normal_variance) / len(rows)
+    return len(rows) * variation / (1 + variation)
+
+
+@nb.njit(nogil=True, cache=True)
+def _grow_nodes(keys, reach, rows, root_starts, max_leaves):  # type: ignore[no-untyped-def]
+    """Divide rows into at most `max_leaves` leaves, always the one on which light is most uneven.
+
+    Args:
+        keys, reach: as of `grow_tree`.
+        rows: points, those of each root one after another; sorted so that those of each leaf are.
+        root_starts: where the rows of each root begin, and their end. (roots + 1,) int64
+    Returns:
+        Axes, values and children of nodes; of each leaf where its rows begin, its parent (−1 − root where it is a root
+        itself) and which child it is; the node of each root, where it has one.
+    """
+    num_roots = len(root_starts) - 1
+    axes, values = np.empty(max_leaves, np.uint8), np.empty(max_leaves, np.float32)
+    children, roots = np.empty((max_leaves, 2), np.int32), np.full(num_roots, -1, np.int32)
+    leaves = np.empty((max(max_leaves, num_roots), 3), np.int64)
+    queue = [(0.0, 0, 0, 0, 0) for _ in range(0)]
+    for root in range(num_roots):
+        start, stop = root_starts[root], root_starts[root + 1]
+        heapq.heappush(queue, (-_light_variation(keys, reach, rows[start:stop]), start, stop, -1 - root, 0))
+    node, num_leaves = 0, 0
+    while queue:
+        _, start, stop, parent, child = heapq.heappop(queue)
+        axis, num_first, value = -1, 0, np.float32(0)
+        if num_leaves + len(queue) + 1 < max_leaves:
+            axis, num_first, value = _split(keys, rows[start:stop])
+        if axis < 0:
+            leaves[num_leaves, 0], leaves[num_leaves, 1], leaves[num_leaves, 2] = start, parent, child
+            num_leaves += 1
+            continue
+        axes[node], values[node] = axis, value
+        if parent < 0:
+            roots[-1 - parent] = node
+        else:
+            children[parent, child] = node
+        for child_side, (low, high) in enumerate(((start, start + num_first), (start + num_first, stop))):
+            heapq.heappush(queue, (-_light_variation(keys, reach, rows[low:high]), low, high, node, child_side))
+        node += 1
+    return axes[:node], values[:node], children[:node], leaves[:num_leaves], roots
+
+
+def grow_tree(
+    keys: F32, reach: F32, side: I32, num_sides: int, max_patches: int
+) -> tuple[PatchTree, list[NDArray[np.int64]]]:
+    """Divide points into cells on which light is about as uneven, times the points.
+
+    Args:
+        keys: position and unit normal. (n, 6) float32
+        reach: how far apart places are that a ray from what sees a point cannot tell from each other. (n,) float32
+        side: number of each point's, in [0, num_sides). (n,) int32
+        num_sides: twice the number of meshes.
+        max_patches: at most `MAX_PATCHES`; fewer where points coincide, or more so that each side has one.
+    Returns:
+        The tree, and the points of each cell.
+    """
+    rows = np.argsort(side, kind="stable")
+    sides, root_starts = np.unique(side[rows], return_index=True)
+    bounds = np.append(root_starts, len(rows)).astype(np.int64)
+    axes, values, children, leaves, root_nodes = _grow_nodes(keys, reach, rows, bounds, max_patches)
+    order = np.argsort(leaves[:, 0])
+    starts, parents, child_side = leaves[order].T
+    roots, leaf_codes = np.full(num_sides, NO_PATCH_NODE, np.int32), -1 - np.arange(len(order), dtype=np.int32)
+    roots[sides] = root_nodes
+    has_parent = parents >= 0
+    children[parents[has_parent], child_side[has_parent]] = leaf_codes[has_parent]
+    roots[sides[-1 - parents[~has_parent]]] = leaf_codes[~has_parent]
+    return PatchTree(axes, values, children, roots), np.split(rows, starts[1:]) if len(order) else []

@@ -1,1 +1,0 @@
-"""What is behind a picture, and how much of it is hidden."""

@@ -1,0 +1,221 @@
+"""Compiles every kernel once, so that nothing compiles while somebody waits: `python -m relume.precompile`.
+
+Most of that is Numba's own work, in Python. What is inlined by `inline="always"` is typed anew at each place: the
+kernel of moving pixels took 27 s so. `forceinline=True` leaves it to LLVM, which takes a tenth of that, and code is as
+fast; `inline` is for helpers that are handed what holds arrays, whose references would be counted.
+
+Bakes a thumbnail of the built-in scene, shows each term with each of its curves, and along each parameter that moves
+several, moves local lights and eyes, covers surfaces with a BTF, compares with the truth, looks measured materials up.
+The compiled kernels lie in the cache that `relume.core.numba_cache` has chosen; every later process loads them from
+there.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relume.assets.btf.btf_store import STORE, store_btf
+from relume.assets.btf.direction_rings import make_direction_grid
+from relume.assets.btf.local_pca_btf import LocalPcaBtf
+from relume.assets.measured.interpolate import NUM_KNOTS, QuotientKind, measured_over_model
+from relume.brdf.parameter_sweep import curves_of_parameter
+from relume.brdf.registry import TERMS
+from relume.brdf.term_validation import complete_term
+from relume.core.cache import Cache
+from relume.image_io.ocio import lut
+from relume.image_io.ocio.sampling import apply_lut
+from relume.image_io.tone_mapping import tone_map
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.normal_mapping import light_gradient
+from relume.look import complete, validate
+from relume.methods.base import TransferMethod
+from relume.methods.free_camera_transfer import BakedFreeCamera
+from relume.methods.registry import METHODS, open_bake
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.reference import ReferencePoints, environment_texels, reference_radiance
+from relume.reference.btf_surfaces import sample_btf_surface
+from relume.scene.examples.still_life import demo_scene
+from relume.scene.model import Scene
+from relume.scene.scene_folder import load_scene, save_scene
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+SIZE, NUM_LIGHTS, NUM_POINTS = (64, 48), 256, 4000  # as many lights as are grouped
+CACHE_BYTES = 1 << 28
+ANALYTIC = tuple(model for model, term in TERMS.items() if not term.needs_data)
+RAY_MODELS = (
+    "lambert",
+    "ggx",
+)  # has no angle; has one that listens to a parameter with another: rays know no more cases
+
+
+def precompile() -> None:
+    """Bake with every method, edit each analytic term by each curve and along parameters, add and move local lights.
+
+    Cost: a minute and a half of two cores, 20 s when everything is compiled.
+    """
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        pictures = pool.submit(_compile_pictures)
+        _compile_rays()
+        pictures.result()
+
+
+def _compile_pictures() -> None:
+    """Compile what pictures of light triangles are made by, half of all there is."""
+    with _temporary_scene() as (scene, folder):
+        _exercise(METHODS["direct"], scene, folder, ANALYTIC)
+        _compare(scene)
+    _evaluate_measured()
+
+
+def _compile_rays() -> None:
+    """Compile what gather rays need more; `gather` last, by when what it shares with `direct` is there."""
+    with _temporary_scene() as (scene, folder):
+        for method in (METHODS["surface"], METHODS["gather"]):
+            _exercise(method, scene, folder, RAY_MODELS)
+
+
+@contextmanager
+def _temporary_scene() -> Iterator[tuple[Scene, Path]]:
+    """The built-in scene, as the worker has it, and a folder for its bakes."""
+    with tempfile.TemporaryDirectory(prefix="relume-warm-") as name:
+        save_scene(demo_scene(), Path(name) / "scene")
+        yield load_scene(Path(name) / "scene"), Path(name)
+
+
+def _exercise(method: TransferMethod, scene: Scene, folder: Path, models: Iterable[str]) -> None:
+    """Bake, open, edit terms of some models, and move what can be moved."""
+    recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS, num_points=NUM_POINTS)
+    transfer: Any = open_bake(
+        bake_in_process(method, scene, recipe, folder / f"{method.name}.zarr"), Cache(CACHE_BYTES)
+    )
+    if isinstance(transfer, BakedFreeCamera):
+        _move_cameras(transfer, FreeCameraPicture(transfer, recipe.views[0], is_watched=True))
+        _apply_btf(transfer, FreeCameraPicture(transfer, recipe.views[0]), folder)
+        return
+    _apply_btf(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)), folder)
+    _edit(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)), models)
+    _move_lights(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)))
+
+
+def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) -> None:
+    """Edit each curve of a term, and along parameters that move several."""
+    material = transfer.material_names[0]
+    for term in map(TERMS.__getitem__, models):
+        partial = {"materials": {material: {"terms": [{"model": term.model}]}}}
+        picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+        _render(picture)
+        for curve in term.curves:
+            picture.prepare(f"/materials/{material}/terms/0/curves/{curve.name}")
+            _render(picture)
+        for parameter in (
+            candidate for candidate in term.parameters if len(curves_of_parameter(term, candidate.name)) > 1
+        ):
+            picture.prepare(f"/materials/{material}/terms/0/params/{parameter.name}")
+            _render(picture)
+    tone_map(picture.image(), 0.0, "agx")
+    apply_lut(np.zeros((lut.SIZE, lut.SIZE, lut.SIZE, 3), np.uint16), np.zeros((1, 3), np.float32))
+
+
+def _move_lights(transfer: FixedViewTransfer, picture: Picture) -> None:
+    """Add a light of each kind, one after another, and move each twice while it is in hand; one material is enough."""
+    dark: dict[str, Any] = {name: {"terms": []} for name in transfer.material_names[1:]}
+    for kind in ("point", "spot", "directional", "rectangle"):
+        picture.prepare("/lights/Lamp")
+        for height in (1.0, 1.1, 1.2):
+            geometry = {} if kind == "directional" else {"position": [0.0, height, 0.5]}
+            partial = {"materials": dark, "lights": {"Lamp": {"kind": kind, "scale": height, **geometry}}}
+            picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+            _render(picture)
+
+
+def _move_cameras(transfer: BakedFreeCamera, picture: FreeCameraPicture) -> None:
+    """See what a moving eye sees, in a picture that is not all edges: kernels are the same whatever terms and lights.
+
+    Normal maps are asked for apart, for the scene has none.
+    """
+    partial = {"lights": {"Lamp": {"kind": "point", "position": [0.0, 1.0, 0.5]}}}
+    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    picture.advance(None)
+    picture.advance(None)
+    picture.set_camera(picture.sized_camera[0], (2 * SIZE[0], 2 * SIZE[1]))
+    picture.advance(None)
+    zero_coefficients, all_probes = (
+        np.zeros(transfer.vectors_shape, np.float32),
+        np.ones(transfer.vectors_shape[0], np.uint8),
+    )
+    light_gradient(transfer.stored_scene, zero_coefficients, all_probes)
+    for form in ("rgb9e5", "f32"):
+        picture.encode(picture.all_tiles(), form)
+
+
+def _apply_btf(transfer: Any, picture: Picture | FreeCameraPicture, folder: Path) -> None:
+    """Show all surfaces covered with a BTF of two texels by two."""
+    source, grid = folder / "btf.txt", make_direction_grid([(0.0, 1), (45.0, 4)])
+    source.write_text("grey")
+    gray = LocalPcaBtf(
+        grid, np.array([[0, 2, 2], [4, 1, 1]], np.int32), np.zeros((5, 5), np.uint8), np.zeros((5, 5, 1), np.int8),
+        np.array([2], np.uint8), np.full((5, 1, 5, 3), 0.1, np.float16), np.zeros((5, 1, 1, 5, 3), np.int8),
+        np.ones((5, 1, 1), np.float32), np.full((5, 5, 3), 0.1, np.float32),
+        np.zeros((1, 1), np.float32), (0.0, 0.0),
+    )  # fmt: skip
+    with STORE.with_search_folder(folder / "btfs"):
+        terms = store_btf(folder / "btfs", source, "Grey", None, lambda: gray).terms()
+        _sample_btf(complete_term(("warm",), terms[0], None))
+        partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
+        picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+        if isinstance(picture, Picture):
+            _render(picture)
+        else:
+            picture.advance(None)
+
+
+def _sample_btf(term: dict[str, Any]) -> None:
+    """Find what places of a BTF send, as brute force does."""
+    texels, up = TERMS[term["model"]].normalized(term).texels, np.array([[0.0, 0.0, 1.0]])
+    assert texels is not None
+    sample_btf_surface(texels, np.ones((1, 5), np.float32), up, np.random.default_rng(0)).evaluate(
+        np.zeros(1, np.int64), up
+    )
+
+
+def _compare(scene: Scene) -> None:
+    """Find the true radiance of a point, of every texel and of a few."""
+    up, tangent = np.array([[0, 1, 0]], np.float32), np.array([[1, 0, 0]], np.float32)
+    points = ReferencePoints(
+        position=9 * up, normal=up, tangent=tangent, wo=up, textures={"diffuse": up}, roughness=up[:, 1]
+    )
+    terms = [[complete_term(("warm",), {"model": "lambert"}, None)]]
+    for spp in (0, 16):
+        reference_radiance(build_scene_buffers(scene), environment_texels(scene.environment), points, terms, spp)
+
+
+def _evaluate_measured() -> None:
+    """Divide a measured material's curves out, in both precisions that quotients are asked in."""
+    table, curves = np.ones((90, 90, 180, 3), np.float32), np.ones((4, 3, NUM_KNOTS))
+    for kind in (np.float32, np.float64):
+        measured_over_model(QuotientKind.DIFFUSE, table, curves, *np.array([[0], [0], [1], [0], [0], [1]], kind))
+
+
+def _render(picture: Picture) -> None:
+    """Freeze what waits, take a short and a full step, encode."""
+    while picture.next_job():
+        picture.run_next_job(lambda _: None, lambda: False)
+    picture.advance(1)
+    picture.advance(None)
+    for form in ("rgb9e5", "f32"):
+        picture.encode(picture.all_tiles(), form)
+
+
+if __name__ == "__main__":
+    precompile()

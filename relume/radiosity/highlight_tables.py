@@ -1,0 +1,88 @@
+"""Highlights of gather cells under one look, as tables: those that few functions do not tell."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.albedo import Reflectances, quantized_reflectance, unpack_lobes, white_material_key
+from relume.brdf.highlight_tables import lobe_table
+from relume.brdf.texture_slots import texture_slot
+from relume.math.direction_grid import NUM_DIRECTION_BINS, NUM_FINE_BINS
+
+F32 = NDArray[np.float32]
+
+
+class HighlightTables(NamedTuple):
+    """Of cells that have any.
+
+    Attributes:
+        rows: these cells. (G,) intp
+        table_index: table of each highlight of a cell, −1 for none. (G, highlights) int16
+        gain: its colour and texture. (G, highlights, 3) float32
+        tables: see `relume.brdf.highlight_tables.lobe_table`; one channel where all are grey.
+            (tables, `NUM_FINE_BINS`, 1 or 3, `NUM_DIRECTION_BINS`) float32
+        reflectance: how much they send of all that comes, F_00. (G, 3) float32
+    """
+
+    rows: NDArray[np.intp]
+    table_index: NDArray[np.int16]
+    gain: F32
+    tables: F32
+    reflectance: F32
+
+    def subset(self, mask: NDArray[np.bool_]) -> HighlightTables:
+        """Those of some of the cells. chosen: (G,)"""
+        rows, table_index, gain = self.rows[mask], self.table_index[mask], self.gain[mask]
+        return HighlightTables(rows, table_index, gain, self.tables, self.reflectance[mask])
+
+    @classmethod
+    def from_materials(
+        cls, reflectances: Reflectances, material: NDArray[np.uint16], textures: F32, energy_scale: F32
+    ) -> HighlightTables:
+        """Tabulate the highlights of all materials.
+
+        Args:
+            reflectances: of all materials. material: of each cell. (C,) uint16
+            textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`. (2, C, 3) float32
+            energy_scale: what all that a cell sends is multiplied by. (C, 3) float32
+        """
+        documents = [unpack_lobes(entry) for entry in reflectances]
+        max_highlights, table_numbers = max(map(len, documents), default=0), dict[str, int]()
+        table_index = np.full((len(documents), max_highlights), -1, np.int16)
+        slot_index, color, reflectance = (
+            np.zeros_like(table_index, np.intp),
+            np.zeros((*table_index.shape, 3)),
+            np.zeros((*table_index.shape, 3)),
+        )
+        for m, entry in enumerate(documents):
+            for k, document in enumerate(entry):
+                table_index[m, k] = table_numbers.setdefault(
+                    white_material_key({**document, "texture": None}), len(table_numbers)
+                )
+                color[m, k], slot_index[m, k] = document["color"], texture_slot(document)
+                reflectance[m, k] = quantized_reflectance(document)[:, 0]
+        has_any = np.array([len(entry) > 0 for entry in documents])
+        rows = np.flatnonzero(has_any[material])
+        multipliers = np.concatenate([np.ones_like(textures[:1]), textures])[:, rows]
+        patch_factors = (
+            multipliers[slot_index[material[rows]].T, np.arange(len(rows))] * energy_scale[rows]
+        )  # (highlights, G, 3)
+        factor = patch_factors.transpose(1, 0, 2)
+        return cls(
+            rows,
+            table_index[material[rows]],
+            (factor * color[material[rows]]).astype(np.float32),
+            _stack_tables([lobe_table(text) for text in table_numbers]),
+            (factor * reflectance[material[rows]]).sum(axis=1).astype(np.float32),
+        )
+
+
+def _stack_tables(tables: list[F32]) -> F32:
+    """All tables, of one channel where each has three alike."""
+    if not tables:
+        return np.zeros((0, NUM_FINE_BINS, 1, NUM_DIRECTION_BINS), np.float32)
+    is_gray = all((table == table[:, :1]).all() for table in tables)
+    return np.ascontiguousarray(np.stack([table[:, :1] if is_gray else table for table in tables]))

@@ -1,0 +1,95 @@
+"""Gather cells whose material leans as an image of normals says: what a bake finds whose scene has it as its map.
+
+Each point of a cell takes the normal of its texels, as blurred as its textures are. What then comes up over its horizon
+is traced, and its gather rays leave about the normal as it is now; docs/adr/0110-cells-under-images-of-normals.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.texture_slots import NormalMap
+from relume.core.thread_pools import parallel_for_cancellable
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import any_tangent
+from relume.views.map_override_store import RayTracer
+from relume.views.normal_override import perturb_normals
+
+_PATCHES_PER_STEP = 512  # a twentieth of a second's rays
+
+
+def normal_mapped_patches(
+    patches: PatchLight,
+    normals: Sequence[NormalMap | None],
+    tracer: RayTracer,
+    is_canceled: Callable[[], bool] = lambda: False,
+) -> PatchLight:
+    """Lean the cells of some materials.
+
+    Args:
+        patches: as they were baked. normals: the image that leans each material, None for none. (materials,)
+        tracer: of rays that the bake did not trace. is_canceled: asked now and then.
+    Returns:
+        All cells; those of bakes that do not say how textures lie on them stay as they are.
+    Raises:
+        StoreError: the store does not say what is needed to trace its rays. NotFoundError, SceneError: an image cannot
+            be had. CancelledError: `is_canceled` said so.
+    Cost: O(points · (rays of a point + lights that come up)) rays.
+    """
+    if patches.uv is None or patches.surface_normal is None:
+        return patches
+    for material, normal_map in enumerate(normals):
+        rows = np.flatnonzero(patches.material == material)
+        if normal_map is not None and len(rows):
+            perturbed_points = _perturbed_points(patches, rows, normal_map)
+            patches = _retrace(patches, perturbed_points, rows, tracer, is_canceled)
+    return patches
+
+
+def _perturbed_points(patches: PatchLight, rows: NDArray[np.intp], normal_map: NormalMap) -> SurfacePoints:
+    """The points of all cells where some lean. rows: which. (G,)"""
+    assert patches.uv is not None  # who calls has looked
+    assert patches.surface_normal is not None
+    points = patches.points_of(rows)
+    uv, surface_normal = patches.uv[rows].reshape(points.num_points, -1), patches.surface_normal[rows].reshape(-1, 3)
+    perturbed_normal = perturb_normals(
+        normal_map, uv, surface_normal, points.normal, points.tangent, surface_normal
+    ).normal
+    point_rows = (rows[:, None] * patches.points_per_patch + np.arange(patches.points_per_patch)).ravel()
+    normal, tangent = patches.points.normal.copy(), patches.points.tangent.copy()
+    normal[point_rows], tangent[point_rows] = perturbed_normal, any_tangent(perturbed_normal)
+    return patches.points._replace(normal=normal, tangent=tangent)
+
+
+def _retrace(
+    patches: PatchLight,
+    perturbed_points: SurfacePoints,
+    rows: NDArray[np.intp],
+    tracer: RayTracer,
+    is_canceled: Callable[[], bool],
+) -> PatchLight:
+    """Cells with other normals, and what some of them see and hit. leaning: points of all. rows: those cells. (G,)"""
+    retraced = replace(
+        patches, points=perturbed_points, visible=patches.visible.copy(), gather_hits=patches.gather_hits.copy()
+    )
+
+    def trace(start: int, stop: int) -> None:
+        step_rows = rows[start:stop]
+        baked_points, step_points = patches.points_of(step_rows), retraced.points_of(step_rows)
+        visible = tracer.visibility(
+            step_points, baked_points.normal, patches.visible[step_rows].reshape(step_points.num_points, -1)
+        )
+        retraced.visible[step_rows] = visible.reshape(len(step_rows), *retraced.visible.shape[1:])
+        retraced.gather_hits[step_rows] = tracer.gather_hits(step_points, step_points.normal, patches.pattern).reshape(
+            len(step_rows), -1
+        )
+
+    parallel_for_cancellable(
+        trace, len(rows), _PATCHES_PER_STEP, lambda share: None, is_canceled, "tracing cells that lean"
+    )
+    return retraced

@@ -1,0 +1,140 @@
+"""First hits of rays, and the camera's rays: what each position of the image plane sees first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges, num_threads, parallel_for_chunks
+from relume.raytrace.embree import EmbreeScene, intersect, packet_arguments
+from relume.raytrace.ray_packet import (
+    LANES,
+    enable_first_lanes,
+    enable_stochastic_alpha,
+    get_hit,
+    get_uv,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_hits,
+)
+from relume.scene.model import Camera
+
+F32 = NDArray[np.float32]
+
+_RAYS_PER_RANGE, _RANGES_PER_THREAD = 8192, 4  # at least; at most: to hand a range out takes as long as 700 rays
+_BY_DIRECTION = np.float32(0)  # the chance of rays that are given none
+
+
+@dataclass(frozen=True)
+class Hits:
+    """The first hits of n rays.
+
+    Attributes:
+        face: index of the triangle, -1 where the ray leaves the scene. (n,) int32
+        uv: barycentric coordinates of its second and third corner. (n, 2) float32
+        distance: along the unit direction; infinite where nothing is hit. (n,) float32
+    """
+
+    face: NDArray[np.int32]
+    uv: F32
+    distance: F32
+
+    def rows(self, rows: NDArray[Any] | slice) -> Hits:
+        """Those of some rays."""
+        return Hits(self.face[rows], self.uv[rows], self.distance[rows])
+
+    @staticmethod
+    def concatenate(batches: Sequence[Hits]) -> Hits:
+        """Those of several, one after another."""
+        return Hits(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Hits)))
+
+
+@nb.njit(nogil=True, cache=True)
+def _trace(intersect, scene, arguments, origins, directions, alpha_sample, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
+    """Trace rays [start, stop). origins, chance: of n rays, or one of all."""
+    last_origin, last_alpha_sample = origins.shape[0] - 1, alpha_sample.shape[0] - 1
+    packet = new_packet(scene, arguments)
+    for k in range(LANES):  # Embree leaves origins as they are
+        set_origin(packet, k, origins[0, 0], origins[0, 1], origins[0, 2])
+    for first in range(start, stop, LANES):
+        width = min(LANES, stop - first)
+        enable_first_lanes(packet, width)
+        for k in range(LANES):
+            r = first + min(k, width - 1)
+            if last_origin > 0:
+                set_origin(packet, k, origins[r, 0], origins[r, 1], origins[r, 2])
+            set_direction(packet, k, directions[r, 0], directions[r, 1], directions[r, 2], np.float32(np.inf))
+            enable_stochastic_alpha(packet, k, alpha_sample[min(r, last_alpha_sample)])
+        trace_hits(intersect, packet)
+        for k in range(width):
+            r = first + k
+            face[r], distance[r] = get_hit(packet, k)
+            if face[r] >= 0:  # else there are those of a ray before
+                uv[r, 0], uv[r, 1] = get_uv(packet, k)
+
+
+def trace_rays(
+    scene: EmbreeScene, origin: F32, directions: F32, alpha_sample: F32 | np.float32 = _BY_DIRECTION
+) -> Hits:
+    """Find the first hits of rays from one point, or from a point each.
+
+    Args:
+        scene: the triangles. origin: (3,) float32, or (n, 3). directions: unit. (n, 3) float32
+        alpha_sample: of each ray at surfaces that blend, within (0, 1], or one of all. (n,) float32
+    """
+    n = len(directions)
+    origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
+    is_coherent, alpha_samples = len(origins) == 1, np.atleast_1d(alpha_sample)
+    hits = Hits(np.empty(n, np.int32), np.zeros((n, 2), np.float32), np.empty(n, np.float32))
+    arguments = packet_arguments(is_coherent)
+    for_ranges(
+        lambda start, stop: _trace(
+            intersect, scene.handle, arguments.ctypes.data, origins, directions, alpha_samples, start, stop,
+            hits.face, hits.uv, hits.distance,
+        ),
+        n,
+        max(_RAYS_PER_RANGE, n // (_RANGES_PER_THREAD * num_threads())),
+    )  # fmt: skip
+    return hits
+
+
+def camera_directions(camera: Camera, size: tuple[int, int], x: F32, y: F32) -> F32:
+    """Compute unit world directions through image positions.
+
+    Args:
+        camera: where the picture is seen from. size: width and height in pixels.
+        x, y: pixels from the left and from the top. (n,) float32
+    Returns:
+        (n, 3) float32
+    """
+    width, height = size
+    half_height = np.tan(camera.yfov / 2)
+    out = np.empty((len(x), 3), np.float32)
+    camera_arguments = (
+        np.ascontiguousarray(camera.to_world[:3, :3], np.float64),
+        half_height * width / height,
+        half_height,
+        width,
+        height,
+    )
+    parallel_for_chunks(lambda start, stop: _aim(*camera_arguments, x, y, start, stop, out), len(x))
+    return out
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _aim(rotation, half_width, half_height, width, height, x, y, start, stop, out):  # type: ignore[no-untyped-def]
+    """Aim rays [start, stop), in double precision: pixels of wide pictures are a ten thousandth apart."""
+    for r in range(start, stop):
+        right, up = (2 * x[r] / width - 1) * half_width, (1 - 2 * y[r] / height) * half_height
+        length = math.sqrt(right * right + up * up + 1)
+        for axis in range(3):
+            along = rotation[axis, 0] * right + rotation[axis, 1] * up - rotation[axis, 2]
+            out[r, axis] = along / length

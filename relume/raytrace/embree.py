@@ -1,0 +1,165 @@
+"""Embree 4 through its C interface: the packet calls that embreex's own wrapper does not offer.
+
+The library is the one that the embreex wheel bundles. Numba kernels receive `occluded` and `intersect` as first-class
+functions and call them without the interpreter: `PACKET_WIDTH` rays a call.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import glob
+import os
+import weakref
+from dataclasses import dataclass
+from typing import Any
+
+import embreex
+import embreex.rtcore
+import numba.experimental.function_type  # noqa: F401  (registers functions that are known by their addresses)
+import numpy as np
+from numba.core import types
+from numpy.typing import NDArray
+
+from relume.core.errors import SceneError
+from relume.raytrace.alpha_filter import FILTER, AlphaTest
+
+_POINTER, _WORD = ctypes.c_void_p, ctypes.c_uint64
+_TRIANGLE, _INDEX_BUFFER, _VERTEX_BUFFER, _UINT3, _FLOAT3 = 0, 0, 1, 0x5003, 0x9003
+_COHERENT, _FEATURE_TRIANGLE = 1 << 16, 2
+_BUILD_QUALITY_MEDIUM = 1
+_NATIVE_RAY16 = 34  # RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED
+
+PacketCall = types.void(types.int64, types.int64, types.int64, types.int64)
+
+
+def _open_library() -> ctypes.CDLL:
+    folder = os.path.join(os.path.dirname(os.path.dirname(embreex.__file__)), "embreex.libs")
+    library_paths = sorted(glob.glob(os.path.join(glob.escape(folder), "libembree4*")))
+    if not library_paths:
+        raise ImportError("the embreex wheel bundles no Embree library here; install embreex from a binary wheel")
+    return ctypes.CDLL(library_paths[0])
+
+
+_library = _open_library()
+
+
+def _function(name: str, result: type | None, *arguments: type) -> ctypes._NamedFuncPointer:
+    function = getattr(_library, name)
+    function.restype, function.argtypes = result, arguments
+    return function  # type: ignore[no-any-return]
+
+
+_new_device = _function("rtcNewDevice", _POINTER, ctypes.c_char_p)
+_release_scene = _function("rtcReleaseScene", None, _POINTER)
+_release_geometry = _function("rtcReleaseGeometry", None, _POINTER)
+_new_scene = _function("rtcNewScene", _POINTER, _POINTER)
+_set_quality = _function("rtcSetSceneBuildQuality", None, _POINTER, ctypes.c_int)
+_new_geometry = _function("rtcNewGeometry", _POINTER, _POINTER, ctypes.c_int)
+_set_buffer = _function(
+    "rtcSetNewGeometryBuffer",
+    _POINTER, _POINTER, ctypes.c_int, ctypes.c_uint, ctypes.c_int, ctypes.c_size_t, ctypes.c_size_t,
+)  # fmt: skip
+_set_user_data = _function("rtcSetGeometryUserData", None, _POINTER, _POINTER)
+_set_filters = [
+    _function(f"rtcSetGeometry{call}FilterFunction", None, _POINTER, _POINTER) for call in ("Intersect", "Occluded")
+]
+_commit_geometry = _function("rtcCommitGeometry", None, _POINTER)
+_attach_geometry = _function("rtcAttachGeometry", ctypes.c_uint, _POINTER, _POINTER)
+_commit_scene = _function("rtcCommitScene", None, _POINTER)
+_device_error = _function("rtcGetDeviceError", ctypes.c_int, _POINTER)
+
+_device = _new_device(b"threads=1")
+_property = _function("rtcGetDeviceProperty", ctypes.c_ssize_t, _POINTER, ctypes.c_int)
+
+# Rays of a packet: what this processor's vectors hold. Embree takes larger packets apart and traces ray by ray.
+PACKET_WIDTH = 16 if _property(_device, _NATIVE_RAY16) else 8
+
+
+class _ByAddress(types.WrapperAddressProtocol):
+    """A C function that Numba calls by address; typed, so that compiled kernels are cached on disk."""
+
+    def __init__(self, name: str) -> None:
+        self._address = ctypes.cast(getattr(_library, name), _POINTER).value
+
+    def __wrapper_address__(self) -> int:
+        assert self._address is not None
+        return self._address
+
+    def signature(self) -> Any:
+        return PacketCall
+
+
+occluded = _ByAddress(f"rtcOccluded{PACKET_WIDTH}")
+intersect = _ByAddress(f"rtcIntersect{PACKET_WIDTH}")
+
+
+def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
+    """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three empty pointers. (5,) uint64"""
+    arguments = np.zeros(5, np.uint64)
+    halves = arguments.view(np.uint32)
+    halves[0] = _COHERENT if coherent else 0
+    halves[1] = _FEATURE_TRIANGLE
+    return arguments
+
+
+_OMITTED_VERTEX = (
+    0xFFFFFFFF  # a corner that no scene has: Embree passes over the triangle, and others keep their numbers
+)
+
+
+@dataclass(frozen=True)
+class EmbreeScene:
+    """Committed triangles; `handle` goes to the kernels. Released with the object."""
+
+    handle: int
+    alpha_test: AlphaTest | None = None
+
+    @classmethod
+    def build(
+        cls, positions: NDArray[np.float32], faces: NDArray[np.uint32], alpha_test: AlphaTest | None = None
+    ) -> EmbreeScene:
+        """Build the acceleration structure.
+
+        Args:
+            positions: (num_vertices, 3) float32, finite. faces: (num_faces, 3) uint32.
+            alpha_test: of triangles that are not everywhere; None where all are.
+        Raises:
+            SceneError: Embree refused the geometry.
+        """
+        scene = _new_scene(_device)
+        _set_quality(scene, _BUILD_QUALITY_MEDIUM)
+        if alpha_test is None:
+            _attach(scene, positions, faces)
+        else:
+            is_alpha_tested = alpha_test.image[:, None] >= 0
+            _attach(scene, positions, np.where(is_alpha_tested, np.uint32(_OMITTED_VERTEX), faces))
+            _attach(scene, positions, np.where(is_alpha_tested, faces, np.uint32(_OMITTED_VERTEX)), alpha_test)
+        _commit_scene(scene)
+        if error := _device_error(_device):
+            raise SceneError(f"Embree could not build the scene (error {error}); check it for broken triangles")
+        return cls(scene, alpha_test)
+
+    def __post_init__(self) -> None:
+        weakref.finalize(self, _release_scene, self.handle).atexit = False
+
+
+def _attach(
+    scene: int, positions: NDArray[np.float32], faces: NDArray[np.uint32], alpha_test: AlphaTest | None = None
+) -> None:
+    """Add triangles to a scene, asking what `alpha_test` says about each hit. Raises SceneError."""
+    geometry = _new_geometry(_device, _TRIANGLE)
+    for kind, layout, rows in (
+        (_VERTEX_BUFFER, _FLOAT3, np.ascontiguousarray(positions, np.float32)),
+        (_INDEX_BUFFER, _UINT3, np.ascontiguousarray(faces, np.uint32)),
+    ):
+        buffer = _set_buffer(geometry, kind, 0, layout, 12, len(rows))
+        if not buffer:
+            raise SceneError(f"Embree could not take {len(rows)} rows of geometry; use a smaller scene")
+        ctypes.memmove(buffer, rows.ctypes.data, rows.nbytes)
+    if alpha_test is not None:
+        _set_user_data(geometry, alpha_test.addresses.ctypes.data)
+        for set_filter in _set_filters:
+            set_filter(geometry, FILTER)
+    _commit_geometry(geometry)
+    _attach_geometry(scene, geometry)
+    _release_geometry(geometry)

@@ -1,0 +1,181 @@
+"""Which samples of a local light each point sees, in packets of 16 neighbouring points × one sample; and their sum.
+
+Both ends of a shadow ray lie off their surfaces, on the sides that face each other: neither shadows itself. Of lights
+of very many samples, four that lie side by side are asked by 16 points together, each of which asks for one of them:
+where all agree, all see all four or none.
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges
+from relume.lights.light_sampling import LightStrata
+from relume.lights.local_lights import LocalLight, light_sample
+from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
+from relume.raytrace.gather_rays import cranley_patterson_offset
+from relume.raytrace.ray_packet import (
+    LANES,
+    enable_lane,
+    enable_stochastic_alpha,
+    is_unoccluded,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_shadows,
+)
+from relume.raytrace.surface_points import SurfacePoints
+
+F32 = NDArray[np.float32]
+
+MIN_GROUPED_SAMPLES = (
+    1024  # samples, of which four side by side are traced one by one only where neighbours do not see them alike
+)
+_POINTS_PER_RANGE = 4096
+_GROUP_SIZE = 4
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def shadow_ray(dx, dy, dz, distance, nx, ny, nz, surface_offset):  # type: ignore[no-untyped-def]
+    """Aim the shadow ray to a sample of a light, off whose surface it ends.
+
+    Args:
+        dx, dy, dz, distance, nx, ny, nz: from `light_sample`. surface_offset: metres.
+    Returns:
+        Direction (three), not normalised where the ray ends, and how many times its length the ray is long.
+    """
+    # not normalised, but where it never ends: it ends at one
+    length, num_lengths = (np.float32(1), distance) if distance == np.inf else (distance, np.float32(1))
+    return (
+        length * dx + surface_offset * nx,
+        length * dy + surface_offset * ny,
+        length * dz + surface_offset * nz,
+        num_lengths,
+    )
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _aim_packet(packet, light, strata, surface_offset, points, first, width, sample, num_samples):  # type: ignore[no-untyped-def]
+    """Aim shadow rays of points [first, first + width) at one sample of a light, or at several side by side.
+
+    Args:
+        packet, light, strata, surface_offset, points: as in `_trace`.
+        sample, num_samples: lane k's is `sample` + k mod `num_samples`; a power of two.
+    Returns:
+        How many of them are to be traced: those of points that this sample may light.
+    """
+    position, normal, _, seed, alpha_sample = points
+    num_active = 0
+    for k in range(LANES):
+        p = first + min(k, width - 1)
+        x, y, z = position[p, 0], position[p, 1], position[p, 2]
+        shift_u, shift_v = cranley_patterson_offset(strata, seed[p])
+        dx, dy, dz, distance, weight, nx, ny, nz = light_sample(
+            light, strata, sample + (k & (num_samples - 1)), shift_u, shift_v, x, y, z
+        )
+        is_above = dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2] > 0
+        is_active = k < width and is_above and weight > 0
+        enable_lane(packet, k, is_active)
+        num_active += 1 if is_active else 0
+        along_x, along_y, along_z, num_lengths = shadow_ray(dx, dy, dz, distance, nx, ny, nz, surface_offset)
+        set_origin(packet, k, x, y, z)
+        enable_stochastic_alpha(packet, k, alpha_sample[min(p, alpha_sample.shape[0] - 1)])
+        set_direction(packet, k, along_x, along_y, along_z, num_lengths)
+    return num_active
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _count_unoccluded(packet, width):  # type: ignore[no-untyped-def]
+    """Count the traced rays that met nothing."""
+    count = 0
+    for k in range(width):
+        count += 1 if packet.is_active[k] != 0 and is_unoccluded(packet, k) else 0
+    return count
+
+
+@nb.njit(nogil=True, cache=True)
+def _trace(  # type: ignore[no-untyped-def]
+    occluded, scene, arguments, light, strata, surface_offset, points, start, stop, bits
+):
+    """Trace points [start, stop); start is a multiple of 16."""
+    packet, num = new_packet(scene, arguments), strata.uv.shape[0]
+    for first in range(start, stop, LANES):
+        width = min(LANES, stop - first)
+        for group in range(0, num, _GROUP_SIZE):
+            all_unoccluded = False
+            if (
+                num >= MIN_GROUPED_SAMPLES
+                and _aim_packet(packet, light, strata, surface_offset, points, first, width, group, _GROUP_SIZE)
+                == width
+            ):
+                trace_shadows(occluded, packet)
+                num_unoccluded = _count_unoccluded(packet, width)
+                if num_unoccluded == 0:
+                    continue
+                all_unoccluded = num_unoccluded == width
+            for sample in range(group, min(group + _GROUP_SIZE, num)):
+                if _aim_packet(packet, light, strata, surface_offset, points, first, width, sample, 1) == 0:
+                    continue
+                if not all_unoccluded:
+                    trace_shadows(occluded, packet)
+                for k in range(width):
+                    if packet.is_active[k] != 0 and (all_unoccluded or is_unoccluded(packet, k)):
+                        bits[first + k, sample >> 3] |= np.uint8(1 << (sample & 7))
+
+
+def trace_light_visibility(
+    scene: EmbreeScene, surface_offset: float, light: LocalLight, strata: LightStrata, points: SurfacePoints
+) -> NDArray[np.uint8]:
+    """Trace every point against every sample of a light that is above its horizon and gives it light.
+
+    Args:
+        scene: the triangles that may be in the way.
+        surface_offset: metres by which rays end before the light's own surface.
+        light: the light. strata: its samples, from `make_light_strata`; the points' seeds shift them.
+        points: n points that the light may reach; neighbours follow each other.
+    Returns:
+        Sample k of a point in bit k & 7 of byte k >> 3. (n, ceil(samples / 8)) uint8
+    """
+    bits = np.zeros((points.num_points, (len(strata.uv) + 7) // 8), np.uint8)
+    arguments = packet_arguments(coherent=True)
+    args = (light, strata, np.float32(surface_offset), points)
+    for_ranges(
+        lambda start, stop: _trace(occluded, scene.handle, arguments.ctypes.data, *args, start, stop, bits),
+        points.num_points,
+        _POINTS_PER_RANGE,
+    )
+    return bits
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _sum_irradiance(light, strata, points, visible, start, stop, irradiance):  # type: ignore[no-untyped-def]
+    """Sum what points [start, stop) see of a light into `irradiance`. (n,)"""
+    position, normal, _, seed, _ = points
+    for p in range(start, stop):
+        x, y, z = position[p, 0], position[p, 1], position[p, 2]
+        shift_u, shift_v = cranley_patterson_offset(strata, seed[p])
+        total = 0.0
+        for sample in range(strata.uv.shape[0]):
+            if (visible[p, sample >> 3] >> (sample & 7)) & 1:
+                dx, dy, dz, _, weight, _, _, _ = light_sample(light, strata, sample, shift_u, shift_v, x, y, z)
+                total += weight * max(dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2], np.float32(0))
+        irradiance[p] = total
+
+
+def compute_irradiance(
+    light: LocalLight, strata: LightStrata, points: SurfacePoints, visible: NDArray[np.uint8]
+) -> F32:
+    """Irradiance of points under a light of unit emission.
+
+    Args:
+        light, strata, points: as `trace_light_visibility` had them. visible: what it returned. (n, bytes) uint8
+    Returns:
+        E over the unit of emission (see `relume.lights.local_lights`). (n,) float32
+    """
+    out = np.empty(points.num_points, np.float32)
+    args = (light, strata, points, visible)
+    for_ranges(lambda start, stop: _sum_irradiance(*args, start, stop, out), points.num_points, _POINTS_PER_RANGE)
+    return out

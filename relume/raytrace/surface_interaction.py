@@ -1,0 +1,223 @@
+"""Points on surfaces: interpolated position, normals, tangent and textures of ray hits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.thread_pools import for_ranges
+from relume.raytrace.barycentric import FacePoints
+from relume.raytrace.camera_rays import Hits
+from relume.raytrace.scene_buffers import SceneBuffers
+from relume.raytrace.shading_normals import flip_to_viewer, mapped_normal, visible_length
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import project_to_tangent
+from relume.raytrace.texture import MipMap
+from relume.scene.model import Material
+from relume.scene.roughness_levels import base_roughness, rougher
+
+F32 = NDArray[np.float32]
+
+_TEXTURE_NAMES = ("diffuse", "specular", "emission")
+_RAYS_PER_RANGE = 16_384
+
+
+@dataclass(frozen=True)
+class SurfaceInteraction:
+    """What n rays see: points of surfaces, and the textures there.
+
+    Attributes:
+        points: turned to the viewer, moved off the surface by the scene's epsilon; their seeds are their numbers.
+        diffuse, specular: texture channels, 1 where the material has none. (n, 3) float32
+        uv: places in textures (u, v), side of what a pixel covers there, angle from the tangent to the texture's x axis
+            in radians, −1 where the texture is seen mirrored, else 1. Where a triangle has no place in textures, it
+            is that of a projection along the axis of the world that it faces most, in metres. (n, 5) float32
+        roughness: over what the material's terms say, 1 where it has no map. (n,) float32
+        normal_length: of the mean of the normals that a pixel covers, 1 where there are no bumps. (n,) float32
+        emission: over the mean of the material's surfaces, 1 where it has no image. (n, 3) float32
+        surface_normal: normals without bumps, which images of others lean; the points' own where there are none.
+            (n, 3) float32
+    """
+
+    points: SurfacePoints
+    diffuse: F32
+    specular: F32
+    uv: F32
+    roughness: F32
+    normal_length: F32
+    emission: F32
+    surface_normal: F32
+
+    def rows(self, rows: NDArray[np.integer]) -> SurfaceInteraction:
+        """Choose some of them; their seeds are their new numbers."""
+        points = self.points.rows(rows)._replace(seed=np.arange(len(rows), dtype=np.uint32))
+        surface_columns = (
+            self.diffuse, self.specular, self.uv, self.roughness, self.normal_length, self.emission,
+            self.surface_normal,
+        )  # fmt: skip
+        return SurfaceInteraction(points, *(column[rows] for column in surface_columns))
+
+
+def surface_at(
+    geometry: SceneBuffers,
+    hits: Hits,
+    directions: F32,
+    materials: Sequence[Material] = (),
+    pixel_angle: float = 0.0,
+) -> SurfaceInteraction:
+    """Interpolate the surface at ray hits.
+
+    Args:
+        geometry: the triangles. hits: the first hits of n rays.
+        directions: unit, of the rays. (n, 3) float32
+        materials: where given, textures and normal maps are evaluated, filtered over the pixel.
+        pixel_angle: angle that a pixel spans, radians.
+    Returns:
+        Points; where a ray hit nothing the normal faces the viewer and the position is the ray's direction.
+    """
+    ranges: dict[int, tuple[F32, ...]] = {}
+
+    def interpolate(start: int, stop: int) -> None:
+        rows = slice(start, stop)
+        ranges[start] = _interpolate_range(geometry, hits.rows(rows), directions[start:stop], materials, pixel_angle)
+
+    for_ranges(interpolate, max(1, len(directions)), _RAYS_PER_RANGE)
+    columns = zip(*(ranges[start] for start in sorted(ranges)), strict=True)
+    position, normal, tangent, *surface_columns = map(np.concatenate, columns)
+    seed = np.arange(len(directions), dtype=np.uint32)
+    return SurfaceInteraction(SurfacePoints(position, normal, tangent, seed), *surface_columns)
+
+
+class _Textured(NamedTuple):
+    """What textures say of n points.
+
+    Attributes:
+        channels: of images. (n, 3) each, roughness (n, 1). length: of the mean of normals that a pixel covers. (n,)
+        normal: leant by normal maps. (n, 3)
+    """
+
+    channels: dict[str, F32]
+    length: F32
+    normal: F32
+
+    @classmethod
+    def sample(
+        cls, face_points: FacePoints, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32
+    ) -> _Textured:
+        """Those of points. material: that each is of, −1 for none. (n,) footprint: of a pixel in textures. (n,)"""
+        channels = dict(zip(_TEXTURE_NAMES, np.ones((3, *face_points.position.shape), np.float32), strict=True))
+        channels["roughness"] = np.ones((len(face_points.uv), 1), np.float32)
+        length, normal = np.ones(len(face_points.uv), np.float32), face_points.normal
+        for index, scene_material in enumerate(materials):
+            rows = np.nonzero(material == index)[0]
+            if not len(rows):
+                continue
+            for name, out in channels.items():
+                if name in scene_material.textures:
+                    out[rows] = MipMap.for_texture(scene_material.textures[name]).sample(
+                        face_points.uv[rows], footprint[rows]
+                    )
+            if scene_material.normal_map is not None:
+                pyramid = MipMap.for_texture(scene_material.normal_map)
+                mapped = pyramid.sample(face_points.uv[rows], footprint[rows])
+                length[rows] = visible_length(mapped, pyramid.texels(footprint[rows]))
+                if (material_roughness := base_roughness(scene_material)) is not None:
+                    channels["roughness"][rows, 0] = rougher(
+                        channels["roughness"][rows, 0], length[rows], material_roughness
+                    )
+                normal = normal.copy() if normal is face_points.normal else normal
+                normal[rows] = mapped_normal(
+                    mapped, normal[rows], face_points.tangents[rows], face_points.face_normal[rows]
+                )
+        return cls(channels, length, normal)
+
+
+def _interpolate_range(
+    geometry: SceneBuffers,
+    hits: Hits,
+    directions: F32,
+    materials: Sequence[Material],
+    pixel_angle: float,
+) -> tuple[F32, ...]:
+    """Interpolate a range of `surface_at`: position, normal, tangent, and the others of `Surface` in their order."""
+    face_points = FacePoints.from_hits(geometry, hits, directions)
+    is_hit, distance = face_points.is_hit, np.where(face_points.is_hit, hits.distance, 1.0)
+    footprint = (
+        face_points.footprint(distance, directions, pixel_angle) if materials else np.zeros(len(is_hit), np.float32)
+    )
+    material = np.where(is_hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
+    channels, length, mapped = _Textured.sample(face_points, materials, material, footprint)
+    normal = flip_to_viewer(mapped, directions)
+    tangent = project_to_tangent(face_points.tangents[:, :3], normal)
+    uv_frame = _texture_frame(face_points.p, face_points.uvs, face_points.uv, normal, tangent)
+    uv_frame[:, 2] = footprint
+    lacks_uv = uv_frame[:, 4] == 0
+    if lacks_uv.any():
+        flat_columns = (
+            column[lacks_uv]
+            for column in (face_points.position, face_points.face_normal, normal, tangent, distance * pixel_angle)
+        )
+        uv_frame[lacks_uv] = _triplanar_frame(*flat_columns)
+    return (
+        np.where(is_hit[:, None], face_points.position, directions).astype(np.float32),
+        np.where(is_hit[:, None], normal, -directions).astype(np.float32),
+        tangent,
+        channels["diffuse"],
+        channels["specular"],
+        uv_frame.astype(np.float32),
+        channels["roughness"][:, 0],
+        length,
+        channels["emission"],
+        face_points.normal.astype(np.float32, copy=False),
+    )
+
+
+def _texture_frame(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
+    """Where points lie in textures, but for the footprint, and how textures lie there; see `Surface.uv`.
+
+    Args:
+        p, uvs: corners of their triangles. (n, 3, 3), (n, 3, 2). uv: of the points. (n, 2)
+        normal, tangent: of the points. (n, 3) each
+    Returns:
+        (n, 5); the last is 0 where a triangle has no area in textures.
+    """
+    position_edges, uv_edges = p[:, 1:] - p[:, :1], uvs[:, 1:] - uvs[:, :1]
+    area = uv_edges[:, 0, 0] * uv_edges[:, 1, 1] - uv_edges[:, 1, 0] * uv_edges[:, 0, 1]
+    sign = np.sign(area)[:, None]
+    along_u = sign * (position_edges[:, 0] * uv_edges[:, 1, 1:] - position_edges[:, 1] * uv_edges[:, 0, 1:])
+    along_v = sign * (position_edges[:, 1] * uv_edges[:, 0, :1] - position_edges[:, 0] * uv_edges[:, 1, :1])
+    x, y = np.einsum("nc,nc->n", along_u, tangent), np.einsum("nc,nc->n", along_u, np.cross(normal, tangent))
+    is_upright = np.einsum("nc,nc->n", np.cross(normal, along_u), along_v) < 0  # v runs down
+    angle, zeros = np.arctan2(y, x), np.zeros(len(uv))
+    return np.asarray(np.column_stack([uv, zeros, angle, np.where(area == 0, 0, np.where(is_upright, 1, -1))]))
+
+
+def triplanar_axes(face_normal: F32) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Axes of a texture that is projected along the axis of the world that faces look along most.
+
+    Args:
+        face_normal: of n faces. (n, 3)
+    Returns:
+        Along u, and against v, unit. (n, 3) each
+    """
+    axis = np.abs(face_normal).argmax(axis=1)
+    sign = np.where(np.take_along_axis(face_normal, axis[:, None], 1)[:, 0] < 0, -1, 1)
+    u_axis = np.eye(3)[np.array([2, 0, 0])[axis]] * np.where(axis == 1, 1, np.where(axis == 0, -sign, sign))[:, None]
+    return u_axis, np.cross(sign[:, None] * np.eye(3)[axis], u_axis)
+
+
+def _triplanar_frame(position: F32, face_normal: F32, normal: F32, tangent: F32, side: F32) -> F32:
+    """Places of a texture that is projected along the axes of the world, a metre wide; see `Surface.uv`.
+
+    Args:
+        position, face_normal, normal, tangent: of n points. (n, 3) each. side: of a pixel there, metres. (n,)
+    """
+    u_axis, v_axis = triplanar_axes(face_normal)
+    u, v = np.einsum("nc,nc->n", position, u_axis), -np.einsum("nc,nc->n", position, v_axis)
+    x = np.einsum("nc,nc->n", u_axis, tangent)
+    y = np.einsum("nc,nc->n", u_axis, np.cross(normal, tangent))
+    return np.asarray(np.column_stack([u, v, side, np.arctan2(y, x), np.ones(len(u))]))

@@ -1,0 +1,152 @@
+"""Filtered texture lookups: a mip pyramid, trilinear."""
+
+from __future__ import annotations
+
+import math
+import weakref
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges
+from relume.scene.model import WRAPS, Texture
+from relume.scene.texture_encoding import ROWS_PER_BATCH, decode, periodic
+
+F32 = NDArray[np.float32]
+
+_LOOKUPS_PER_RANGE = 16_384
+_REPEAT, _, _CLAMP = range(len(WRAPS))  # as kernels know them
+
+
+class MipMap:
+    """A texture and its halvings down to one texel; these are kept in half precision."""
+
+    def __init__(self, texture: Texture) -> None:
+        self.wrap, self.coding = texture.wrap, texture.encoding
+        self.levels: list[NDArray[Any]] = [texture.pixels]
+        while max(self.levels[-1].shape[:2]) > 1:
+            self.levels.append(self._downsample(len(self.levels) - 1))
+
+    def level(self, k: int) -> F32:
+        """The values of a level. (height, width, channels) float32"""
+        return decode(self.levels[k], self.coding if k == 0 else None)
+
+    def _downsample(self, k: int) -> NDArray[np.float16]:
+        """The level after level k, made a few rows at a time."""
+        image, coding = self.levels[k], self.coding if k == 0 else None
+        strips = [
+            _halve(decode(image[start : start + ROWS_PER_BATCH], coding))
+            for start in range(0, len(image), ROWS_PER_BATCH)
+        ]
+        return np.concatenate([strip.astype(np.float16) for strip in strips])
+
+    @staticmethod
+    def for_texture(texture: Texture) -> MipMap:
+        """Find or make the pyramid of a texture, kept for as long as the texture is."""
+        key = id(texture)
+        if key not in _pyramids:
+            _pyramids[key] = MipMap(texture)
+            weakref.finalize(texture, _pyramids.pop, key, None).atexit = False
+        return _pyramids[key]
+
+    def texels(self, footprint: F32) -> F32:
+        """Sides of filters, in texels. footprint: in uv. (n,)"""
+        return np.asarray(footprint * max(self.levels[0].shape[:2]), np.float32)
+
+    def sample(self, uv: F32, footprint: F32) -> F32:
+        """Look filtered values up.
+
+        Args:
+            uv: v from the top. (n, 2) float32. footprint: side of the filter in uv. (n,) float32
+        Returns:
+            (n, channels) float32
+        """
+        texels = np.maximum(self.texels(footprint), 1.0)
+        level = np.minimum(np.log2(texels), len(self.levels) - 1)
+        lower = np.floor(level).astype(np.int64)
+        out = np.zeros((len(uv), self.levels[0].shape[2]), np.float32)
+        for k in np.unique(np.concatenate([lower, np.minimum(lower + 1, len(self.levels) - 1)])):
+            weight = np.maximum(1 - np.abs(level - k), 0)
+            rows = np.nonzero(weight > 0)[0]
+            out[rows] += (weight[rows, None] * self._bilinear(int(k), uv[rows])).astype(np.float32)
+        return out
+
+    def _bilinear(self, k: int, uv: F32) -> F32:
+        image, coding = self.levels[k], self.coding if k == 0 else None
+        height, width = image.shape[:2]
+        x = uv[:, 0].astype(np.float64) * width - 0.5
+        y = uv[:, 1].astype(np.float64) * height - 0.5
+        x0, y0 = np.floor(x), np.floor(y)
+        fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+        columns = [periodic(x0 + dx, width, self.wrap[0]) for dx in (0, 1)]
+        rows = [periodic(y0 + dy, height, self.wrap[1]) for dy in (0, 1)]
+        texel_rows = [[decode(image[row, column], coding) for column in columns] for row in rows]
+        top, bottom = (left * (1 - fx) + right * fx for left, right in texel_rows)
+        return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
+
+
+def sample_image(texture: Texture, uv: F32) -> F32:
+    """Look a texture up at places, some at once on every thread.
+
+    Args:
+        texture: any. uv: u, v, and the side of what a pixel covers there, as
+            `relume.raytrace.surface_interaction.SurfaceInteraction` has them. (n, ≥ 3) float32
+    Returns:
+        (n, channels) float32
+    """
+    pyramid, out = MipMap.for_texture(texture), np.empty((len(uv), texture.pixels.shape[2]), np.float32)
+
+    def sample_range(start: int, stop: int) -> None:
+        out[start:stop] = pyramid.sample(uv[start:stop, :2], uv[start:stop, 2])
+
+    for_ranges(sample_range, len(uv), _LOOKUPS_PER_RANGE)
+    return out
+
+
+_pyramids: dict[int, MipMap] = {}
+"""By identity of their textures, for as long as these live; equal content is not worth comparing."""
+
+
+def _halve(image: F32) -> F32:
+    height, width = image.shape[:2]
+    padded = np.pad(
+        image, ((0, height % 2 if height > 1 else 1), (0, width % 2 if width > 1 else 1), (0, 0)), mode="edge"
+    )
+    return np.asarray(
+        (padded[0::2, 0::2] + padded[1::2, 0::2] + padded[0::2, 1::2] + padded[1::2, 1::2]) / 4, np.float32
+    )
+
+
+@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
+    """Fold a texel's index into an image that is mirrored outside, or clamp it."""
+    if wrap == _CLAMP:
+        return min(max(index, 0), size - 1)
+    folded = index % (2 * size)
+    return min(folded, 2 * size - 1 - folded)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def two_texels(wrap, coordinate, size):  # type: ignore[no-untyped-def]
+    """Find the two texels about a place along one side of an image, and the share of the second.
+
+    wrap: of `WRAPS`. coordinate: along the image's side, 0 to 1. size: texels along it.
+    """
+    if wrap == _REPEAT:
+        coordinate -= math.floor(
+            coordinate
+        )  # so that what is outside is so by one texel at most, and nothing is divided
+    texel_coordinate = coordinate * np.float32(size) - np.float32(0.5)
+    below = math.floor(texel_coordinate)
+    first: Any = np.int64(below)
+    second = first + 1
+    if wrap == _REPEAT:
+        return (
+            first + size if first < 0 else first,
+            second - size if second >= size else second,
+            np.float32(texel_coordinate - below),
+        )
+    return _texel(wrap, first, size), _texel(wrap, second, size), np.float32(texel_coordinate - below)

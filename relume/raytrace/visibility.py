@@ -1,0 +1,147 @@
+"""Which light triangles each point sees: one bit a pair, traced in packets of 16 neighbouring points × one light."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges, parallel_for_chunks
+from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
+from relume.raytrace.ray_packet import (
+    FAR,
+    LANES,
+    enable_lane,
+    enable_stochastic_alpha,
+    is_unoccluded,
+    new_packet,
+    set_direction,
+    set_origin,
+    trace_shadows,
+)
+from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
+
+F32 = NDArray[np.float32]
+
+_POINTS_PER_RANGE = 512
+NO_EXCLUSION = np.zeros((1, 3), np.float32)  # a normal that no light is above
+
+
+@nb.njit(nogil=True, cache=True)
+def _trace(  # type: ignore[no-untyped-def]
+    occluded, scene, arguments, origins, normals, excluded_normals, alpha_sample, directions, start, stop, bits
+):
+    """Trace points [start, stop) against all lights; returns the number of rays. start is a multiple of 16."""
+    packet = new_packet(scene, arguments)
+    facing = np.empty(LANES, np.bool_)
+    num_lights = directions.shape[0]
+    num_rays = 0
+    for first in range(start, stop, LANES):
+        width = min(LANES, stop - first)
+        for k in range(LANES):
+            p = first + min(k, width - 1)
+            set_origin(packet, k, origins[p, 0], origins[p, 1], origins[p, 2])
+            enable_stochastic_alpha(packet, k, alpha_sample[min(p, alpha_sample.shape[0] - 1)])
+        for light in range(num_lights):
+            x, y, z = directions[light, 0], directions[light, 1], directions[light, 2]
+            num_active = 0
+            for k in range(LANES):
+                p = first + min(k, width - 1)
+                is_above = normals[p, 0] * x + normals[p, 1] * y + normals[p, 2] * z > 0
+                q = min(p, excluded_normals.shape[0] - 1)
+                is_excluded = excluded_normals[q, 0] * x + excluded_normals[q, 1] * y + excluded_normals[q, 2] * z > 0
+                facing[k] = is_above and not is_excluded and k < width
+                enable_lane(packet, k, facing[k])
+                num_active += 1 if facing[k] else 0
+            if num_active == 0:
+                continue
+            num_rays += num_active
+            for k in range(LANES):
+                set_direction(packet, k, x, y, z, FAR)
+            trace_shadows(occluded, packet)
+            byte, bit = light >> 3, np.uint8(1 << (light & 7))
+            for k in range(width):
+                if facing[k] and is_unoccluded(packet, k):
+                    bits[first + k, byte] |= bit
+    return num_rays
+
+
+@dataclass(frozen=True)
+class VisibilityBits:
+    """What n points see, and what it cost to find out.
+
+    Attributes:
+        visible: light m of a point in bit m & 7 of byte m >> 3. (n, ceil(m / 8)) uint8
+        num_rays: rays traced. trace_s: wall time of the tracing alone.
+    """
+
+    visible: NDArray[np.uint8]
+    num_rays: int
+    trace_s: float
+
+
+def trace_visibility(
+    scene: EmbreeScene,
+    origins: F32,
+    normals: F32,
+    directions: F32,
+    alpha_sample: F32 = FIXED_ALPHA_SAMPLE,
+    excluded_normals: F32 = NO_EXCLUSION,
+) -> VisibilityBits:
+    """Trace every point against every light above its horizon.
+
+    Args:
+        scene: the triangles that may be in the way.
+        origins: off the surface already. (n, 3) float32
+        normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
+        directions: unit, towards the lights. (m, 3) float32
+        alpha_sample: of the rays of each point, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
+        excluded_normals: other normals; lights above their horizon are not traced and count as hidden, too. (n, 3) or
+            (1, 3)
+    Cost: O(n · m · log triangles) time.
+    """
+    bits = np.zeros((len(origins), (len(directions) + 7) // 8), np.uint8)
+    arguments = packet_arguments(coherent=True)
+    counts: list[int] = []
+
+    def kernel(start: int, stop: int) -> None:
+        counts.append(
+            _trace(
+                occluded, scene.handle, arguments.ctypes.data, origins, normals, excluded_normals, alpha_sample,
+                directions,
+                start, stop, bits,
+            )
+        )  # fmt: skip
+
+    start_time = time.perf_counter()
+    for_ranges(kernel, len(origins), _POINTS_PER_RANGE)
+    return VisibilityBits(bits, sum(counts), time.perf_counter() - start_time)
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _select_bits(visible, rows, lights, start, stop, out):  # type: ignore[no-untyped-def]
+    for i in range(start, stop):
+        for k in range(len(lights)):
+            light = lights[k]
+            bit = (visible[rows[i], light >> 3] >> (light & 7)) & 1
+            out[i, k >> 3] |= np.uint8(bit << (k & 7))
+
+
+def select_visibility(
+    visible: NDArray[np.uint8], rows: NDArray[np.intp], lights: NDArray[np.intp]
+) -> NDArray[np.uint8]:
+    """What some points see of some lights.
+
+    Args:
+        visible: what all points see of all lights, as in `Traced`. (n, bytes) uint8
+        rows: the points. (m,). lights: (N,)
+    Returns:
+        The same of them alone. (m, ceil(N / 8)) uint8
+    """
+    out = np.zeros((len(rows), -(-len(lights) // 8)), np.uint8)
+    parallel_for_chunks(lambda start, stop: _select_bits(visible, rows, lights, start, stop, out), len(rows))
+    return out

@@ -1,0 +1,91 @@
+"""The environment as point lights, one a texel; and directions drawn by power within stratified choices of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.environments.environment import Environment
+from relume.assets.environments.equirect import direction_to_uv, rotate_about_y, texel_solid_angles, uv_to_direction
+from relume.core.color import luminance
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EnvironmentSamples:
+    """Texels that are not black.
+
+    Attributes:
+        direction: unit, world space. (m, 3) float64
+        power: radiance times solid angle. (m, 3) float64
+        cdf: running sum of luminance, the last one is 1. (m,) float64
+        index: of each in the map, row-major. (m,)
+        map: the environment's radiance. (height, width, 3) float32
+        rotation: of the map about +Y, degrees. gain: what multiplies its channels.
+        luminance: of all of them, times solid angle, before the gain.
+    """
+
+    direction: F64
+    power: F64
+    cdf: F64
+    index: NDArray[np.intp]
+    map: F32
+    rotation: float
+    gain: tuple[float, float, float]
+    luminance: float
+
+    @property
+    def num_texels(self) -> int:
+        """m."""
+        return len(self.direction)
+
+    def scaled(self, gain: tuple[float, float, float]) -> EnvironmentSamples:
+        """Every channel multiplied; none of them where nothing is left."""
+        if not any(gain):
+            return replace(self, direction=self.direction[:0], power=self.power[:0], cdf=self.cdf[:0])
+        return replace(self, power=self.power * np.array(gain), gain=gain)
+
+    def sample_directions(self, num_samples: int, rng: np.random.Generator) -> F64:
+        """Directions anywhere in texels drawn by luminance, one a stratum, with the density `pdf_table`. (num, 3)"""
+        strata = (np.arange(num_samples) + rng.random(num_samples)) / num_samples
+        texel_index = np.minimum(np.searchsorted(self.cdf, strata, side="right"), self.num_texels - 1)
+        height, width, _ = self.map.shape
+        row, column = np.divmod(self.index[texel_index], width)
+        u = (column + rng.random(num_samples)) / width
+        upper, lower = (np.sin(np.pi * (0.5 - edge / height)) for edge in (row, row + 1))
+        v = 0.5 - np.arcsin(upper + rng.random(num_samples) * (lower - upper)) / np.pi
+        return rotate_about_y(uv_to_direction(u, v), self.rotation)
+
+    def radiance(self, direction: F64) -> tuple[F64, F64]:
+        """What comes from unit directions (..., 3), texels having one value each, and the density with which `drawn`
+        draws them, per steradian. (..., 3), (...)"""
+        height, width, _ = self.map.shape
+        u, v = direction_to_uv(rotate_about_y(direction.reshape(-1, 3), -self.rotation))
+        column = np.minimum((u * width).astype(np.intp), width - 1)
+        row = np.minimum((v * height).astype(np.intp), height - 1)
+        texel_radiance = self.map[row, column].reshape(direction.shape)
+        pdf = luminance(texel_radiance).astype(np.float64) / self.luminance
+        return texel_radiance.astype(np.float64) * np.array(self.gain), pdf
+
+
+def environment_texels(environment: Environment, rotation: float = 0.0) -> EnvironmentSamples:
+    """All texels with light in them.
+
+    Args:
+        rotation: of the map about +Y, degrees.
+    """
+    height, width, _ = environment.radiance.shape
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    power = environment.radiance.astype(np.float64) * texel_solid_angles(height, width)[:, None, None]
+    is_lit = power.reshape(-1, 3).any(axis=1)
+    power = power.reshape(-1, 3)[is_lit]
+    cumulative = np.cumsum(luminance(power.astype(np.float32)).astype(np.float64))
+    direction = rotate_about_y(uv_to_direction(u, v).reshape(-1, 3)[is_lit], rotation)
+    index, total = np.nonzero(is_lit)[0], float(cumulative[-1])
+    return EnvironmentSamples(
+        direction, power, cumulative / total, index, environment.radiance, rotation, (1.0, 1.0, 1.0), total
+    )

@@ -1,0 +1,90 @@
+"""Materials of a look as surfaces reflect: one with a map of roughness is many, each as rough as some of its texels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.roughness_levels import scaled_roughness, uses_roughness_map
+from relume.brdf.specular import is_mirror, specular_albedo
+from relume.brdf.texture_slots import roughness_image
+from relume.images.image_store import load_roughness_map, mean_roughness
+from relume.look import Look
+from relume.scene.model import Material, Scene
+from relume.scene.roughness_levels import levels_of_material, levels_of_texture, min_mean_normal_length, select_level
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+Terms = Sequence[Mapping[str, Any]]
+
+_MAX_CLASSES_PER_MATERIAL, _MAX_CLASSES = (
+    48,
+    96,
+)  # kinds of a material, and of a scene: far finer than pictures tell apart
+
+
+@dataclass(frozen=True)
+class RoughnessClasses:
+    """What the surfaces of a scene are made of.
+
+    Attributes:
+        terms: of each kind. mirrors: how much of each term of a kind mirrors, where the scene's own material does, so
+            that pictures follow what is seen in it. (3,) each
+        first: kind of each material's first. ratios: of each material's kinds, none for one.
+    """
+
+    terms: list[Terms]
+    mirrors: list[list[F64]]
+    first: list[int]
+    ratios: list[tuple[float, ...]]
+
+    def classify(self, material: NDArray[np.integer], roughness: F32) -> NDArray[np.int64]:
+        """The kinds of points.
+
+        Args:
+            material: index into the scene's materials. (n,) roughness: over the material's, see
+                `relume.raytrace.surface_interaction.SurfaceInteraction`. (n,)
+        """
+        class_index: NDArray[np.int64] = np.array(self.first, np.int64)[material]
+        for index, ratios in enumerate(self.ratios):
+            if ratios:
+                rows = np.flatnonzero(material == index)
+                class_index[rows] += select_level(ratios, roughness[rows])
+        return class_index
+
+
+def _roughness_levels(material: Material, terms: Terms) -> tuple[float, ...]:
+    """Of the map that terms of a material follow."""
+    name = roughness_image(terms)
+    if name is None:
+        return levels_of_material(material)
+    return levels_of_texture(
+        load_roughness_map(name), mean_roughness(name) or None, min_mean_normal_length(material.normal_map)
+    )
+
+
+def roughness_classes(scene: Scene, look: Look) -> RoughnessClasses:
+    """Find the kinds of a scene's surfaces under a look."""
+    material_terms = [look.materials[material.name].terms for material in scene.materials]
+    level_ranges = [
+        _roughness_levels(m, terms) if any(map(uses_roughness_map, terms)) else ()
+        for m, terms in zip(scene.materials, material_terms, strict=True)
+    ]
+    num = min(_MAX_CLASSES_PER_MATERIAL, max(2, _MAX_CLASSES // max(1, sum(map(bool, level_ranges)))))
+    classes = RoughnessClasses([], [], [], [])
+    for material, terms, material_levels in zip(scene.materials, material_terms, level_ranges, strict=True):
+        ratios = (
+            tuple(np.square(np.linspace(material_levels[0] ** 0.5, material_levels[-1] ** 0.5, num)).tolist())
+            if material_levels
+            else ()
+        )
+        classes.first.append(len(classes.terms))
+        classes.ratios.append(ratios)
+        classes.terms.extend([scaled_roughness(term, ratio) for term in terms] for ratio in ratios or (1.0,))
+        mirrors = [specular_albedo(term) * is_mirror(material.terms) for term in terms]
+        classes.mirrors.extend(mirrors for _ in ratios or (1.0,))
+    return classes

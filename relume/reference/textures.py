@@ -1,0 +1,116 @@
+"""What textures of places on surfaces show: the scene's own images, and those that a look names in their place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.roughness_levels import uses_roughness_map
+from relume.brdf.texture_slots import TEXTURES, roughness_image, user_images
+from relume.images.image_store import load_normal_map, load_roughness_map, load_texture, mean_roughness
+from relume.look import Look
+from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
+from relume.raytrace.texture import sample_image
+from relume.scene.model import Material, Mesh, Scene
+from relume.scene.roughness_levels import rougher
+from relume.scene_io.gltf.uvs import compute_tangents
+
+F32 = NDArray[np.float32]
+
+
+def with_overrides(scene: Scene, look: Look) -> Scene:
+    """The scene whose materials have the normal maps that a look names, as if its file had them.
+
+    Args:
+        scene: any. look: that is shown.
+    """
+    normals = [look.materials[material.name].normals for material in scene.materials]
+    if not any(normals):
+        return scene
+    materials = tuple(
+        material
+        if normal_map is None
+        else replace(material, normal_map=load_normal_map(normal_map), terms=_terms_with_roughness_map(material, look))
+        for material, normal_map in zip(scene.materials, normals, strict=True)
+    )
+    meshes = tuple(
+        mesh if normals[mesh.material] is None or mesh.tangents.any() else _with_tangents(_with_uvs(mesh))
+        for mesh in scene.meshes
+    )
+    return replace(scene, materials=materials, meshes=meshes)
+
+
+def _with_tangents(mesh: Mesh) -> Mesh:
+    """A mesh with tangents along u, as imports make them for normal maps."""
+    return replace(mesh, tangents=compute_tangents(mesh.positions, mesh.normals, mesh.uvs, mesh.faces))
+
+
+def _with_uvs(mesh: Mesh) -> Mesh:
+    """A mesh with texture coordinates; where there are none, those of a projection, as in `StoredScene`."""
+    if mesh.uvs.any():
+        return mesh
+    corners = mesh.positions[mesh.faces]
+    u_axis, v_axis = triplanar_axes(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    u, v = np.einsum("fkc,fc->fk", corners, u_axis), -np.einsum("fkc,fc->fk", corners, v_axis)
+    order = mesh.faces.ravel()
+    return replace(
+        mesh,
+        positions=mesh.positions[order],
+        normals=mesh.normals[order],
+        tangents=mesh.tangents[order],
+        uvs=np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32),
+        faces=np.arange(len(order), dtype=np.uint32).reshape(-1, 3),
+    )
+
+
+def _terms_with_roughness_map(material: Material, look: Look) -> tuple[dict[str, Any], ...]:
+    """A material's own terms, which bumps widen where those of a look follow a map."""
+    look_terms = look.materials[material.name].terms
+    uses_map = [k < len(look_terms) and uses_roughness_map(look_terms[k]) for k in range(len(material.terms))]
+    return tuple(
+        {**term, "roughness_map": True} if f else dict(term) for term, f in zip(material.terms, uses_map, strict=True)
+    )
+
+
+def surface_textures(
+    scene: Scene, look: Look, surface: SurfaceInteraction, material: NDArray[np.integer]
+) -> dict[str, F32]:
+    """What multiplies terms by their channel, at places on surfaces.
+
+    Args:
+        scene: whose materials they are. look: that is shown. surface: the places.
+        material: index of each into the scene's materials; others are left as they are. (n,)
+    Returns:
+        (n, 3) float32 each
+    """
+    textures = {"diffuse": surface.diffuse, "specular": surface.specular}
+    for index, scene_material in enumerate(scene.materials):
+        for channel, name in zip(TEXTURES, user_images(look.materials[scene_material.name].terms), strict=True):
+            if name is not None:
+                rows = np.flatnonzero(material == index)
+                textures[channel] = textures[channel].copy()
+                textures[channel][rows] = sample_image(load_texture(name), surface.uv[rows])
+    return textures
+
+
+def surface_roughness(scene: Scene, look: Look, surface: SurfaceInteraction, material: NDArray[np.integer]) -> F32:
+    """How rough places on surfaces are, over what terms say.
+
+    Args:
+        scene, look, surface, material: as in `textures_of`.
+    Returns:
+        (n,) float32
+    """
+    roughness = surface.roughness
+    for index, scene_material in enumerate(scene.materials):
+        name = roughness_image(look.materials[scene_material.name].terms)
+        if name is not None:
+            rows = np.flatnonzero(material == index)
+            roughness = roughness.copy()
+            roughness[rows] = sample_image(load_roughness_map(name), surface.uv[rows])[:, 0]
+            if scene_material.normal_map is not None and (mean := mean_roughness(name)):
+                roughness[rows] = rougher(roughness[rows], surface.normal_length[rows], mean)
+    return roughness

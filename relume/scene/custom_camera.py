@@ -1,0 +1,119 @@
+"""Cameras that people place: part of a recipe, beside those that came with the scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from relume.core.errors import ParameterError
+from relume.scene.model import Camera, Scene
+
+MAX_NAME = 80
+MIN_YFOV, MAX_YFOV = 1.0, 170.0  # degrees
+MAX_DISTANCE_M = 1e6  # metres from the origin; beyond, float32 cannot tell one pixel's ray from the next
+_FIELDS = ("name", "to_world", "yfov")
+_ANGLE_TOLERANCE, _RIGID_TOLERANCE = (
+    1e-3,
+    1e-8,
+)  # how far axes may be from right angles; below which nothing is done to them
+
+
+@dataclass(frozen=True)
+class CustomCamera:
+    """A camera as it stands in a recipe; made by `make_custom_camera`.
+
+    Attributes:
+        to_world: camera to world, 16 numbers by row; rigid.
+        yfov: vertical field of view, degrees.
+    """
+
+    name: str
+    to_world: tuple[float, ...]
+    yfov: float
+
+    @property
+    def camera(self) -> Camera:
+        """As scenes have it."""
+        return Camera(self.name, np.array(self.to_world).reshape(4, 4), math.radians(self.yfov))
+
+    def document(self) -> dict[str, Any]:
+        """As JSON; the inverse of `read_custom_camera`."""
+        return {"name": self.name, "to_world": list(self.to_world), "yfov": self.yfov}
+
+
+def make_custom_camera(name: str, to_world: Sequence[float], yfov: float) -> CustomCamera:
+    """Check a camera that somebody placed.
+
+    Args:
+        name: what views of it are called.
+        to_world: camera to world, 16 numbers by row; it looks along its -Z. Scale is taken out.
+        yfov: vertical field of view, degrees.
+    Raises:
+        ParameterError: one of them is not of a camera.
+    """
+    _check_name(name)
+    if not (math.isfinite(yfov) and MIN_YFOV <= yfov <= MAX_YFOV):
+        raise ParameterError("yfov", yfov, f"a vertical field of view of {MIN_YFOV:g} to {MAX_YFOV:g} degrees")
+    return CustomCamera(name, _rigid(to_world), float(yfov))
+
+
+def read_custom_camera(document: object) -> CustomCamera:
+    """The camera of a JSON document. Raises ParameterError."""
+    if not isinstance(document, Mapping) or set(document) != set(_FIELDS):
+        raise ParameterError("camera", document, "an object with " + ", ".join(_FIELDS))
+    name, to_world, yfov = (document[field] for field in _FIELDS)
+    if not isinstance(name, str):
+        raise ParameterError("name", name, "text")
+    if not isinstance(to_world, list) or not all(map(_is_number, to_world)):
+        raise ParameterError("to_world", to_world, "16 numbers by row")
+    if not _is_number(yfov):
+        raise ParameterError("yfov", yfov, "a number of degrees")
+    return make_custom_camera(name, to_world, yfov)
+
+
+def with_cameras(scene: Scene, cameras: Iterable[Camera]) -> Scene:
+    """The scene with more cameras, which win over those of the same name; it stays the same scene, by its id too."""
+    added = {camera.name: camera for camera in cameras}
+    scene_cameras = [camera for camera in scene.cameras if camera.name not in added]
+    return replace(scene, cameras=(*scene_cameras, *added.values()))
+
+
+def _check_name(name: str) -> None:
+    is_plain = name.isprintable() and name == name.strip() and not set("/\\") & set(name) and name not in (".", "..")
+    if not is_plain or not 1 <= len(name) <= MAX_NAME:
+        raise ParameterError("name", name, f"1 to {MAX_NAME} printable characters without slashes")
+
+
+def _rigid(to_world: Sequence[float]) -> tuple[float, ...]:
+    """The frame without scale. Raises ParameterError where its axes are not those of a camera."""
+    allowed = "16 finite numbers by row, the last four 0, 0, 0, 1"
+    if len(to_world) != 16:
+        raise ParameterError("to_world", f"{len(to_world)} numbers", allowed)
+    frame = np.array(to_world, np.float64).reshape(4, 4)
+    if not np.isfinite(frame).all() or not np.array_equal(frame[3], (0, 0, 0, 1)):
+        raise ParameterError("to_world", list(to_world), allowed)
+    if np.abs(frame[:3, 3]).max() > MAX_DISTANCE_M:
+        raise ParameterError(
+            "to_world", frame[:3, 3].tolist(), f"an eye at most {MAX_DISTANCE_M:,.0f} m from the origin"
+        )
+    max_value = np.abs(frame[:3, :3]).max()  # asked first: squares of larger ones overflow
+    lengths = np.linalg.norm(frame[:3, :3], axis=0) if max_value <= 1e12 else np.full(3, max_value)
+    if lengths.min() < 1e-12 or lengths.max() > 1e12:
+        raise ParameterError("to_world", frame[:3, :3].tolist(), "three axes of a length, none of them zero")
+    axes = frame[:3, :3] / lengths
+    if not np.allclose(axes.T @ axes, np.eye(3), rtol=0, atol=_ANGLE_TOLERANCE):
+        raise ParameterError("to_world", frame[:3, :3].tolist(), "three axes at right angles")
+    if np.linalg.det(axes) < 0:
+        raise ParameterError("to_world", frame[:3, :3].tolist(), "axes that are not mirrored")
+    if not np.allclose(frame[:3, :3].T @ frame[:3, :3], np.eye(3), rtol=0, atol=_RIGID_TOLERANCE):
+        u, _, v = np.linalg.svd(axes)  # the nearest rotation
+        frame[:3, :3] = u @ v
+    return tuple((frame + 0.0).ravel().tolist())  # -0 becomes 0: one text for one camera
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,5 +1,0 @@
-"""Reading Wavefront OBJ and Stanford PLY, from files that nobody vouches for."""
-
-from relume.scene.mesh_files.importer import import_obj, import_ply
-
-__all__ = ["import_obj", "import_ply"]

@@ -1,0 +1,318 @@
+"""A scene as a folder: scene.json (words and numbers) and arrays.npz (arrays), named by the hash of its content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+from numpy.lib import format as npy_format
+from numpy.typing import NDArray
+
+from relume.assets.environments.environment import Environment
+from relume.core.errors import NotFoundError, SceneError
+from relume.core.filesystem import atomic_write
+from relume.core.import_warnings import ImportRemark, warning_of
+from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture, TextureEncoding
+from relume.scene.validate import check_scene
+
+FORMAT_VERSION = 1
+MAX_JSON_BYTES = 64 << 20
+MAX_ARRAY_BYTES = 16 << 30
+MESH_ARRAYS = ("positions", "normals", "tangents", "uvs", "faces")
+REMEDY = "import the scene again"
+_STORED = (np.dtype("<f4"), np.dtype("<u4"), np.dtype("|u1"))
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def make_scene(
+    name: str,
+    meshes: Sequence[Mesh],
+    materials: Sequence[Material],
+    cameras: Sequence[Camera],
+    environment: Environment,
+    warnings: Sequence[ImportRemark] = (),
+    variants: Mapping[str, dict[str, Any]] | None = None,
+    lights: Sequence[Light] = (),
+) -> Scene:
+    """Checks the parts and joins them to a scene that knows its id.
+
+    Args:
+        name: what people call the scene.
+        meshes, materials, cameras: at least one of each; a mesh's `material` counts in `materials`.
+        environment: the distant light.
+        warnings: what the importer did not understand, one sentence each.
+        variants: partial looks by name.
+        lights: local lights, each of a name of its own.
+    Raises:
+        SceneError: the parts do not make a scene (see `relume.scene.validate`).
+    """
+    check_scene(meshes, materials, cameras, environment, lights)
+    contents = (tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings), dict(variants or {}))
+    scene = Scene("", name, *contents, tuple(lights))
+    document, arrays = _to_document(scene)
+    return replace(scene, id=scene_id(document, arrays))
+
+
+def scene_id(document: dict[str, Any], arrays: Arrays) -> str:
+    """First 16 hexadecimal digits of `scene_digest`."""
+    return scene_digest(document, arrays)[:16]
+
+
+def scene_digest(document: dict[str, Any], arrays: Arrays) -> str:
+    """SHA-256 over all arrays and all that stands in the document but warnings and aspects, in hexadecimal digits."""
+    digest = hashlib.sha256()
+    content = {key: value for key, value in document.items() if key not in ("id", "warnings", "aspects")}
+    digest.update(json.dumps(content, sort_keys=True, allow_nan=False).encode())
+    for key in sorted(arrays):
+        array = np.ascontiguousarray(arrays[key])
+        digest.update(f"{key} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.data)
+    return digest.hexdigest()
+
+
+def save_scene(scene: Scene, folder: str | Path) -> None:
+    """Writes the scene into `folder` (made where missing); readers see the old files or the new, never half of one.
+
+    Raises:
+        SceneError: the folder has a scene of the same id and other content.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    document, arrays = _to_document(scene)
+    document |= {"id": scene.id, "sha256": scene_digest(document, arrays)}
+    if _digest_in(folder, scene.id) not in (None, document["sha256"]):  # made for that: it takes billions of tries
+        raise SceneError(f"another scene is here as {scene.id}; delete that one first, if it is not yours")
+    with atomic_write(folder / "arrays.npz") as unfinished:
+        np.savez(unfinished, allow_pickle=False, **arrays)
+    with atomic_write(folder / "scene.json") as unfinished:
+        unfinished.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
+
+
+def _digest_in(folder: Path, scene_id: str) -> str | None:
+    """Of the scene of that id in a folder; None where there is none, it cannot be read, or it was saved without."""
+    try:
+        document = _read_document(folder / "scene.json")
+        return document.get("sha256") if document.get("id") == scene_id else None
+    except (OSError, ValueError, RecursionError, AttributeError):
+        return None
+
+
+def load_scene(folder: str | Path) -> Scene:
+    """Reads what `save_scene` wrote.
+
+    Raises:
+        SceneError: a file is missing, damaged, larger than allowed, or does not hash to the id it claims.
+    """
+    folder = Path(folder)
+    try:
+        document = _read_document(folder / "scene.json")
+        arrays = _read_arrays(folder / "arrays.npz")
+        scene = _from_document(document, arrays)
+    except FileNotFoundError:
+        raise SceneError(f"there is no scene in {folder.name!r}; {REMEDY}") from None
+    except SceneError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, zipfile.BadZipFile) as problem:
+        detail = str(problem).partition("\n")[0] or type(problem).__name__
+        raise SceneError(f"the scene in {folder.name!r} is damaged ({detail}); {REMEDY}") from None
+    check_scene(scene.meshes, scene.materials, scene.cameras, scene.environment, scene.lights)
+    if scene_id(*_to_document(scene)) != scene.id:
+        raise SceneError(f"the scene in {folder.name!r} is not the one that was saved there; {REMEDY}")
+    return scene
+
+
+def load_cameras(folder: str | Path) -> list[Camera]:
+    """The cameras alone of what `save_scene` wrote. Raises SceneError where they cannot be read."""
+    try:
+        return _cameras(_read_document(Path(folder) / "scene.json"))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
+        raise SceneError(f"the cameras of the scene in {Path(folder).name!r} cannot be read; {REMEDY}") from problem
+
+
+def load_material(folder: str | Path, name: str) -> Material:
+    """One material of what `save_scene` wrote, with its own arrays alone.
+
+    Raises:
+        SceneError: it cannot be read. NotFoundError: the scene has no such material.
+    """
+    folder = Path(folder)
+    try:
+        for index, document in enumerate(_read_document(folder / "scene.json")["materials"]):
+            if document["name"] == name:
+                arrays = _read_arrays(folder / "arrays.npz", f"material{index}_")
+                return _assemble_material(index, document, arrays)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, zipfile.BadZipFile) as problem:
+        raise SceneError(f"the materials of the scene in {folder.name!r} cannot be read; {REMEDY}") from problem
+    raise NotFoundError(f"the scene has no material {name[:80]!r}; give one that it has")
+
+
+def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
+    yield from sorted(material.textures.items())
+    if material.normal_map is not None:
+        yield "normal_map", material.normal_map
+
+
+def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
+    """The scene as a JSON document and named arrays, one to one."""
+    arrays: Arrays = {"environment": scene.environment.radiance}
+    for i, mesh in enumerate(scene.meshes):
+        arrays |= {f"mesh{i}_{key}": getattr(mesh, key) for key in MESH_ARRAYS}
+    for i, material in enumerate(scene.materials):
+        arrays |= {f"material{i}_{channel}": texture.pixels for channel, texture in _textures(material)}
+        if material.opacity is not None:
+            arrays[f"material{i}_opacity"] = material.opacity.alpha
+    document = {
+        "format": FORMAT_VERSION,
+        "name": scene.name,
+        "meshes": [{"name": mesh.name, "material": mesh.material} for mesh in scene.meshes],
+        "materials": [
+            {
+                "name": material.name,
+                "terms": list(material.terms),
+                "textures": {channel: list(texture.wrap) for channel, texture in _textures(material)},
+                "double_sided": material.double_sided,
+                # ids of scenes without these stay what they were
+                **_encoding_documents(material),
+                **({"catcher": True} if material.shadow_catcher else {}),
+                **({"opacity": _opacity_document(material.opacity)} if material.opacity else {}),
+                **({"glass": asdict(material.glass)} if material.glass else {}),
+            }
+            for material in scene.materials
+        ],
+        "cameras": [{"name": c.name, "to_world": c.to_world.tolist(), "yfov": c.yfov} for c in scene.cameras],
+        "environment": {"name": scene.environment.name},
+        "warnings": [warning.document() for warning in scene.warnings],
+    }
+    if any(camera.aspect is not None for camera in scene.cameras):
+        document["aspects"] = [camera.aspect for camera in scene.cameras]
+    if scene.variants:
+        document["variants"] = scene.variants
+    if scene.lights:
+        document["lights"] = [{"name": light.name, "fields": light.fields} for light in scene.lights]
+    return document, arrays
+
+
+def _encoding_documents(material: Material) -> dict[str, Any]:
+    encodings = {channel: asdict(texture.encoding) for channel, texture in _textures(material) if texture.encoding}
+    return {"codings": encodings} if encodings else {}
+
+
+def _opacity_document(opacity: Opacity) -> dict[str, Any]:
+    return {"wrap": list(opacity.wrap), "cutoff": opacity.cutoff}
+
+
+def _from_document(document: dict[str, Any], arrays: Arrays) -> Scene:
+    """The inverse of `_to_document`; raises what Python raises where something is missing or of the wrong kind."""
+    meshes = [
+        Mesh(name=str(m["name"]), material=int(m["material"]), **{k: arrays[f"mesh{i}_{k}"] for k in MESH_ARRAYS})
+        for i, m in enumerate(document["meshes"])
+    ]
+    cameras = _cameras(document)
+    return Scene(
+        str(document["id"]),
+        str(document["name"]),
+        tuple(meshes),
+        tuple(_assemble_material(i, m, arrays) for i, m in enumerate(document["materials"])),
+        tuple(cameras),
+        Environment(str(document["environment"]["name"]), arrays["environment"]),
+        tuple(warning_of(warning) for warning in document["warnings"]),
+        {str(name): dict(look) for name, look in document.get("variants", {}).items()},
+        tuple(Light(str(light["name"]), dict(light["fields"])) for light in document.get("lights", ())),
+    )
+
+
+def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Material:
+    textures = {
+        channel: _assemble_texture(arrays[f"material{i}_{channel}"], wrap, document.get("codings", {}).get(channel))
+        for channel, wrap in document["textures"].items()
+    }
+    normal_map = textures.pop("normal_map", None)
+    terms = tuple(dict(term) for term in document["terms"])
+    double_sided, shadow_catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
+    opacity = _assemble_opacity(document["opacity"], arrays[f"material{i}_opacity"]) if "opacity" in document else None
+    glass = _assemble_glass(document["glass"]) if "glass" in document else None
+    return Material(str(document["name"]), terms, textures, normal_map, double_sided, shadow_catcher, opacity, glass)
+
+
+def _assemble_glass(document: dict[str, Any]) -> Glass:
+    (red, green, blue), (r, g, b) = document["tint"], document["absorbed"]
+    tint, absorbed = (float(red), float(green), float(blue)), (float(r), float(g), float(b))
+    return Glass(tint, float(document["ior"]), float(document["thickness"]), absorbed)
+
+
+def _assemble_texture(pixels: NDArray[Any], wrap: list[Any], encoding: dict[str, Any] | None) -> Texture:
+    channels = 1 if encoding is not None and encoding["kind"] == "share" else 3
+    is_image = pixels.ndim == 3 and pixels.shape[2] == channels and pixels.size > 0
+    if not is_image or pixels.dtype != (np.float32 if encoding is None else np.uint8):
+        raise SceneError(f"a texture of the scene has the wrong shape or type; {REMEDY}")
+    wrap_u, wrap_v = map(str, wrap)
+    if encoding is None:
+        return Texture(pixels, (wrap_u, wrap_v))
+    red, green, blue = map(float, encoding["scale"])
+    if encoding["kind"] not in ("srgb", "normal", "share"):
+        raise SceneError(f"a texture of the scene has a coding that is not known; {REMEDY}")
+    return Texture(
+        pixels, (wrap_u, wrap_v), TextureEncoding(str(encoding["kind"]), (red, green, blue), float(encoding["turn"]))
+    )
+
+
+def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:
+    wrap_u, wrap_v = document["wrap"]
+    cutoff = document["cutoff"]
+    return Opacity(alpha, (str(wrap_u), str(wrap_v)), None if cutoff is None else float(cutoff))
+
+
+def _cameras(document: dict[str, Any]) -> list[Camera]:
+    camera_documents = document["cameras"]
+    aspects = document.get("aspects") or [None] * len(camera_documents)
+    return [
+        Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"]), None if a is None else float(a))
+        for c, a in zip(camera_documents, aspects, strict=True)
+    ]
+
+
+def _read_document(path: Path) -> dict[str, Any]:
+    if path.stat().st_size > MAX_JSON_BYTES:
+        raise SceneError(f"{path.name} is larger than {MAX_JSON_BYTES >> 20} MB; {REMEDY}")
+    document = json.loads(path.read_bytes())
+    if not isinstance(document, dict) or document.get("format") != FORMAT_VERSION:
+        raise SceneError(f"{path.name} is not a scene that this relume reads; {REMEDY}")
+    return document
+
+
+def _read_arrays(path: Path, prefix: str = "") -> Arrays:
+    """Those whose names begin so. Members are stored, not compressed, so that none can be larger than the file that is
+    there."""
+    size_bytes = path.stat().st_size
+    if size_bytes > MAX_ARRAY_BYTES:
+        raise SceneError(f"{path.name} is larger than {MAX_ARRAY_BYTES >> 30} GB; {REMEDY}")
+    arrays: Arrays = {}
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.infolist():
+            if member.compress_type != zipfile.ZIP_STORED or member.file_size > size_bytes:
+                raise SceneError(f"{path.name} was not written by relume; {REMEDY}")
+            if not member.filename.startswith(prefix):
+                continue
+            with archive.open(member) as file:
+                arrays[member.filename.removesuffix(".npy")] = _read_array(cast(BinaryIO, file), member.file_size)
+    return arrays
+
+
+def _read_array(file: BinaryIO, size_bytes: int) -> NDArray[Any]:
+    """One .npy member, its header checked against its length before anything of that size is made."""
+    if npy_format.read_magic(file) != (1, 0):
+        raise SceneError(f"arrays.npz was not written by relume; {REMEDY}")
+    shape, fortran_order, dtype = npy_format.read_array_header_1_0(file)
+    needed_bytes = math.prod(shape) * dtype.itemsize
+    if fortran_order or dtype not in _STORED or not 0 <= needed_bytes <= size_bytes:
+        raise SceneError(f"arrays.npz holds an array that relume does not write; {REMEDY}")
+    data = file.read(needed_bytes)
+    return np.frombuffer(bytearray(data), dtype).reshape(shape)

@@ -1,0 +1,1 @@
+"""Scene files read: glTF, OBJ and PLY; untrusted, bounded before they are allocated."""

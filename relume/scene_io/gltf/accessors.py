@@ -1,0 +1,208 @@
+"""Accessors as NumPy arrays; every offset, stride and count is checked against the bytes that are there.
+
+glTF 2.0 specification, section 3.6.2.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.errors import SceneError
+from relume.scene_io.gltf.compression import (
+    MAX_UNPACKED_BYTES,
+    MeshoptBuffer,
+    decompress_draco,
+    decompress_view,
+    read_draco,
+    read_meshopt,
+)
+from relume.scene_io.gltf.container import UNSUPPORTED_COMPRESSION, GltfContainer
+from relume.scene_io.gltf.document import Accessor, BufferView, Primitive, Sparse
+
+DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+MAX_NUMBERS = 240_000_000  # in all accessors that are read: about what a file of the largest size can hold
+
+Array = NDArray[Any]
+
+
+class AccessorReader:
+    """Reads the accessors of one file, each once, within one budget for all of them."""
+
+    def __init__(self, container: GltfContainer) -> None:
+        self._container = container
+        self._integers: dict[int, Array] = {}
+        self._floats: dict[int, NDArray[np.float32]] = {}
+        self._draco: dict[int, Array] = {}
+        self._budget = MAX_NUMBERS
+
+    def unpack(self, primitive: Primitive, label: str) -> None:
+        """Unpack a primitive's accessors where they have no data of their own.
+
+        Raises:
+            SceneError: the packed data is damaged, or is not what the accessors say.
+        """
+        draco = read_draco(primitive.extensions, label)
+        position = primitive.attributes.get("POSITION")
+        if draco is None or position is None or self._accessor(position, label).bufferView is not None:
+            return
+        if primitive.indices is None or primitive.mode != 4:
+            raise SceneError(f"{label} is packed by Draco and no list of triangles; export the scene again")
+        indices, positions = self._accessor(primitive.indices, label), self._accessor(position, label)
+        data = bytes(view_bytes(self._container, draco.bufferView, label))
+        corners, values = decompress_draco(data, indices.count, positions.count, label)
+        self._draco[primitive.indices] = _cast_to_accessor(corners[:, None], indices, f"indices of {label}")
+        for name, number in draco.attributes.items():
+            index = primitive.attributes.get(name)
+            if index is not None and number in values:
+                accessor = self._accessor(index, label)
+                self._draco[index] = _cast_to_accessor(values[number], accessor, f"{name[:40]} of {label}")
+
+    def integers(self, index: int, label: str) -> Array:
+        """Unsigned scalars, such as vertex indices. (count,)"""
+        accessor = self._accessor(index, label)
+        if accessor.type != "SCALAR" or accessor.componentType not in (5121, 5123, 5125):
+            raise SceneError(f"{label} are not unsigned scalars; export the scene again")
+        if index not in self._integers:
+            self._integers[index] = self._values(index, accessor, label)[:, 0]
+        return self._integers[index]
+
+    def floats(self, index: int, widths: tuple[int, ...], label: str) -> NDArray[np.float32]:
+        """The vectors of an accessor; normalised integers are scaled to [0, 1] or [-1, 1], others taken as they are.
+
+        Args:
+            index: of the accessor in the document.
+            widths: the numbers of components that are allowed.
+            label: names the data in errors.
+        Returns:
+            (count, width) float32
+        Raises:
+            SceneError: an index, offset, stride, type or count does not fit the data.
+        """
+        accessor = self._accessor(index, label)
+        if WIDTHS.get(accessor.type) not in widths:
+            raise SceneError(f"{label} are {accessor.type}; give vectors of {' or '.join(map(str, widths))}")
+        if index not in self._floats:
+            values = self._values(index, accessor, label)
+            if accessor.normalized and values.dtype.kind != "f":
+                scaled = values / np.float64(np.iinfo(values.dtype).max)
+                self._floats[index] = np.maximum(scaled, -1).astype(np.float32)
+            else:
+                self._floats[index] = values.astype(np.float32)
+        return self._floats[index]
+
+    def _accessor(self, index: int, label: str) -> Accessor:
+        accessor: Accessor = _item_at(self._container.document.accessors, index, label)
+        return accessor
+
+    def _values(self, index: int, accessor: Accessor, label: str) -> Array:
+        self._budget -= accessor.count * WIDTHS[accessor.type]
+        if self._budget < 0:
+            raise SceneError(f"the scene's arrays hold more than {MAX_NUMBERS:,} numbers; simplify it")
+        return self._draco[index] if index in self._draco else _read(self._container, accessor, label)
+
+
+def _cast_to_accessor(values: Array, accessor: Accessor, label: str) -> Array:
+    """Unpacked values in the type that their accessor says. (count, width) Raises SceneError where they cannot be."""
+    dtype = np.dtype(DTYPES[accessor.componentType])
+    is_float = dtype.kind == "f"
+    fits = values.shape == (accessor.count, WIDTHS.get(accessor.type)) and (values.dtype.kind == "f") == is_float
+    if not fits or not (is_float or np.array_equal(values.astype(dtype), values)):
+        raise SceneError(f"{label} are not what their Draco data holds; export the scene again")
+    return values.astype(dtype)
+
+
+def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
+    """The bytes of a buffer view.
+
+    Args:
+        container: the file's document and buffers.
+        index: of the view in the document.
+        label: names the data in errors.
+    Raises:
+        SceneError: there is no such view, or it reaches out of its buffer.
+    """
+    view = _item_at(container.document.bufferViews, index, f"the buffer view of {label}")
+    for extension in UNSUPPORTED_COMPRESSION:
+        if extension in view.extensions:
+            raise SceneError(f"{label} is packed with {extension}; unpack it: {UNSUPPORTED_COMPRESSION[extension]}")
+    compression = read_meshopt(view, label)
+    if compression is None:
+        return _bytes(container, view, label)
+    if index not in container.decompressed_views:
+        num_bytes = view.byteLength + sum(len(chunk) for chunk in container.decompressed_views.values())
+        if num_bytes > MAX_UNPACKED_BYTES:
+            raise SceneError(f"the scene's arrays unpack to more than {MAX_UNPACKED_BYTES >> 20} MB; simplify it")
+        container.decompressed_views[index] = decompress_view(
+            compression, bytes(_bytes(container, compression, label)), label
+        )
+    return container.decompressed_views[index]
+
+
+def _bytes(container: GltfContainer, view: BufferView | MeshoptBuffer, label: str) -> memoryview:
+    """A stretch of a buffer."""
+    content: memoryview = _item_at(container.buffers, view.buffer, f"the buffer of {label}")
+    if view.byteOffset + view.byteLength > len(content):
+        raise SceneError(f"the buffer view of {label} reaches beyond its buffer; export the scene again")
+    return content[view.byteOffset : view.byteOffset + view.byteLength]
+
+
+def _read(container: GltfContainer, accessor: Accessor, label: str) -> Array:
+    """The values as stored, sparse substitutions made. (count, width)"""
+    width, dtype = WIDTHS[accessor.type], np.dtype(DTYPES[accessor.componentType])
+    if accessor.bufferView is None:
+        _check_zeros(container, accessor, width * dtype.itemsize, label)
+        values: Array = np.zeros((accessor.count, width), dtype)
+    else:
+        values = _read_strided(container, accessor.bufferView, accessor.byteOffset, accessor.count, width, dtype, label)
+    if accessor.sparse is not None:
+        _substitute(container, accessor.sparse, values, label)
+    return values
+
+
+def _read_strided(
+    container: GltfContainer, view_index: int, offset: int, count: int, width: int, dtype: np.dtype[Any], label: str
+) -> Array:
+    content = view_bytes(container, view_index, label)
+    element_bytes = width * dtype.itemsize
+    stride = container.document.bufferViews[view_index].byteStride or element_bytes
+    if stride < element_bytes:
+        raise SceneError(f"{label} have a stride of {stride} for elements of {element_bytes} bytes; export it again")
+    if offset + (count - 1) * stride + element_bytes > len(content):
+        raise SceneError(f"{label} have more elements than its buffer view holds; export the scene again")
+    return np.ndarray((count, width), dtype, content, offset, (stride, dtype.itemsize)).copy()
+
+
+def _substitute(container: GltfContainer, sparse: Sparse, values: Array, label: str) -> None:
+    """Puts the sparse values in their places."""
+    num_elements, width = values.shape
+    if sparse.count > num_elements:
+        raise SceneError(f"{label} have more sparse elements than elements; export the scene again")
+    index_view, index_dtype = sparse.indices, np.dtype(DTYPES[sparse.indices.componentType])
+    indices = _read_strided(
+        container, index_view.bufferView, index_view.byteOffset, sparse.count, 1, index_dtype, f"sparse {label}"
+    )
+    if int(indices.max()) >= num_elements:
+        raise SceneError(f"{label} have sparse indices out of range; export the scene again")
+    value_view = sparse.values
+    values[indices[:, 0]] = _read_strided(
+        container, value_view.bufferView, value_view.byteOffset, sparse.count, width, values.dtype, f"sparse {label}"
+    )
+
+
+def _check_zeros(container: GltfContainer, accessor: Accessor, element_bytes: int, label: str) -> None:
+    """An accessor without a view is all zeros but for its sparse part: a few bytes that could claim gigabytes."""
+    if accessor.sparse is None:
+        raise SceneError(f"{label} have no data; export the scene again")
+    buffer_bytes = sum(len(buffer) for buffer in container.buffers)
+    if accessor.count * element_bytes > 1000 * buffer_bytes:
+        raise SceneError(f"{label} claim {accessor.count:,} elements and hold almost none; export the scene again")
+
+
+def _item_at(items: Any, index: int, label: str) -> Any:
+    if index >= len(items):
+        raise SceneError(f"{label} refer to number {index} of {len(items)}; export the scene again")
+    return items[index]

@@ -1,0 +1,114 @@
+"""The base layer where images say it: diffuse albedo and reflectance head-on of every texel, some rows at a time.
+
+    diffuse = b (1 - m),  f0 = mix(s min(c f, 1), b, m),  f90 = mix(s, 1, m)
+
+of base colour b, metallic m, specular s with colour c and reflectance f, as `relume.scene_io.gltf.materials` says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from relume.scene.model import Texture, TextureEncoding
+from relume.scene.texture_encoding import F32, F64, ROWS_PER_BATCH, SRGB_TO_LINEAR, U8, encode_rows
+from relume.scene_io.gltf.texture_resampling import Raster
+
+
+@dataclass(frozen=True)
+class MetallicBlend:
+    """A material's images and factors.
+
+    Attributes:
+        raster: images "base", "packed", "specular", "tint". factor: of the base colour. (3,)
+        dielectric: reflectance head-on with its colour. (3,) metallic, specular: factors.
+    """
+
+    raster: Raster
+    factor: F64
+    dielectric: F64
+    metallic: float
+    specular: float
+
+    @property
+    def _metallic_image(self) -> U8:
+        """What the factor of metallic multiplies."""
+        return self.raster.channel("packed", 2) if self.metallic else np.zeros((1, 1, 1), np.uint8)
+
+    def diffuse(self) -> Texture:
+        """What multiplies the diffuse colour."""
+        base, metallic = self.raster.rgb("base"), self._metallic_image
+        if metallic.size == 1 and base.shape[:2] == self.raster.size:
+            diffuse_scale = 1 - self.metallic * float(metallic[0, 0, 0]) / 255
+            return Texture(
+                np.ascontiguousarray(base),
+                self.raster.wrap,
+                TextureEncoding("srgb", (diffuse_scale, diffuse_scale, diffuse_scale)),
+            )
+
+        def values(rows: slice) -> F32:
+            return SRGB_TO_LINEAR[select_rows(base, rows)] * (
+                1 - np.float32(self.metallic) * _unit_values(metallic, rows)
+            )
+
+        return encode_rows(values, self.raster.size, np.ones(3), self.raster.wrap)
+
+    def _f0(self, rows: slice) -> F32:
+        metallic = np.float32(self.metallic) * _unit_values(self._metallic_image, rows)
+        weight = np.float32(self.specular) * _unit_values(self.raster.channel("specular", 3), rows)
+        tint = SRGB_TO_LINEAR[select_rows(self.raster.rgb("tint"), rows)]
+        head_on = np.minimum(tint * self.dielectric.astype(np.float32), 1) * weight
+        base = (
+            SRGB_TO_LINEAR[select_rows(self.raster.rgb("base"), rows)]
+            if metallic.any()
+            else np.ones((1, 1, 3), np.float32)
+        )
+        return np.asarray(lerp(head_on, self.factor.astype(np.float32) * base, metallic), np.float32)
+
+    def f0_and_f90(self) -> tuple[F64, F64, F64, float]:
+        """Least, highest and mean reflectance head-on, (3,) each, and the mean at the horizon."""
+        height, _ = self.raster.size
+        lowest, highest, total = np.full(3, np.inf), np.full(3, -np.inf), np.zeros(3)
+        at_horizon = 0.0
+        for start in range(0, height, ROWS_PER_BATCH):
+            rows = slice(start, min(start + ROWS_PER_BATCH, height))
+            row_fraction, f0 = (rows.stop - rows.start) / height, self._f0(rows).reshape(-1, 3)
+            lowest, highest = np.minimum(lowest, f0.min(axis=0)), np.maximum(highest, f0.max(axis=0))
+            total += row_fraction * f0.mean(axis=0, dtype=np.float64)
+            metallic = self.metallic * _unit_values(self._metallic_image, rows)
+            weight = self.specular * _unit_values(self.raster.channel("specular", 3), rows)
+            at_horizon += row_fraction * float(np.mean(lerp(weight, 1, metallic), dtype=np.float64))
+        return lowest, highest, total, at_horizon
+
+    def normalized_f0(self, mean: F64, highest: F64) -> Texture:
+        """Reflectance head-on over its mean: what multiplies the highlight."""
+        base, metallic = self.raster.rgb("base"), self._metallic_image
+        if (
+            metallic.size == 1
+            and self.metallic * float(metallic[0, 0, 0]) == 255
+            and base.shape[:2] == self.raster.size
+        ):
+            red, green, blue = (self.factor / mean).tolist()
+            return Texture(np.ascontiguousarray(base), self.raster.wrap, TextureEncoding("srgb", (red, green, blue)))
+        divisor = mean.astype(np.float32)
+        return encode_rows(lambda rows: self._f0(rows) / divisor, self.raster.size, highest / mean, self.raster.wrap)
+
+
+def lerp(a: Any, b: Any, weight: Any) -> Any:
+    """Interpolate linearly from a, at weight 0, to b, at weight 1."""
+    return a + (b - a) * weight
+
+
+def select_rows(values: U8, rows: slice) -> U8:
+    """Rows of an image, or the one texel that stands for all. (rows or 1, width or 1, channels)
+
+    Args:
+        values: of the image, or of that texel. rows: of the image.
+    """
+    return values if values.shape[:2] == (1, 1) else values[rows]
+
+
+def _unit_values(values: U8, rows: slice) -> F32:
+    return select_rows(values, rows).astype(np.float32) / np.float32(255)

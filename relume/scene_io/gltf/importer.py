@@ -1,0 +1,335 @@
+"""glTF to Scene: what relume understands, and one warning for each thing it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.assets.environments.environment import Environment
+from relume.assets.environments.studio import studio
+from relume.core.errors import SceneError
+from relume.core.import_warnings import ImportRemark, approximated, ignored, unsupported
+from relume.scene.collect_lights import LightCollector
+from relume.scene.finalize import finalize
+from relume.scene.merge_meshes import merge_by_material
+from relume.scene.model import F32, Camera, Mesh, Scene
+from relume.scene.unique_names import unique_name
+from relume.scene.validate import MAX_TRIANGLES
+from relume.scene.vertex_colors import MAX_COLORED, draw_color_image, is_uniform
+from relume.scene_io.gltf.accessors import AccessorReader
+from relume.scene_io.gltf.cameras import framing_camera, make_slug, rigid_frame
+from relume.scene_io.gltf.container import SUPPORTED_EXTENSIONS, GltfContainer, read_container
+from relume.scene_io.gltf.degenerate_transforms import (
+    cofactors,
+    count_dimensions,
+    determinant,
+    plane_normal,
+    remove_degenerate,
+)
+from relume.scene_io.gltf.document import Document, Node, Primitive
+from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
+from relume.scene_io.gltf.geometry import MAX_COORDINATE, GltfGeometry, count_corners, read_primitive
+from relume.scene_io.gltf.images import ImageReader
+from relume.scene_io.gltf.instances import read_instances
+from relume.scene_io.gltf.lights import LightReader
+from relume.scene_io.gltf.materials import WHITE, MaterialReader, ReadMaterial, VertexColors, has_textures
+from relume.scene_io.gltf.nodes import walk_nodes
+from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
+from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
+from relume.scene_io.referenced_files import Companions, NoFiles
+
+F64 = NDArray[np.float64]
+Key = tuple[int, int]  # a mesh and a primitive of it
+MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
+MAX_INSTANCES = 100_000  # primitives times the nodes and the instances that show them
+_MAX_SEPARATE_MESHES = (
+    2_000  # meshes; more of one material are joined, for each is a handful of arrays in files and in memory
+)
+
+
+def import_gltf(
+    data: bytes, name: str, environment: Environment | None = None, companions: Companions | None = None
+) -> Scene:
+    """Reads a .glb file, or a .gltf file.
+
+    Args:
+        data: the file's bytes.
+        name: what people call the scene.
+        environment: the light; the studio of the built-in scene where None.
+        companions: the files that it may name; none where None.
+
+    Returns:
+        The scene, nodes applied: one mesh per primitive and node, cameras or one view "front", lights and materials
+        that shine.
+
+    Raises:
+        SceneError: the file cannot be used; the message says why and what to do.
+    """
+    builder = _SceneBuilder(read_container(data, companions or NoFiles()))
+    materials = [read_material.material for read_material in builder.materials]
+    contents = (name, builder.meshes, materials, builder.cameras, environment or studio())
+    return finalize(*contents, builder.warnings, builder.variants, builder.lights)
+
+
+class _BoundPrimitive(NamedTuple):
+    """A primitive, its places in textures, and the material that it wears."""
+
+    geometry: GltfGeometry
+    uvs: F32
+    read_material: ReadMaterial
+    material_index: int
+
+
+class _SceneBuilder:
+    """One file on its way to a scene: walks the nodes, reading meshes and materials when they are first met."""
+
+    def __init__(self, container: GltfContainer) -> None:
+        self._document = container.document
+        self._accessors = AccessorReader(container)
+        self.warnings: list[ImportRemark] = []
+        self._material_reader = MaterialReader(ImageReader(container), self.warnings)
+        self._collector = LightCollector(self.warnings)
+        self._light_reader = LightReader(container.document, self._collector, self.warnings)
+        self._geometry: dict[Key, GltfGeometry | None] = {}
+        self._material_index: dict[tuple[int | None, Choices], int] = {}
+        self._choices = _read_all_choices(container.document)
+        self._primitives = _primitives_by_material(container.document, self._choices)
+        self._bound_primitives: dict[tuple[Key, int], _BoundPrimitive] = {}
+        self._mesh_names: dict[str, int] = {}
+        self._flattened: list[str] = []
+        self._camera_names: dict[str, int] = {}
+        self._remaining_instances, self._remaining_corners = MAX_INSTANCES, MAX_CORNERS
+        self._remaining_triangles, self._remaining_vertices = MAX_TRIANGLES, MAX_VERTICES
+        self.materials: list[ReadMaterial] = []
+        self.meshes: list[Mesh] = []
+        self.cameras: list[Camera] = []
+        self._warn_unsupported()
+        for node, to_world in walk_nodes(self._document, self.warnings):
+            self._add_node(node, to_world)
+        if self._flattened:
+            num, first = len(self._flattened), self._flattened[0]
+            self.warnings.append(approximated(f"{num:,} meshes are flattened by their nodes, {first!r} among them"))
+        if len(self.meshes) > _MAX_SEPARATE_MESHES:
+            self.meshes = merge_by_material(self.meshes)
+        if not self.meshes:
+            raise SceneError("the scene has no triangles with an area; export at least one mesh made of triangles")
+        emissions = [np.array(read_material.emission) for read_material in self.materials]
+        scene_materials = [read_material.material for read_material in self.materials]
+        lit = self._collector.emissive_light(scene_materials, emissions, self.meshes)
+        self.materials = [replace(u, material=material) for u, material in zip(self.materials, lit, strict=True)]
+        self.lights = self._collector.lights
+        self.variants = self._read_variants()
+        if not self.cameras:
+            self.cameras.append(framing_camera(self.meshes, make_slug("front", self._camera_names)))
+
+    def _add_node(self, node: Node, to_world: F64) -> None:
+        if node.camera is not None:
+            self._add_camera(node, to_world)
+        self._light_reader.add(node, to_world)
+        if node.mesh is None:
+            return
+        if node.mesh >= len(self._document.meshes):
+            raise SceneError(f"mesh {node.mesh} does not exist; export the scene again")
+        if node.skin is not None:
+            self.warnings.append(approximated(f"the skin of node {node.name[:80]!r} is not used; it has its rest pose"))
+        mesh = self._document.meshes[node.mesh]
+        instances = read_instances(node, self._accessors, self._remaining_instances, self.warnings)
+        self._remaining_instances -= len(mesh.primitives) * len(instances)
+        if self._remaining_instances < 0:
+            raise SceneError(f"the scene shows more than {MAX_INSTANCES:,} meshes; join them (gltf-transform join)")
+        for instance in instances:
+            for i, primitive in enumerate(mesh.primitives):
+                name = unique_name(node.name or mesh.name or "mesh", self._mesh_names)
+                self._add_primitive((node.mesh, i), primitive, name, to_world @ instance)
+
+    def _read_geometry(self, key: Key, primitive: Primitive, name: str) -> GltfGeometry | None:
+        if key not in self._geometry:
+            self._remaining_corners -= count_corners(self._document, primitive)
+            if self._remaining_corners < 0:
+                raise SceneError(f"the file describes more than {MAX_TRIANGLES:,} triangles; simplify it")
+            self._accessors.unpack(primitive, f"mesh {name!r}")
+            self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {name!r}", self.warnings)
+        return self._geometry[key]
+
+    def _add_primitive(self, key: Key, primitive: Primitive, name: str, to_world: F64) -> None:
+        if self._read_geometry(key, primitive, name) is None:
+            return
+        material_index = self._find_material_index(key, primitive)
+        geometry = self._geometry[key]
+        assert geometry is not None
+        self._remaining_triangles -= len(geometry.faces)
+        self._remaining_vertices -= len(geometry.positions)
+        if min(self._remaining_triangles, self._remaining_vertices) < 0:
+            raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
+        num_dimensions = count_dimensions(to_world[:3, :3])
+        mesh = _make_world_mesh(self._bind_material(key, geometry, material_index), to_world, num_dimensions, name)
+        if mesh is not None and num_dimensions == 2:
+            self._flattened.append(name)
+        if mesh is None:
+            self.warnings.append(unsupported(f"mesh {name!r} is scaled to nothing or out of range; it is left out"))
+        else:
+            self.meshes.append(mesh)
+
+    def _bind_material(self, key: Key, geometry: GltfGeometry, material_index: int) -> _BoundPrimitive:
+        """A primitive with its material, made once for all the nodes that show it."""
+        if (key, material_index) not in self._bound_primitives:
+            read_material = self.materials[material_index]
+            uvs = read_material.uv_slot.apply(geometry.uvs, len(geometry.positions))
+            self._bound_primitives[key, material_index] = _BoundPrimitive(geometry, uvs, read_material, material_index)
+        return self._bound_primitives[key, material_index]
+
+    def _find_material_index(self, key: Key, primitive: Primitive) -> int:
+        """Number of the primitive's material; those that variants exchange differently are different ones."""
+        choices = self._choices[key]
+        material_key = (primitive.material, choices)
+        if material_key not in self._material_index:
+            self._material_index[material_key] = len(self.materials)
+            colors = self._vertex_colors(primitive.material, choices)
+            self.materials.append(self._read_material(primitive.material, colors))
+        return self._material_index[material_key]
+
+    def _vertex_colors(self, index: int | None, choices: Choices) -> VertexColors:
+        """The colours of all vertices that wear a material; where they become an image, geometries get places in it."""
+        primitives = self._primitives[index, choices]
+        if not any("COLOR_0" in primitive.attributes for _, primitive in primitives):
+            return WHITE
+        read = {key: self._read_geometry(key, primitive, f"of {key[0]}") for key, primitive in primitives}
+        geometries = {key: geometry for key, geometry in read.items() if geometry is not None}
+        vertex_colors = {key: geometry.colors for key, geometry in geometries.items() if geometry.colors is not None}
+        if not vertex_colors:
+            return WHITE
+        white = [np.ones((1, 4), np.float32)] if len(vertex_colors) < len(geometries) else []
+        colors = np.concatenate([*vertex_colors.values(), *white])
+        red, green, blue, alpha = colors.mean(axis=0, dtype=np.float64).tolist()
+        material = self._gltf_material(index)
+        if is_uniform(colors):
+            return VertexColors((red, green, blue, alpha))
+        num_triangles = sum(len(geometries[key].faces) for key in vertex_colors)
+        if has_textures(material) or num_triangles > MAX_COLORED:
+            reason = "has textures" if has_textures(material) else f"colours more than {MAX_COLORED:,} triangles"
+            message = f"vertex colours of material {material.name[:80]!r}, which {reason}, are replaced by their mean"
+            self.warnings.append(approximated(message))
+            return VertexColors((red, green, blue, alpha))
+        return VertexColors(image=self._draw_color_image(geometries))
+
+    def _draw_color_image(self, geometries: dict[Key, GltfGeometry]) -> NDArray[np.uint8]:
+        """Draw the colours of geometries, and place these in the image."""
+        colors_by_key = {key: geometry.colors for key, geometry in geometries.items() if geometry.colors is not None}
+        corners = [colors[geometries[key].faces] for key, colors in colors_by_key.items()]
+        image, uvs, white_uv = draw_color_image(np.concatenate(corners))
+        uv_blocks = np.split(uvs, np.cumsum([len(block) for block in corners])[:-1])
+        self._geometry |= {
+            key: geometries[key].split_vertices(block) for key, block in zip(colors_by_key, uv_blocks, strict=True)
+        }
+        for key in geometries.keys() - colors_by_key.keys():
+            white_uvs = np.tile(white_uv, (len(geometries[key].positions), 1))
+            self._geometry[key] = replace(geometries[key], uvs=(white_uvs,))
+        return image
+
+    def _read_material(self, index: int | None, colors: VertexColors = WHITE) -> ReadMaterial:
+        return self._material_reader.read(self._gltf_material(index), colors)
+
+    def _gltf_material(self, index: int | None) -> GltfMaterial:
+        if index is not None and index >= len(self._document.materials):
+            raise SceneError(f"material {index} does not exist; export the scene again")
+        return GltfMaterial(name="default") if index is None else self._document.materials[index]
+
+    def _read_variants(self) -> dict[str, dict[str, Any]]:
+        read_materials = {index: self.materials[number] for (index, _), number in self._material_index.items()}
+        variant_indices = {index for _, choices in self._material_index for _, index in choices}
+        variant_materials = {
+            index: read_materials.get(index) or self._read_material(index) for index in sorted(variant_indices)
+        }
+        scene_materials = [(self.materials[number], choices) for (_, choices), number in self._material_index.items()]
+        return variant_looks(variant_names(self._document), scene_materials, variant_materials, self.warnings)
+
+    def _add_camera(self, node: Node, to_world: F64) -> None:
+        if node.camera is None or node.camera >= len(self._document.cameras):
+            raise SceneError(f"camera {node.camera} does not exist; export the scene again")
+        camera = self._document.cameras[node.camera]
+        name = camera.name or node.name or "camera"
+        frame = rigid_frame(to_world)
+        if camera.perspective is None or camera.type != "perspective":
+            self.warnings.append(unsupported(f"camera {name[:80]!r} is not a perspective one; it is left out"))
+        elif frame is None:
+            self.warnings.append(unsupported(f"camera {name[:80]!r} is scaled to nothing; it is left out"))
+        else:
+            yfov, aspect = camera.perspective.yfov, camera.perspective.aspectRatio
+            self.cameras.append(Camera(make_slug(name, self._camera_names), frame, yfov, aspect))
+
+    def _warn_unsupported(self) -> None:
+        document = self._document
+        if document.animations:
+            num_animations = len(document.animations)
+            animations = "1 animation is" if num_animations == 1 else f"{num_animations} animations are"
+            self.warnings.append(ignored(f"{animations} not used; everything has its rest pose"))
+        for extension in document.extensionsRequired:
+            if extension not in SUPPORTED_EXTENSIONS:
+                self.warnings.append(
+                    unsupported(f"the file requires {extension[:60]!r}, which is not understood; it may look wrong")
+                )
+
+
+def _read_all_choices(document: Document) -> dict[Key, Choices]:
+    """How the primitives of all meshes exchange their materials."""
+    return {
+        (m, i): read_choices(primitive)
+        for m, mesh in enumerate(document.meshes)
+        for i, primitive in enumerate(mesh.primitives)
+    }
+
+
+def _primitives_by_material(
+    document: Document, all_choices: Mapping[Key, Choices]
+) -> dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]]:
+    """The primitives that wear each material, and exchange it alike."""
+    primitives: dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]] = {}
+    for (m, i), choices in all_choices.items():
+        primitive = document.meshes[m].primitives[i]
+        primitives.setdefault((primitive.material, choices), []).append(((m, i), primitive))
+    return primitives
+
+
+def _make_world_mesh(bound: _BoundPrimitive, to_world: F64, num_dimensions: int, name: str) -> Mesh | None:
+    """The geometry in world space; None where the transform leaves nothing of it. A mirror turns the faces round."""
+    geometry, uvs, read_material, material_index = bound
+    linear = to_world[:3, :3]
+    positions = geometry.positions @ linear.T + to_world[:3, 3]
+    if num_dimensions < 2 or np.abs(positions).max() > MAX_COORDINATE:
+        return None
+    orientation = np.sign(determinant(linear)) if num_dimensions == 3 else 1.0
+    faces = geometry.faces if orientation > 0 else np.ascontiguousarray(geometry.faces[:, ::-1])
+    normals = _normalize(geometry.normals @ (orientation * cofactors(linear)).T)
+    if num_dimensions == 2:
+        faces = remove_degenerate(positions, faces)
+        normals = np.where(normals.any(axis=1, keepdims=True), normals, plane_normal(linear))
+        if not len(faces):
+            return None
+    tangents = np.zeros((len(positions), 4))
+    tangents[:, :3] = _normalize(geometry.tangents[:, :3] @ linear.T)
+    tangents[:, 3] = geometry.tangents[:, 3] * orientation
+    mesh = Mesh(
+        name,
+        positions.astype(np.float32),
+        normals.astype(np.float32),
+        tangents.astype(np.float32),
+        uvs,
+        faces,
+        material_index,
+    )
+    if read_material.material.normal_map is None and read_material.tangent_rotation is None:
+        return mesh
+    if not mesh.tangents.any():
+        mesh = replace(mesh, tangents=compute_tangents(mesh.positions, mesh.normals, mesh.uvs, faces))
+    if not read_material.tangent_rotation:
+        return mesh
+    return replace(mesh, tangents=rotate_tangents(mesh.tangents, mesh.normals, read_material.tangent_rotation))
+
+
+def _normalize(vectors: F64) -> F64:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1))

@@ -1,0 +1,103 @@
+"""KHR_lights_punctual as the scene's local lights.
+
+The extension counts light as eyes do: candela and lux. relume's radiance is radiometric, and 683 lumens are a watt (of
+green light; what exporters that think in watts multiply by).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, ValidationError
+
+from relume.core.errors import SceneError
+from relume.core.import_warnings import ImportRemark, approximated, unsupported
+from relume.scene.collect_lights import LightCollector
+from relume.scene.validate import MAX_METERS
+from relume.scene_io.gltf.document import Document, Factor, Index, Name, Node, Number
+
+F64 = NDArray[np.float64]
+
+EXTENSION = "KHR_lights_punctual"
+LUMENS_PER_WATT = 683.0
+_MAX_DEFINITIONS = 10_000
+_UNITS = approximated(
+    f"the file's lights count candela and lux; {LUMENS_PER_WATT:g} of them are one of relume's, watts"
+)
+
+
+class _Spot(BaseModel, frozen=True):
+    """The half-angles of a spot's cone, radians."""
+
+    innerConeAngle: Annotated[float, Field(ge=0, le=np.pi / 2, allow_inf_nan=False)] = 0.0  # noqa: N815
+    outerConeAngle: Annotated[float, Field(gt=0, le=np.pi / 2 + 1e-6, allow_inf_nan=False)] = np.pi / 4  # noqa: N815
+
+
+class _Punctual(BaseModel, frozen=True):
+    """One light, shared by the nodes that name it."""
+
+    name: Name = ""
+    type: Literal["point", "spot", "directional"]
+    color: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [1.0, 1.0, 1.0]
+    intensity: Annotated[Number, Field(ge=0)] = 1.0
+    range: Number | None = None
+    spot: _Spot = _Spot()
+
+
+class _PunctualLights(BaseModel, frozen=True):
+    """The extension at the document."""
+
+    lights: Annotated[list[_Punctual], Field(max_length=_MAX_DEFINITIONS, fail_fast=True)] = []
+
+
+class _LightReference(BaseModel, frozen=True):
+    """The extension at a node."""
+
+    light: Index
+
+
+class LightReader:
+    """Reads the lamps at the nodes of one file."""
+
+    def __init__(self, document: Document, collector: LightCollector, warnings: list[ImportRemark]) -> None:
+        self._collector = collector
+        self._warnings = warnings
+        try:
+            self._definitions = _PunctualLights.model_validate(document.extensions.get(EXTENSION, {})).lights
+        except (ValidationError, RecursionError):
+            raise SceneError(
+                f"{EXTENSION} of the file is not valid or lists over {_MAX_DEFINITIONS:,} lights; export it again"
+            ) from None
+
+    def add(self, node: Node, to_world: F64) -> None:
+        """The light of a node, if it has one; it shines along the node's −Z.
+
+        Raises:
+            SceneError: there is no such light, or there are more than a look may have.
+        """
+        if EXTENSION not in node.extensions:
+            return
+        try:
+            light = self._definitions[_LightReference.model_validate(node.extensions[EXTENSION]).light]
+        except (ValidationError, IndexError, RecursionError):
+            raise SceneError(f"node {node.name[:80]!r} names a light that does not exist; export it again") from None
+        name = self._collector.name(light.name or node.name or light.type)
+        direction, position = -to_world[:3, 2], to_world[:3, 3]
+        length = float(np.linalg.norm(direction))
+        if np.abs(position).max() > MAX_METERS or (light.type != "point" and length < 1e-12):
+            self._warnings.append(unsupported(f"light {name!r} is scaled to nothing or out of range; it is left out"))
+            return
+        fields: dict[str, Any] = {"kind": light.type}
+        if light.type != "directional":
+            fields["position"] = position.tolist()
+        if light.type != "point":
+            fields["direction"] = (direction / length).tolist()
+        if light.type == "spot":
+            outer = min(np.degrees(light.spot.outerConeAngle), 90.0)
+            fields["cone"] = [min(float(np.degrees(light.spot.innerConeAngle)), outer), outer]
+        if light.range is not None:
+            self._warnings.append(approximated(f"the range of light {name!r} is not used; its light ends nowhere"))
+        self._warnings.extend([] if _UNITS in self._warnings else [_UNITS])
+        self._collector.add(name, fields, np.array(light.color) * light.intensity / LUMENS_PER_WATT)

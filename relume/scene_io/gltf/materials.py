@@ -1,0 +1,366 @@
+"""Materials of a glTF file: numbers and textures brought to the base layer that `terms` describes.
+
+Base colour b, metallic m, specular s with colour c: lambert takes b (1 - m), the highlight has
+f0 = mix(s min(c f, 1), b, m) and f90 = mix(s, 1, m), with f from the index of refraction. glTF 2.0 specification,
+appendix B, and the extensions' own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.errors import SceneError
+from relume.core.import_warnings import ImportRemark, approximated, ignored, unsupported
+from relume.scene.model import Glass, Material, Opacity, Texture, TextureEncoding
+from relume.scene.opacity import make_opacity
+from relume.scene.texture_encoding import mean_value
+from relume.scene.unique_names import unique_name
+from relume.scene.validate import MAX_IOR
+from relume.scene.vertex_colors import WRAP
+from relume.scene_io.gltf.blend import MetallicBlend, lerp
+from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
+from relume.scene_io.gltf.document import TextureInfo
+from relume.scene_io.gltf.images import ImageReader
+from relume.scene_io.gltf.material_extensions import Clearcoat, MaterialExtensions, read_extensions
+from relume.scene_io.gltf.texture_resampling import Raster
+from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, dielectric_reflectance, make_terms
+from relume.scene_io.gltf.uvs import UvSlot, UvTransforms
+
+_MAX_CLEAR_ROUGHNESS = 0.1  # roughness of glass that blurs nothing to speak of
+MAX_TEXTURE_TEXELS = 700_000_000  # kept for the materials of one scene, 3 bytes each
+
+
+@dataclass(frozen=True)
+class VertexColors:
+    """What colours of vertices are to a material.
+
+    Attributes:
+        factor: RGB and alpha that multiply the base colour.
+        image: that stands for its texture; None where it has none, or the colours are all alike. (height, width, 4)
+    """
+
+    factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    image: NDArray[np.uint8] | None = None
+
+
+@dataclass(frozen=True)
+class ReadMaterial:
+    """A material, which texture coordinates its meshes must carry, and how far their tangents are turned, or None.
+
+    Attributes:
+        tangent_rotation: radians, from the tangent towards the bitangent; None where the material is isotropic.
+        emission: radiance, which the image of that name multiplies.
+    """
+
+    material: Material
+    uv_slot: UvSlot
+    tangent_rotation: float | None = None
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+WHITE = VertexColors()
+
+
+class MaterialReader:
+    """Turns the materials of one file into relume's, counting the texels it makes."""
+
+    def __init__(self, images: ImageReader, warnings: list[ImportRemark]) -> None:
+        self._images = images
+        self._warnings = warnings
+        self._names: dict[str, int] = {}
+        self._remaining_texels = MAX_TEXTURE_TEXELS
+
+    def read(self, material: GltfMaterial, colors: VertexColors = WHITE) -> ReadMaterial:
+        """One material under a name of its own.
+
+        Args:
+            material: as the file has it. colors: of the vertices that wear it.
+        Raises:
+            SceneError: a texture cannot be used or there are too many texels.
+        """
+        name = unique_name(material.name or "material", self._names)
+        label = f"material {name!r}"
+        extensions = read_extensions(material.extensions, label, self._warnings)
+        self._warn_unsupported(material, label)
+        infos = [info for info in _infos(material, extensions) if info is not None]
+        self._uv_transforms = UvTransforms(infos, label, self._warnings)
+        material = _scale_base_color(material, colors.factor)
+        surface = self._surface(material, extensions, self._raster(material, extensions, colors.image, label))
+        strength, tangent_rotation = self._anisotropy(extensions, label)
+        transmission = self._transmission(extensions, label)
+        glass = self._glass(surface, extensions, transmission, label) if transmission > 0 else None
+        if glass is None:
+            self._warn_unphysical_ior(extensions, label)
+        surface = replace(surface, diffuse=surface.diffuse * (1 - transmission))
+        if strength > 0 and "roughness" in surface.textures:
+            self._warnings.append(approximated(f"the roughness texture of {label}, which is anisotropic, is its mean"))
+        coat_layer = self._coat_layer(extensions, strength, label)
+        normal_map = self._normal_map(material.normalTexture, tangent_rotation, label)
+        emission_textures = self._emission_textures(material, label)
+        if coat_layer.coat > 0:
+            self._warn_coat_normals(extensions.clearcoat, label, has_normal_map=normal_map is not None)
+        scene_material = Material(
+            name,
+            make_terms(replace(surface, has_normal_map=normal_map is not None), coat_layer),
+            surface.textures | emission_textures,
+            normal_map,
+            material.doubleSided,
+            opacity=self._opacity(material, colors.image, label),
+            glass=glass,
+        )
+        anisotropy_rotation = tangent_rotation if strength > 0 else None
+        return ReadMaterial(
+            scene_material, self._uv_transforms.slot, anisotropy_rotation, self._emission(material, extensions, label)
+        )
+
+    def _transmission(self, extensions: MaterialExtensions, label: str) -> float:
+        transmission = extensions.transmission
+        return transmission.transmissionFactor * self._mean(
+            transmission.transmissionTexture, 0, f"transmission texture of {label}"
+        )
+
+    def _glass(self, surface: PbrSurface, extensions: MaterialExtensions, transmission: float, label: str) -> Glass:
+        """How light passes: tinted by the base colour, and inside of a solid by what it absorbs."""
+        volume, ior = extensions.volume, extensions.ior.ior
+        if surface.roughness > _MAX_CLEAR_ROUGHNESS:
+            self._warnings.append(approximated(f"{label} is frosted; what is behind it is seen sharply"))
+        if not 1 <= ior <= MAX_IOR:
+            self._warnings.append(
+                unsupported(f"{label} has an index of refraction of {ior:g}; it bends as if it had 1.5")
+            )
+            ior = 1.5
+        tint = surface.diffuse * transmission
+        if "diffuse" in surface.textures:
+            tint = tint * mean_value(surface.textures["diffuse"])
+        absorbed = -np.log(np.maximum(volume.attenuationColor, 1e-6)) / volume.attenuationDistance
+        red, green, blue = np.clip(tint, 0, 1).tolist()
+        r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
+        return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b))
+
+    def _warn_coat_normals(self, coat: Clearcoat, label: str, *, has_normal_map: bool) -> None:
+        """Tell of bumps that a coat has not in common with what it covers; a sample has one normal for both."""
+        has_coat_normals = coat.clearcoatNormalTexture is not None
+        if has_normal_map or has_coat_normals:
+            appearance = "as bumpy as what it covers" if has_normal_map else "smooth, as what it covers"
+            reason = "its own normal texture is not used" if has_coat_normals else "in the file it is smooth"
+            self._warnings.append(approximated(f"the coat of {label} is shown {appearance}; {reason}"))
+
+    def _warn_unphysical_ior(self, extensions: MaterialExtensions, label: str) -> None:
+        """Tell of an index of refraction that no opaque matter has; what stands for a mirror is tinted or weak."""
+        ior, specular = extensions.ior.ior, extensions.specular
+        reflectance = min(1.0, _f0(ior) * max(specular.specularColorFactor)) * specular.specularFactor
+        if 0 < ior < 1 or reflectance > _f0(MAX_IOR):
+            message = f"{label} has an index of refraction of {ior:g}; where it is no metal, {reflectance:.0%} of"
+            self._warnings.append(
+                unsupported(f"{message} the light that falls straight on it is reflected (1.5 is usual)")
+            )
+
+    def _opacity(self, material: GltfMaterial, colors: NDArray[np.uint8] | None, label: str) -> Opacity | None:
+        """Where the material has holes; alpha that is not asked for is not looked at."""
+        if material.alphaMode not in ("MASK", "BLEND"):
+            if material.alphaMode != "OPAQUE":
+                self._warnings.append(
+                    unsupported(f"{label} has the alpha mode {material.alphaMode[:20]!r}; it is opaque here")
+                )
+            return None
+        pbr, alpha, wrap = material.pbrMetallicRoughness, None, ("repeat", "repeat")
+        if pbr.baseColorTexture is not None:
+            pixels, wrap = self._load_image(pbr.baseColorTexture, f"the base colour texture of {label}")
+            alpha = pixels[..., 3]
+        elif colors is not None:
+            alpha, wrap = colors[..., 3], WRAP
+        cutoff = material.alphaCutoff if material.alphaMode == "MASK" else None
+        return make_opacity(alpha, wrap, pbr.baseColorFactor[3], cutoff, label, self._warnings)
+
+    def _emission(
+        self, material: GltfMaterial, extensions: MaterialExtensions, label: str
+    ) -> tuple[float, float, float]:
+        factor = np.maximum(material.emissiveFactor, 0) * extensions.emissive_strength.emissiveStrength
+        red, green, blue = factor.tolist()
+        return red, green, blue
+
+    def _emission_textures(self, material: GltfMaterial, label: str) -> dict[str, Texture]:
+        """The image of what surfaces shine, as it is in the file."""
+        if material.emissiveTexture is None or max(material.emissiveFactor) <= 0:
+            return {}
+        pixels, wrap = self._load_image(material.emissiveTexture, f"the emission texture of {label}")
+        return {
+            "emission": self._count_texels(
+                Texture(np.ascontiguousarray(pixels[..., :3]), wrap, TextureEncoding("srgb"))
+            )
+        }
+
+    def _surface(self, material: GltfMaterial, extensions: MaterialExtensions, raster: Raster) -> PbrSurface:
+        """The base layer; images only where a texture says more than one value."""
+        pbr, specular = material.pbrMetallicRoughness, extensions.specular
+        factor = np.array(pbr.baseColorFactor[:3])
+        dielectric = _f0(extensions.ior.ior) * np.array(specular.specularColorFactor)
+        roughness = raster.mean("packed", 1) * pbr.roughnessFactor
+        specular_reflectance = dielectric_reflectance(
+            float(np.minimum(dielectric, 1).max()) * specular.specularFactor, specular.specularFactor
+        )
+        if raster.empty:
+            metallic, weight = pbr.metallicFactor, specular.specularFactor
+            f0 = lerp(weight * np.minimum(dielectric, 1), factor, metallic)
+            return PbrSurface(factor * (1 - metallic), f0, lerp(weight, 1, metallic), roughness, specular_reflectance)
+        blend = MetallicBlend(raster, factor, dielectric, pbr.metallicFactor, specular.specularFactor)
+        textures = {"diffuse": self._count_texels(blend.diffuse())}
+        if roughness > 0 and raster.varies("packed", 1):
+            textures["roughness"] = self._count_texels(_normalize_roughness(raster))
+        lowest, highest, mean_f0, f90 = blend.f0_and_f90()
+        if (highest - lowest).max() < 1e-6:
+            return PbrSurface(factor, lowest, f90, roughness, specular_reflectance, textures)
+        mean_f0 = np.maximum(mean_f0, 1e-4)
+        textures["specular"] = self._count_texels(blend.normalized_f0(mean_f0, highest))
+        return PbrSurface(factor, mean_f0, f90, roughness, specular_reflectance, textures)
+
+    def _raster(
+        self, material: GltfMaterial, extensions: MaterialExtensions, colors: NDArray[np.uint8] | None, label: str
+    ) -> Raster:
+        """The images that the base layer is made of, all in the size of the first."""
+        if colors is not None:
+            return Raster({"base": (colors, WRAP)})
+        pbr = material.pbrMetallicRoughness
+        infos = {
+            "base": (pbr.baseColorTexture, "base colour"),
+            "packed": (pbr.metallicRoughnessTexture, "metallic-roughness"),
+            "specular": (extensions.specular.specularTexture, "specular"),
+            "tint": (extensions.specular.specularColorTexture, "specular colour"),
+        }
+        images = {
+            key: self._load_image(info, f"the {texture_name} texture of {label}")
+            for key, (info, texture_name) in infos.items()
+            if info is not None
+        }
+        tiled_shapes = [
+            images[key][0].shape for key, (info, _) in infos.items() if info and self._uv_transforms.is_tiled(info)
+        ]
+        return Raster(
+            images, (max((h for h, _, _ in tiled_shapes), default=0), max((w for _, w, _ in tiled_shapes), default=0))
+        )
+
+    def _coat_layer(self, extensions: MaterialExtensions, anisotropy: float, label: str) -> CoatLayer:
+        coat, sheen = extensions.clearcoat, extensions.sheen
+        weight = coat.clearcoatFactor * self._mean(coat.clearcoatTexture, 0, f"coat texture of {label}")
+        coat_roughness = coat.clearcoatRoughnessFactor
+        if coat.clearcoatRoughnessTexture is not None:
+            coat_roughness *= self._mean(coat.clearcoatRoughnessTexture, 1, f"coat roughness texture of {label}")
+        sheen_roughness = sheen.sheenRoughnessFactor
+        if sheen.sheenRoughnessTexture is not None:
+            sheen_roughness *= self._mean(sheen.sheenRoughnessTexture, 3, f"sheen roughness texture of {label}")
+        tint = np.array(sheen.sheenColorFactor) * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {label}")
+        r, g, b = (round(float(value), 6) for value in tint)
+        if r + g + b > 0:
+            self._warnings.append(
+                approximated(f"what lies under the sheen of {label} is dimmed by two curves' product")
+            )
+        return CoatLayer(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
+
+    def _anisotropy(self, extensions: MaterialExtensions, label: str) -> tuple[float, float]:
+        """Strength, and radians from the tangent to the direction of it; (0, 0) where the material is isotropic."""
+        anisotropy = extensions.anisotropy
+        strength, rotation = anisotropy.anisotropyStrength, anisotropy.anisotropyRotation
+        if anisotropy.anisotropyTexture is not None and strength > 0:
+            pixels, _ = self._images.texture(anisotropy.anisotropyTexture.index, f"the anisotropy texture of {label}")
+            x, y = (pixels[..., :2].mean((0, 1), dtype=np.float64) / 127.5 - 1).tolist()
+            strength *= float(pixels[..., 2].mean()) / 255
+            rotation += float(np.arctan2(y, x))
+            if np.hypot(x, y) < 0.5:
+                self._warnings.append(
+                    approximated(f"the anisotropy of {label} runs in all directions; its highlight is round")
+                )
+                return 0.0, 0.0
+            if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
+                self._warnings.append(approximated(f"the anisotropy texture of {label} is replaced by its mean"))
+        if strength == 0:
+            return 0.0, 0.0
+        self._warnings.append(
+            approximated(f"{label} is anisotropic; its highlight is Ashikhmin-Shirley's, of about the same width")
+        )
+        return strength, float(np.remainder(rotation, 2 * np.pi))
+
+    def _normal_map(self, info: TextureInfo | None, tangent_rotation: float, label: str) -> Texture | None:
+        """Unit normals, in the frame of tangents turned by `tangent_rotation`."""
+        if info is None:
+            return None
+        pixels, wrap = self._load_image(info, f"the normal texture of {label}")
+        scale = float(np.clip(info.scale, -100, 100))
+        encoding = TextureEncoding("normal", (scale, scale, 1.0), tangent_rotation)
+        return self._count_texels(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, encoding))
+
+    def _load_image(self, info: TextureInfo, label: str) -> tuple[NDArray[np.uint8], tuple[str, str]]:
+        """An image, placed as the meshes' coordinates want it, and how it wraps."""
+        pixels, wrap = self._images.texture(info.index, label)
+        return self._uv_transforms.tile_image(info, pixels, wrap), wrap
+
+    def _mean(self, info: TextureInfo | None, channel: int, label: str) -> float:
+        """Mean of one channel, in [0, 1]; 1 without a texture, and a warning where it varies."""
+        if info is None:
+            return 1.0
+        pixels, _ = self._images.texture(info.index, f"the {label}")
+        if np.ptp(pixels[..., channel]) > 2:
+            self._warnings.append(approximated(f"the {label} is replaced by its mean"))
+        return float(pixels[..., channel].mean()) / 255
+
+    def _mean_color(self, info: TextureInfo | None, label: str) -> Any:
+        if info is None:
+            return np.ones(3)
+        pixels, _ = self._images.texture(info.index, f"the {label}")
+        if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
+            self._warnings.append(approximated(f"the {label} is replaced by its mean"))
+        return mean_value(Texture(pixels[..., :3], encoding=TextureEncoding("srgb")))
+
+    def _count_texels(self, texture: Texture) -> Texture:
+        self._remaining_texels -= texture.pixels.size // 3
+        if self._remaining_texels < 0:
+            raise SceneError(f"the scene needs more than {MAX_TEXTURE_TEXELS:,} texels; scale its textures down")
+        return texture
+
+    def _warn_unsupported(self, material: GltfMaterial, label: str) -> None:
+        if material.occlusionTexture is not None:
+            self._warnings.append(ignored(f"the occlusion texture of {label} is not used; relume traces occlusion"))
+
+
+def _infos(material: GltfMaterial, extensions: MaterialExtensions) -> list[TextureInfo | None]:
+    """The textures that are kept as images, first those that the others should follow."""
+    pbr, specular = material.pbrMetallicRoughness, extensions.specular
+    images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
+    return [*images, specular.specularTexture, specular.specularColorTexture, material.emissiveTexture]
+
+
+def has_textures(material: GltfMaterial) -> bool:
+    """Whether a material names any image."""
+    pbr = material.pbrMetallicRoughness
+    texture_infos = [
+        pbr.baseColorTexture,
+        pbr.metallicRoughnessTexture,
+        material.normalTexture,
+        material.emissiveTexture,
+    ]
+    extension_objects = (value for value in material.extensions.values() if isinstance(value, dict))
+    return any(info is not None for info in texture_infos) or any(
+        key.endswith("Texture") for extension in extension_objects for key in extension
+    )
+
+
+def _scale_base_color(material: GltfMaterial, factor: tuple[float, float, float, float]) -> GltfMaterial:
+    """A material whose base colour is multiplied."""
+    pbr = material.pbrMetallicRoughness
+    scaled = [component * scale for component, scale in zip(pbr.baseColorFactor, factor, strict=True)]
+    return material.model_copy(update={"pbrMetallicRoughness": pbr.model_copy(update={"baseColorFactor": scaled})})
+
+
+def _normalize_roughness(raster: Raster) -> Texture:
+    """Roughness over its mean, texel by texel."""
+    scale = 1 / raster.mean("packed", 1)
+    pixels = np.ascontiguousarray(raster.channel("packed", 1))
+    return Texture(pixels, raster.wrap, TextureEncoding("share", (scale, scale, scale)))
+
+
+def _f0(ior: float) -> float:
+    """Reflectance of a dielectric head-on; the extension's 0 stands for a mirror."""
+    return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2

@@ -1,0 +1,67 @@
+"""Several images of one material brought to one size, so that they can be combined texel by texel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import PIL.Image
+
+from relume.scene_io.gltf.images import U8
+
+Wrap = tuple[str, str]
+NOISE = 2  # that lossy coding makes of one value
+
+
+class Raster:
+    """Images by name, all in the size and with the wrap of the first; those that are missing are white and opaque.
+
+    Args:
+        images: pixels and wrap of each. min_size: height and width of those that need more than the first has.
+    """
+
+    def __init__(self, images: Mapping[str, tuple[U8, Wrap]], min_size: tuple[int, int] = (0, 0)) -> None:
+        self._images = {key: pixels for key, (pixels, _) in images.items()}
+        first, self.wrap = next(iter(images.values()), (np.zeros((0, 0, 4), np.uint8), ("repeat", "repeat")))
+        self._height, self._width = (
+            max(int(extent), min_extent) for extent, min_extent in zip(first.shape, min_size, strict=False)
+        )
+        self.empty = not images
+        self._channels: dict[tuple[str, int], U8] = {}
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width of all images."""
+        return self._height, self._width
+
+    def rgb(self, key: str) -> U8:
+        """(height, width, 3); (1, 1, 3) white where there is no such image."""
+        return self.pixels(key)[..., :3]
+
+    def channel(self, key: str, channel: int) -> U8:
+        """One channel; white where there is no image. (height, width, 1); (1, 1, 1) where it varies by noise alone"""
+        if (key, channel) not in self._channels:
+            values = self.pixels(key)[..., channel, None]
+            uniform = np.full((1, 1, 1), round(float(values.mean())), np.uint8)
+            self._channels[key, channel] = values if np.ptp(values) > NOISE else uniform
+        return self._channels[key, channel]
+
+    def mean(self, key: str, channel: int) -> float:
+        """Mean of a channel in [0, 1]; 1 where there is no such image."""
+        return float(self._images[key][..., channel].mean()) / 255 if key in self._images else 1.0
+
+    def varies(self, key: str, channel: int) -> bool:
+        """Whether a channel differs from texel to texel by more than the noise of its coding."""
+        return key in self._images and bool(np.ptp(self._images[key][..., channel]) > NOISE)
+
+    def pixels(self, key: str) -> U8:
+        """(height, width, 4); (1, 1, 4) white where there is no such image."""
+        if key not in self._images:
+            return np.full((1, 1, 4), 255, np.uint8)
+        pixels = self._images[key]
+        if pixels.shape[:2] != self.size:
+            # Channel by channel: Pillow would multiply colours by alpha
+            channels = [PIL.Image.fromarray(np.ascontiguousarray(pixels[..., k])) for k in range(4)]
+            scaled = [c.resize(self.size[::-1], PIL.Image.Resampling.BILINEAR) for c in channels]
+            self._images[key] = np.stack([np.asarray(c) for c in scaled], axis=-1)
+        return self._images[key]

@@ -1,0 +1,138 @@
+"""A glTF material in numbers, and the terms that stand for it.
+
+Base: lambert times the mean of (1 - F) of what is not metal, and ggx, F = f90 · schlick(f0 / f90). Anisotropic:
+ashikhmin_shirley instead of ggx, its exponents from the widths of the facet distribution, n = 2/α² - 2 (Walter 2007,
+section 5.2). Clearcoat: a second ggx. What lies under a coat is dimmed by what that reflects towards the viewer, by a
+factor on its curve of θo; what lies under a sheen on that of θi, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.fresnel import schlick
+from relume.brdf.registry import TERMS
+from relume.brdf.specular import SOFT
+from relume.brdf.term import Term
+from relume.math.angle_bands import band_averages
+from relume.scene.model import Texture
+from relume.scene_io.gltf.sheen import sheen_attenuation, sheen_term
+
+F64 = NDArray[np.float64]
+COAT_F0 = 0.04
+_MEAN_RISE = 0.0036845  # of (1 - cos θd)^5 over both hemispheres, each weighted by its cosine
+Terms = tuple[dict[str, Any], ...]
+
+
+@dataclass(frozen=True)
+class PbrSurface:
+    """What lies under coat and sheen.
+
+    Attributes:
+        diffuse: albedo. f0, f90: reflectance head-on and at the horizon. (3,), (3,), one
+        roughness: as artists know it.
+        specular_reflectance: mean share that what is not metal reflects before light comes to what scatters it.
+        textures: multipliers of the two terms, and of the roughness.
+        has_normal_map: which makes it rougher where it is seen from far, see `relume.scene.roughness_levels`.
+    """
+
+    diffuse: F64
+    f0: F64
+    f90: float
+    roughness: float
+    specular_reflectance: float = 0.0
+    textures: dict[str, Texture] = field(default_factory=dict)
+    has_normal_map: bool = False
+
+
+@dataclass(frozen=True)
+class CoatLayer:
+    """What changes or covers the surface: strength of anisotropy; weight and roughness of the coat; the sheen's."""
+
+    anisotropy: float = 0.0
+    coat: float = 0.0
+    coat_roughness: float = 0.0
+    sheen: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sheen_roughness: float = 0.0
+
+
+def make_terms(surface: PbrSurface, coat_layer: CoatLayer) -> Terms:
+    """The terms of a look, bottom up: diffuse, highlight, sheen, coat."""
+    textures = {channel: channel if channel in surface.textures else None for channel in ("diffuse", "specular")}
+    layers = [
+        {
+            "model": "lambert",
+            "color": _round_color(surface.diffuse * (1 - surface.specular_reflectance)),
+            "texture": textures["diffuse"],
+        },
+        _highlight(surface, coat_layer.anisotropy) | {"texture": textures["specular"]},
+    ]
+    if any(coat_layer.sheen):
+        layers = [_attenuate_below_sheen(layer, coat_layer) for layer in layers]
+        layers.append(sheen_term(coat_layer.sheen, coat_layer.sheen_roughness))
+    if coat_layer.coat > 0:
+        params = _clamp_params(TERMS["ggx"], roughness=coat_layer.coat_roughness, f0=COAT_F0)
+        layers = [
+            _attenuate(layer, "theta_o", lambda angle: 1 - coat_layer.coat * schlick(np.cos(angle), COAT_F0))
+            for layer in layers
+        ]
+        layers.append({"model": "ggx", "color": [coat_layer.coat] * 3, "params": params, "texture": None})
+    return tuple(layers)
+
+
+def dielectric_reflectance(f0: float, f90: float) -> float:
+    """Mean reflectance of a dielectric by Schlick's F(θd) from f0 head-on to f90 at the horizon."""
+    return f0 + (f90 - f0) * _MEAN_RISE
+
+
+def _highlight(surface: PbrSurface, anisotropy: float) -> dict[str, Any]:
+    color = _round_color(np.full(3, surface.f90))
+    f0 = surface.f0 / surface.f90 if surface.f90 > 0 else surface.f0
+    if anisotropy == 0:
+        params = _clamp_params(TERMS["ggx"], roughness=surface.roughness, f0=f0)
+        needs_roughness_map = (
+            surface.has_normal_map and surface.roughness >= SOFT
+        )  # mirrors are pictures, which nothing widens
+        roughness_map = {"roughness_map": True} if "roughness" in surface.textures or needs_roughness_map else {}
+        return {"model": "ggx", "color": color, "params": params, **roughness_map}
+    across = max(surface.roughness**2, 1e-3)
+    along = across + (1 - across) * anisotropy**2
+    params = _clamp_params(TERMS["ashikhmin_shirley"], nu=2 / along**2 - 2, nv=2 / across**2 - 2, f0=f0)
+    return {"model": "ashikhmin_shirley", "color": color, "params": params}
+
+
+def _clamp_params(term: Term, **values: Any) -> dict[str, Any]:
+    """Parameters held to their ranges."""
+    params = {}
+    for name, value in values.items():
+        parameter = term.parameter(name)
+        clipped = np.round(np.clip(value, parameter.minimum, parameter.maximum), 6)
+        params[name] = clipped.tolist()
+    return params
+
+
+def _attenuate_below_sheen(layer: dict[str, Any], coat_layer: CoatLayer) -> dict[str, Any]:
+    """What a layer sends through a sheen."""
+    by_light = any(curve.name == "theta_i" for curve in TERMS[layer["model"]].curves)
+    light, view = sheen_attenuation(max(coat_layer.sheen), coat_layer.sheen_roughness, by_light=by_light)
+    layer = _attenuate(layer, "theta_i", light) if by_light else layer
+    return _attenuate(layer, "theta_o", view)
+
+
+def _attenuate(layer: dict[str, Any], name: str, attenuation: Callable[[F64], F64]) -> dict[str, Any]:
+    """A layer with a curve of which this share is kept."""
+    num_bands = TERMS[layer["model"]].curve(name).num_bands
+    factors = band_averages(lambda theta: np.clip(attenuation(theta), 0, 1), num_bands)
+    curves = layer.get("curves", {})
+    curve = curves.get(name, {"factors": [1.0] * num_bands, "channels": "rgb"})
+    kind = "bands" if "bands" in curve else "factors"
+    return layer | {"curves": {**curves, name: {**curve, kind: np.round(np.array(curve[kind]) * factors, 6).tolist()}}}
+
+
+def _round_color(color: Any) -> list[float]:
+    return [round(float(value), 6) for value in color]

@@ -1,0 +1,178 @@
+"""Which texture coordinates a material uses, moved as KHR_texture_transform says, and tangents made from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
+
+from relume.core.import_warnings import ImportRemark, unsupported
+from relume.scene.model import F32, U32
+from relume.scene_io.gltf.document import Index, Number, TextureInfo
+
+U8 = NDArray[np.uint8]
+Wrap = tuple[str, str]
+Tiling = tuple[tuple[int, int], tuple[float, float]]
+_NO_TILING: Tiling = ((1, 1), (0.0, 0.0))
+_MAX_TILED = 8192  # texels a side
+_MAX_REPEAT_ERROR = 1e-4
+
+
+class UvTransform(BaseModel, frozen=True):
+    """KHR_texture_transform of one texture; `texCoord` overrides the set."""
+
+    offset: tuple[Number, Number] = (0.0, 0.0)
+    rotation: Number = 0.0
+    scale: tuple[Number, Number] = (1.0, 1.0)
+    texCoord: Index | None = None  # noqa: N815
+
+
+@dataclass(frozen=True)
+class UvSlot:
+    """A set of texture coordinates and how they are moved; the same for all textures of a material."""
+
+    uv_set: int = 0
+    transform: UvTransform = field(default_factory=UvTransform)
+
+    def apply(self, sets: Sequence[F32], num_vertices: int) -> F32:
+        """Coordinates (num_vertices, 2): scaled, turned counter-clockwise with v down, shifted; zeros without a set."""
+        if self.uv_set >= len(sets):
+            return np.zeros((num_vertices, 2), np.float32)
+        p = self.transform
+        c, s = np.cos(p.rotation), np.sin(p.rotation)
+        rotation = np.array([[c, s], [-s, c]])
+        transformed = (sets[self.uv_set] * np.array(p.scale)) @ rotation.T + np.array(p.offset)
+        return np.asarray(np.clip(transformed, -1e6, 1e6), np.float32)
+
+
+class UvTransforms:
+    """How all images of a material are brought to one placement: those that repeat more often are tiled.
+
+    Attributes:
+        candidate: what the meshes carry.
+    """
+
+    def __init__(self, textures: Sequence[TextureInfo], label: str, warnings: list[ImportRemark]) -> None:
+        """Choose the placement.
+
+        Args:
+            textures: of the material; the first one decides where none is a whole part of all others.
+            label: names the material in warnings. warnings: gets a sentence where an image cannot be placed.
+        """
+        self._label, self._warnings = label, warnings
+        slots = [_read_slot(texture, label, warnings) for texture in textures]
+        self._slots = dict(zip(map(id, textures), slots, strict=True))
+        candidates = (candidate for candidate in slots if all(tiling(slot, candidate) is not None for slot in slots))
+        self.slot = next(candidates, slots[0] if slots else UvSlot())
+        self._has_warned = False
+
+    def is_tiled(self, info: TextureInfo) -> bool:
+        """Whether `placed` tiles an image. info: one of the material's textures"""
+        layout = tiling(self._slots[id(info)], self.slot)
+        return layout is not None and layout[0] != (1, 1)
+
+    def tile_image(self, info: TextureInfo, pixels: U8, wrap: Wrap) -> U8:
+        """An image as it is to be sampled at the meshes' coordinates.
+
+        Args:
+            info: one of the material's textures. pixels: top row first. (height, width, channels). wrap: its own
+        """
+        layout = tiling(self._slots[id(info)], self.slot)
+        if layout == _NO_TILING or pixels.shape[:2] == (1, 1):
+            return pixels
+        height, width = pixels.shape[:2]
+        if layout is not None and wrap == ("repeat", "repeat"):
+            (across, down), (right, below) = layout
+            if max(width * across, height * down) <= _MAX_TILED:
+                shift = round(-below * height) % height, round(-right * width) % width
+                return np.tile(np.roll(pixels, shift, axis=(0, 1)), (down, across, 1))
+        if not self._has_warned:
+            message = f"the textures of {self._label} are placed differently, one no whole number of times as often as"
+            self._warnings.append(unsupported(f"{message} another, or not repeated; all are placed alike"))
+        self._has_warned = True
+        return pixels
+
+
+def tiling(slot: UvSlot, base_slot: UvSlot) -> Tiling | None:
+    """How often an image stands in another's along u and v, and where (0, 0) of that lies in it.
+
+    Returns:
+        None where that is no whole number of times, or one is turned.
+    """
+    transform, base_transform = slot.transform, base_slot.transform
+    if slot == base_slot:
+        return _NO_TILING
+    if slot.uv_set != base_slot.uv_set or transform.rotation != base_transform.rotation or 0 in base_transform.scale:
+        return None
+    repeats = np.array(transform.scale) / base_transform.scale
+    whole = np.rint(repeats)
+    if (
+        (whole < 1).any()
+        or np.abs(repeats - whole).max() > _MAX_REPEAT_ERROR
+        or (transform.rotation and repeats[0] != repeats[1])
+    ):
+        return None
+    across, down = (int(min(number, _MAX_TILED)) for number in whole)
+    right, below = (np.array(transform.offset) - whole * base_transform.offset).tolist()
+    return (across, down), (right, below)
+
+
+def _read_slot(texture: TextureInfo, label: str, warnings: list[ImportRemark]) -> UvSlot:
+    extension = texture.extensions.get("KHR_texture_transform")
+    if extension is None:
+        return UvSlot(texture.texCoord)
+    try:
+        transform = UvTransform.model_validate(extension)
+    except ValidationError:
+        warnings.append(unsupported(f"a texture transform of {label} is not valid; it is not used"))
+        return UvSlot(texture.texCoord)
+    uv_set = texture.texCoord if transform.texCoord is None else transform.texCoord
+    return UvSlot(uv_set, transform.model_copy(update={"texCoord": None}))
+
+
+def compute_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
+    """Tangents along u with handedness, averaged over the triangles of a vertex.
+
+    The bitangent cross(normal, tangent)·w points against v, which runs down: up, as the green of a normal map means.
+
+    Args:
+        positions, normals: of the vertices; normals unit. (num_vertices, 3)
+        uvs: texture coordinates, v from the top. (num_vertices, 2)
+        faces: the triangles' vertices. (num_faces, 3)
+    Returns:
+        (num_vertices, 4) float32, unit, the handedness ±1 in w
+    """
+    p, uv = positions[faces].astype(np.float64), uvs[faces].astype(np.float64)
+    e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    (du1, dv1), (du2, dv2) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
+    orientation = np.sign(du1 * dv2 - du2 * dv1)
+    # Divided by the determinant these are dP/du and dP/dv; left undivided, large triangles count more.
+    along = (e1 * dv2[:, None] - e2 * dv1[:, None]) * orientation[:, None]
+    down = (e2 * du1[:, None] - e1 * du2[:, None]) * orientation[:, None]
+    tangents, bitangents = np.zeros(positions.shape), np.zeros(positions.shape)
+    for corner in range(3):
+        np.add.at(tangents, faces[:, corner], along)
+        np.add.at(bitangents, faces[:, corner], down)
+    tangents -= normals * (normals * tangents).sum(1, keepdims=True)
+    length = np.linalg.norm(tangents, axis=1, keepdims=True)
+    tangents = np.where(length > 1e-20, tangents / np.maximum(length, 1e-20), 0)
+    is_mirrored = (np.cross(normals, tangents) * bitangents).sum(1) > 0
+    return np.column_stack([tangents, np.where(is_mirrored, -1.0, 1.0)]).astype(np.float32)
+
+
+def rotate_tangents(tangents: F32, normals: F32, angle: float) -> F32:
+    """Tangents turned towards the bitangent cross(normal, tangent)·w.
+
+    Args:
+        tangents: unit, the handedness ±1 in w. (num_vertices, 4)
+        normals: unit. (num_vertices, 3)
+        angle: radians.
+    Returns:
+        (num_vertices, 4) float32
+    """
+    along, handedness = tangents[:, :3], tangents[:, 3:]
+    rotated = np.cos(angle) * along + np.sin(angle) * np.cross(normals, along) * handedness
+    return np.column_stack([rotated, handedness]).astype(np.float32)

@@ -1,0 +1,66 @@
+"""Scene files of any kind that relume reads, told apart by what they begin with."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from relume.assets.environments.environment import Environment
+from relume.core.errors import SceneError
+from relume.scene.model import Scene
+from relume.scene_io.gltf import import_gltf
+from relume.scene_io.obj_ply import import_obj, import_ply
+from relume.scene_io.referenced_files import Companions, Folder, NoFiles
+from relume.scene_io.zip_scene import open_zip
+
+MAX_FILE_BYTES = 512 << 20
+OBJ_LINE = re.compile(rb"^(v|vn|vt|f|o|g|usemtl|mtllib)[ \t]", re.MULTILINE)
+
+
+def import_scene(
+    source: str | Path | bytes,
+    name: str,
+    environment: Environment | None = None,
+    companions: Companions | None = None,
+) -> Scene:
+    """Reads .glb, .gltf, .obj, .ply, or a .zip with one of them and the files that it names.
+
+    Args:
+        source: a path, whose folder may hold the files that the scene names; or bytes, which stand alone.
+        name: what people call the scene.
+        environment: the light; the studio of the built-in scene where None.
+        companions: the files that came with it, where they do not lie in its folder or in the same archive.
+
+    Raises:
+        SceneError: the file cannot be used; the message says why and what to do.
+    """
+    data = read_file(source)
+    if not data:
+        raise SceneError("the scene file is empty: 0 bytes; export or download it again")
+    if companions is None:
+        companions = NoFiles() if isinstance(source, bytes) else Folder(Path(source).parent)
+    if data.startswith(b"PK"):
+        data, companions = open_zip(data)
+    if data.startswith(b"ply"):
+        return import_ply(data, name, environment)
+    if data.startswith(b"glTF") or data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
+        return import_gltf(data, name, environment, companions)
+    if b"\0" not in data[:4_096] and OBJ_LINE.search(data[: 1 << 20]):
+        return import_obj(data, name, environment, companions)
+    raise SceneError("the scene file is none of .glb, .gltf, .obj, .ply or .zip; export it as .glb")
+
+
+def read_file(source: str | Path | bytes) -> bytes:
+    """The bytes of a file of bounded size. Raises SceneError."""
+    if isinstance(source, bytes):
+        data = source
+    else:
+        try:
+            if Path(source).stat().st_size > MAX_FILE_BYTES:
+                raise SceneError(f"{Path(source).name!r} is larger than {MAX_FILE_BYTES >> 20} MB; simplify the scene")
+            data = Path(source).read_bytes()
+        except OSError as problem:
+            raise SceneError(f"{Path(source).name!r} cannot be read ({problem.strerror}); check the path") from None
+    if len(data) > MAX_FILE_BYTES:
+        raise SceneError(f"the scene file has {len(data) >> 20} MB, {MAX_FILE_BYTES >> 20} MB are allowed; simplify it")
+    return data

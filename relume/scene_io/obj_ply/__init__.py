@@ -1,0 +1,5 @@
+"""Reading Wavefront OBJ and Stanford PLY, from files that nobody vouches for."""
+
+from relume.scene_io.obj_ply.importer import import_obj, import_ply
+
+__all__ = ["import_obj", "import_ply"]

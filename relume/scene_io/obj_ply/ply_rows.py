@@ -1,0 +1,204 @@
+"""The rows of a PLY file as columns; a list column is the lengths of its lists and all their values."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.errors import SceneError
+
+Lists = tuple[NDArray[np.int64], NDArray[np.int64]]
+Columns = dict[str, NDArray[Any] | Lists]
+Layout = list[tuple[str, int]]  # NumPy type and how many of it, for each part of a row
+SHORT = "the .ply file has fewer rows than its header says; export or download it again"
+
+
+@dataclass(frozen=True)
+class Property:
+    """A column of an element; `count` is the type of a list's length, None for a single value."""
+
+    name: str
+    type: str
+    count: str | None = None
+
+
+@dataclass(frozen=True)
+class Element:
+    """So many rows of the same properties."""
+
+    name: str
+    rows: int
+    properties: tuple[Property, ...]
+
+
+class PlyRows(Protocol):
+    """What is left of the rows, in numbers or in bytes."""
+
+    @property
+    def remaining(self) -> int:
+        """How much there is; a row takes at least one for each property."""
+
+    def take(self, kind: str, count: int) -> NDArray[Any]:
+        """The next values, all of one type. Raises SceneError where there are fewer."""
+
+    def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
+        """The next rows without moving on, (rows, count) for each part; None where there are fewer."""
+
+    def skip(self, layout: Layout, rows: int) -> None:
+        """Move on by so many rows."""
+
+
+class TextRows:
+    """Rows of a text file: numbers one after another."""
+
+    def __init__(self, body: memoryview) -> None:
+        try:
+            with warnings.catch_warnings():  # by which alone NumPy before 2.3 says that it stopped at a word
+                warnings.simplefilter("error", DeprecationWarning)
+                self._numbers = np.fromstring(bytes(body).decode("ascii"), np.float64, sep=" ")
+        except (ValueError, DeprecationWarning):
+            raise SceneError("the .ply file has words where numbers should be; export it again") from None
+        self._offset = 0
+
+    @property
+    def remaining(self) -> int:
+        """How many numbers there still are."""
+        return len(self._numbers) - self._offset
+
+    def take(self, kind: str, count: int) -> NDArray[Any]:
+        """The next values, as `Rows.take` says."""
+        if count > self.remaining:
+            raise SceneError(SHORT)
+        self._offset += count
+        return self._numbers[self._offset - count : self._offset]
+
+    def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
+        """The next rows, as `Rows.table` says."""
+        width = sum(count for _, count in layout)
+        if rows * width > self.remaining:
+            return None
+        values = self._numbers[self._offset : self._offset + rows * width].reshape(rows, width)
+        return np.split(values, np.cumsum([count for _, count in layout])[:-1], axis=1)
+
+    def skip(self, layout: Layout, rows: int) -> None:
+        """Move on by so many rows, as `Rows.skip` says."""
+        self._offset += rows * sum(count for _, count in layout)
+
+
+class BinaryRows:
+    """Rows of a binary file in one byte order, "<" or ">"."""
+
+    def __init__(self, body: memoryview, order: str) -> None:
+        self._body, self._order, self._offset = body, order, 0
+
+    @property
+    def remaining(self) -> int:
+        """How many bytes there still are."""
+        return len(self._body) - self._offset
+
+    def take(self, kind: str, count: int) -> NDArray[Any]:
+        """The next values, as `Rows.take` says."""
+        dtype = np.dtype(self._order + kind)
+        if count * dtype.itemsize > self.remaining:
+            raise SceneError(SHORT)
+        values = np.frombuffer(self._body, dtype, count, self._offset)
+        self._offset += count * dtype.itemsize
+        return values
+
+    def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
+        """The next rows, as `Rows.table` says."""
+        row_bytes = sum(np.dtype(kind).itemsize * count for kind, count in layout)
+        if rows * row_bytes > self.remaining:
+            return None
+        dtype = np.dtype([(str(k), self._order + kind, (count,)) for k, (kind, count) in enumerate(layout)])
+        values = np.frombuffer(self._body, dtype, rows, self._offset)
+        return [values[str(k)] for k in range(len(layout))]
+
+    def skip(self, layout: Layout, rows: int) -> None:
+        """Move on by so many rows, as `Rows.skip` says."""
+        self._offset += rows * sum(np.dtype(kind).itemsize * count for kind, count in layout)
+
+
+def read_element(rows: PlyRows, element: Element) -> Columns:
+    """The columns of the next element. Raises SceneError where there are fewer rows than the header says."""
+    if element.rows == 0 or not element.properties:
+        return {}
+    if element.rows > rows.remaining // len(element.properties):
+        raise SceneError(SHORT)
+    return _uniform(rows, element) or _row_by_row(rows, element)
+
+
+def _uniform(rows: PlyRows, element: Element) -> Columns | None:
+    """All rows at once, where every list of a property is as long as its first; None where they are not."""
+    layout: Layout = []
+    for p in element.properties:
+        if p.count is not None:
+            layout.append((p.count, 1))
+            first = rows.table([*layout, (p.type, 0)], 1)
+            if first is None:
+                return None
+            layout.append((p.type, max(_length(first[len(layout) - 1][0, 0]), 0)))
+        else:
+            layout.append((p.type, 1))
+    blocks = rows.table(layout, element.rows)
+    if blocks is None:
+        return None
+    columns: Columns = {}
+    block_iterator = iter(zip(blocks, layout, strict=True))
+    for p in element.properties:
+        values, _ = next(block_iterator)
+        if p.count is None:
+            columns[p.name] = values[:, 0]
+            continue
+        items, (_, count) = next(block_iterator)
+        if not (values == count).all():
+            return None
+        columns[p.name] = (np.full(element.rows, count, np.int64), _whole(items.reshape(-1)))
+    rows.skip(layout, element.rows)
+    return columns
+
+
+def _row_by_row(rows: PlyRows, element: Element) -> Columns:
+    single: dict[str, list[float]] = {p.name: [] for p in element.properties if p.count is None}
+    lists: dict[str, list[NDArray[Any]]] = {p.name: [] for p in element.properties if p.count is not None}
+    for _ in range(element.rows):
+        for p in element.properties:
+            if p.count is None:
+                single[p.name].append(float(rows.take(p.type, 1)[0]))
+            else:
+                lists[p.name].append(rows.take(p.type, _length(rows.take(p.count, 1)[0])))
+    columns: Columns = {name: np.array(values) for name, values in single.items()}
+    for name, values in lists.items():
+        columns[name] = (np.array([len(row) for row in values], np.int64), _whole(np.concatenate(values)))
+    return columns
+
+
+def _length(value: float) -> int:
+    if not 0 <= value < 2**31:
+        raise SceneError("a list of the .ply file has an odd length; export it again")
+    return int(value)
+
+
+def _whole(values: NDArray[Any]) -> NDArray[np.int64]:
+    """Indices; what is no whole number of a sane size becomes -2, which no vertex has."""
+    is_whole = np.abs(values) < 2**40 if values.dtype.kind == "f" else np.ones(values.shape, np.bool_)
+    return np.where(is_whole, values, -2).astype(np.int64)
+
+
+def read_body(rows: PlyRows, elements: Sequence[Element]) -> dict[str, Columns]:
+    """The columns of all elements by name, up to the faces; what follows them is not looked at. Raises SceneError."""
+    names = [element.name for element in elements]
+    if any(a == b for a, b in pairwise(sorted(names))):
+        raise SceneError("the .ply file has two elements of one name; export it again")
+    read: dict[str, Columns] = {}
+    for element in elements:
+        read[element.name] = read_element(rows, element)
+        if {"vertex", "face"} <= read.keys():
+            break
+    return read

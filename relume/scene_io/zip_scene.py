@@ -1,0 +1,56 @@
+"""A scene in a .zip file: one scene file with what it names, bounded before any of it is unpacked."""
+
+from __future__ import annotations
+
+import io
+import posixpath
+import zipfile
+
+from relume.archives.bounded import LongDirectoryError, open_bounded
+from relume.core.errors import SceneError
+from relume.scene_io.referenced_files import MAX_BYTES, Archive, read_entry
+
+MAX_ENTRIES = 1_000
+MAX_DIRECTORY_BYTES = 1 << 20
+SCENE_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
+TOO_MANY_ENTRIES = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
+
+
+def open_zip(data: bytes) -> tuple[bytes, Archive]:
+    """The scene file in the archive, and its companions.
+
+    Raises:
+        SceneError: the archive is damaged, encrypted, too large, or holds no scene file or several.
+    """
+    if b"PK\5\6" not in data:
+        raise SceneError("the .zip file is truncated; download or pack it again")
+    try:
+        archive = open_bounded(io.BytesIO(data), MAX_DIRECTORY_BYTES)
+    except LongDirectoryError:
+        raise SceneError(TOO_MANY_ENTRIES) from None
+    except Exception:  # zipfile raises many kinds for damaged data
+        raise SceneError("the .zip file is damaged; pack it again") from None
+    entries = [entry for entry in archive.infolist() if not entry.is_dir() and not _is_litter(entry.filename)]
+    _check_entries(entries)
+    scenes = [entry for entry in entries if entry.filename.lower().endswith(SCENE_SUFFIXES)]
+    if len(scenes) != 1:
+        raise SceneError(f"the .zip file holds {len(scenes)} scene files; pack one of .glb, .gltf, .obj or .ply")
+    folder = posixpath.dirname(scenes[0].filename.replace("\\", "/"))
+    return read_entry(archive, scenes[0]), Archive(archive, folder)
+
+
+def _check_entries(entries: list[zipfile.ZipInfo]) -> None:
+    if len(entries) > MAX_ENTRIES:
+        raise SceneError(TOO_MANY_ENTRIES)
+    if sum(entry.file_size for entry in entries) > MAX_BYTES:
+        raise SceneError(f"the .zip file unpacks to more than {MAX_BYTES >> 20} MB; scale it down")
+    for entry in entries:
+        if entry.flag_bits & 1:
+            raise SceneError("the .zip file is encrypted; pack it without a password")
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise SceneError("the .zip file is packed in an unusual way; pack it with deflate")
+
+
+def _is_litter(name: str) -> bool:
+    """What desktops add to archives."""
+    return name.startswith("__MACOSX/") or posixpath.basename(name).startswith(".")

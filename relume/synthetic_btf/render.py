@@ -1,0 +1,248 @@
+"""What a small geometry sends from each place of its plane to each side, lit from each: the values of its BTF.
+
+    B_x(v, l) = ∫_texel [ f(l, v) cos θ_l V(l) + ρ/π · E_l ] dx ,
+
+where an eye far off towards v sees the geometry through the texel. Straight light is traced from many directions ω_j,
+evenly over the hemisphere, others at each place of a texel; values are on the way to those that tell it best,
+
+    B(v, ·) → argmin Σ_j ( Σ_l hat_l(ω_j) B(v, l) − f(ω_j, v) cos θ_j V(ω_j) )² ,
+
+with hat_l of `relume.assets.btf.direction_rings` (ADR 87). Eyes are points, as far lenses are: between them relief is
+found by its height (`relume.assets.btf.parallax`),
+which a blur would only hide. E_l is the irradiance by light that other faces
+have sent on, which do so as matt surfaces of the same reflectance ρ: found once for the middles of all faces,
+by rays to other
+faces, as often as it takes.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from relume.assets.btf.direction_rings import DirectionGrid, directions, interpolation_weights_numpy, polar
+from relume.brdf.albedo import reflectance
+from relume.brdf.evaluate import eval_brdf
+from relume.raytrace.camera_rays import Hits, trace_rays
+from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.tangents import any_tangent
+from relume.raytrace.visibility import trace_visibility
+from relume.synthetic_btf.tileable_geometry import I64, Tile, centered_height, repeat_tile
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_GRAZING = np.radians(82.5)  # θ of the lowest rays
+_SURFACE_OFFSET = 1e-5  # periods that rays begin off surfaces
+_RAYS_PER_FACE = 96  # to other faces
+_BOUNCES = 5
+_CAMERA_HEIGHT = 4.0  # periods above the plane that eyes' rays begin
+_MAX_PAIRS = 1 << 19
+_STEPS = 2  # towards the least squares: all the way, what single places see by chance would be kept, too
+_GOLDEN = np.pi * (3 - 5**0.5)
+
+
+class _SurfaceSamples(NamedTuple):
+    """Places on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32. material: (n,)"""
+
+    position: F32
+    normal: F32
+    material: I64
+
+    def rows(self, rows: slice) -> _SurfaceSamples:
+        return _SurfaceSamples(self.position[rows], self.normal[rows], self.material[rows])
+
+
+class _LightSamples(NamedTuple):
+    """Light at one place of each texel: where it comes from, and what its light adds to the values of all l.
+
+    Attributes:
+        directions: ω. (L, 3). weights: of the texel's values. (L of values, L of ω)
+    """
+
+    directions: F64
+    weights: F64
+
+
+class TileGeometry:
+    """A tile and what is beside it, ready to be lit and looked at.
+
+    Args:
+        tile: one period. grid: of directions to lights and to eyes. size: height and width of the texture, texels.
+        samples_per_side: places along each side of a texel that are looked at, each in light from other directions.
+        seed: of the rays between faces.
+    """
+
+    def __init__(
+        self, tile: Tile, grid: DirectionGrid, size: tuple[int, int], samples_per_side: int, seed: int
+    ) -> None:
+        self.grid, self.size, self._samples_per_side, self._seed = grid, size, samples_per_side, seed
+        self._materials = [
+            [{"params": {}, "curves": {}, "texture": None, **term} for term in terms] for terms in tile.materials
+        ]
+        self._num_faces, self._material = len(tile.faces), tile.material
+        centered = centered_height(tile)
+        # that rays pass on their way, and what reaches over the square's sides
+        self._num_repeats = max(1, int(np.ceil(np.ptp(centered.positions[:, 2]) * np.tan(_GRAZING))))
+        self._repeated_tile = repeat_tile(centered, self._num_repeats)
+        self._positions = self._repeated_tile.positions.astype(np.float32)
+        self._embree = EmbreeScene.build(self._positions, self._repeated_tile.faces.astype(np.uint32))
+        self._directions = directions(grid)
+
+    def get_view(self, view: int) -> F32:
+        """Every texel's values from one direction. (lights, texels, 3) float32"""
+        wo = self._directions[view]
+        out = np.zeros((self.grid.num_directions, self.size[0] * self.size[1], 3))
+        for subsample, light_samples in enumerate(self._light_samples):
+            out += self._shade_hits(self._trace_view(subsample, wo), wo, light_samples)
+        return np.maximum(out, 0).astype(np.float32)
+
+    def height(self) -> F32:
+        """How far over the texture's plane the geometry reaches at each texel; in holes, as far as it reaches down.
+
+        Returns:
+            In sides of the texture. (height, width) float32
+        """
+        up, samples_per_side, deepest = np.array([0.0, 0.0, 1.0]), self._samples_per_side, self._positions[:, 2].min()
+        above = [
+            _CAMERA_HEIGHT - self._trace_view(subsample, up).distance
+            for subsample in range(samples_per_side * samples_per_side)
+        ]
+        return np.asarray(np.maximum(above, deepest).mean(axis=0), np.float32).reshape(self.size)
+
+    def _trace_view(self, subsample: int, wo: F64) -> Hits:
+        """What is seen from afar at one place of each texel."""
+        (height, width), samples_per_side = self.size, self._samples_per_side
+        row, column = np.divmod(np.arange(height * width), width)
+        x = (column + (subsample % samples_per_side + 0.5) / samples_per_side) / width
+        y = 1 - (row + (subsample // samples_per_side + 0.5) / samples_per_side) / height
+        origin = np.stack([x, y, np.zeros_like(x)], axis=1) + _CAMERA_HEIGHT * wo / wo[2]
+        return trace_rays(self._embree, origin.astype(np.float32), np.tile(-wo.astype(np.float32), (len(x), 1)))
+
+    @cached_property
+    def _light_samples(self) -> list[_LightSamples]:
+        """The light of each place: the same for all texels, so that what it misses is no noise."""
+        num_subsamples = self._samples_per_side**2
+        if num_subsamples == 1:
+            return [_LightSamples(self._directions, np.eye(len(self._directions)))]
+        all_directions = _uniform_hemisphere(num_subsamples * self.grid.num_directions)
+        index, weight, cosine_ratio = interpolation_weights_numpy(self.grid, all_directions)
+        hat = np.zeros((len(all_directions), self.grid.num_directions))
+        np.add.at(hat, (np.arange(len(all_directions))[:, None], index), weight * cosine_ratio[:, None])
+        gram, mass = hat.T @ hat, (hat.T @ hat.sum(axis=1))[:, None]
+        weights = hat.T / mass
+        for _ in range(_STEPS):
+            weights += (hat.T - gram @ weights) / mass
+        return [
+            _LightSamples(all_directions[subsample::num_subsamples], weights[:, subsample::num_subsamples])
+            for subsample in range(num_subsamples)
+        ]
+
+    def _shade_hits(self, hits: Hits, wo: F64, light_samples: _LightSamples) -> F64:
+        """What hits add to values towards wo, by light. (lights, hits, 3)"""
+        is_hit, values = hits.face >= 0, np.zeros((self.grid.num_directions, len(hits.face), 3))
+        surface_hits = hits.rows(is_hit)
+        samples = self._surface_samples(surface_hits, wo)
+        step = max(1, _MAX_PAIRS // self.grid.num_directions)
+        rows = np.flatnonzero(is_hit)
+        for start in range(0, len(rows), step):
+            direct = self._direct(samples.rows(slice(start, start + step)), wo, light_samples.directions)
+            values[:, rows[start : start + step]] = np.tensordot(light_samples.weights, direct, (1, 1))
+        face, sample_weight = surface_hits.face % self._num_faces, 1 / (np.pi * len(self._light_samples))
+        values[:, rows] += (sample_weight * self._reflectance[face, None] * self._indirect_irradiance[face]).transpose(
+            1, 0, 2
+        )
+        return values
+
+    def _direct(self, samples: _SurfaceSamples, wo: F64, lights: F64) -> F64:
+        """f cos θ V of all pairs of places and lights. (places, lights, 3)"""
+        n = samples.normal.astype(np.float64)
+        t = any_tangent(samples.normal).astype(np.float64)
+        frame = np.stack([t, np.cross(n, t), n], axis=1)
+        cosine = np.maximum(n @ lights.T, 0) * self._visible(samples, lights)
+        sample_index, light_index = np.nonzero(cosine)  # half of all pairs are dark
+        local = np.einsum("nij,nj->ni", frame[sample_index], lights[light_index])
+        wo_local = np.einsum("pij,j->pi", frame, wo)[sample_index]
+        out = np.zeros((*cosine.shape, 3))
+        for material_index, terms in enumerate(self._materials):
+            has_material = samples.material[sample_index] == material_index
+            out[sample_index[has_material], light_index[has_material]] = sum(
+                eval_brdf(term, local[has_material], wo_local[has_material]) for term in terms
+            )
+        return np.asarray(out * cosine[..., None])
+
+    def _visible(self, samples: _SurfaceSamples, lights: F64) -> F64:
+        visibility_bits = trace_visibility(
+            self._embree, samples.position, samples.normal, lights.astype(np.float32)
+        ).visible
+        return np.unpackbits(visibility_bits, axis=1, count=len(lights), bitorder="little").astype(np.float64)
+
+    def _surface_samples(self, hits: Hits, wo: F64) -> _SurfaceSamples:
+        corners = self._repeated_tile.faces[hits.face]
+        p, n = self._positions[corners].astype(np.float64), self._repeated_tile.normals[corners]
+        b = np.column_stack([1 - hits.uv.sum(axis=1), hits.uv])[..., None]
+        face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        face_normal /= np.linalg.norm(face_normal, axis=1, keepdims=True)
+        face_normal *= np.where(face_normal @ wo < 0, -1, 1)[:, None]
+        normal = (n * b).sum(axis=1)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal = np.where(np.einsum("nc,nc->n", normal, face_normal)[:, None] < 0, -normal, normal)
+        deficit = np.maximum(0.01 - normal @ wo, 0)[:, None]  # what is seen faces the eye
+        normal += deficit * wo
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        position = (p * b).sum(axis=1) + _SURFACE_OFFSET * face_normal
+        return _SurfaceSamples(
+            position.astype(np.float32), normal.astype(np.float32), self._repeated_tile.material[hits.face]
+        )
+
+    @cached_property
+    def _reflectance(self) -> F64:
+        """ρ of each face of the tile. (faces, 3)"""
+        reflectances = [sum((reflectance(term) for term in terms), np.zeros(3)) for terms in self._materials]
+        return np.asarray(reflectances, np.float64)[self._material]
+
+    @cached_property
+    def _indirect_irradiance(self) -> F64:
+        """E of each face of the tile, by light: what has been sent on at least once. (faces, lights, 3)"""
+        face_centers = Hits(
+            np.arange(self._num_faces, dtype=np.int32)
+            + self._num_faces * (2 * self._num_repeats + 2) * self._num_repeats,
+            np.full((self._num_faces, 2), 1 / 3, np.float32),
+            np.ones(self._num_faces, np.float32),
+        )
+        samples = self._surface_samples(face_centers, np.array([0.0, 0.0, 1.0]))
+        cosine = np.maximum(np.einsum("nc,lc->nl", samples.normal.astype(np.float64), self._directions), 0)
+        direct = (cosine * self._visible(samples, self._directions))[..., None] * np.ones(3)
+        form_factors = self._form_factors(samples)
+        num, lights = direct.shape[:2]
+        incident, indirect = direct, np.zeros_like(direct)
+        for _ in range(_BOUNCES):
+            incident = (form_factors @ (self._reflectance[:, None] * incident).reshape(num, -1)).reshape(num, lights, 3)
+            indirect += incident
+        return np.asarray(indirect)
+
+    def _form_factors(self, samples: _SurfaceSamples) -> csr_array:
+        """Form factors: what share of the hemisphere over each face others take. (faces, faces)"""
+        rng, num = np.random.default_rng(self._seed), self._num_faces
+        u, azimuth_sample = rng.random((2, num, _RAYS_PER_FACE))
+        u = (np.arange(_RAYS_PER_FACE) + u) / _RAYS_PER_FACE
+        radius, phi = np.sqrt(u)[..., None], (2 * np.pi * azimuth_sample)[..., None]
+        n = samples.normal.astype(np.float64)[:, None]
+        t = any_tangent(samples.normal).astype(np.float64)[:, None]
+        w = radius * (np.cos(phi) * t + np.sin(phi) * np.cross(n, t)) + np.sqrt(1 - u)[..., None] * n
+        origin = np.repeat(samples.position, _RAYS_PER_FACE, axis=0)
+        hits = trace_rays(self._embree, origin, w.reshape(-1, 3).astype(np.float32))
+        hit = hits.face >= 0
+        row = np.repeat(np.arange(num), _RAYS_PER_FACE)[hit]
+        weight = np.full(len(row), 1 / _RAYS_PER_FACE)
+        return csr_array((weight, (row, hits.face[hit] % num)), (num, num))
+
+
+def _uniform_hemisphere(num: int) -> F64:
+    """Directions evenly over the hemisphere, on a spiral. (num, 3)"""
+    k = np.arange(num, dtype=np.float64)
+    return polar(np.arccos(1 - (k + 0.5) / num), k * _GOLDEN)

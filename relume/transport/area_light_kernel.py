@@ -1,0 +1,295 @@
+"""The kernel that lists lamps of some extent as light triangles: those parts of them that a point sees.
+
+A part that is seen as a whole and no wider than `_NARROW_ASPECT` is two triangles; what is wider, or partly hidden, is
+divided along its halvings (`relume.lights.light_sampling`), down to single samples.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba as nb
+import numpy as np
+
+from relume.core.numba_options import UNCOUNTED
+from relume.lights.light_sampling import NOT_FLAT_RADIUS
+from relume.lights.local_lights import light_sample
+from relume.raytrace.gather_rays import cranley_patterson_offset
+from relume.transport.gather_kernel import in_frame
+from relume.transport.light_culling import cull
+
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_THIRD, _TWO = np.float32(1 / 3), np.float32(2)
+_PI = np.float32(math.pi)
+_NARROW = np.float32(0.12)  # radians, to the farthest corner: what cosines vary over it is a hundredth
+_NOT_FLAT = np.float32(NOT_FLAT_RADIUS)
+_NOTHING = np.float32(1e-6)  # as a share of a part: a corner is a triangle's where it is two of four
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _count_visible(bits, first, count):  # type: ignore[no-untyped-def]
+    """Count the samples [first, first + count) that are seen, count a power of four."""
+    if count < 8:
+        nibble: Any = np.int64(bits[first >> 3]) >> (first & 7)
+        return (nibble & 1) + ((nibble >> 1 & 1) + (nibble >> 2 & 1) + (nibble >> 3 & 1) if count == 4 else 0)
+    num_visible = 0
+    for byte_index in range(first >> 3, (first + count) >> 3):
+        byte: Any = np.int64(bits[byte_index])
+        byte = (byte & 0x55) + (byte >> 1 & 0x55)
+        byte = (byte & 0x33) + (byte >> 2 & 0x33)
+        num_visible += (byte & 0x0F) + (byte >> 4)
+    return num_visible
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _make_square(x, y, z, nx, ny, nz, half, corner):  # type: ignore[no-untyped-def]
+    """Lay a square about a place, across a normal. half: of its side. corner: written. (4, 3)"""
+    length = math.sqrt(max(nx * nx + nz * nz, ny * ny + nz * nz))
+    ex, ey, ez = (nz, _ZERO, -nx) if abs(nx) > abs(ny) else (_ZERO, nz, -ny)
+    along = half / max(length, np.float32(1e-20))
+    ex, ey, ez = ex * along, ey * along, ez * along
+    fx, fy, fz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex
+    for k in range(4):
+        s = _ONE if k in (1, 2) else -_ONE
+        t = _ONE if k >= 2 else -_ONE
+        corner[k, 0], corner[k, 1], corner[k, 2] = x + s * ex + t * fx, y + s * ey + t * fy, z + s * ez + t * fz
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+def _unit(x, y, z):  # type: ignore[no-untyped-def]
+    inverse = _ONE / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-30)))
+    return x * inverse, y * inverse, z * inverse
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _triangle_nodes(corner, second, node):  # type: ignore[no-untyped-def]
+    """Find the directions of a triangle's corners, 0, `second` and the next of four, and of its edges' middles.
+
+    Args:
+        corner: seen from the point, metres. (4, 3) node: written. (6, 3)
+    """
+    for k in range(3):
+        corner_index = 0 if k == 0 else second + k - 1
+        node[k, 0], node[k, 1], node[k, 2] = _unit(
+            corner[corner_index, 0], corner[corner_index, 1], corner[corner_index, 2]
+        )
+    for k in range(3):
+        next_corner = (k + 1) % 3
+        x, y, z = (
+            node[k, 0] + node[next_corner, 0],
+            node[k, 1] + node[next_corner, 1],
+            node[k, 2] + node[next_corner, 2],
+        )
+        node[3 + k, 0], node[3 + k, 1], node[3 + k, 2] = _unit(x, y, z)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _radius(x, y, z, node):  # type: ignore[no-untyped-def]
+    """Find the angle from a direction to the farthest of a triangle's corners."""
+    max_squared = _ZERO
+    for k in range(3):
+        dx, dy, dz = node[k, 0] - x, node[k, 1] - y, node[k, 2] - z
+        max_squared = max(max_squared, dx * dx + dy * dy + dz * dz)
+    return _TWO * math.asin(min(_HALF * math.sqrt(max_squared), _ONE))
+
+
+# What is inlined takes arrays of the lamp, which a call would count references to: threads share them, and a list of
+# parts took twice as long.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _add_halves(  # type: ignore[no-untyped-def]
+    frame,
+    corner,
+    normal,
+    first_fraction,
+    area,
+    gain,
+    is_two_sided,
+    num_triangles,
+    end,
+    light,
+    wi,
+    nodes,
+    irradiance_radius,
+):
+    """Add the two triangles of a quadrilateral.
+
+    Args:
+        frame: tangent, n × t, normal of the point. (3, 3) corner: seen from there, metres. (4, 3)
+        normal: of the lamp there. (3,) first_fraction: of the first in its light. area: that it stands for, m².
+        gain: (3,). num_triangles, end: of triangles and entries so far.
+        light, wi, nodes, irradiance_radius: written, see `list_area_light`.
+    Returns:
+        made and end, afterwards.
+    """
+    for half in range(2):
+        triangle_area = area * (first_fraction if half == 0 else _ONE - first_fraction)
+        if triangle_area <= _NOTHING * area:
+            continue
+        x = _THIRD * (corner[0, 0] + corner[1 + half, 0] + corner[2 + half, 0])
+        y = _THIRD * (corner[0, 1] + corner[1 + half, 1] + corner[2 + half, 1])
+        z = _THIRD * (corner[0, 2] + corner[1 + half, 2] + corner[2 + half, 2])
+        squared = x * x + y * y + z * z
+        x, y, z = _unit(x, y, z)
+        cosine = -(x * normal[0] + y * normal[1] + z * normal[2])
+        cosine = abs(cosine) if is_two_sided else cosine
+        up = frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z
+        if cosine <= 0 or up <= 0:
+            continue
+        _triangle_nodes(corner, 1 + half, nodes[num_triangles])
+        weight = triangle_area * cosine / max(squared, triangle_area / _PI)
+        for channel in range(3):
+            irradiance_radius[num_triangles, channel] = weight * gain[channel]
+        irradiance_radius[num_triangles, 3] = _radius(x, y, z, nodes[num_triangles])
+        light[end] = num_triangles
+        wi[0, end] = frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z
+        wi[1, end] = frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z
+        wi[2, end] = up
+        num_triangles, end = num_triangles + 1, end + 1
+    return num_triangles, end
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _outline(light, strata, emitter_parts, part_index, sample, shift, x, y, z, area, corner, across):  # type: ignore[no-untyped-def]
+    """Find the quadrilateral that stands for a part.
+
+    Args:
+        light, strata, emitter_parts: of the lamp. part_index: number of the part. sample: its only one, if it does not
+        lie flat.
+        shift: of the point. x, y, z: the point. area: that the part stands for, m².
+        corner: seen from the point, written. (4, 3) across: normal of the lamp there, written. (3,)
+    Returns:
+        The share of its first triangle.
+    """
+    if emitter_parts.radius[part_index] < _NOT_FLAT:
+        for k in range(4):
+            corner[k, 0] = emitter_parts.corners[part_index, k, 0] - x
+            corner[k, 1] = emitter_parts.corners[part_index, k, 1] - y
+            corner[k, 2] = emitter_parts.corners[part_index, k, 2] - z
+        across[0], across[1], across[2] = (
+            emitter_parts.normal[part_index, 0],
+            emitter_parts.normal[part_index, 1],
+            emitter_parts.normal[part_index, 2],
+        )
+        return emitter_parts.first_fraction[part_index]
+    # a sample of several pieces stands for so much about it
+    dx, dy, dz, distance, _, nx, ny, nz = light_sample(light, strata, sample, shift[0], shift[1], x, y, z)
+    across[0], across[1], across[2] = nx, ny, nz
+    _make_square(distance * dx, distance * dy, distance * dz, nx, ny, nz, _HALF * math.sqrt(area), corner)
+    return _HALF
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _list_visible_parts(  # type: ignore[no-untyped-def]
+    frame, position, shift, bits, area_light, scratch, num_triangles, end, light, wi, nodes, irradiance_radius
+):
+    """List the parts that a point sees; returns triangles and entries so far.
+
+    Args:
+        frame: as in `_add_halves`. position: of the point. (3,) shift: of its samples. bits: which of them it sees.
+        area_light: light, strata, parts and gain, as in `LocalRays`. scratch: from `_scratch`.
+        num_triangles, end, light, wi, nodes, irradiance_radius: as in `_add_halves`.
+    """
+    emitter, strata, emitter_parts, gain = area_light
+    corner, across, stack = scratch
+    x, y, z = position[0], position[1], position[2]
+    num, stack_size = strata.uv.shape[0], 1
+    stack[0, 0] = stack[0, 1] = 0
+    while stack_size > 0:
+        stack_size -= 1
+        level, index = stack[stack_size, 0], stack[stack_size, 1]
+        count = num >> (2 * level)
+        num_visible = _count_visible(bits, index * count, count)
+        if num_visible == 0:
+            continue
+        part_index = ((1 << (2 * level)) - 1) // 3 + index
+        mx, my, mz = (
+            emitter_parts.center[part_index, 0] - x,
+            emitter_parts.center[part_index, 1] - y,
+            emitter_parts.center[part_index, 2] - z,
+        )
+        width = emitter_parts.radius[part_index]
+        is_narrow = width * width <= _NARROW * _NARROW * (mx * mx + my * my + mz * mz)
+        if count > 1 and (num_visible < count or not is_narrow):
+            for child in range(4):
+                stack[stack_size, 0], stack[stack_size, 1] = level + 1, 4 * index + child
+                stack_size += 1
+            continue
+        area = emitter.area / np.float32(1 << (2 * level))
+        first_fraction = _outline(
+            emitter, strata, emitter_parts, part_index, index, shift, x, y, z, area, corner, across
+        )
+        num_triangles, end = _add_halves(
+            frame,
+            corner,
+            across,
+            first_fraction,
+            area,
+            gain,
+            emitter.is_two_sided,
+            num_triangles,
+            end,
+            light,
+            wi,
+            nodes,
+            irradiance_radius,
+        )
+    return num_triangles, end
+
+
+@nb.njit(nogil=True, cache=True)
+def _scratch():  # type: ignore[no-untyped-def]
+    """Make room for corners, a normal, and the parts that wait for their turn: three more at each level."""
+    return np.empty((4, 3), np.float32), np.empty(3, np.float32), np.empty((16, 2), np.int64)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def list_area_light(  # type: ignore[no-untyped-def]
+    points, wo, area_light, visible, kinds, support, start, stop, first, light, wi, out, nodes, irradiance_radius
+):
+    """List what points [start, stop) see of a lamp.
+
+    Args:
+        points: `Points`. wo: towards the viewer. (n, 3) float32
+        area_light: light, strata, parts and gain, as in `LocalRays`. visible: as there.
+        kinds, support, first, light, wi, out: as of `relume.transport.light_culling.list_lights`.
+        nodes: of triangles, written, corners and midpoints of edges. (M, 6, 3) float32
+        irradiance_radius: their irradiance and, in radians, radius, written. (M, 4) float32
+    Returns:
+        K, the number of entries, and M, of triangles.
+    """
+    position, normal, tangent, seed, _ = points
+    max_triangles = 2 * area_light[1].uv.shape[0]
+    radius, reach, nearest = (
+        irradiance_radius[:, 3],
+        np.empty(max_triangles, np.float32),
+        np.empty(max_triangles, np.float32),
+    )
+    frame, scratch = np.empty((3, 3), np.float32), _scratch()
+    num_triangles = end = np.int64(0)
+    for p in range(start, stop):
+        begin = end
+        first[p - start] = begin
+        (bx, by, bz), (ox, oy, oz) = in_frame(normal[p], tangent[p], wo[p])
+        for axis in range(3):
+            frame[0, axis], frame[2, axis] = tangent[p, axis], normal[p, axis]
+        frame[1, 0], frame[1, 1], frame[1, 2] = bx, by, bz
+        shift = cranley_patterson_offset(area_light[1], seed[p])
+        num_triangles, end = _list_visible_parts(
+            frame,
+            position[p],
+            shift,
+            visible[p],
+            area_light,
+            scratch,
+            num_triangles,
+            end,
+            light,
+            wi,
+            nodes,
+            irradiance_radius,
+        )
+        end = cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest)
+        out[0, begin:end], out[1, begin:end], out[2, begin:end] = ox, oy, oz
+    first[stop - start] = end
+    return end, num_triangles

@@ -1,0 +1,227 @@
+"""Gather rays of points: directed, weighed, and listed with the light that they bring, or summed at once.
+
+Loops that make the numbers of all rays of a point write one array each, so that they are vectors; what is looked up by
+the cell that a ray hits comes after them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from relume.core.numba_options import UNCOUNTED
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.raytrace.gather_rays import glossy_pdf, lattice_offsets
+from relume.transport.outgoing_patch_light import bin_of
+
+_ZERO, _ONE, _TWO, _HALF = np.float32(0), np.float32(1), np.float32(2), np.float32(0.5)
+_PI = np.float32(math.pi)
+_EPSILON, _GROWTH = np.float32(1e-3), np.float32(1 + 1e3)  # of `relume.raytrace.gather_rays`
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def in_frame(n, t, o):  # type: ignore[no-untyped-def]
+    """Find the bitangent n × t of a shading frame, and direction o in the frame."""
+    bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+    ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
+    oy = bx * o[0] + by * o[1] + bz * o[2]
+    oz = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+    return (bx, by, bz), (ox, oy, oz)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _cosine_rays(rays, shift, x, y, z, radius_squared):  # type: ignore[no-untyped-def]
+    """Direct the cosine rays of a point, as `cosine_ray` does. square: scratch. (rays,) each"""
+    offset, cosine, sine = shift[0], shift[2], shift[3]
+    for k in range(x.shape[0]):
+        u = rays[k, 0] + offset
+        u = u - _ONE if u >= _ONE else u
+        radius_squared[k] = u + _ONE if u < _ZERO else u
+    for k in range(x.shape[0]):
+        x[k] = math.sqrt(radius_squared[k]) * (rays[k, 2] * cosine - rays[k, 3] * sine)
+    for k in range(x.shape[0]):
+        y[k] = math.sqrt(radius_squared[k]) * (rays[k, 3] * cosine + rays[k, 2] * sine)
+    for k in range(x.shape[0]):
+        z[k] = math.sqrt(_ONE - radius_squared[k])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _glossy_rays(rays, shift, o, x, y, z, distance, twice_cosine):  # type: ignore[no-untyped-def]
+    """Direct the glossy rays of a point, as `glossy_ray` does. away, twice: scratch. (rays,) each"""
+    offset, scale, cosine, sine = shift[0], shift[1], shift[2], shift[3]
+    ox, oy, oz = o
+    for k in range(x.shape[0]):
+        u, far = rays[k, 0] + offset, rays[k, 1] * scale
+        far = far * np.float32(1 / 1001) if u >= _ONE else far
+        far = far * _GROWTH if u < _ZERO else far
+        distance[k] = max(_ZERO, min(_EPSILON * (far - _ONE), _ONE))
+    for k in range(x.shape[0]):
+        x[k] = math.sqrt(distance[k] * (_TWO - distance[k])) * (rays[k, 2] * cosine - rays[k, 3] * sine)
+    for k in range(x.shape[0]):
+        y[k] = math.sqrt(distance[k] * (_TWO - distance[k])) * (rays[k, 3] * cosine + rays[k, 2] * sine)
+    for k in range(x.shape[0]):  # so far half vectors: they turn into the directions
+        twice_cosine[k] = _TWO * (ox * x[k] + oy * y[k] + oz * (_ONE - distance[k]))
+    for k in range(x.shape[0]):
+        x[k] = twice_cosine[k] * x[k] - ox
+    for k in range(x.shape[0]):
+        y[k] = twice_cosine[k] * y[k] - oy
+    for k in range(x.shape[0]):
+        z[k] = twice_cosine[k] * (_ONE - distance[k]) - oz
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
+    """Weigh all rays of a point, as `weight_of` does."""
+    ox, oy, oz = o
+    num_cosine_rays, num_glossy_rays = np.float32(num_cosine), np.float32(x.shape[0] - num_cosine)
+    if num_glossy_rays == _ZERO:
+        weight[:] = _PI / num_cosine_rays
+        return
+    for k in range(x.shape[0]):
+        hx, hy, hz = x[k] + ox, y[k] + oy, z[k] + oz
+        length = math.sqrt(hx * hx + hy * hy + hz * hz)
+        cos_theta_h = min(hz / max(length, np.float32(1e-6)), _ONE)
+        pdf = glossy_pdf(cos_theta_h, _HALF * length)
+        cosine = max(z[k], _ZERO)  # below the horizon nothing is traced
+        weight[k] = cosine / (num_cosine_rays * cosine / _PI + num_glossy_rays * pdf)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _generate_rays(pattern, seed, o, local, weight):  # type: ignore[no-untyped-def]
+    """Direct and weigh all rays of a point. o: local wo. local: written, and scratch. (5, rays) weight: (rays,)"""
+    num = pattern.num_cosine
+    cosine_shift, glossy_shift = lattice_offsets(pattern, seed)
+    x, y, z, scratch_a, scratch_b = local[0], local[1], local[2], local[3], local[4]
+    _cosine_rays(pattern.rays[:num], cosine_shift, x[:num], y[:num], z[:num], scratch_a)
+    if num < x.shape[0]:
+        _glossy_rays(pattern.rays[num:], glossy_shift, o, x[num:], y[num:], z[num:], scratch_a, scratch_b)
+    _weights(num, x, y, z, o, weight)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _lobes_hit(gather_hits, lobe, rows, rays):  # type: ignore[no-untyped-def]
+    """List the rays of a point that hit a lobe, without a branch that nobody could foretell; returns their number.
+
+    Args:
+        gather_hits: of the point. (rays,) lobe: of each cell. rows, rays: written, lobes and rays. (> rays,)
+    """
+    num = 0
+    for ray in range(gather_hits.shape[0]):
+        rows[num], rays[num] = lobe[gather_hits[ray]], ray
+        num += rows[num] >= 0
+    return num
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _bin_hit(outgoing, row, n, t, b, x, y, z):  # type: ignore[no-untyped-def]
+    """Find the square of a lobe that a local direction (x, y, z) looks at. n, t, b: frame of the point"""
+    dx, dy, dz = t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
+    return bin_of(outgoing.frame, row, -dx, -dy, -dz)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _table_for(outgoing, num_cosine, weight):  # type: ignore[no-untyped-def]
+    """Choose what a ray looks lobes up in: where most rays are about the mirror direction, what has no rings."""
+    return outgoing.smooth if _TWO * np.float32(num_cosine) * weight < _PI else outgoing.table
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def list_gather_rays(  # type: ignore[no-untyped-def]
+    points, wo, gather_hits, pattern, outgoing, start, stop, first, wi, out, irradiance
+):
+    """List the rays of points [start, stop) that hit a cell, in the points' local frames.
+
+    Args:
+        points: `Points`. wo: towards the viewer. (n, 3) float32
+        gather_hits: cell that each ray hits. (n, rays) uint16. pattern: the rays' directions.
+        outgoing: by cells, a `Sent`.
+        start, stop: the points.
+        first: written, where the rays of each point begin. (points + 1,) int64
+        wi: written, local directions. (3, K) float32. out: written, local wo. (3, K) float32
+        irradiance: written, w · L of each ray. (3, K) float32
+    Returns:
+        K, the number of rays.
+    """
+    num_rays = gather_hits.shape[1]
+    local, weights, entry_index = (
+        np.empty((5, num_rays), np.float32),
+        np.empty(num_rays, np.float32),
+        np.empty(num_rays, np.int64),
+    )
+    scratch = np.empty(num_rays + 1, np.int32), np.empty(num_rays + 1, np.int64), local, weights, entry_index
+    return _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance):  # type: ignore[no-untyped-def]
+    """Do what `list_gather_rays` is for. scratch: `rows` and `rays` of `_lobes_hit`, `local` and `weight` of `_direct`,
+    and where each ray is listed. (rays,)"""
+    _, normal, tangent, seed, _ = points
+    rows, rays, local, weights, entry_index = scratch
+    has_lobes, num_rays, end = outgoing.table.shape[0] > 0, gather_hits.shape[1], 0
+    for p in range(start, stop):
+        first[p - start] = end
+        n, t = normal[p], tangent[p]
+        b, o = in_frame(n, t, wo[p])
+        _generate_rays(pattern, seed[p], o, local, weights)
+        for ray in range(num_rays):
+            patch = gather_hits[p, ray]
+            entry_index[ray] = end
+            if patch == NO_PATCH:
+                continue
+            wi[0, end], wi[1, end], wi[2, end] = local[0, ray], local[1, ray], local[2, ray]
+            out[0, end], out[1, end], out[2, end] = o[0], o[1], o[2]
+            for channel in range(3):
+                irradiance[channel, end] = weights[ray] * outgoing.isotropic[patch, channel]
+            end += 1
+        for k in range(_lobes_hit(gather_hits[p], outgoing.lobe, rows, rays) if has_lobes else 0):
+            row, ray = rows[k], rays[k]
+            bin_index = _bin_hit(outgoing, row, n, t, b, local[0, ray], local[1, ray], local[2, ray])
+            table = _table_for(outgoing, pattern.num_cosine, weights[ray])
+            for channel in range(3):
+                value = outgoing.scale[row, channel] * table[row, bin_index, channel]
+                irradiance[channel, entry_index[ray]] += weights[ray] * value
+    first[stop - start] = end
+    return end
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def sum_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, out):  # type: ignore[no-untyped-def]
+    """Sum the light of the rays of points [start, stop): what `list_gather_rays` lists, where directions do not matter.
+
+    Args:
+        points, wo, gather_hits, pattern, outgoing, start, stop: as there.
+        out: Σ w · L, written. (points, 3) float32
+    """
+    num_rays = gather_hits.shape[1]
+    local, weights = np.empty((5, num_rays), np.float32), np.empty(num_rays, np.float32)
+    scratch = np.empty(num_rays + 1, np.int32), np.empty(num_rays + 1, np.int64), local, weights
+    _sum(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _sum(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out):  # type: ignore[no-untyped-def]
+    """Do what `sum_gather_rays` is for. scratch: as of `_list`, but for the last."""
+    _, normal, tangent, seed, _ = points
+    rows, rays, local, weights = scratch
+    has_lobes, num_rays = outgoing.table.shape[0] > 0, gather_hits.shape[1]
+    for p in range(start, stop):
+        n, t = normal[p], tangent[p]
+        b, o = in_frame(n, t, wo[p])
+        _generate_rays(pattern, seed[p], o, local, weights)
+        red = green = blue = np.float32(0)
+        for ray in range(num_rays):
+            patch, weight = gather_hits[p, ray], weights[ray]
+            red += weight * outgoing.isotropic[patch, 0]
+            green += weight * outgoing.isotropic[patch, 1]
+            blue += weight * outgoing.isotropic[patch, 2]
+        for k in range(_lobes_hit(gather_hits[p], outgoing.lobe, rows, rays) if has_lobes else 0):
+            row, ray = rows[k], rays[k]
+            bin_index = _bin_hit(outgoing, row, n, t, b, local[0, ray], local[1, ray], local[2, ray])
+            weight, table = weights[ray], _table_for(outgoing, pattern.num_cosine, weights[ray])
+            red += weight * outgoing.scale[row, 0] * table[row, bin_index, 0]
+            green += weight * outgoing.scale[row, 1] * table[row, bin_index, 1]
+            blue += weight * outgoing.scale[row, 2] * table[row, bin_index, 2]
+        out[p - start, 0], out[p - start, 1], out[p - start, 2] = red, green, blue

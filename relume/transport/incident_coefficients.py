@@ -1,0 +1,177 @@
+"""Light vectors: what arrives at points, in the in-basis of their own hemispheres.
+
+    t_k(x) = ∫ L(x, ωi) V(x, ωi) cos θi h_k(ωi) dωi = Σ_s w_s h_k(ω_s)
+
+where s are light triangles that the point sees, and rays from cells and local lights. Nothing of it knows a BRDF or an
+eye: they multiply it (`relume.live.free_camera.basis.outgoing_coefficients`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges, parallel_for_chunks
+from relume.lights.spherical_triangles import TriangleLights
+from relume.math.zernike import (
+    BATCH_RAYS,
+    DEGREE,
+    LIGHT,
+    NUM_COLUMNS,
+    WI,
+    accumulate,
+    num_functions,
+    project,
+    recurrence,
+)
+from relume.raytrace.surface_points import SurfacePoints
+from relume.transport.shading_points import RayList, ShadingPoints, build_ray_lists
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+_POINTS_PER_RANGE = 512
+_LISTED_POINTS_PER_RANGE = 128
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _from_triangles(recurrence_table, normal, tangent, visible, direction, irradiance, start, stop, out):  # type: ignore[no-untyped-def]
+    """Add the light triangles that points [start, stop) see. direction, irradiance: (3, M). out: (n, 3, K)"""
+    num_lights = direction.shape[1]
+    visible_lights, columns = np.empty(num_lights + 1, np.int32), np.empty(NUM_COLUMNS * BATCH_RAYS, np.float32)
+    for p in range(start, stop):
+        num_visible = 0
+        for m in range(num_lights):  # without branches, which nothing foretells
+            visible_lights[num_visible] = m
+            num_visible += (visible[p, m >> 3] >> (m & 7)) & 1
+        n, t = normal[p], tangent[p]
+        nx, ny, nz, tx, ty, tz = n[0], n[1], n[2], t[0], t[1], t[2]
+        bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+        for first in range(0, num_visible, BATCH_RAYS):
+            num = min(BATCH_RAYS, num_visible - first)
+            for i in range(num):
+                m = visible_lights[first + i]
+                x, y, z = direction[0, m], direction[1, m], direction[2, m]
+                cosine = max(nx * x + ny * y + nz * z, np.float32(0))
+                columns[WI + i], columns[WI + BATCH_RAYS + i] = tx * x + ty * y + tz * z, bx * x + by * y + bz * z
+                for channel in range(3):
+                    columns[LIGHT + channel * BATCH_RAYS + i] = cosine * irradiance[channel, m]
+            accumulate(recurrence_table, num, columns, out[p])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _from_listed(recurrence_table, num_points, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
+    """Add listed rays, whose light has been weighed by the cosine, to their points. out: (num_points, 3, K)"""
+    columns = np.empty(NUM_COLUMNS * BATCH_RAYS, np.float32)
+    for p in range(num_points):
+        for begin in range(first[p], first[p + 1], BATCH_RAYS):
+            num = min(BATCH_RAYS, first[p + 1] - begin)
+            for i in range(num):
+                columns[WI + i], columns[WI + BATCH_RAYS + i] = wi[0, begin + i], wi[1, begin + i]
+                for channel in range(3):
+                    columns[LIGHT + channel * BATCH_RAYS + i] = irradiance[channel, begin + i]
+            accumulate(recurrence_table, num, columns, out[p])
+
+
+def incident_coefficients(
+    points: SurfacePoints,
+    visible: NDArray[np.uint8],
+    lights: TriangleLights,
+    rays: Sequence[RayList],
+    degree: int = DEGREE,
+) -> F32:
+    """Find what arrives at points, as vectors.
+
+    Args:
+        points: n of them. visible: which of the lights each sees, as in `ShadingPoints`. (n, bytes) uint8
+        lights: triangles of the environment. rays: what brings light besides.
+        degree: of the functions.
+    Returns:
+        t, radiance times solid angle, of the functions up to the degree alone. (n, 3, functions) float32
+    Cost: O(n · (lights + rays) · K) time.
+    """
+    out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
+    if lights.num_lights:
+        direction, irradiance = np.ascontiguousarray(lights.direction.T), np.ascontiguousarray(lights.irradiance.T)
+        args = (recurrence(degree), points.normal, points.tangent, visible, direction, irradiance)
+        for_ranges(lambda start, stop: _from_triangles(*args, start, stop, out), points.num_points, _POINTS_PER_RANGE)
+    _add_rays(points, rays, degree, out)
+    return out
+
+
+def ray_incident_coefficients(points: SurfacePoints, rays: Sequence[RayList], degree: int = DEGREE) -> F32:
+    """Do as `incident_coefficients` where all light comes along rays.
+
+    Args:
+        points, rays, degree: as there.
+    Returns:
+        As there.
+    """
+    out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
+    _add_rays(points, rays, degree, out)
+    return out
+
+
+def _add_rays(points: SurfacePoints, rays: Sequence[RayList], degree: int, out: F32) -> None:
+    no_visibility = np.empty((points.num_points, 0), np.uint8)
+    receivers = ShadingPoints(
+        points, points.normal, no_visibility
+    )  # no ray of a point depends on where it is seen from
+    for some in rays:
+        for_ranges(
+            lambda start, stop, some=some: _list_and_add(some, receivers, degree, start, stop, out),  # type: ignore[misc]
+            points.num_points,
+            _LISTED_POINTS_PER_RANGE,
+        )
+
+
+def _list_and_add(rays: RayList, receivers: ShadingPoints, degree: int, start: int, stop: int, out: F32) -> None:
+    """Add rays of points [start, stop)."""
+    ray_list = build_ray_lists(rays, receivers, start, stop)
+    _from_listed(recurrence(degree), stop - start, ray_list.first, ray_list.wi, ray_list.irradiance, out[start:stop])
+
+
+def incident_coefficients_numpy(points: SurfacePoints, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:
+    """Do as `incident_coefficients` for light triangles alone, in plain NumPy: its oracle.
+
+    Args:
+        points, visible, lights: as there.
+    Returns:
+        (n, 3, K) float64
+    """
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    frame = np.stack([t, np.cross(n, t), n], axis=1)
+    wi = np.einsum("nij,mj->nmi", frame, lights.direction.astype(np.float64))
+    is_visible = np.unpackbits(visible, axis=1, count=lights.num_lights, bitorder="little").astype(np.float64)
+    weight = is_visible * np.maximum(wi[..., 2], 0)
+    return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), project(wi)))
+
+
+def add_scaled(
+    total: F32, addend: F32, gain: F32, rows: NDArray[np.intp] | None = None, *, has_all_rows: bool = False
+) -> None:
+    """Add light vectors times a gain of each channel to others.
+
+    Args:
+        total: what they are added to. (n, 3, K) float32
+        addend: that is added, of as many functions or fewer. (m, 3, ≤ K) float32. gain: (3,) float32
+        rows: which of the n they are. (m,); None: all. has_all_rows: `addend` has all n, of which `rows` are added.
+    """
+    target_rows = np.arange(len(total)) if rows is None else rows
+    source_rows = target_rows if has_all_rows or rows is None else np.arange(len(addend))
+    parallel_for_chunks(
+        lambda start, stop: _add_scaled(addend, gain, source_rows, target_rows, start, stop, total), len(target_rows)
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _add_scaled(addend, gain, source_rows, target_rows, start, stop, out):  # type: ignore[no-untyped-def]
+    for i in range(start, stop):
+        q, p = source_rows[i], target_rows[i]
+        for channel in range(3):
+            for k in range(addend.shape[2]):
+                out[p, channel, k] += gain[channel] * addend[q, channel, k]

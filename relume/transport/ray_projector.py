@@ -1,0 +1,91 @@
+"""The projector's other half: light that arrives along rays, from gather cells and from local lights.
+
+R(x) = Σ_r w_r L_r q(x, ω_r) Π_f curve_f(angle_f(x, ω_r)),   w_r = cos θi over the density of rays
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.patches.neighbor_filter import NeighborFilter
+from relume.transport.diffuse_projector import diffuse_quotients
+from relume.transport.ray_kernel import project_rays, sum_rays, weight_rays
+from relume.transport.shading_points import GatherRays, RayList, ReceiverList, ShadingPoints, is_area_light
+from relume.transport.term_contraction import Contraction
+
+F32 = NDArray[np.float32]
+
+
+class RayProjector:
+    """Adds the rays of points to what a projector has made of its lights; holds the scratch memory of one thread.
+
+    Args:
+        term: the BRDF term. contraction: its curves, from `contract`.
+        receivers: where the rays arrive. capacity: points that are listed at once.
+    """
+
+    def __init__(self, term: Term, contraction: Contraction, receivers: ShadingPoints, capacity: int) -> None:
+        self._term, self._contraction, self._receivers, self._capacity = term, contraction, receivers, capacity
+        max_rays = capacity * max((rays.max_rays_per_point for rays in receivers.rays), default=0)
+        self._ray_list = ReceiverList(np.empty(capacity + 1, np.int64), *np.empty((3, 3, max_rays), np.float32))
+
+    def add(self, start: int, stop: int, out: F32) -> None:
+        """Add points [start, stop) to `out`, laid out as `project_rays` has it."""
+        radiance = np.zeros_like(out)
+        for rays in self._receivers.rays:
+            if is_area_light(rays, self._contraction.kinds.size):
+                continue  # it is listed as triangles
+            if isinstance(rays, GatherRays) and rays.sharing is not None:
+                self._add_shared(rays, rays.sharing, start, stop, radiance)
+            else:
+                self._add(rays, self._receivers, start, stop, radiance)
+        out += self._contraction.constant[:, None] * radiance
+
+    def _add_shared(self, rays: GatherRays, sharing: NeighborFilter, start: int, stop: int, out: F32) -> None:
+        """Add what points have of their own rays and of their neighbours'."""
+        filter_passes, rows = sharing.weights_for(self._term).find_dependencies(start, stop)
+        radiance = np.zeros((len(rows), *out.shape[1:]), np.float32)
+        self._add(rays.unshared(rows), self._receivers.without_light(rows), 0, len(rows), radiance)
+        filtered = radiance.reshape(len(rows), -1)
+        for filter_pass in reversed(filter_passes):
+            filtered = filter_pass @ filtered
+        out += filtered.reshape(out.shape)
+
+    def _add(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int, out: F32) -> None:
+        c = self._contraction
+        if c.kinds.size == 0 and self._term.is_lambertian and isinstance(rays, GatherRays):
+            out[:, :, 0] += diffuse_quotients(self._term, receivers, start, stop)[:, None] * rays.sum(
+                receivers, start, stop
+            )
+            return
+        for first in range(start, stop, self._capacity):
+            last = min(first + self._capacity, stop)
+            shading, block_out = self._list(rays, receivers, first, last), out[first - start : last - start]
+            if c.kinds.size == 0:
+                sum_rays(self._ray_list.first, self._ray_list.irradiance, shading, block_out)
+                continue
+            project_rays(
+                *self._ray_list, shading,
+                c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_index, c.active, block_out,
+            )  # fmt: skip
+
+    def weight_rays(self, start: int, stop: int) -> F32:
+        """Weigh what each ray of points [start, stop) brings, all curves contracted. (3, rays) float32"""
+        c, ray_weights = self._contraction, []
+        for rays in self._receivers.rays:
+            shading = self._list(rays, self._receivers, start, stop)
+            ray_weights.append(np.empty((3, shading.shape[1]), np.float32))
+            ray_list = self._ray_list
+            weight_rays(
+                ray_list.first[: stop - start + 1], ray_list.wi, ray_list.wo, ray_list.irradiance, shading,
+                c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.setting_index, ray_weights[-1],
+            )  # fmt: skip
+        return np.concatenate(ray_weights, axis=1) * c.constant[:, None]
+
+    def _list(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> F32:
+        """List rays of points; returns the term's quotients. (1 or 3, rays)"""
+        ray_list = self._ray_list
+        num = rays.list_into(ray_list, receivers, start, stop)
+        return np.asarray(self._term.quotients(*ray_list.wi[:, :num], *ray_list.wo[:, :num]))

@@ -1,0 +1,173 @@
+"""What harmonics of light bring to points, their shadows included: precomputed transfer (Müller 2004, section 5).
+
+    T_k,lm(x) = ∫ Y_lm(ωi) V(x, ωi) cos θi h_k(ωi) dωi = Σ_s ΔΩ_s Y_lm(ω_s) V cos θ_s h_k(ω_s)
+
+with s the light triangles whose shadows are known. Smooth light c arrives as T c. Matrices of neighbours are alike, and
+kept by local PCA (Sloan 2003; `relume.math.local_pca`): a cluster for each point, and weights of its components. Of
+light that changes only the clusters' few vectors are found anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.core.numba_options import UNCOUNTED
+from relume.core.thread_pools import for_ranges, parallel_for_chunks
+from relume.math.local_pca import cluster, distances
+from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
+from relume.math.zernike import evaluate_basis, num_functions, project, recurrence
+from relume.raytrace.surface_points import SurfacePoints
+
+F16 = NDArray[np.float16]
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+NUM_CLUSTERS, NUM_COMPONENTS = 32, 9
+_MIN_POINTS_PER_CLUSTER = 64  # at least, in the mean
+_MAX_FITTED_POINTS = 4096  # points that clusters and components are found from
+_POINTS_PER_BATCH = 4096
+_POINTS_PER_RANGE = 256
+_LIGHTS_PER_BATCH = 128  # lights whose functions are summed together; they stay in the cache
+_WIDTH = 32  # numbers that are added at once: as many vectors as hold all harmonics
+
+
+def transfer_matrices(
+    points: SurfacePoints, visible: NDArray[np.uint8], directions: F32, solid_angles: F64, degree: int
+) -> F32:
+    """Find T of points.
+
+    Args:
+        points: n of them. visible: which of the lights each sees, as in `ShadingPoints`. (n, bytes) uint8
+        directions: of the lights. (M, 3) float32. solid_angles: of these. (M,)
+        degree: of the in-basis.
+    Returns:
+        (n, K, NUM_HARMONICS) float32
+    """
+    values = np.zeros((len(directions), _WIDTH), np.float32)
+    values[:, :NUM_HARMONICS] = harmonics(directions.astype(np.float64)) * solid_angles[:, None]
+    out = np.empty((points.num_points, num_functions(degree), NUM_HARMONICS), np.float32)
+    args = (recurrence(degree), points.normal, points.tangent, visible, directions, values)
+    for_ranges(lambda start, stop: _transfer(*args, start, stop, out), points.num_points, _POINTS_PER_RANGE)
+    return out
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _transfer(recurrence_table, normal, tangent, visible, direction, values, start, stop, out):  # type: ignore[no-untyped-def]
+    """Sum the lights that points [start, stop) see. out: (n, K, NUM_HARMONICS)"""
+    wi, scratch = np.empty((2, _LIGHTS_PER_BATCH), np.float32), np.empty((5, _LIGHTS_PER_BATCH), np.float32)
+    functions, weighted_harmonics = (
+        np.zeros((out.shape[1], _LIGHTS_PER_BATCH), np.float32),
+        np.zeros((_LIGHTS_PER_BATCH, _WIDTH), np.float32),
+    )
+    total, product = np.empty((out.shape[1], _WIDTH), np.float32), np.empty((out.shape[1], _WIDTH), np.float32)
+    for p in range(start, stop):
+        n, t = normal[p], tangent[p]
+        bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
+        total[:] = 0
+        num_pending = 0
+        for m in range(len(direction)):
+            x, y, z = direction[m, 0], direction[m, 1], direction[m, 2]
+            above = n[0] * x + n[1] * y + n[2] * z
+            if above > 0 and (visible[p, m >> 3] >> (m & 7)) & 1:
+                wi[0, num_pending], wi[1, num_pending] = t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z
+                for harmonic in range(_WIDTH):
+                    weighted_harmonics[num_pending, harmonic] = above * values[m, harmonic]
+                num_pending += 1
+            if num_pending == _LIGHTS_PER_BATCH or m == len(direction) - 1:
+                evaluate_basis(recurrence_table, num_pending, wi, scratch, functions)
+                weighted_harmonics[num_pending:] = 0
+                np.dot(functions, weighted_harmonics, product)
+                total += product
+                num_pending = 0
+        out[p] = total[:, :NUM_HARMONICS]
+
+
+def transfer_matrices_numpy(
+    points: SurfacePoints, visible: NDArray[np.uint8], directions: F32, solid_angles: F64
+) -> F64:
+    """Do as `transfer_matrices`, of the whole in-basis, in plain NumPy: its oracle.
+
+    Args:
+        points, visible, directions, solid_angles: as there.
+    Returns:
+        (n, K, NUM_HARMONICS) float64
+    """
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    wi = np.einsum("nij,mj->nmi", np.stack([t, np.cross(n, t), n], axis=1), directions.astype(np.float64))
+    is_visible = np.unpackbits(visible, axis=1, count=len(directions), bitorder="little")
+    weight = is_visible * np.maximum(wi[..., 2], 0) * solid_angles
+    return np.asarray(np.einsum("nm,nmk,mj->nkj", weight, project(wi), harmonics(directions.astype(np.float64))))
+
+
+class ClusteredTransfer(NamedTuple):
+    """T of n points, by local PCA.
+
+    Attributes:
+        basis: mean, then components of each cluster. (clusters, 1 + C, K, NUM_HARMONICS) float16
+        cluster: of each point. (n,) uint8. weight: of the components. (n, C) float16
+    """
+
+    basis: F16
+    cluster: NDArray[np.uint8]
+    weight: F16
+
+    @classmethod
+    def fit(
+        cls, num_points: int, matrices: Callable[[NDArray[np.intp]], F32], rng: np.random.Generator
+    ) -> ClusteredTransfer:
+        """Find clusters and components from some points, then the weights of all.
+
+        Args:
+            num_points: n. matrices: finds T of points by their numbers. (…, K, NUM_HARMONICS) float32
+            rng: chooses the points, and first means among them.
+        """
+        sample = np.sort(rng.permutation(num_points)[:_MAX_FITTED_POINTS])
+        fitted = matrices(sample)
+        clusters = max(1, min(NUM_CLUSTERS, num_points // _MIN_POINTS_PER_CLUSTER))
+        pca = cluster(fitted.reshape(len(fitted), -1), clusters, NUM_COMPONENTS, rng)
+        cluster_index, weight = np.empty(num_points, np.uint8), np.empty((num_points, NUM_COMPONENTS), np.float16)
+        for start in range(0, num_points, _POINTS_PER_BATCH):
+            rows = np.arange(start, min(start + _POINTS_PER_BATCH, num_points))
+            batch = matrices(rows).reshape(len(rows), -1)
+            cluster_index[rows] = np.argmin(distances(batch, pca), axis=1)
+            for k in np.unique(cluster_index[rows]):
+                members = rows[cluster_index[rows] == k]
+                weight[members] = (batch[members - start] - pca.mean[k]) @ pca.components[k].T
+        basis = np.concatenate([pca.mean[:, None], pca.components], axis=1).astype(np.float16)
+        return cls(basis.reshape(*basis.shape[:2], *fitted.shape[1:]), cluster_index, weight)
+
+    def incident_coefficients(self, smooth: F32, rows: NDArray[np.intp]) -> F32:
+        """Find light vectors of some points in smooth light.
+
+        Args:
+            smooth: its coefficients. (NUM_HARMONICS, 3) float32. rows: the points. (m,)
+        Returns:
+            t. (m, 3, K) float32
+        """
+        transferred = np.ascontiguousarray(np.einsum("ajkl,lc->ajck", self.basis.astype(np.float32), smooth))
+        out = np.empty((len(rows), *transferred.shape[2:]), np.float32)
+        flat, flat_out = transferred.reshape(*transferred.shape[:2], -1), out.reshape(len(rows), -1)
+        weight = self.weight.astype(np.float32)
+        parallel_for_chunks(
+            lambda start, stop: _sum(flat, self.cluster, weight, rows, start, stop, flat_out), len(rows)
+        )
+        return out
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _sum(transferred, cluster, weight, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Sum the mean and the components of points rows[start:stop]. out: (m, 3 K)"""
+    for i in range(start, stop):
+        p = rows[i]
+        cluster_coefficients = transferred[cluster[p]]
+        for k in range(out.shape[1]):
+            out[i, k] = cluster_coefficients[0, k]
+        for j in range(weight.shape[1]):
+            component_weight = weight[p, j]
+            for k in range(out.shape[1]):
+                out[i, k] += component_weight * cluster_coefficients[j + 1, k]

@@ -1,0 +1,111 @@
+"""The kernels of groups of lights: which of them points see wholly, and which are near enough to one light each."""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+
+from relume.core.numba_options import UNCOUNTED
+from relume.transport.shading.light_list_kernel import (
+    allocate_chunks,
+    band_scales,
+    defer_triangles,
+    error_tolerance,
+    evaluate_listed,
+    per_axis,
+)
+from relume.transport.shading.table_averages import CHUNK, sum_up
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def select_groups(visibility_words, first, group_lights, whole):  # type: ignore[no-untyped-def]
+    """Find groups all of whose lights a point sees, and take these lights away from it.
+
+    Args:
+        visibility_words: of each light, bit k for point k; lights of whole groups are taken out. (M,) uint64
+        first, group_lights: of `relume.lights.spherical_triangles.LightGroups`. whole: of each group, written. (G,)
+        uint64
+    """
+    for g in range(whole.shape[0]):
+        begin, end = first[g], first[g + 1]
+        common_word = visibility_words[group_lights[begin]]
+        for k in range(begin + 1, end):
+            common_word &= visibility_words[group_lights[k]]
+        whole[g] = common_word
+        if common_word:
+            for k in range(begin, end):
+                visibility_words[group_lights[k]] &= ~common_word
+
+
+@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+def _restore_lights(bits, first, group_lights, group):  # type: ignore[no-untyped-def]
+    """Let a point see the lights of a group by themselves."""
+    for k in range(first[group], first[group + 1]):
+        bits[group_lights[k] >> 3] |= np.uint8(1) << np.uint8(group_lights[k] & 7)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def add_groups(  # type: ignore[no-untyped-def]
+    normal, tangent, light_list, local_wo, lights, groups, axes, curves, start, stop, visible, out
+):
+    """Add what those groups bring to points that are near enough to one light; lights of others are given back.
+
+    Args:
+        normal, tangent, axes, curves, start, stop, out: as in `shade_points`.
+        light_list: first, light and shading of it, for groups. local_wo: of it as well.
+        lights: nodes, brings and `between` of the groups. groups: first and part of them, see `LightGroups`.
+        visible: of the points, lights of listed groups that are to be shaded one by one are set. (points, bytes)
+    """
+    num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)
+    chunks = allocate_chunks(lights[0].shape[0] // CHUNK + 1, num_rows)
+    local, scratch = np.empty((3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
+    wo, total, chunk_range = np.empty((num_curves, 3), np.float32), np.empty(3, np.float32), np.empty(CHUNK, np.float32)
+    scratch_arrays = (chunks, local, scratch, wo, total, chunk_range)
+    _add(
+        normal,
+        tangent,
+        light_list,
+        local_wo,
+        lights,
+        groups,
+        axes,
+        (curves, scale),
+        start,
+        stop,
+        scratch_arrays,
+        visible,
+        out,
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+def _add(  # type: ignore[no-untyped-def]
+    normal, tangent, light_list, local_wo, lights, groups, axes, curves, start, stop, scratch_arrays, visible, out
+):
+    """Do what `add_groups` is for, in the memory that it has made."""
+    (first, light, shading), (curves, scale) = light_list, curves
+    chunks, local, scratch, wo, total, chunk_range = scratch_arrays
+    weight, _, deferred, value, error = chunks
+    for p in range(start, stop):
+        row = p - start
+        begin, end = first[row], first[row + 1]
+        if begin == end:
+            continue
+        per_axis(axes, local_wo, begin, wo)
+        total[:] = 0
+        evaluate_listed(
+            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local, scratch, chunk_range,
+            chunks, total,
+        )  # fmt: skip
+        tolerance = error_tolerance(total, out[row, :, 0])
+        total[:] = 0
+        for chunk in range((end - begin + CHUNK - 1) // CHUNK):
+            at = begin + chunk * CHUNK
+            num = min(CHUNK, end - at)
+            for n in deferred[
+                chunk, : defer_triangles(value[chunk], weight[chunk], error[chunk], num, tolerance, deferred[chunk])
+            ]:
+                _restore_lights(visible[row], groups[0], groups[1], light[at + n])
+            sum_up(value[chunk], weight[chunk], num, total)
+        for channel in range(3):
+            out[row, channel, 0] += total[channel]

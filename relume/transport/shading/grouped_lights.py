@@ -1,0 +1,64 @@
+"""Lights that points see in whole groups, and that are as good as one light to them.
+
+What a group brings is evaluated as one light's; where its curves vary so much within it that this may be wrong, its
+lights are left to be shaded one by one. What of a group a dormant curve does not see brings nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.core.bit_matrix import rows_to_words, words_to_rows
+from relume.lights.spherical_triangles import LightGroups
+from relume.transport.light_lists import LightList
+from relume.transport.shading.group_kernel import add_groups, select_groups
+from relume.transport.shading_points import ShadingPoints
+from relume.transport.term_contraction import Contraction
+
+F32 = NDArray[np.float32]
+Bits = NDArray[np.uint8]
+
+
+class GroupedLights:
+    """Shades groups of lights at blocks of receivers; holds the scratch memory of one thread.
+
+    Args:
+        term, contraction, receivers: as `relume.transport.shading.shader.Shader` takes them.
+        groups: of the lights that receivers see. num_lights: of these.
+    """
+
+    def __init__(
+        self, term: Term, contraction: Contraction, groups: LightGroups, num_lights: int, receivers: ShadingPoints
+    ) -> None:
+        self._receivers, self._contraction, self._groups = receivers, contraction, groups
+        self._light_list = LightList(term, contraction, groups.lights, receivers)
+        self._visibility_words, self._whole = (
+            np.empty(num_lights, np.uint64),
+            np.empty(groups.lights.num_lights, np.uint64),
+        )
+
+    def add(self, start: int, stop: int, out: F32) -> Bits:
+        """Add what groups bring to points [start, stop), at most a block.
+
+        Args:
+            out: (points, 3, 1) float32, added to.
+        Returns:
+            The lights that are left, as in `ShadingPoints`. (stop - start, bytes) uint8
+        """
+        r, c, groups, light_list = self._receivers, self._contraction, self._groups, self._light_list
+        remaining = np.empty_like(r.visible[start:stop])
+        whole = np.empty((stop - start, (len(self._whole) + 7) // 8), np.uint8)
+        rows_to_words(r.visible[start:stop], self._visibility_words)
+        select_groups(self._visibility_words, groups.first, groups.light_index, self._whole)
+        words_to_rows(self._visibility_words, remaining)
+        words_to_rows(self._whole, whole)
+        shading, wo = light_list.list(start, stop, whole)
+        lights = groups.lights.nodes_by_light, light_list.irradiance_radius, groups.between_variance
+        add_groups(
+            r.normal, r.tangent, (light_list.first, light_list.light, shading), wo, lights, (groups.first,
+            groups.light_index),
+            c.axes, c.whole, start, stop, remaining, out,
+        )  # fmt: skip
+        return remaining

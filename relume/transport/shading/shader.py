@@ -1,0 +1,98 @@
+"""The projector of pictures: no curve is free, so that what arrives is summed without sharing it out to bands.
+
+    R(x) = Σ_m V(x, m) L_m Ω_m cos θi · q(x, ω_m) · Π_f mean_m(f)
+
+The sums of `relume.transport.projector`, by a quadrature that need not be right for whatever a curve may become: the
+pictures are the same to a thousandth or two (docs/adr/0055-boxes-for-pictures.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.lights.spherical_triangles import TriangleLights
+from relume.transport.diffuse_projector import DiffuseProjector
+from relume.transport.light_lists import POINTS_PER_BLOCK, AreaLightList, LightList, area_light_lists
+from relume.transport.ray_projector import RayProjector
+from relume.transport.shading.grouped_lights import GroupedLights
+from relume.transport.shading.shade_kernel import shade_points
+from relume.transport.shading_points import ShadingPoints
+from relume.transport.term_contraction import Contraction
+
+F32 = NDArray[np.float32]
+
+
+class Shader:
+    """Shades ranges of receivers; holds the scratch memory of one thread.
+
+    Args:
+        term: the BRDF term. contraction: its curves, none of them free and each of one setting, from `contract`.
+        lights: triangles of the environment; `receivers` tell which of them each point sees.
+        receivers: all points, and what arrives at them.
+        base_radiance: what the term makes of other light, where that is known: beside much of it little need be found
+            less finely. (n, 3) float32
+    """
+
+    def __init__(
+        self,
+        term: Term,
+        contraction: Contraction,
+        lights: TriangleLights,
+        receivers: ShadingPoints,
+        base_radiance: F32 | None = None,
+    ) -> None:
+        self._contraction, self._lights, self._receivers, self._base_radiance = (
+            contraction,
+            lights,
+            receivers,
+            base_radiance,
+        )
+        self._light_list = LightList(term, contraction, lights, receivers)
+        is_diffuse = term.is_lambertian and contraction.kinds.size == 0
+        self._diffuse = DiffuseProjector(term, contraction.constant, lights) if is_diffuse else None
+        is_groupable = contraction.kinds.size > 0 and not term.is_steep  # by curves, how the term varies within a group
+        groups = lights.groups if is_groupable else None
+        self._grouped = groups and GroupedLights(term, contraction, groups, lights.num_lights, receivers)
+        self._rays = RayProjector(term, contraction, receivers, POINTS_PER_BLOCK)
+        self._area_lights = area_light_lists(term, contraction, receivers)
+
+    def project(self, start: int, stop: int) -> F32:
+        """Shade points [start, stop). (stop - start, 1, 3) float32, as `Projector.project` returns it"""
+        base_radiance = (
+            np.zeros((stop - start, 3), np.float32) if self._base_radiance is None else self._base_radiance[start:stop]
+        )
+        out = np.array(base_radiance[..., None], order="C")
+        if self._diffuse is not None:
+            out[:, :, 0] += self._diffuse.shade(self._receivers, start, stop)
+        elif self._lights.num_lights:
+            self._add_listed(start, stop, out)
+        self._rays.add(start, stop, out)
+        for area_light in self._area_lights:
+            self._add_area_light(area_light, start, stop, out)
+        return (out - base_radiance[..., None]).transpose(0, 2, 1)
+
+    def _add_area_light(self, area_light: AreaLightList, start: int, stop: int, out: F32) -> None:
+        r, c = self._receivers, self._contraction
+        for block in range(start, stop, area_light.points_per_block):
+            end = min(block + area_light.points_per_block, stop)
+            shading, wo, nodes, irradiance_radius = area_light.list(block, end)
+            shade_points(
+                r.normal, r.tangent, area_light.first, area_light.light, shading, wo, nodes, irradiance_radius,
+                c.axes, c.whole, block, end, out[block - start : end - start],
+            )  # fmt: skip
+
+    def _add_listed(self, start: int, stop: int, out: F32) -> None:
+        """Add the environment, of which lists are made."""
+        r, c, light_list = self._receivers, self._contraction, self._light_list
+        for block in range(start, stop, POINTS_PER_BLOCK):
+            end = min(block + POINTS_PER_BLOCK, stop)
+            block_out = out[block - start : end - start]
+            visible = self._grouped.add(block, end, block_out) if self._grouped else r.visible[block:end]
+            shading, wo = light_list.list(block, end, visible)
+            shade_points(
+                r.normal, r.tangent, light_list.first, light_list.light, shading, wo, self._lights.nodes_by_light,
+                light_list.irradiance_radius,
+                c.axes, c.whole, block, end, block_out,
+            )  # fmt: skip

@@ -1,0 +1,150 @@
+"""A term made ready to be projected: which curve stays free, and the bands of those that do not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.term import Term
+from relume.core.simd import NUM as EIGHT
+
+F32 = NDArray[np.float32]
+
+_NOTHING = 1e-9
+_MIN_STEP = 1e-30  # of a curve; with numbers near the smallest float32 a processor is several times slower
+_FLAT = 1e-12  # band averages of a constant differ by rounding
+
+
+class WholeCurves(NamedTuple):
+    """The curves of a term with none free, as `relume.transport.shading.table_averages` integrates them.
+
+    Attributes:
+        kinds, num_rows, num_bands: as in `Contraction`.
+        steps: each band's value; the sum of the values from it on; how much they vary from it on. (C, 3, J or more, 3)
+            float32. Summed from the end, where curves mostly are small, for what is small is their difference there.
+    """
+
+    kinds: NDArray[np.int64]
+    steps: F32
+    num_rows: NDArray[np.int64]
+    num_bands: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Contraction:
+    """A term made ready for the kernel: which curve stays free, and the bands of those that do not.
+
+    Attributes:
+        kinds: `Angle` of each curve that depends on wi. (C,) int64
+        axes: `Curve.axes` of each. (C, 3) float32
+        num_bands: (C,) int64
+        bands: padded with the last band. (C, 3, max J + 8) float32
+        num_rows: 1 where a curve is the same in all channels, else 3. (C,) int64
+        settings: the curves that have several, settings last: N, padded with zeros to a multiple of eight, or three
+            times as many where channels differ. (V, max J + 8, 8 n or 24 n) float32
+        setting_index: row of each curve in `settings`, -1 for none. (C,) int64
+        support: bands beyond which a dormant curve is nothing; infinite for the free one. (C,) float32
+        constant: product of the curves, where all are flat and none is listed. (3,) float32
+        active: index of the free curve, -1 for none.
+        num_settings: N, settings of the curves that are contracted at once; 1 where a curve is free.
+    """
+
+    kinds: NDArray[np.int64]
+    axes: F32
+    num_bands: NDArray[np.int64]
+    bands: F32
+    num_rows: NDArray[np.int64]
+    settings: F32
+    setting_index: NDArray[np.int64]
+    support: F32
+    constant: F32
+    active: int
+    num_settings: int
+
+    @property
+    def num_columns(self) -> int:
+        """Columns of what is projected: J of the free curve, or N."""
+        return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
+
+    @cached_property
+    def decrements(self) -> F32:
+        """By how much each band is less than the one before it. (C, 3, max J + 8) float32"""
+        bands = self.bands.astype(np.float64)
+        return -np.diff(bands, axis=2, prepend=bands[:, :, :1]).astype(np.float32)
+
+    @cached_property
+    def whole(self) -> WholeCurves:
+        """Its curves where none is free and each has one setting."""
+        steps = np.zeros((*self.bands.shape, 3), np.float32)
+        for curve_steps, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
+            values = bands[:, :num][:, ::-1]
+            variation = np.abs(np.diff(values, axis=1, prepend=values[:, :1]))
+            curve_steps[:, :num] = np.stack([values, values.cumsum(axis=1), variation.cumsum(axis=1)], axis=2)[:, ::-1]
+        steps[np.abs(steps) < _MIN_STEP] = 0
+        return WholeCurves(self.kinds, steps, self.num_rows, self.num_bands)
+
+
+def _support(rows: NDArray[np.float64]) -> float:
+    """Count the bands after which each of a curve's rows (..., J) stays below a billionth of its own peak."""
+    above = rows > _NOTHING * rows.max(axis=-1, keepdims=True)
+    nonzero_bands = np.nonzero(above.reshape(-1, rows.shape[-1]).any(axis=0))[0]
+    return float(nonzero_bands[-1] + 1) if len(nonzero_bands) else 0.0
+
+
+def _is_flat(bands: NDArray[np.float64]) -> bool:
+    """Tell whether a curve (3, J) is the same everywhere, but for rounding."""
+    return bands.ndim == 2 and bool(np.all(np.ptp(bands, axis=1) <= _FLAT * np.abs(bands[:, 0])))
+
+
+def _settings(curves: Sequence[NDArray[np.float64]], widest: int) -> F32:
+    """Lay out curves (3, N, J) as `Contraction.settings`. widest: bands of the widest curve, padded"""
+    if not curves:
+        return np.empty((0, widest, 0), np.float32)
+    num_channels = 1 if all(np.all(bands == bands[0]) for bands in curves) else 3
+    num_padded = -(-curves[0].shape[1] // EIGHT) * EIGHT
+    table = np.zeros((len(curves), widest, num_channels, num_padded), np.float32)
+    for rows, bands in zip(table, curves, strict=True):
+        rows[: bands.shape[2], :, : bands.shape[1]] = bands[:num_channels].transpose(2, 0, 1)
+    return table.reshape(len(curves), widest, -1)
+
+
+def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str | None) -> Contraction:
+    """Make a term ready: curves of the outgoing angle are left out (they multiply the finished sample).
+
+    Args:
+        term: whose curves these are.
+        bands: of each curve by name. (3, J) float64, or (3, N, J) for N settings of it at once
+        active: the curve that stays free, None to contract all.
+    """
+    curves = [curve for curve in term.curves if not curve.depends_on_view]
+    constant = np.ones(3)
+    if active is None and all(_is_flat(bands[curve.name]) for curve in curves):
+        # nothing depends on an angle; with any other curve flat ones stay, for every angle decides where triangles are
+        # divided, and a curve that becomes flat must not change that
+        constant = np.prod([constant, *(bands[curve.name].mean(axis=1) for curve in curves)], axis=0)
+        curves = []
+    all_bands = [bands[curve.name] for curve in curves]
+    multiple_settings = [rows for rows in all_bands if rows.ndim == 3]
+    free = next((k for k, curve in enumerate(curves) if curve.name == active), -1)
+    widest = max((rows.shape[-1] for rows in all_bands), default=1) + EIGHT
+    single_setting = [rows if rows.ndim == 2 else np.zeros((3, rows.shape[2])) for rows in all_bands]
+    padded = [np.pad(rows, ((0, 0), (0, widest - rows.shape[1])), mode="edge") for rows in single_setting]
+    has_settings = np.array([rows.ndim == 3 for rows in all_bands], bool)
+    return Contraction(
+        kinds=np.array([int(curve.angle) for curve in curves], np.int64),
+        axes=np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
+        num_bands=np.array([rows.shape[-1] for rows in all_bands], np.int64),
+        bands=np.array(padded, np.float32).reshape(len(curves), 3, widest),
+        num_rows=np.array([1 if np.all(rows == rows[0]) else 3 for rows in single_setting], np.int64),
+        settings=_settings(multiple_settings, widest),
+        setting_index=np.where(has_settings, np.cumsum(has_settings) - 1, -1),
+        support=np.array([np.inf if k == free else _support(rows) for k, rows in enumerate(all_bands)], np.float32),
+        constant=constant.astype(np.float32),
+        active=free,
+        num_settings=multiple_settings[0].shape[1] if multiple_settings else 1,
+    )

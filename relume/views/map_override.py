@@ -1,0 +1,132 @@
+"""Views whose materials wear other maps of roughness or of normals than they were baked with.
+
+Levels of roughness are coefficients of one operator (docs/adr/0052-roughness-in-levels.md), and bakes say where samples
+lie in textures. So an image in the place of a map of roughness is another level for each sample, nothing else; as
+samples of a level lie together, they come in another order (docs/adr/0102-images-of-roughness.md). An image of normals
+is another normal for each, and another level where bumps below a pixel widen it (docs/adr/0107-images-of-normals.md).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume.brdf.roughness_levels import RoughnessLevels
+from relume.brdf.texture_slots import NormalMap
+from relume.camera.tiling import morton
+from relume.camera.view_samples import dither_thresholds
+from relume.core.errors import StoreError
+from relume.images.image_store import load_normal_map, load_roughness_map, mean_roughness
+from relume.raytrace.texture import sample_image
+from relume.scene.roughness_levels import (
+    levels_in_range,
+    min_mean_normal_length,
+    ratio_range,
+    rougher,
+    select_level,
+    smoother,
+)
+from relume.views.map_override_store import MapOverrideStore, RayTracer
+from relume.views.normal_override import PerturbedNormals, perturbed
+from relume.views.store_io import read_normal_length, read_shortest_normals, read_uv
+from relume.views.view import View, open_view
+
+F32 = NDArray[np.float32]
+
+
+class MapOverrides(NamedTuple):
+    """What a look names in the place of a material's maps.
+
+    Attributes:
+        roughness: "image:<id>", None for its own. normals: None for its own.
+        base_roughness: the roughness of its terms, as the scene has it, that bumps widen; None where no term follows a
+            map.
+    """
+
+    roughness: str | None
+    normals: NormalMap | None
+    base_roughness: float | None
+
+
+def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: RayTracer) -> View:
+    """Let materials of a baked view wear images in the place of their maps.
+
+    Args:
+        view: as it was baked. maps: of each material, None where it wears its own.
+        tracer: of rays that the bake did not trace.
+    Returns:
+        The view; the same object for all who have it.
+    Raises:
+        StoreError: the store does not say where samples lie in textures. NotFoundError, SceneError: an image cannot be
+            had.
+    """
+    cached = view.overridden.get(maps)
+    if cached is not None or not any(maps):
+        return cached or view
+    rows, level, ratios = view.unmodified(), view.level.copy(), list(view.ratios)
+    perturbed_by_row, materials = dict[int, PerturbedNormals](), dict[int, int]()
+    for material, override in enumerate(maps):
+        material_rows = view.rows(material)
+        if override is None or material_rows.start == material_rows.stop:
+            continue
+        if override.normals is not None:
+            tracer.check()
+        perturbed_normals = None if override.normals is None else perturbed(view, material, override.normals)
+        ratios[material], sample_levels = _overridden_levels(view, material, override, perturbed_normals)
+        code = morton(view.pixel[material_rows].astype(np.int64), view.width)
+        order = np.lexsort((code, sample_levels))
+        level[material_rows], rows[material_rows] = sample_levels[order], rows[material_rows][order]
+        if perturbed_normals is not None:
+            perturbed_by_row[material_rows.start], materials[material_rows.start] = (
+                perturbed_normals.rows(order),
+                material,
+            )
+    tracer_arguments = tracer, view.cache, (view.key, view.name, maps)
+    store = MapOverrideStore(
+        view.store, view.index, rows, level, ratios, perturbed_by_row, materials, *tracer_arguments
+    )
+    view.overridden[maps] = overridden = open_view(store, view.index, view.cache, view.key, maps, rows)
+    return overridden
+
+
+def _overridden_levels(
+    view: View, material: int, override: MapOverrides, perturbed_normals: PerturbedNormals | None
+) -> RoughnessLevels:
+    """How rough a material's samples are where images say it: what a bake finds whose scene has the images."""
+    rows, store, base_roughness = view.rows(material), view.store, override.base_roughness
+    shortest = read_shortest_normals(store)[material]
+    length = read_normal_length(store, view.index, rows.start, rows.stop)
+    if override.roughness is None:
+        ratio, low, high = _map_roughness(view, material, base_roughness, length, shortest)
+    else:
+        uv, texture = read_uv(store, view.index, rows.start, rows.stop), load_roughness_map(override.roughness)
+        if uv is None:
+            raise StoreError("this bake is too old to show images; bake the scene again")
+        base_roughness = mean_roughness(override.roughness) or None
+        ratio, (low, high) = sample_image(texture, uv)[:, 0], ratio_range(texture)
+    if perturbed_normals is not None and override.normals is not None:
+        length, shortest = perturbed_normals.normal_length, min_mean_normal_length(load_normal_map(override.normals))
+    ratios = levels_in_range(low, high, base_roughness, shortest)
+    if not ratios:
+        return RoughnessLevels(ratios, np.zeros(rows.stop - rows.start, np.uint8))
+    if base_roughness and shortest < 1:
+        ratio = rougher(ratio, length, base_roughness)
+    pixel = view.pixel[rows].astype(np.int64)
+    return RoughnessLevels(ratios, select_level(ratios, ratio, dither_thresholds(pixel, view.width)))
+
+
+def _map_roughness(
+    view: View, material: int, base_roughness: float | None, length: F32, shortest: float
+) -> tuple[F32, float, float]:
+    """The roughness of a material's samples over its own as the scene's map has it, without what bumps add; and the
+    ends of that map."""
+    ratios, level = view.ratios[material], view.level[view.rows(material)]
+    if not ratios or ratios[0] == 1:  # there is no map, or bumps alone widen it
+        return np.ones(len(level), np.float32), 1.0, 1.0
+    ratio, low, high = np.array(ratios, np.float32)[level], ratios[0], ratios[-1]
+    if base_roughness is None or shortest == 1:
+        return ratio, low, high
+    highest = smoother(np.array([high], np.float32), np.array([shortest], np.float32), base_roughness)
+    return smoother(ratio, length, base_roughness), low, max(low, float(highest[0]))

@@ -1,1 +1,0 @@
-"""Files that come in and go out: uploads and their import, downloads, small pictures."""

@@ -1,1 +1,0 @@
-"""Live sessions: what a client wants, what its picture shows, and what goes over the wire."""

@@ -1,1 +1,0 @@
-"""Several people on one look: rooms, the places in them, and the sessions that share what a room has."""

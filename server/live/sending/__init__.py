@@ -1,1 +1,0 @@
-"""The sending half of a session: frames of the newest look, and answers."""

@@ -1,0 +1,1 @@
+"""The server: REST, live sessions, rooms, jobs. Start at `app`."""

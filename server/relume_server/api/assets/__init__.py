@@ -1,0 +1,1 @@
+"""Routes of assets that looks name: materials, BTFs, environments, images."""

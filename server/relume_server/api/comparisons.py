@@ -1,0 +1,121 @@
+"""/api/truths: a frame against brute force, pass by pass."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from fastapi.concurrency import run_in_threadpool
+
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.protocols import CameraMode, OpenBake
+from relume_server.api.bakes import require_ready_bake
+from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
+from relume_server.api.pagination import PageDep
+from relume_server.api.renders import baked_view, check_display, check_look, check_picture_size
+from relume_server.auth.roles import CallerDep
+from relume_server.batch.frame_sequence import comparison_camera
+from relume_server.errors import NotReadyError
+from relume_server.io.downloads import Download
+from relume_server.jobs.comparison_jobs import ComparisonJob
+from relume_server.jobs.job import JobFilter
+from relume_server.openapi import files
+from relume_server.schemas.base import Id, JobState
+from relume_server.schemas.bodies import ComparisonBody, ComparisonPlanBody, ComparisonRequest
+from relume_server.services import Services, ServicesDep
+
+router = APIRouter(prefix="/api/truths", tags=["truths"])
+Picture = Literal["error", "reference", "method-error", "method-reference"]
+
+
+@router.post("", status_code=202, responses={200: {"model": ComparisonPlanBody, "description": "A dry run's answer"}})
+async def submit_comparison(
+    request: ComparisonRequest, services: ServicesDep, caller: CallerDep, response: Response
+) -> ComparisonBody | ComparisonPlanBody:
+    """Queue a comparison, or say how long it would take; the look is checked first."""
+    await run_in_threadpool(require_ready_bake, services, request.bake)
+    async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        await run_in_threadpool(_check, request, transfer)
+        if request.dry_run:
+            response.status_code = 200
+            _, (width, height) = comparison_camera(request, transfer)
+            foreseen = await run_in_threadpool(services.comparisons.estimate_duration, request, width * height)
+            return ComparisonPlanBody(passes=request.passes, **foreseen._asdict())
+    await run_in_threadpool(services.access.quotas.check_room)
+    identity = await run_in_threadpool(services.comparisons.submit, request, caller.name)
+    response.headers["Location"] = f"/api/truths/{identity}"
+    return await run_in_threadpool(lambda: _body(services.comparisons.get(identity), services))
+
+
+def _check(request: ComparisonRequest, transfer: OpenBake) -> None:
+    baked_view(request.view, transfer)
+    if transfer.camera_mode is CameraMode.FREE:
+        comparison_camera(request, transfer)
+        check_picture_size(request.size)
+    elif request.camera is not None or request.size is not None:
+        allowed = "none for this bake, whose eye does not move: it is compared as it was baked"
+        raise ParameterError("camera" if request.size is None else "size", "given", allowed)
+    check_look(request.look, transfer, "/look")
+    check_display(request.look, "/look")
+
+
+@router.get("")
+def list_comparisons(
+    services: ServicesDep,
+    page: PageDep,
+    state: Annotated[JobState | None, Query()] = None,
+    bake: Annotated[Id | None, Query()] = None,
+    user: Annotated[UserName | None, Query()] = None,
+) -> list[ComparisonBody]:
+    """Comparisons, newest first, those of a state, a bake or a user; 100 where no `limit` is given."""
+    job_filter = JobFilter(state, user, bake)
+    return [_body(job, services) for job in list_jobs(services.comparisons, job_filter, page)]
+
+
+@router.get("/{truth}")
+def get_comparison(truth: Id, services: ServicesDep) -> ComparisonBody:
+    """State, progress, and what was found so far."""
+    return _body(services.comparisons.get(truth), services)
+
+
+@router.delete("/{truth}", status_code=204)
+def stop_comparison(truth: Id, services: ServicesDep, forget: bool = False) -> Response:
+    """Stop a comparison; what was found so far is kept, unless `forget` says that nobody needs it."""
+    (services.comparisons.delete if forget else services.comparisons.stop)(truth)
+    return Response(status_code=204)
+
+
+@router.post("/{truth}/resume", status_code=202)
+def resume_comparison(truth: Id, services: ServicesDep) -> ComparisonBody:
+    """Go on with a comparison that was stopped or has failed, after its last finished pass."""
+    services.comparisons.resume(truth)
+    return _body(services.comparisons.get(truth), services)
+
+
+@router.get(
+    "/{truth}/{name}.png",
+    response_class=Download,
+    name="get_comparison_picture",
+    responses=files("image/png"),
+)
+def get_picture(
+    truth: Id, name: Picture, services: ServicesDep, passes: Annotated[int | None, Query(ge=0)] = None
+) -> Download:
+    """Where the frame differs, or the brute force so far, by the paths that were asked for or by those that the bake's
+    method follows. Brute force from the first pass on, where the frame differs from the second. `passes` only makes the
+    address change when the picture does."""
+    job = services.comparisons.get(truth)
+    path = services.comparisons.picture_path(truth, name)
+    if not path.exists():
+        needed = "one pass is" if name.endswith("reference") else "two passes are"
+        raise NotReadyError(f"{needed} needed, {job.done} are done; wait a little")
+    return Download(path, media_type="image/png", headers={"Cache-Control": "no-store"})
+
+
+def _body(job: ComparisonJob, services: Services) -> ComparisonBody:
+    request = job.request
+    figures = dict(services.comparisons.figures(job.id))
+    return ComparisonBody.from_object(
+        job, bake=request.bake, view=request.view, paths=request.paths, passes=job.done,
+        **format_timestamps(job), **figures,
+    )  # fmt: skip

@@ -1,0 +1,41 @@
+"""/api/built-ins: the scenes made by code, and taking one of them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+from fastapi.concurrency import run_in_threadpool
+
+from relume.core.errors import NotFoundError
+from relume.scene.examples.catalog import BUILT_IN
+from relume_server.api.pagination import PageDep
+from relume_server.api.scenes import get_scene_body
+from relume_server.auth.roles import CallerDep
+from relume_server.io.import_request import ImportRequest
+from relume_server.schemas.bodies import ExampleSceneBody, SceneBody
+from relume_server.services import ServicesDep
+
+router = APIRouter(prefix="/api/built-ins", tags=["scenes"])
+ExampleName = Annotated[str, Path(max_length=256)]
+
+
+@router.get("", name="list_built_ins")
+def list_examples(page: PageDep) -> list[ExampleSceneBody]:
+    """All of them, in the order in which they are shown."""
+    return [
+        ExampleSceneBody(name=name, label=each.label, description=each.description, size=each.size, method=each.method)
+        for name, each in page.in_order(BUILT_IN.items())
+    ]
+
+
+@router.post("/{name}", status_code=201, name="take_built_in")
+async def import_example(name: ExampleName, services: ServicesDep, caller: CallerDep, response: Response) -> SceneBody:
+    """Make it and register it like an imported one; a second time it is the same scene."""
+    if name not in BUILT_IN:
+        raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")
+    request = ImportRequest.create(services.settings, "built_in", None, name)
+    async with services.intake.reserving(caller.name, 0) as reservation:
+        identity = await services.intake.import_file(reservation, lambda folder: request)
+    response.headers["Location"] = f"/api/scenes/{identity}"
+    return await run_in_threadpool(get_scene_body, identity, services)

@@ -1,0 +1,35 @@
+"""/livez: the process runs. /readyz: it can serve. /metrics: figures for Prometheus."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+from fastapi.responses import PlainTextResponse
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+from sqlalchemy import select
+
+from relume_server.services import ServicesDep
+from relume_worker.database.models import BakeRow
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/livez")
+async def livez() -> dict[str, str]:
+    """The process answers."""
+    return {"status": "alive"}
+
+
+@router.get("/readyz")
+def readyz(services: ServicesDep) -> dict[str, str]:
+    """The database can be read, the data directory has room, and the server is not being stopped."""
+    services.drain.check()
+    with services.bakes.ledger.sessions() as session:
+        session.execute(select(BakeRow.id).limit(1))
+    services.access.quotas.check_room()
+    return {"status": "ready"}
+
+
+@router.get("/metrics", response_class=PlainTextResponse)
+def metrics(services: ServicesDep) -> PlainTextResponse:
+    """Prometheus text."""
+    return PlainTextResponse(generate_latest(services.metrics.registry), headers={"Content-Type": CONTENT_TYPE_LATEST})

@@ -1,0 +1,43 @@
+"""What routes of renders, comparisons and BTFs in the making have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, Field
+
+from relume_server.api.pagination import MAX_LONG, Key, Page, newest
+from relume_server.jobs.job import Job, JobFilter
+from relume_server.jobs.queue import JobQueue
+from relume_server.schemas.bodies import format_timestamp
+
+Request = TypeVar("Request", bound=BaseModel)
+UserName = Annotated[str, Field(max_length=80)]
+
+
+def list_jobs(
+    queue: JobQueue[Request],
+    job_filter: JobFilter,
+    page: Page,
+    default_limit: int = MAX_LONG,
+    *,
+    newest_first: bool = True,
+) -> list[Job[Request]]:
+    """A part of a queue's list. most: how long it is at most where nobody says that."""
+
+    def key(job: Job[Request]) -> Key:
+        return newest(job.created, job.id) if newest_first else (job.created, job.id)
+
+    page.check((0.0, ""))
+    after = None
+    if page.after is not None:
+        created, identity = float(page.after[0]), str(page.after[1])
+        after = -created if newest_first else created, identity
+    jobs = queue.page(job_filter, page.default_limit(default_limit) + 1, after, newest_first=newest_first)
+    return page.cut(jobs, key)
+
+
+def format_timestamps(job: Job[Request]) -> dict[str, str | None]:
+    """When it was asked for, begun and ended, as bodies say it."""
+    times = {"created": job.created, "started": job.started, "ended": job.ended}
+    return {name: None if at is None else format_timestamp(at) for name, at in times.items()}

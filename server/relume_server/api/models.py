@@ -1,0 +1,55 @@
+"""/api/models: every BRDF term, its parameters and curves; sliders are built from it. How moving views send terms."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter
+from fastapi.concurrency import run_in_threadpool
+
+from relume.brdf import registry
+from relume.brdf.albedo import directional_albedo, reflectance
+from relume.brdf.specular import specular_threshold
+from relume.brdf.term_validation import complete_term
+from relume_server.api.pagination import PageDep
+from relume_server.schemas.models import AlbedoBody, ModelBody, TermsRequest, ZernikeFitBody
+
+router = APIRouter(prefix="/api/models", tags=["models"])
+
+
+@router.get("")
+def list_models(page: PageDep) -> list[ModelBody]:
+    """Every BRDF term."""
+    terms = page.in_order(registry.describe())
+    return [ModelBody(**term, mirrors_below=specular_threshold(term["model"])) for term in terms]
+
+
+@router.post("/in-out")
+async def get_zernike_fit(request: TermsRequest) -> list[ZernikeFitBody]:
+    """How terms are sent in views whose eye moves: the in-out factorisation of each (Mahajan 2008)."""
+    return await run_in_threadpool(_zernike_fit, _complete(request))
+
+
+@router.post("/albedo")
+async def get_albedo(request: TermsRequest) -> AlbedoBody:
+    """What share of the light that meets a material of these terms it sends back: no more than all, in the world."""
+    return await run_in_threadpool(_albedo, _complete(request))
+
+
+def _complete(request: TermsRequest) -> list[dict[str, Any]]:
+    return [complete_term(("terms", index), term, None) for index, term in enumerate(request.terms)]
+
+
+def _albedo(terms: list[dict[str, Any]]) -> AlbedoBody:
+    theta, albedo = directional_albedo(terms)
+    mean = np.sum([reflectance(term) for term in terms], axis=0)
+    row = int(albedo.max(axis=1).argmax())
+    return AlbedoBody(mean=mean.tolist(), most=float(albedo[row].max()), at_deg=math.degrees(theta[row]))
+
+
+def _zernike_fit(terms: list[dict[str, Any]]) -> list[ZernikeFitBody]:
+    from relume.live.free_camera.basis.factorization_error import factorization_error  # loads compiled kernels
+
+    return [ZernikeFitBody(**factorization_error(term)._asdict()) for term in terms]

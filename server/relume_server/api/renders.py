@@ -1,0 +1,294 @@
+"""/api/renders: exact pictures of many looks at once."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Response
+from fastapi.concurrency import run_in_threadpool
+
+from relume import look as looks
+from relume.core.errors import NotFoundError, ParameterError
+from relume.image_io.ocio.active_config import get_config
+from relume.image_io.ocio.view import OcioView
+from relume.live.fixed_camera.protocols import CameraMode, EditAxis, OpenBake
+from relume.output.exr.color_space import find_space
+from relume.output.exr.layers import make_layers
+from relume_server.api.bakes import require_ready_bake
+from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
+from relume_server.api.pagination import PageDep
+from relume_server.auth.roles import Caller, CallerDep
+from relume_server.batch.frame_sequence import check_animation, look_at_frame, look_document_at_frame, with_pivot
+from relume_server.errors import NotReadyError
+from relume_server.io.downloads import Download, ZipStream
+from relume_server.io.video import check_encoder
+from relume_server.jobs.job import JobFilter, new_id
+from relume_server.jobs.render_jobs import RenderJob, planned_bytes
+from relume_server.openapi import files
+from relume_server.schemas.base import MAX_NAME, Id, JobState, Name
+from relume_server.schemas.cameras import CameraFrame
+from relume_server.schemas.protocol import MAX_EYE_PIXELS
+from relume_server.schemas.renders import (
+    MAX_FRAMES,
+    MAX_LISTED_BYTES,
+    MAX_LISTED_FRAMES,
+    Keyframes,
+    LooksBody,
+    LooksRequest,
+    RenderBody,
+    RenderRequest,
+)
+from relume_server.services import Services, ServicesDep
+from relume_worker.scenes import get_scene
+
+router = APIRouter(prefix="/api/renders", tags=["renders"])
+FrameIndex = Annotated[int, Path(ge=0, lt=MAX_FRAMES)]
+MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
+
+
+@router.post("", status_code=202)
+async def submit_render(
+    request: RenderRequest, services: ServicesDep, caller: CallerDep, response: Response
+) -> RenderBody:
+    """Queue a batch; every look is checked first."""
+    await run_in_threadpool(require_ready_bake, services, request.bake)
+    async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        max_bytes = await run_in_threadpool(_check, request, transfer)
+        if request.name is None:
+            scene = await run_in_threadpool(get_scene, services.bakes.ledger, transfer.scene_id)
+            request.name = f"{scene.name} {request.view}"[:MAX_NAME]
+    identity = await run_in_threadpool(_queue, request, max_bytes, caller, services)
+    response.headers["Location"] = f"/api/renders/{identity}"
+    return _body(await run_in_threadpool(services.renders.get, identity))
+
+
+def _queue(request: RenderRequest, max_bytes: int, caller: Caller, services: Services) -> str:
+    """Queue a batch that takes at most so many bytes of whoever asks. Raises QuotaError, BusyError."""
+    quotas = services.access.quotas
+    with quotas.deciding:
+        quotas.check_bytes(caller.name, max_bytes)
+        identity = new_id()
+        with quotas.owner_assigned(caller.name, "render", identity, max_bytes):
+            return services.renders.submit(request, caller.name, identity=identity)
+
+
+@router.post("/looks")
+async def frame_looks(request: LooksRequest, services: ServicesDep) -> LooksBody:
+    """What each frame of a batch with these keyframes shows, and from where: an editor plays what will be rendered."""
+    if request.num_frames > MAX_LISTED_FRAMES:
+        raise ParameterError("frames", request.num_frames, f"at most {MAX_LISTED_FRAMES} to be looked at")
+    await run_in_threadpool(require_ready_bake, services, request.bake)
+    async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
+        return await run_in_threadpool(_frame_looks, request, transfer)
+
+
+def _frame_looks(request: LooksRequest, transfer: OpenBake) -> LooksBody:
+    _check_looks(request, transfer)
+    cameras = None if request.path is None else _path_cameras(request, transfer)
+    request = with_pivot(request, transfer)
+    num_chars, documents = 0, []
+    for index in range(request.num_frames):
+        documents.append(dict(look_document_at_frame(request, request.view, transfer, index)))
+        num_chars += len(json.dumps(documents[-1]))
+        if num_chars > MAX_LISTED_BYTES:
+            raise ParameterError("frames", request.num_frames, f"at most {index} of looks as large as these")
+    return LooksBody(looks=documents, cameras=cameras)
+
+
+def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame] | None:
+    """Where each frame is seen from; None where it was baked. Raises ParameterError where no eye can go there."""
+    if request.view is None:
+        raise ParameterError("view", None, "the view that the path is a way of")
+    baked_view(request.view, transfer)
+    cameras = [camera for camera in check_animation(request, request.view, transfer) if camera is not None]
+    return [
+        CameraFrame(to_world=camera.to_world.ravel().tolist(), yfov=math.degrees(camera.yfov)) for camera in cameras
+    ] or None
+
+
+def _check_looks(request: Keyframes, transfer: OpenBake) -> None:
+    if len(request.looks) > request.num_frames:
+        allowed = f"at most as many as frames, {request.num_frames}"
+        raise ParameterError("looks", f"{len(request.looks)} keyframes", allowed)
+    for index, partial in enumerate(request.looks):
+        check_look(partial, transfer, f"/looks/{index}")
+
+
+def baked_view(name: str, transfer: OpenBake) -> Any:
+    """A view of a bake that a body names. Raises ParameterError."""
+    if name not in transfer.views:
+        raise ParameterError("view", name, "one of " + ", ".join(transfer.views)[:400])
+    return transfer.views[name]
+
+
+def check_picture_size(size: tuple[int, int] | None) -> None:
+    """Whether pictures of a moving eye may be so large; None: as baked. Raises ParameterError."""
+    if size is not None and size[0] * size[1] > MAX_EYE_PIXELS:
+        raise ParameterError("size", list(size), f"at most {MAX_EYE_PIXELS} pixels in all")
+
+
+def check_look(partial: dict[str, Any], transfer: OpenBake, pointer: str) -> None:
+    """A look that stands at `pointer` of a body. Raises ParameterError."""
+    try:
+        looks.complete(partial, transfer.default_look)
+    except ParameterError as error:
+        raise ParameterError(f"{pointer}{error.name}", error.value, error.allowed) from None
+
+
+def check_display(partial: dict[str, Any], pointer: str) -> None:
+    """Whether pictures of a checked look, at `pointer` of a body, can be shown here. Raises ParameterError."""
+    tone_map = partial.get("display", {}).get("tone_map")
+    if not isinstance(tone_map, dict):
+        return
+    config = get_config()
+    if config is None:
+        allowed = "one of relume's own: there is no OpenColorIO config here (RELUME_OCIO)"
+        raise ParameterError(f"{pointer}/display/tone_map", tone_map, allowed)
+    try:
+        config.check_view(OcioView(**tone_map))
+    except ParameterError as error:
+        raise ParameterError(f"{pointer}/display/tone_map", error.value, error.allowed) from None
+
+
+def _check(request: RenderRequest, transfer: OpenBake) -> int:
+    """Raises ParameterError where something cannot be rendered.
+
+    Returns:
+        What its files take at most, bytes.
+    """
+    view = baked_view(request.view, transfer)
+    if request.format != "exr" and request.layers:
+        raise ParameterError("layers", True, "false for this format; only EXR files have layers")
+    if request.format != "exr" and request.color_space is not None:
+        raise ParameterError("color_space", request.color_space, "null for this format, whose looks have a tone map")
+    find_space(request.color_space)
+    if request.format == "mp4":
+        check_encoder()
+    if transfer.camera_mode is CameraMode.FREE:
+        check_picture_size(request.size or (view.width, view.height))
+    elif request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
+        allowed = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
+        raise ParameterError("size", list(request.size), allowed)
+    _check_looks(request, transfer)
+    if request.format != "exr":
+        for index, partial in enumerate(request.looks):
+            check_display(partial, f"/looks/{index}")
+    check_animation(request, request.view, transfer)
+    look = look_at_frame(request, request.view, transfer, 0)
+    layers = make_layers(request.layers, look, has_indirect=EditAxis.BOUNCES in transfer.axes)
+    return planned_bytes(request, request.size or (view.width, view.height), 1 + len(layers))
+
+
+@router.get("")
+def list_renders(
+    services: ServicesDep,
+    page: PageDep,
+    state: Annotated[JobState | None, Query()] = None,
+    bake: Annotated[Id | None, Query()] = None,
+    name: Annotated[Name | None, Query()] = None,
+    user: Annotated[UserName | None, Query()] = None,
+) -> list[RenderBody]:
+    """Batches, newest first, those of a state, a bake, a name or a user; 100 where no `limit` is given."""
+    job_filter = JobFilter(state, user, bake, name)
+    return [_body(job) for job in list_jobs(services.renders, job_filter, page)]
+
+
+@router.get("/{render}")
+def get_render(render: Id, services: ServicesDep) -> RenderBody:
+    """State and progress."""
+    return _body(services.renders.get(render))
+
+
+@router.delete("/{render}", status_code=204)
+def delete_render(render: Id, services: ServicesDep) -> Response:
+    """Stop a batch and forget its pictures."""
+    services.renders.delete(render)
+    services.access.quotas.disown("render", render)
+    return Response(status_code=204)
+
+
+@router.post("/{render}/resume", status_code=202)
+def resume_render(render: Id, services: ServicesDep) -> RenderBody:
+    """Go on with a batch that has failed; pictures that are there stay."""
+    services.access.quotas.check_room()
+    services.renders.resume(render)
+    return _body(services.renders.get(render))
+
+
+@router.post("/{render}/frames/{index}/retry", status_code=202)
+def retry_frame(render: Id, index: FrameIndex, services: ServicesDep) -> RenderBody:
+    """Paint one picture of a batch that is ready or has failed again, and what else is missing."""
+    services.access.quotas.check_room()
+    services.renders.retry(_job_with_frame(render, index, services), index)
+    return _body(services.renders.get(render))
+
+
+def _job_with_frame(identity: str, index: int, services: Services) -> RenderJob:
+    job = services.renders.get(identity)
+    if index >= job.total:
+        raise NotFoundError(f"this batch has {job.total} frames, counted from 0")
+    return job
+
+
+@router.get(
+    "/{render}/frames/{index}",
+    response_class=Download,
+    name="get_frame",
+    responses=files("image/x-exr", "image/png", "image/webp"),
+)
+def get_frame(render: Id, index: FrameIndex, services: ServicesDep) -> Download:
+    """One finished picture, counted from 0."""
+    job = _job_with_frame(render, index, services)
+    path = services.renders.frame_path(job, index)
+    if not path.exists():
+        raise NotReadyError(f"frame {index} is not finished; {_state(job)}")
+    name = services.renders.download_name(job, index)
+    return Download(path, media_type=MEDIA_TYPES[job.request.picture_format], filename=name)
+
+
+@router.get("/{render}/video.mp4", response_class=Download, name="get_video", responses=files("video/mp4"))
+def get_video(render: Id, services: ServicesDep) -> Download:
+    """All pictures as a video, where one was asked for, when it is finished."""
+    job = services.renders.get(render)
+    if job.request.format != "mp4":
+        raise NotFoundError(f"this batch has {job.request.format} pictures; ask for the format mp4")
+    if job.state != "ready":
+        raise NotReadyError(f"the batch is not finished; {_state(job)}")
+    path = services.renders.video_path(job)
+    return Download(path, media_type=MEDIA_TYPES["mp4"], filename=services.renders.video_name(job))
+
+
+@router.get("/{render}/archive.zip", response_class=Download, name="get_archive", responses=files("application/zip"))
+def get_archive(render: Id, services: ServicesDep, partial: bool = False) -> Response:
+    """All pictures in one file, when all are finished; with `partial` those that are, before."""
+    job = services.renders.get(render)
+    if job.state != "ready":
+        if not partial:
+            raise NotReadyError(f"the batch is not finished; {_state(job)}; ?partial=true has what is there")
+        return _partial_archive(job, services)
+    path = services.renders.archive_path(job)
+    return Download(path, media_type="application/zip", filename=services.renders.archive_name(job))
+
+
+def _partial_archive(job: RenderJob, services: Services) -> Response:
+    missing = set(services.renders.missing(job))
+    painted = [index for index in range(job.total) if index not in missing]
+    if not painted:
+        raise NotReadyError(f"no frame is finished; {_state(job)}")
+    files = [(services.renders.frame_path(job, k), services.renders.download_name(job, k)) for k in painted]
+    name = services.renders.archive_name(job).removesuffix(".zip") + "-partial.zip"
+    return ZipStream(files, name)
+
+
+def _state(job: RenderJob) -> str:
+    if job.state == "failed":
+        return f"it failed: {job.problem}"
+    return f"it is {job.state}, wait a little"
+
+
+def _body(job: RenderJob) -> RenderBody:
+    request = job.request
+    asked = {name: getattr(request, name) for name in ("bake", "view", "name", "format", "size")}
+    return RenderBody.from_object(job, **asked, **format_timestamps(job))

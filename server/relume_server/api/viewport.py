@@ -1,0 +1,69 @@
+"""/api/scenes/{id}/finder: the scene in plain colours from anywhere, to place cameras by before anything is baked."""
+
+from __future__ import annotations
+
+import io
+import math
+
+from fastapi import APIRouter, Response
+from fastapi.concurrency import run_in_threadpool
+from PIL import Image
+
+from relume.scene.custom_camera import make_custom_camera
+from relume.scene.model import Camera
+from relume_server.runtime.protocols import PlacementViewport
+from relume_server.schemas.base import Id
+from relume_server.schemas.cameras import CameraFrame, PickBody, ViewportBody, ViewportPixel, ViewportRequest
+from relume_server.services import Services, ServicesDep
+from relume_worker.paths import scene_path
+from relume_worker.scenes import get_scene
+
+router = APIRouter(prefix="/api/scenes/{scene}/finder", tags=["scenes"])
+
+JPEG_QUALITY = 85
+
+
+class JpegResponse(Response):
+    """An image; names its media type in the API's description."""
+
+    media_type = "image/jpeg"
+
+
+@router.get("")
+async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
+    """Where the scene is; reads it, which may take seconds."""
+    viewport = await _open_viewport(scene, services)
+    framing = viewport.framing
+    frame = CameraFrame(to_world=framing.to_world.ravel().tolist(), yfov=math.degrees(framing.yfov))
+    return ViewportBody(lowest=viewport.lowest.tolist(), highest=viewport.highest.tolist(), framing=frame)
+
+
+@router.post("", response_class=JpegResponse, name="draw_finder")
+async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep) -> JpegResponse:
+    """What a camera would see, in plain colours."""
+    camera, viewport = _camera(view), await _open_viewport(scene, services)
+
+    def encode_jpeg() -> bytes:
+        file = io.BytesIO()
+        Image.fromarray(viewport.image(camera, view.size)).save(file, "JPEG", quality=JPEG_QUALITY)
+        return file.getvalue()
+
+    return JpegResponse(await run_in_threadpool(encode_jpeg), headers={"Cache-Control": "no-store"})
+
+
+@router.post("/place", name="place_in_finder")
+async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBody:
+    """What a position of that picture shows."""
+    camera, viewport = _camera(pixel), await _open_viewport(scene, services)
+    position = await run_in_threadpool(viewport.point_at, camera, pixel.size, pixel.x, pixel.y)
+    return PickBody(position=None if position is None else position.tolist())
+
+
+async def _open_viewport(scene: str, services: Services) -> PlacementViewport:
+    record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
+    folder = scene_path(services.settings.data, record.id)
+    return await services.pictures.run(("finder", folder), lambda: services.live.library.open_viewport(folder))
+
+
+def _camera(frame: CameraFrame) -> Camera:
+    return make_custom_camera("finder", frame.to_world, frame.yfov).camera

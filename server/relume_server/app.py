@@ -1,0 +1,187 @@
+"""Puts the server together: `create_app(settings)`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+
+import uvicorn
+from fastapi import Depends, FastAPI
+
+from relume.core.memory_usage import limit_malloc_arenas
+from relume.image_io.ocio.active_config import get_config, using_config
+from relume_server import errors, openapi
+from relume_server.api import (
+    bakes,
+    cameras,
+    client,
+    color,
+    comments,
+    comparisons,
+    examples,
+    health,
+    login,
+    looks,
+    models,
+    probes,
+    renders,
+    scenes,
+    session,
+    shares,
+    viewport,
+)
+from relume_server.api.assets import balls, btf_jobs, btfs, environments, images, library, materials
+from relume_server.api.pagination import check_query
+from relume_server.auth.middleware import AuthMiddleware
+from relume_server.auth.rules import methods_at
+from relume_server.conditional_requests import Conditional
+from relume_server.idempotency import Idempotency
+from relume_server.io.upload_middleware import UPLOADS_AT_ONCE, UPLOADS_EACH, UploadMiddleware
+from relume_server.lifecycle.connection import Connection
+from relume_server.lifecycle.drain import DrainState
+from relume_server.lifecycle.server import ServerProcess
+from relume_server.lifecycle.websocket_protocol import Socket
+from relume_server.request_limits import Guard
+from relume_server.runtime.assets import using_asset_stores
+from relume_server.runtime.library import open_library
+from relume_server.schemas.protocol import MAX_MESSAGE_BYTES
+from relume_server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
+from relume_server.settings import Settings
+from relume_server.telemetry.logs.requests import RequestIds
+from relume_server.telemetry.logs.setup import set_up
+from relume_server.telemetry.metrics import Metrics
+
+ROUTE_GROUPS = (
+    scenes,
+    cameras,
+    comments,
+    viewport,
+    examples,
+    color,
+    models,
+    materials,
+    btfs,
+    btf_jobs,
+    library,
+    balls,
+    environments,
+    images,
+    bakes,
+    probes,
+    renders,
+    comparisons,
+    looks,
+    shares,
+    session,
+    login,
+    health,
+)
+
+
+def create_app(
+    settings: Settings | None = None,
+    *,
+    open_library: OpenLibrary = open_library,
+    open_bakes: OpenBakes = open_bakes,
+    open_batches: OpenBatches = open_batches,
+    clock: Callable[[], float] = time.monotonic,
+) -> FastAPI:
+    """The ASGI app; opens its data at startup and closes it at shutdown.
+
+    Args:
+        settings: None: from the environment.
+        open_library, open_bakes, open_batches: what sessions, bakes and renders stand on; tests put stand-ins here.
+        clock: seconds, by which things that nobody uses grow old.
+    """
+    settings = settings or Settings()
+    metrics, drain = Metrics(), DrainState()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        with using_asset_stores(settings.data), using_config(settings.ocio, settings.ocio_space):
+            get_config()  # what is wrong with it is said now
+            opening = open_services(settings, metrics, drain, open_library, open_bakes, open_batches, clock)
+            async with opening as services:
+                app.state.services = services
+                yield
+                del app.state.services
+
+    app = FastAPI(
+        title="relume",
+        summary="Edit materials and lights in the finished picture.",
+        version=version("relume"),
+        openapi_url="/api/openapi.json",
+        docs_url=None,  # the documentation pages load scripts from other sites
+        redoc_url=None,
+        lifespan=lifespan,
+        responses=errors.OPENAPI_RESPONSES,
+        generate_unique_id_function=lambda route: route.name,
+    )
+    openapi.install(app)
+    app.state.drain = drain
+    errors.install(app, methods_at)
+    # the last that is added is the first that a request passes
+    app.add_middleware(Idempotency, store=lambda: app.state.services.idempotency)
+    app.add_middleware(
+        UploadMiddleware,
+        access=lambda: app.state.services.access,
+        max_per_user=UPLOADS_EACH if settings.login else UPLOADS_AT_ONCE,
+        weights=settings.turns,
+    )
+    app.add_middleware(AuthMiddleware, settings=settings, access=lambda: app.state.services.access, clock=clock)
+    app.add_middleware(Conditional)
+    app.add_middleware(
+        Guard,
+        allowed_hosts=[*settings.allowed_hosts, settings.host],
+        allowed_origins=settings.allowed_origins,
+        max_body_bytes=settings.max_body_bytes,
+        max_upload_bytes=settings.max_upload_bytes,
+        https_only=settings.https_only,
+        count=metrics.count_request,
+    )
+    app.add_middleware(RequestIds)
+    for group in ROUTE_GROUPS:
+        takes_any = group in (session, health)  # what a session's address may say it checks itself
+        app.include_router(group.router, dependencies=[] if takes_any else [Depends(check_query)])
+    app.router.default = client.Client(settings.client)  # not a mount, which would hide a call's 405
+    return app
+
+
+def serve(settings: Settings, on_started: Callable[[], object] = lambda: None) -> None:
+    """Run the server until it is stopped, and tell once when it answers; blocks."""
+    set_up(settings.log_format, settings.log_level)
+    limit_malloc_arenas()
+    create_server(create_app(settings), settings, on_started).run()
+
+
+def create_server(app: FastAPI, settings: Settings, on_started: Callable[[], object] = lambda: None) -> ServerProcess:
+    """The server that runs the app, and takes leave of its sessions before it ends."""
+    return ServerProcess(
+        configure(app, settings),
+        drain=app.state.drain,
+        num_sessions=lambda: app.state.services.access.quotas.num_sessions,
+        drain_seconds=settings.drain_seconds,
+        stop_seconds=settings.stop_seconds,
+        on_started=on_started,
+    )
+
+
+def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    """How uvicorn runs the app."""
+    return uvicorn.Config(
+        app,
+        host=settings.host,
+        port=settings.port,
+        loop="uvloop",
+        http=Connection,
+        ws=Socket,
+        ws_max_size=MAX_MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves
+        log_config=None,  # `relume_server.telemetry.logs` has set it up
+        access_log=False,  # it would show resume tokens
+        server_header=False,
+        proxy_headers=False,  # `relume_server.auth.identity` reads them, of proxies that are trusted
+        timeout_graceful_shutdown=5,
+    )

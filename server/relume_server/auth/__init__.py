@@ -1,0 +1,1 @@
+"""Authentication, roles, quotas, rate limits, and the audit log; no route decides these."""

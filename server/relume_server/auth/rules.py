@@ -1,0 +1,159 @@
+"""The table of what each call needs; the gate asks it before anything of a request is read.
+
+A call that is not listed is for admins alone, and `tests/access` fails for it: every route has its line here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from starlette.routing import compile_path
+
+from relume_server.auth.roles import Caller, Role
+from relume_server.errors import ForbiddenError
+
+ANYONE, VIEW, EDIT, ADMIN = Role
+
+SOCKET = "WEBSOCKET"
+"""Stands for a method where a live session is opened."""
+
+RULES: Mapping[str, Mapping[str, Role]] = {
+    "/livez": {"GET": ANYONE},
+    "/readyz": {"GET": ANYONE},
+    "/metrics": {"GET": VIEW},
+    "/api/openapi.json": {"GET": ANYONE},
+    "/api/me": {"GET": ANYONE},
+    "/api/login": {"POST": ANYONE},
+    "/api/logout": {"POST": ANYONE},
+    "/api/audit": {"GET": ADMIN},
+    "/api/scenes": {"GET": VIEW, "POST": EDIT},
+    "/api/scenes/{scene}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/scenes/{scene}/ground": {"POST": EDIT},
+    "/api/scenes/{scene}/thumbnail.webp": {"GET": VIEW},
+    "/api/scenes/{scene}/cameras": {"GET": VIEW},
+    "/api/scenes/{scene}/cameras/{name}": {"GET": VIEW, "PUT": EDIT, "DELETE": EDIT},
+    "/api/scenes/{scene}/comments": {"GET": VIEW, "POST": EDIT},
+    "/api/scenes/{scene}/comments/{comment}": {"PATCH": EDIT, "DELETE": EDIT},
+    "/api/scenes/{scene}/comments/{comment}/picture.webp": {"GET": VIEW},
+    "/api/scenes/{scene}/finder": {"GET": VIEW, "POST": VIEW},
+    "/api/scenes/{scene}/finder/place": {"POST": VIEW},
+    "/api/scenes/{scene}/ball": {"POST": VIEW},
+    "/api/built-ins": {"GET": VIEW},
+    "/api/built-ins/{name}": {"POST": EDIT},
+    "/api/color": {"GET": VIEW},
+    "/api/color/{config}/lut": {"GET": VIEW},
+    "/api/models": {"GET": VIEW},
+    "/api/models/in-out": {"POST": VIEW},
+    "/api/models/albedo": {"POST": VIEW},
+    "/api/materials": {"GET": VIEW},
+    "/api/materials/map": {"GET": VIEW},
+    "/api/materials/map/at": {"GET": VIEW},
+    "/api/materials/{table}/{material}/thumbnail.png": {"GET": VIEW},
+    "/api/materials/measured": {"GET": VIEW, "POST": EDIT},
+    "/api/materials/measured/{material}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/materials/measured/{material}/thumbnail.png": {"GET": VIEW},
+    "/api/materials/btf": {"GET": VIEW},
+    "/api/materials/btf/{material}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/materials/btf/{material}/thumbnail.png": {"GET": VIEW},
+    "/api/materials/btf-works": {"GET": VIEW, "POST": EDIT},
+    "/api/materials/btf-works/synthetic": {"POST": EDIT},
+    "/api/materials/btf-works/geometry": {"POST": EDIT},
+    "/api/materials/btf-works/{work}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/materials/btf-works/{work}/resume": {"POST": EDIT},
+    "/api/environments": {"GET": VIEW, "POST": EDIT},
+    "/api/environments/{environment}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/environments/{environment}/thumbnail.png": {"GET": VIEW},
+    "/api/images": {"GET": VIEW, "POST": EDIT},
+    "/api/images/{image}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/images/{image}/metalness": {"POST": EDIT},
+    "/api/images/{image}/thumbnail.png": {"GET": VIEW},
+    "/api/bakes": {"GET": VIEW, "POST": EDIT},
+    "/api/bakes/{bake}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/bakes/{bake}/events": {"GET": VIEW},
+    "/api/bakes/{bake}/views/{view}/materials.png": {"GET": VIEW},
+    "/api/bakes/{bake}/environment.png": {"GET": VIEW},
+    "/api/bakes/{bake}/surface": {"GET": VIEW},
+    "/api/bakes/{bake}/surface/{array}": {"GET": VIEW},
+    "/api/bakes/{bake}/session": {SOCKET: VIEW},
+    "/api/renders": {"GET": VIEW, "POST": EDIT},
+    "/api/renders/looks": {"POST": VIEW},
+    "/api/renders/{render}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/renders/{render}/resume": {"POST": EDIT},
+    "/api/renders/{render}/frames/{index}": {"GET": VIEW},
+    "/api/renders/{render}/frames/{index}/retry": {"POST": EDIT},
+    "/api/renders/{render}/video.mp4": {"GET": VIEW},
+    "/api/renders/{render}/archive.zip": {"GET": VIEW},
+    "/api/truths": {"GET": VIEW, "POST": EDIT},
+    "/api/truths/{truth}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/truths/{truth}/resume": {"POST": EDIT},
+    "/api/truths/{truth}/{name}.png": {"GET": VIEW},
+    "/api/looks": {"GET": VIEW},
+    "/api/looks/{name}": {"GET": VIEW, "PUT": EDIT, "DELETE": EDIT},
+    "/api/shares": {"GET": VIEW, "POST": EDIT},
+    "/api/looks/{name}/thumbnail": {"PUT": EDIT},
+    "/api/looks/{name}/thumbnail.webp": {"GET": VIEW},
+    "/api/shares/{share}": {"GET": VIEW, "DELETE": EDIT},
+}
+
+MESSAGES: Mapping[str, Role] = {
+    "open": VIEW,
+    "edit": EDIT,
+    "seen": VIEW,  # an edit of nothing but ways of looking: exposure, light paths, what is shown alone
+    "touch": VIEW,  # who may edit has the curve frozen; who may not is told its values
+    "hold": EDIT,  # a touch of what is no curve: it only prepares edits
+    "view": VIEW,
+    "views": VIEW,
+    "focus": VIEW,
+    "region": VIEW,
+    "eye": VIEW,
+    "evaluate": VIEW,
+    "stream": VIEW,
+    "ack": VIEW,
+    "probe": VIEW,
+    "brush": VIEW,
+    "presence": VIEW,
+    "ping": VIEW,
+}
+"""What the messages of a live session need."""
+
+_COMPILED: tuple[tuple[re.Pattern[str], Mapping[str, Role]], ...] = tuple(
+    (compile_path(path)[0], roles) for path, roles in RULES.items()
+)
+
+_COMMENTS = compile_path("/api/scenes/{scene}/comments")[0]
+
+
+def required_role(method: str, path: str) -> Role:
+    """What a call needs: the most that any line asks that fits it; of what is no call, nothing, the editor's files."""
+    fitting = [roles[method] for pattern, roles in _COMPILED if method in roles and pattern.match(path)]
+    if fitting:
+        return max(fitting)
+    is_file = method in ("GET", "HEAD") and not (path == "/api" or path.startswith("/api/"))
+    return ANYONE if is_file else ADMIN
+
+
+def methods_at(path: str) -> list[str]:
+    """What a path takes; routes of one path know each only their own method."""
+    return sorted({method for pattern, roles in _COMPILED if pattern.match(path) for method in roles} - {SOCKET})
+
+
+def is_comment(method: str, path: str) -> bool:
+    """Whether a call writes a comment, which settings may let viewers do."""
+    return method == "POST" and _COMMENTS.match(path) is not None
+
+
+def is_change(method: str, path: str) -> bool:
+    """Whether a call changes something that others see: it is not safe, and needs more than to look."""
+    return method not in ("GET", "HEAD", "OPTIONS", SOCKET) and required_role(method, path) >= EDIT
+
+
+def check_message(caller: Caller, kind: str) -> None:
+    """Raises ForbiddenError where a caller may not send messages of that kind."""
+    if caller.role < MESSAGES[kind] and caller.watches:
+        raise ForbiddenError("this link is for watching; ask who sent it for the one to work together")
+    if caller.role < MESSAGES[kind]:
+        raise ForbiddenError(
+            f"{caller.display_name} may look at this picture but not edit it; ask an admin for a token with the role "
+            f"edit"
+        )

@@ -1,0 +1,28 @@
+"""What steps work with: the library, and the bakes that were used last."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from relume.live.fixed_camera.protocols import OpenBake
+from relume_server.runtime.protocols import Library
+from relume_worker.paths import bake_path
+
+
+@dataclass
+class BatchContext:
+    """Of one process."""
+
+    data: Path
+    library: Library
+    _open_bakes: dict[str, OpenBake] = field(default_factory=dict, init=False)
+
+    def transfer(self, bake: str) -> OpenBake:
+        """A bake, opened to be read; the last two stay open, of which each queue may need one. Raises StoreError."""
+        if bake not in self._open_bakes:
+            for oldest in list(self._open_bakes)[: len(self._open_bakes) - 1]:
+                del self._open_bakes[oldest]
+            self._open_bakes[bake] = self.library.open_transient(bake_path(self.data, bake))
+        self._open_bakes[bake] = transfer = self._open_bakes.pop(bake)
+        return transfer

@@ -1,0 +1,133 @@
+"""What each frame of a batch shows: from where, and under which look; and from where a comparison sees its view."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from relume import look as looks
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.protocols import CameraMode, CameraView, OpenBake
+from relume.look import Look
+from relume.look.interpolate import enclosing_keyframes, interpolate_looks
+from relume.look.rotate import rotated_environment, rotated_lights
+from relume.scene.custom_camera import make_custom_camera
+from relume_server.schemas.bodies import ComparisonRequest
+from relume_server.schemas.cameras import CameraFrame
+from relume_server.schemas.renders import Animation, CameraPath, Keyframes, LooksRequest, Turntable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from relume.live.free_camera.free_view import FreeView
+    from relume.live.free_camera.protocol import FreeCameraTransfer
+    from relume.scene.model import Camera
+
+
+def check_animation(request: Animation, view: str, transfer: OpenBake) -> Sequence[Camera | None]:
+    """Whether a bake can follow a batch, and where each frame is seen from; None where it was baked.
+
+    Raises:
+        ParameterError: what cannot be, and what can.
+    """
+    path, num_frames = request.path, request.num_frames
+    if path is not None and transfer.camera_mode is not CameraMode.FREE and not _has_fixed_camera(path):
+        allowed = "no path, or bake by method surface: this bake is seen from where it was baked alone"
+        raise ParameterError("path", _path_text(path), allowed)
+    if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
+        raise ParameterError("frames", request.frames, f"{path.turntable}, as the turntable says, or nothing")
+    num_cameras = 0 if path is None or isinstance(path, Turntable) else len(path.eyes)
+    if num_cameras > num_frames:
+        raise ParameterError("path/eyes", f"{num_cameras} keyframes", f"at most as many as frames, {num_frames}")
+    return cameras_of(request, view, transfer)
+
+
+def _path_text(path: Turntable | CameraPath) -> str:
+    return f"turntable {path.turntable}" if isinstance(path, Turntable) else f"{len(path.eyes)} cameras"
+
+
+def _has_fixed_camera(path: Turntable | CameraPath) -> bool:
+    return isinstance(path, Turntable) and path.turns == "environment" and path.start is None
+
+
+def cameras_of(request: Animation, name: str, transfer: OpenBake) -> Sequence[Camera | None]:
+    """Where each frame is seen from; None where it was baked. Raises ParameterError for bad cameras."""
+    from relume.live.free_camera.camera_paths import (  # SciPy, which a process that describes its API does without
+        interpolate_cameras,
+        turntable,
+    )
+
+    if transfer.camera_mode is not CameraMode.FREE:
+        return [None] * request.num_frames
+    view = cast("FreeView", transfer.views[name])
+    if request.path is None:
+        return [view.camera] * request.num_frames
+
+    if isinstance(request.path, Turntable):
+        start = _start_camera(request.path, view)
+        if request.path.turns == "environment":
+            return [start] * request.num_frames
+        return turntable(start, _turntable_pivot(request.path, view, transfer), request.num_frames)
+    return interpolate_cameras([_camera_of_frame(view, frame) for frame in request.path.eyes], request.num_frames)
+
+
+def _camera_of_frame(view: CameraView, frame: CameraFrame) -> Camera:
+    return make_custom_camera(view.name, frame.to_world, frame.yfov).camera
+
+
+def comparison_camera(request: ComparisonRequest, transfer: OpenBake) -> tuple[Camera, tuple[int, int]]:
+    """From where a comparison sees its view, and how large its pictures are. Raises ParameterError for bad cameras."""
+    view = transfer.views[request.view]
+    camera = view.camera if request.camera is None else _camera_of_frame(view, request.camera)
+    return camera, request.size or (view.width, view.height)
+
+
+def _start_camera(path: Turntable, view: FreeView) -> Camera:
+    return view.camera if path.start is None else _camera_of_frame(view, path.start)
+
+
+def _turntable_pivot(path: Turntable, view: FreeView, transfer: OpenBake) -> NDArray[np.float64]:
+    from relume.live.free_camera.camera_paths import pivot_of
+
+    if path.about is not None:
+        return np.array(path.about)
+    return pivot_of(cast("FreeCameraTransfer", transfer), _start_camera(path, view))
+
+
+def with_pivot(request: LooksRequest, transfer: OpenBake) -> LooksRequest:
+    """The same where an object turns, about a place that is found once rather than for each frame."""
+    path = request.path
+    if request.view is None or not isinstance(path, Turntable) or path.turns != "object":
+        return request
+    pivot = _turntable_pivot(path, cast("FreeView", transfer.views[request.view]), transfer)
+    return request.model_copy(update={"path": path.model_copy(update={"about": pivot.tolist()})})
+
+
+def look_at_frame(request: Animation, view: str, transfer: OpenBake, index: int) -> Look:
+    """The look of a frame, validated: one of the batch's, or between two of them, under light that `path` may turn."""
+    default = transfer.default_look
+    return looks.validate(look_document_at_frame(request, view, transfer, index), default)
+
+
+def look_document_at_frame(request: Animation, view: str | None, transfer: OpenBake, index: int) -> Mapping[str, Any]:
+    """The complete look of a frame, see `look_of`; `view` may be None where there is no path."""
+    document = _interpolated_document(request, transfer.default_look, index)
+    if not isinstance(request.path, Turntable) or request.path.turns == "eye":
+        return document
+    degrees = 360 * index / request.num_frames
+    if request.path.turns == "environment":
+        return rotated_environment(document, degrees)
+    pivot = _turntable_pivot(request.path, cast("FreeView", transfer.views[cast("str", view)]), transfer)
+    return rotated_lights(document, degrees, pivot.tolist())
+
+
+def _interpolated_document(request: Keyframes, default: Mapping[str, Any], index: int) -> Mapping[str, Any]:
+    """Only those looks that a frame lies between are completed."""
+    if len(request.looks) == request.num_frames:
+        return looks.complete(request.looks[index], default)
+    position = index / max(1, request.num_frames - 1)
+    first, second, weight = enclosing_keyframes(len(request.looks), position)
+    keys = dict.fromkeys((first, second))  # one of them where the frame is a keyframe
+    return interpolate_looks([looks.complete(request.looks[k], default) for k in keys], weight, request.between)

@@ -1,0 +1,123 @@
+"""Frames of batch renders: painted one by one into files, and packed."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from relume.core.filesystem import UNFINISHED, atomic_write
+from relume.image_io.downsample import downsample
+from relume.image_io.write_image import write_image
+from relume.live.fixed_camera.jobs import CancelCheck
+from relume.live.fixed_camera.protocols import EditAxis, OpenBake
+from relume.output.exr.color_space import find_space
+from relume.output.exr.export import Progress, export_exr
+from relume.output.exr.layers import make_layers
+from relume.output.exr.metadata import Provenance, build_attributes
+from relume_server.batch.context import BatchContext
+from relume_server.batch.frame_sequence import cameras_of, look_at_frame
+from relume_server.io.video import write_video
+from relume_server.runtime.protocols import F32
+from relume_server.schemas.renders import RenderRequest
+
+if TYPE_CHECKING:
+    from relume.scene.model import Camera
+
+_LAYERS = ".layers-*"  # folders beside a picture that is being written
+
+
+def paint_frame(
+    context: BatchContext,
+    report: Progress,
+    is_canceled: CancelCheck,
+    *,
+    request: Mapping[str, Any],
+    index: int,
+    path: str,
+    scene_name: str,
+) -> Mapping[str, Any]:
+    """Paint one picture of a batch.
+
+    Args:
+        request: the batch's body. index: of the picture. path: of its file, which appears whole.
+        scene_name: that people read in the file.
+    """
+    render_request, target = RenderRequest.model_validate(request), Path(path)
+    _tidy(target.parent)
+    transfer = context.transfer(render_request.bake)
+    camera = cameras_of(render_request, render_request.view, transfer)[index]
+    view = transfer.views[render_request.view]
+    camera_and_size = None if camera is None else (camera, render_request.size or (view.width, view.height))
+
+    def render(look: Any, progress: Progress) -> F32:
+        image = context.library.render(
+            transfer, render_request.view, look, progress=progress, for_display=render_request.format != "exr",
+            is_canceled=is_canceled, camera_and_size=camera_and_size, exact=render_request.exact,
+        )  # fmt: skip
+        return (
+            image
+            if render_request.size is None or camera_and_size is not None
+            else downsample(image, render_request.size)
+        )
+
+    look = look_at_frame(render_request, render_request.view, transfer, index)
+    if render_request.format == "exr":
+        _export(target, render, look, transfer, render_request, camera or view.camera, scene_name, report)
+    else:
+        write_image(target, render(look, report), look.display.exposure, look.display.tone_map)
+    return {}
+
+
+def _tidy(folder: Path) -> None:
+    """Remove what a killed process left: of a batch one picture is painted at a time."""
+    for stray in folder.glob(_LAYERS):
+        shutil.rmtree(stray, ignore_errors=True)
+    for unfinished in folder.glob(UNFINISHED):
+        unfinished.unlink(missing_ok=True)
+
+
+def _export(
+    path: Path,
+    render: Any,
+    look: Any,
+    transfer: OpenBake,
+    request: RenderRequest,
+    camera: Camera,
+    scene_name: str,
+    progress: Progress,
+) -> None:
+    view = transfer.views[request.view]
+    layers = make_layers(request.layers, look, has_indirect=EditAxis.BOUNCES in transfer.axes)
+    origin = Provenance(transfer.scene_id, scene_name, request.bake)
+    size = request.size or (view.width, view.height)
+    space = find_space(request.color_space)
+    attributes = build_attributes(origin, camera, size, look, layers, space)
+    export_exr(path, render, look, layers, attributes, request.precision, progress, space)
+
+
+def pack(
+    context: BatchContext,
+    report: Progress,
+    is_canceled: CancelCheck,
+    *,
+    frames: Sequence[Sequence[str]],
+    archive: str,
+    video: str | None,
+    fps: int,
+) -> Mapping[str, Any]:
+    """Pack a finished batch.
+
+    Args:
+        frames: path of each picture, and what it is called in the archive. archive: file of all of them.
+        video: file of a video of them, or None. fps: its frames a second.
+    """
+    if video is not None:
+        target = Path(video)
+        write_video(target.parent, fps, target, is_canceled)
+    with atomic_write(Path(archive)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive_zip:
+        for path, name in frames:
+            archive_zip.write(path, name)
+    return {}

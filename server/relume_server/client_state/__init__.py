@@ -1,0 +1,1 @@
+"""State of one client: its look, target, visible views, pending requests, socket."""

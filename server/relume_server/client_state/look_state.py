@@ -1,0 +1,80 @@
+"""The look of a session: where its edits are applied, checked and counted."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from relume import look as looks
+from relume.core.errors import EditError
+from relume.look import Look, MaterialLook
+from relume_server.client_state.pointers import check_active_pointer
+from relume_server.client_state.target import Target
+from relume_server.schemas.protocol import EditMessage
+
+
+class LookState:
+    """The newest accepted look, its revision, and which sources of light alone are shown (None: all)."""
+
+    def __init__(
+        self, default: dict[str, Any], document: dict[str, Any], revision: int, solo: frozenset[str] | None = None
+    ) -> None:
+        self.default, self.document, self.revision, self.solo = default, document, revision, solo
+        self._materials: dict[str, tuple[Any, MaterialLook]] = {}
+
+    def target(self, shared: int = 0) -> Target:
+        """The look as something to show; `shared` as in `Target`."""
+        return Target(self._read(self.document), self.document, self.revision, None, solo=self.solo, shared=shared)
+
+    def apply(self, message: EditMessage, received_s: float) -> Target:
+        """Apply an edit that came at `received_s`, whole or not at all.
+
+        Raises:
+            EditError, ParameterError: the look stays as it was.
+        """
+        if message.revision <= self.revision:
+            raise EditError(f"old revision: {message.revision} is not newer than {self.revision}; count on from there")
+        patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
+        document = looks.apply_patch(self.document, patch, self.default)
+        if message.hand is not None:
+            check_active_pointer(message.hand, document)
+        look = self._read(document)
+        self.document, self.revision = document, message.revision
+        if message.changes_solo:
+            self.solo = None if message.solo is None else frozenset(message.solo)
+        applied_s = time.perf_counter()
+        return Target(look, document, message.revision, received_s, message.hand, self.solo, applied_s=applied_s)
+
+    def adopt(self, document: dict[str, Any], source: Target) -> Target:
+        """Show a document that somebody else's edit led to, as they see it; the revision stays."""
+        self.document = document
+        look = self._read(document)
+        return Target(
+            look,
+            document,
+            self.revision,
+            source.received_s,
+            source.active_pointer,
+            self.solo,
+            source.shared,
+            source.applied_s,
+        )
+
+    def reverted(self, document: dict[str, Any], previous: Target) -> Target:
+        """What would be shown if the look became this document, and what is alone as it was when `previous` was."""
+        return Target(self._read(document), document, self.revision, None, solo=previous.solo, shared=previous.shared)
+
+    def revert(self, previous: Target) -> None:
+        """Go back to the look that is shown; the revision stays, so that the client counts on."""
+        self.document, self.solo = previous.document, previous.solo
+
+    def _read(self, document: dict[str, Any]) -> Look:
+        """A complete document as a look; long curves of materials that did not change are not read again."""
+        previous, self._materials = self._materials, {}
+        for name, section in document["materials"].items():
+            before, material = previous.get(name, (None, None))
+            if material is None or before is not section:
+                material = MaterialLook.model_validate(section)
+            self._materials[name] = section, material
+        materials = {name: material for name, (_, material) in self._materials.items()}
+        return Look.model_validate({**document, "materials": materials})

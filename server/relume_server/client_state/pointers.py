@@ -1,0 +1,67 @@
+"""Pointers into a look: whether there is such a curve, or such a thing to take hold of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from relume.brdf.registry import TERMS
+from relume.brdf.term import Curve
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.edit_pointers import (
+    ColorPointer,
+    CurvePointer,
+    EnvironmentPointer,
+    LightPointer,
+    ParameterPointer,
+    TransportPointer,
+    parse_curve,
+    parse_pointer,
+)
+
+
+def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any], Curve]:
+    """The term that a curve pointer means, and the curve's declaration, whether it is drawn by hand or not.
+
+    Raises:
+        ParameterError: there is no such curve in this look.
+    """
+    curve_pointer = parse_curve(pointer)
+    term = _term(curve_pointer, document)
+    curves = {curve.name: curve for curve in TERMS[term["model"]].normalized(term).curves} if term else {}
+    if term is None or curve_pointer.name not in curves:
+        raise ParameterError("curve", pointer, "a pointer like /materials/Teapot/terms/1/curves/theta_h of this look")
+    return term, curves[curve_pointer.name]
+
+
+def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
+    """Raises ParameterError where this look has no such parameter, light or field of the environment."""
+    match parse_pointer(pointer):
+        case ParameterPointer() as parameter:
+            term = _term(parameter, document)
+            exists = term is not None and parameter.name in {p.name for p in TERMS[term["model"]].parameters}
+        case ColorPointer(material, term_index):
+            exists = term_index < len(document["materials"].get(material, {"terms": ()})["terms"])
+        case LightPointer(name):
+            exists = name in document["lights"]
+        case EnvironmentPointer() | TransportPointer():
+            exists = True
+        case CurvePointer():
+            exists = False
+    if not exists:
+        raise ParameterError("parameter", pointer, "like /materials/Teapot/terms/1/params/ior or /lights/Lamp, here")
+
+
+def check_active_pointer(pointer: str, document: Mapping[str, Any]) -> None:
+    """Raises ParameterError where this look has neither such a curve nor what `check_parameter` looks for."""
+    if isinstance(parse_pointer(pointer), CurvePointer):
+        find_curve(pointer, document)
+    else:
+        check_parameter(pointer, document)
+
+
+def _term(pointer: CurvePointer | ParameterPointer, document: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The term that a pointer goes into, where there is one; of a catcher's terms no picture shows anything."""
+    material = document["materials"].get(pointer.material)
+    terms: list[dict[str, Any]] = material["terms"] if material and not material.get("catcher") else []
+    return terms[pointer.term] if pointer.term < len(terms) else None

@@ -1,0 +1,119 @@
+"""A room: a look that several people share, and who they are. Used from the event loop only."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+from relume.look.difference import Operation
+from relume_server.auth.roles import Caller
+from relume_server.client_state.target import Target
+from relume_server.collaboration.join import JoinRequest
+from relume_server.collaboration.participant import COLORS, Participant
+from relume_server.errors import BusyError
+from relume_server.schemas.rooms import Person
+
+LOCAL_SECTIONS = ("display", "transport")
+"""Sections of a look that each has for themselves: they are ways of looking."""
+
+
+def is_local_setting(path: str) -> bool:
+    """Whether a pointer into a look is one of a way of looking."""
+    return path.split("/")[1:2] in ([name] for name in LOCAL_SECTIONS)
+
+
+def with_local_settings(document: Mapping[str, Any], local_document: Mapping[str, Any]) -> dict[str, Any]:
+    """A room's look with somebody's own ways of looking."""
+    return {**document, **{name: local_document[name] for name in LOCAL_SECTIONS}}
+
+
+class Listener(Protocol):
+    """A session in a room, as the room knows it; see `relume_server.collaboration.member.RoomMember`."""
+
+    changed: asyncio.Event
+    has_comments: bool
+
+    def on_remote_edit(self, target: Target, author: int, changes: Sequence[Operation]) -> None: ...
+
+
+class Room:
+    """One shared look.
+
+    Attributes:
+        document: the complete look, seen as whoever edited last sees it. num_changes: that it has seen.
+        members: sessions that are in it. is_lost: another server has it.
+    """
+
+    def __init__(
+        self, document: dict[str, Any], max_people: int, away_seconds: float, on_empty: Callable[[Room], None]
+    ) -> None:
+        self.document, self.num_changes = document, 0
+        self.members: list[Listener] = []
+        self.is_lost = asyncio.Event()
+        self._participants: dict[str, Participant] = {}
+        self._max_people, self._away_seconds, self._on_empty = max_people, away_seconds, on_empty
+        self._num_joined = 0
+
+    def people(self) -> list[Person]:
+        """Who has a place, in the order of coming."""
+        return [participant.person() for participant in self._participants.values()]
+
+    def join(self, join_request: JoinRequest, caller: Caller) -> Participant:
+        """The place that a session comes back to, or a new one. Raises BusyError where there is none."""
+        participant = self._participants.get(join_request.participant_token or "")
+        if participant is None or participant.owner != caller.name:
+            participant = self._add_participant(join_request, caller)
+        if participant.removal is not None:
+            participant.removal.cancel()
+            participant.removal = None
+        participant.num_sessions += 1
+        participant.role = caller.role
+        self.notify_people()
+        return participant
+
+    def _add_participant(self, join_request: JoinRequest, caller: Caller) -> Participant:
+        if len(self._participants) >= self._max_people:
+            raise BusyError(f"{self._max_people} people are in this room; one of them has to leave first")
+        self._num_joined += 1
+        used_colors = {participant.color for participant in self._participants.values()}
+        color = next((color for color in COLORS if color not in used_colors), COLORS[self._num_joined % len(COLORS)])
+        name = caller.person or join_request.name or f"Guest {self._num_joined}"
+        participant = Participant(secrets.token_urlsafe(24), self._num_joined, color, name, caller.role, caller.name)
+        self._participants[participant.token] = participant
+        return participant
+
+    def leave(self, participant: Participant, *, is_for_good: bool) -> None:
+        """A session of somebody has ended; their place is kept for a while, unless that was the last one for good."""
+        participant.num_sessions -= 1
+        if participant.num_sessions == 0 and is_for_good:
+            self._remove_participant(participant)
+        elif participant.num_sessions == 0:
+            participant.removal = asyncio.get_running_loop().call_later(
+                self._away_seconds, self._remove_participant, participant
+            )
+        self.notify_people()
+
+    def _remove_participant(self, participant: Participant) -> None:
+        del self._participants[participant.token]
+        self.notify_people()
+        if not self._participants:
+            self._on_empty(self)
+
+    def notify_people(self) -> None:
+        """Something about who is here has changed."""
+        for member in self.members:
+            member.changed.set()
+
+    def notify_comments(self) -> None:
+        """Somebody has commented."""
+        for member in self.members:
+            member.has_comments = True
+            member.changed.set()
+
+    def close(self) -> None:
+        """Forget whoever may still come back."""
+        for participant in self._participants.values():
+            if participant.removal is not None:
+                participant.removal.cancel()

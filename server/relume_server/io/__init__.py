@@ -1,0 +1,1 @@
+"""Uploads, imports in sandboxed processes, downloads, thumbnails, video."""

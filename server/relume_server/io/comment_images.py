@@ -1,0 +1,42 @@
+"""Pictures that clients send with comments: read as what they say they are, made small, and written anew."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import io
+import warnings
+
+from PIL import Image
+
+from relume.core.errors import ParameterError
+
+MAX_SIDE = 1024
+STORED_SIDE = 320
+_FORMATS = ("PNG", "JPEG", "WEBP")
+
+
+def small_picture(text: str) -> bytes:
+    """A picture as it is kept: WebP, at most `STORED_SIDE` pixels a side.
+
+    Args:
+        text: PNG, JPEG or WebP in Base64, or as the data URL that a canvas gives.
+    Raises:
+        ParameterError: it is no such picture, or larger than `MAX_SIDE`.
+    """
+    try:
+        data = base64.b64decode(text.partition("base64,")[2] or text, validate=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+                if max(image.size) > MAX_SIDE:  # the header says it; nothing has been decoded yet
+                    raise ParameterError("picture", list(image.size), f"at most {MAX_SIDE} pixels a side")
+                small = image.convert("RGB")
+    except (binascii.Error, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError("picture", "unreadable", "a PNG, JPEG or WebP in Base64") from None
+    small.thumbnail((STORED_SIDE, STORED_SIDE))
+    written = io.BytesIO()
+    small.save(written, "WEBP", quality=82)
+    return written.getvalue()

@@ -1,0 +1,137 @@
+"""Takes in what imports make: read in a process of its own, measured, counted as somebody's, put in its place."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from fastapi.concurrency import run_in_threadpool
+
+from relume.assets.asset_store import AssetStore
+from relume.assets.environments.environment_store import STORE as ENVIRONMENTS
+from relume.assets.measured.measured_store import STORE as MATERIALS
+from relume.brdf.texture_slots import IMAGES
+from relume.core.errors import RelumeError
+from relume_server.auth.quotas import OwnedKind, Quotas
+from relume_server.auth.reservations import MAX_CONCURRENT_IMPORTS, Reservation
+from relume_server.io.fair_slots import Slots
+from relume_server.io.import_processes import Importers, ImportTooLargeError
+from relume_server.io.import_request import SUMMARY, UPLOAD_PREFIX, ImportRequest
+from relume_worker.ledger import Ledger
+from relume_worker.paths import environments_path, images_path, materials_path, scene_path
+from relume_worker.scenes import insert_scene
+
+if TYPE_CHECKING:
+    from relume_server.settings import Settings
+
+T = TypeVar("T")
+_OUTPUT_FOLDER = "made"
+MAX_SUMMARY_BYTES = 64 << 20
+_STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
+    "environment": (ENVIRONMENTS, environments_path, "environment"),
+    "image": (IMAGES, images_path, "image"),
+    "material": (MATERIALS, materials_path, "material"),
+}
+
+
+class Intake:
+    """What routes give files to.
+
+    Attributes:
+        importers: read files.
+    """
+
+    def __init__(self, settings: Settings, ledger: Ledger, quotas: Quotas, importers: Importers) -> None:
+        self._settings, self._ledger, self._quotas, self.importers = settings, ledger, quotas, importers
+        self._slots = Slots(MAX_CONCURRENT_IMPORTS, 1 if settings.login else MAX_CONCURRENT_IMPORTS, settings.turns)
+
+    @asynccontextmanager
+    async def reserving(self, owner: str, num_bytes: int) -> AsyncIterator[Reservation]:
+        """Room for something that is made and not sent. Raises QuotaError, NearlyFullError."""
+        reservation = Reservation(self._quotas, owner)
+        try:
+            await run_in_threadpool(reservation.reserve, num_bytes)
+            yield reservation
+        finally:
+            await run_in_threadpool(reservation.release)
+
+    async def run_in_slot(self, client: str, work: Callable[[], T]) -> T:
+        """Do something in a thread when it is somebody's turn to import."""
+        async with self._slots.acquire(client):
+            return await run_in_threadpool(work)
+
+    async def import_file(self, reservation: Reservation, make_request: Callable[[Path], ImportRequest]) -> str:
+        """Import a file, and return the id under which it is kept; whose it is, is counted.
+
+        Args:
+            reservation: what it may take. make_request: lays files into an empty folder, in a thread, and says what
+                they are.
+        Raises:
+            QuotaError, NearlyFullError: what it unpacks to is too much; nothing of it is kept.
+            And what `Importers.run` raises.
+        """
+        return await self.run_in_slot(reservation.owner, lambda: self._import_file(reservation, make_request))
+
+    def _import_file(self, reservation: Reservation, make_request: Callable[[Path], ImportRequest]) -> str:
+        with tempfile.TemporaryDirectory(dir=self._settings.data, prefix=UPLOAD_PREFIX) as folder:
+            request = make_request(Path(folder))
+            identity = self.read(reservation, request, Path(folder))
+            self._adopt(reservation, request, Path(folder) / _OUTPUT_FOLDER, identity)
+        return identity
+
+    def read(self, reservation: Reservation, request: ImportRequest, folder: Path) -> str:
+        """Have a file of a folder read, within what it may take; what is made of it is there, too."""
+        max_bytes, output_folder = reservation.max_import_bytes(), folder / _OUTPUT_FOLDER
+        output_folder.mkdir()
+        try:
+            return self.importers.run(replace(request, into=str(output_folder), max_file_bytes=max_bytes))
+        except ImportTooLargeError:
+            raise reservation.too_large_error(max_bytes) from None
+
+    def _adopt(self, reservation: Reservation, request: ImportRequest, into: Path, identity: str) -> None:
+        store = _STORES.get(request.kind)
+        target = scene_path(self._settings.data, identity)
+        if store is not None:
+            target = store[1](self._settings.data) / store[0].path(into, identity).name
+        num_bytes = _checked_bytes(into / identity)
+        if not target.exists():  # else it takes nothing more
+            reservation.reserve(num_bytes)
+        if store is None:
+            self._register_scene(into, identity, target)
+        else:
+            store[0].adopt(target.parent, into / identity)
+        reservation.convert(store[2] if store else "scene", identity, num_bytes)
+
+    def _register_scene(self, into: Path, identity: str, target: Path) -> None:
+        """Put a scene in its place; one that is here and damaged is whole again."""
+        with (into / SUMMARY).open("rb") as file:
+            summary = json.loads(file.read(MAX_SUMMARY_BYTES))
+        is_new = not target.exists()
+        target.mkdir(parents=True, exist_ok=True)
+        for name in ("arrays.npz", "scene.json"):
+            os.replace(into / identity / name, target / name)
+        try:
+            insert_scene(self._settings.data, self._ledger, identity, summary)
+        except Exception:
+            if is_new:  # nobody would find it
+                shutil.rmtree(target, ignore_errors=True)
+            raise
+
+
+def _checked_bytes(folder: Path) -> int:
+    """What the files in a folder take that another process has written. Raises RelumeError where one is no file."""
+    num_bytes = 0
+    for path in folder.rglob("*"):
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
+            raise RelumeError("the import wrote what is no file; report the file that was sent")
+        num_bytes += status.st_size
+    return num_bytes

@@ -1,0 +1,218 @@
+"""Reads an uploaded file, writes what it is into a folder, and says its id or why it failed.
+
+That is done in a process of its own, with limits, which has neither the database nor other files: a hostile file can
+end that process, not the server. `relume_server.io.importer_zygote` makes it, `relume_server.io.import_processes` asks
+for it, and `relume_server.io.import_queue` takes over what it has made.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from relume.core.errors import DiskFullError, MaterialError, RelumeError, is_disk_full
+from relume.core.filesystem import UNFINISHED
+
+if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
+    from relume.scene.model import Scene
+    from relume_server.settings import Settings
+
+_OUT_OF_MEMORY_MESSAGES = (os.strerror(errno.ENOMEM), "can't start new thread")
+UPLOAD_PREFIX = "upload-"
+SUMMARY = "summary.json"
+"""What lists show of a scene, beside its folder."""
+ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "tile"]
+
+
+@dataclass(frozen=True)
+class ImportRequest:
+    """What to import.
+
+    Attributes:
+        into: an empty folder, which what is made is written to, and nothing else.
+        kind, file: what it is, and its path; empty for a built-in scene; of a scene to be "grounded" the folder that it
+            is kept in. A "tile", which a BTF is made of, is looked at alone, and has no id.
+        environment: path of a scene's environment map, or None.
+        name: what people will call it; of a built-in scene, which one it is.
+        scene: the name that a scene's or a material's file had, folders included.
+        companions: paths of the files that came with a scene, by theirs.
+        ground: whether a scene is put on one. period: side of what repeats, metres, where it is known.
+        seconds: of processor and wall. max_bytes: of address space. max_file_bytes: of each file that is written.
+    """
+
+    into: str
+    kind: ImportKind
+    file: str
+    environment: str | None
+    name: str
+    seconds: int
+    max_bytes: int
+    max_file_bytes: int
+    ground: bool = False
+    period: float | None = None
+    scene: str = ""
+    companions: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def create(
+        cls,
+        settings: Settings,
+        kind: ImportKind,
+        file: Path | None,
+        name: str,
+        environment: Path | None = None,
+        scene: str = "",
+        companions: Mapping[str, Path] | None = None,
+    ) -> ImportRequest:
+        """A request within a server's limits; where to, and how large, is known when it has its turn."""
+        return cls(
+            into="",
+            kind=kind,
+            file="" if file is None else str(file),
+            environment=None if environment is None else str(environment),
+            name=name,
+            seconds=settings.import_seconds,
+            max_bytes=settings.import_bytes,
+            max_file_bytes=0,
+            scene=scene,
+            companions={named: str(path) for named, path in (companions or {}).items()},
+        )
+
+    @property
+    def input_files(self) -> list[Path]:
+        """The files that it is about."""
+        paths = [self.file, self.environment or "", *self.companions.values()]
+        return [Path(path) for path in paths if path]
+
+
+def remove_strays(data: Path, older_than_s: float) -> None:
+    """Delete uploads, and what was being deleted, that a killed server left; younger ones may be another server's."""
+    for folder in [*data.glob(f"{UPLOAD_PREFIX}*"), *data.glob(f"*/{UNFINISHED}/")]:
+        with suppress(OSError):
+            if time.time() - folder.stat().st_mtime > older_than_s:
+                shutil.rmtree(folder)
+
+
+def run_import(request: ImportRequest) -> dict[str, str]:
+    """What the process says: {"id": id}, or what failed.
+
+    That is {"problem": sentence} of the file, {"material": sentence} of that of a material, {"full": sentence} of the
+    disk, {"large": sentence} where a file that it writes became larger than it may be, and {"failure": sentence} of all
+    else that is known. What nobody foresaw passes.
+    """
+    try:
+        return {"id": _import(request)}
+    except DiskFullError as error:
+        return {"full": str(error)}
+    except MaterialError as error:
+        return {"material": str(error)}
+    except RelumeError as error:
+        if _is_too_large(error.__cause__):
+            return {"large": str(error)}
+        return {"problem" if type(error) is not RelumeError else "failure": str(error)}
+    except Exception as error:
+        if isinstance(error, OSError) and is_disk_full(error):
+            return {"full": str(error)}
+        if _is_too_large(error):
+            return {"large": str(error)}
+        if not _is_out_of_memory(error):
+            raise
+        return {"problem": f"the import needs more than {request.max_bytes / 1e9:.1f} GB; simplify the file"}
+
+
+def _is_too_large(error: BaseException | None) -> bool:
+    """Whether the limit of the files that it writes was met; NumPy says of a short write only how much was missing."""
+    is_short = isinstance(error, OSError) and error.errno is None and "requested and" in str(error)
+    return is_short or (isinstance(error, OSError) and error.errno == errno.EFBIG)
+
+
+def _is_out_of_memory(error: Exception) -> bool:
+    """Whether the limit of address space was met: the system's calls say so in their own words."""
+    return isinstance(error, MemoryError) or any(message in str(error) for message in _OUT_OF_MEMORY_MESSAGES)
+
+
+def _import(request: ImportRequest) -> str:
+    if request.kind == "grounded":
+        return _put_on_ground(request)
+    if request.kind == "image":
+        return _import_image(request)
+    if request.kind == "material":
+        return _import_material(request)
+    if request.kind == "tile":
+        return _look_at_tile(request)
+    return _import_environment(request) if request.kind == "environment" else _import_scene(request)
+
+
+def _import_environment(request: ImportRequest) -> str:
+    from relume.assets.environments.environment_store import store_environment
+
+    return store_environment(Path(request.into), Path(request.file), request.name).id
+
+
+def _import_image(request: ImportRequest) -> str:
+    from relume.images.image_store import store
+
+    return store(Path(request.into), Path(request.file), request.name).id
+
+
+def _import_material(request: ImportRequest) -> str:
+    from relume.assets.measured.measured_store import store_material
+
+    return store_material(Path(request.into), Path(request.file), request.name, request.scene or None).id
+
+
+def _look_at_tile(request: ImportRequest) -> str:
+    from relume.synthetic_btf.from_mesh import read_tile
+
+    read_tile(Path(request.file), request.period)
+    return ""
+
+
+def _import_scene(request: ImportRequest) -> str:
+    scene = _built_in(request.name) if request.kind == "built_in" else _read_scene(request)
+    if request.ground:
+        from relume.scene.shadow_catcher_ground import with_ground
+
+        scene = with_ground(scene)
+    return _write_scene(request, scene)
+
+
+def _built_in(name: str) -> Scene:
+    from relume.scene.examples.catalog import built_in
+
+    return built_in(name)
+
+
+def _put_on_ground(request: ImportRequest) -> str:
+    from relume.scene.scene_folder import load_scene
+    from relume.scene.shadow_catcher_ground import with_ground
+
+    return _write_scene(request, with_ground(load_scene(request.file), request.name))
+
+
+def _write_scene(request: ImportRequest, scene: Scene) -> str:
+    from relume.scene.scene_folder import save_scene
+    from relume_worker.scenes import summarize_scene
+
+    save_scene(scene, Path(request.into) / scene.id)
+    (Path(request.into) / SUMMARY).write_text(json.dumps(summarize_scene(scene)))
+    return scene.id
+
+
+def _read_scene(request: ImportRequest) -> Scene:
+    from relume.assets.environments.read_environment import read_environment
+    from relume.scene_io.import_scene import import_scene, read_file
+    from relume.scene_io.referenced_files import UploadedFiles
+
+    environment = None if request.environment is None else read_environment(request.environment, "Environment")
+    uploaded_files = UploadedFiles({name: Path(path) for name, path in request.companions.items()}, request.scene)
+    # bytes: what lies beside the file on this disk is not its own
+    return import_scene(read_file(request.file), request.name, environment, uploaded_files)

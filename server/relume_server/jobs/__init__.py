@@ -1,0 +1,1 @@
+"""Jobs that take minutes and outlive the server: renders, comparisons, BTF compression."""

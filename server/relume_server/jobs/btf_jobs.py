@@ -1,0 +1,86 @@
+"""BTFs that are made or imported: rendered from a small geometry, or compressed from images that were sent."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from sqlalchemy.orm import Session, sessionmaker
+
+from relume.core.folder_size import folder_bytes
+from relume_server.batch.btf_steps import RESULT_FILE, UPLOAD_FILE
+from relume_server.batch.step import RunStep
+from relume_server.batch.step_timer import StepTimer
+from relume_server.jobs.job import Job, Quota
+from relume_server.jobs.queue import JobQueue
+from relume_server.persistence.tables import BtfRow
+from relume_server.schemas.btfs import BtfRequest
+from relume_worker.paths import btfs_path
+
+BtfJob = Job[BtfRequest]
+
+
+class BtfQueue(JobQueue[BtfRequest]):
+    """BTFs in the database, what is found so far in `data`/btf-works/<id>/; all of one is a step, done in turns."""
+
+    row, noun, request_type = BtfRow, "BTF", BtfRequest
+    resumable = ("stopped",)
+
+    def __init__(
+        self,
+        sessions: sessionmaker[Session],
+        data: Path,
+        run: RunStep,
+        quota: Quota,
+        report_ready: Callable[[str, str, int], None],
+        report_failed: Callable[[str], None],
+    ) -> None:
+        """
+        Args:
+            sessions: of the database. data: directory of what is made.
+            run: does the steps. quota: how much may wait.
+            report_ready: called with the id of a work that is done, that of the BTF, and how many bytes it takes.
+            report_failed: called with the id of a work that has failed; nothing of it takes bytes any more.
+        """
+        super().__init__(sessions, data / "btf-works", run, quota)
+        self._btfs, self._report_ready, self._report_failed = btfs_path(data), report_ready, report_failed
+
+    def steps(self, request: BtfRequest) -> int:
+        """One, which keeps what it has found when it is stopped."""
+        return 1
+
+    def step_s(self, request: BtfRequest) -> float | None:
+        """Two of them have little in common."""
+        return None
+
+    def is_first(self, request: BtfRequest) -> bool:
+        """Images are compressed in a tenth of the time that rendering them takes."""
+        return request.geometry is None
+
+    def material(self, identity: str) -> str | None:
+        """Id of the BTF that a work has made; None where it is not ready."""
+        path = self.folder / identity / RESULT_FILE
+        return str(json.loads(path.read_text())["material"]) if path.exists() else None
+
+    def step(self, job: BtfJob, timer: StepTimer) -> int:
+        """Make it, or go on with it for a while."""
+        folder = self.folder / job.id
+        self.record_progress(job.id, 0)
+        values = {"request": job.request.model_dump(mode="json"), "folder": str(folder)}
+        if not self.run_in_process(job, "BTF", values, timer.report)["is_done"]:
+            return 0
+        self.record_progress(job.id, 0)  # the lease may be lost since
+        if (material := self.material(job.id)) is not None:
+            self._report_ready(job.id, material, folder_bytes(self._btfs / material))
+        return 1
+
+    def on_ready(self, job: BtfJob) -> None:
+        """Let go what was sent: the material is there."""
+        (self.folder / job.id / UPLOAD_FILE).unlink(missing_ok=True)
+
+    def on_failed(self, job: BtfJob) -> None:
+        """Let go what was sent: nobody can go on with it."""
+        shutil.rmtree(self.folder / job.id, ignore_errors=True)
+        self._report_failed(job.id)

@@ -1,0 +1,137 @@
+"""Batch renders: one frame after another; what is on disk is not painted again after a restart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from sqlalchemy.orm import Session, sessionmaker
+
+from relume.core.folder_size import folder_bytes
+from relume_server.batch.step import RunStep
+from relume_server.batch.step_timer import StepTimer
+from relume_server.io.downloads import safe_stem
+from relume_server.jobs.job import Job, Quota
+from relume_server.jobs.queue import JobQueue
+from relume_server.persistence.tables import RenderRow
+from relume_server.schemas.renders import RenderRequest
+
+RenderJob = Job[RenderRequest]
+HEAD_BYTES = 1 << 16
+"""More than a picture's file has besides its pixels."""
+
+
+class RenderQueue(JobQueue[RenderRequest]):
+    """Batches in the database, pictures in `data`/renders/<id>/; a step is a picture."""
+
+    row, noun, request_type = RenderRow, "render", RenderRequest
+
+    def __init__(
+        self,
+        sessions: sessionmaker[Session],
+        data: Path,
+        run: RunStep,
+        quota: Quota,
+        scene_name: Callable[[str], str],
+        report_bytes: Callable[[str, int], object],
+    ) -> None:
+        """
+        Args:
+            sessions: of the database. data: directory of bakes and pictures.
+            run: does the steps. quota: how much may wait. scene_name: of a bake's id.
+            report_bytes: told the id of a finished render, and what its files take, bytes.
+        """
+        super().__init__(sessions, data / "renders", run, quota)
+        self._scene_name, self._report_bytes = scene_name, report_bytes
+
+    def steps(self, request: RenderRequest) -> int:
+        """One for each frame."""
+        return request.num_frames
+
+    def step_s(self, request: RenderRequest) -> float | None:
+        """Pictures of two batches have little in common."""
+        return None
+
+    def frame_path(self, job: RenderJob, index: int) -> Path:
+        """File of one picture, there or not."""
+        return self.folder / job.id / f"{index:04d}.{job.request.picture_format}"
+
+    def download_name(self, job: RenderJob, index: int) -> str:
+        """What the file of one picture is called where it is saved."""
+        number = f"-{index:04d}" if job.total > 1 else ""
+        return f"{_stem(job)}{number}.{job.request.picture_format}"
+
+    def archive_name(self, job: RenderJob) -> str:
+        """What the file of all pictures is called where it is saved."""
+        return f"{_stem(job)}.zip"
+
+    def video_name(self, job: RenderJob) -> str:
+        """What the video is called where it is saved."""
+        return f"{_stem(job)}.mp4"
+
+    def video_path(self, job: RenderJob) -> Path:
+        """The finished batch as a video, where one was asked for."""
+        return self.folder / job.id / "video.mp4"
+
+    def archive_path(self, job: RenderJob) -> Path:
+        """The finished batch in one file."""
+        return self.folder / job.id / "archive.zip"
+
+    def is_first(self, request: RenderRequest) -> bool:
+        """A single picture does not wait behind animations."""
+        return request.num_frames == 1
+
+    def missing(self, job: RenderJob) -> list[int]:
+        """Which pictures are not painted yet."""
+        return [index for index in range(job.total) if not self.frame_path(job, index).exists()]
+
+    def retry(self, job: RenderJob, index: int) -> None:
+        """Paint one picture again, and pack all anew.
+
+        Raises:
+            NotReadyError: the batch waits or runs. BusyError, QuotaError: as `submit`.
+        """
+
+        def remove_files() -> None:
+            for path in (self.frame_path(job, index), self.archive_path(job), self.video_path(job)):
+                path.unlink(missing_ok=True)
+
+        self.requeue(job, ("ready", "failed"), remove_files)
+
+    def step(self, job: RenderJob, timer: StepTimer) -> int:
+        """Paint the first picture that is missing, or pack them."""
+        missing = self.missing(job)
+        done = job.total - len(missing)
+        self.record_progress(job.id, min(done, job.total - 1))
+        if missing:
+            index = missing[0]
+            values = {"request": job.request.model_dump(mode="json"), "index": index}
+            values |= {"path": str(self.frame_path(job, index)), "scene_name": self._scene_name(job.request.bake)}
+            self.run_in_process(job, "frame of a batch", values, timer.report)
+            timer.next_step()
+            return done + 1 if len(missing) > 1 else self._pack(job)
+        return self._pack(job)
+
+    def _pack(self, job: RenderJob) -> int:
+        frames = [(str(self.frame_path(job, k)), self.download_name(job, k)) for k in range(job.total)]
+        video = str(self.video_path(job)) if job.request.format == "mp4" else None
+        values = {"frames": frames, "archive": str(self.archive_path(job)), "video": video, "fps": job.request.fps}
+        self.run_in_process(job, "pack of a batch", values, lambda share: None)
+        self.record_progress(job.id, job.total - 1)  # the lease may be lost since
+        self._report_bytes(job.id, folder_bytes(self.folder / job.id))
+        return job.total
+
+
+def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int) -> int:
+    """What the files of a render take at most: its pictures uncompressed, and all of them again, packed.
+
+    Args:
+        request: what is asked for. size: of a picture, pixels. num_layers: of a picture, itself among them.
+    """
+    channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
+    picture_bytes = size[0] * size[1] * 3 * channel_bytes * num_layers
+    return 2 * request.num_frames * (picture_bytes + HEAD_BYTES)
+
+
+def _stem(job: RenderJob) -> str:
+    return safe_stem(job.request.name or job.request.view)

@@ -1,0 +1,1 @@
+"""Graceful shutdown: announce, drain sessions, stop jobs, exit within a bound."""

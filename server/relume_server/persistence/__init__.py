@@ -1,0 +1,1 @@
+"""Tables and stores of the database: looks, shares, comments, jobs, room leases."""

@@ -1,0 +1,208 @@
+"""Saved looks: named JSON documents in the database, changed only by who knows the version they change."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn, cast
+
+from sqlalchemy import CursorResult, delete, func, select, update
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session, sessionmaker
+
+from relume.core.errors import NotFoundError, ParameterError
+from relume.look import Look
+from relume_server.errors import BusyError, PreconditionFailedError, PreconditionRequiredError, TooLargeError
+from relume_server.persistence.tables import LookRow
+
+MAX_LOOK_BYTES = 256 * 1024
+MAX_LOOKS = 10_000
+SECTIONS = tuple(Look.model_fields)
+
+
+@dataclass(frozen=True)
+class SavedLook:
+    """A look as it was saved; times in seconds since 1970.
+
+    Attributes:
+        document: JSON, its members in the order in which they came.
+        etag: quoted, as in the header.
+        has_thumbnail: whether there is a picture of this version.
+    """
+
+    name: str
+    document: str
+    etag: str
+    modified: float
+    created: float
+    has_thumbnail: bool = False
+
+    @property
+    def num_bytes(self) -> int:
+        """Of the document, which is ASCII."""
+        return len(self.document)
+
+
+@dataclass(frozen=True)
+class ListedLook:
+    """What a list says of a look; `num_bytes` of its document."""
+
+    name: str
+    etag: str
+    modified: float
+    created: float
+    has_thumbnail: bool
+    num_bytes: int
+
+
+def check_name(name: str) -> str:
+    """The name as it is stored. Raises ParameterError unless it is 1 to 80 printable characters."""
+    name = unicodedata.normalize("NFC", name)
+    is_plain = name.isprintable() and name == name.strip() and not set("/\\") & set(name) and name not in (".", "..")
+    if not is_plain or not 1 <= len(name) <= 80:
+        raise ParameterError("name", name, "1 to 80 printable characters without slashes")
+    return name
+
+
+def parse_document(body: bytes) -> str:
+    """A look document as compact JSON, in its own order: lights are listed in it.
+
+    Raises TooLargeError, ParameterError.
+    """
+    if len(body) > MAX_LOOK_BYTES:
+        raise TooLargeError(f"a look has at most {MAX_LOOK_BYTES:,} bytes; simplify its curves")
+    try:
+        document: Any = json.loads(body, parse_constant=_refuse_constant)
+        text = json.dumps(document, separators=(",", ":"), allow_nan=False)
+    except (ValueError, RecursionError):
+        raise ParameterError("look", "not JSON", "a look document as JSON, every number finite") from None
+    if not isinstance(document, dict):
+        raise ParameterError("look", document, "an object with some of " + ", ".join(SECTIONS))
+    for section, value in document.items():
+        if section not in SECTIONS:
+            raise ParameterError(f"/{section[:80]}", value, "nothing of that name: a look has " + ", ".join(SECTIONS))
+        if not isinstance(value, dict):
+            raise ParameterError(f"/{section}", value, "an object")
+    return text
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(name)
+
+
+class LookStore:
+    """Saved looks by name."""
+
+    def __init__(self, sessions: sessionmaker[Session]) -> None:
+        self._sessions = sessions
+
+    def list(self) -> Sequence[ListedLook]:
+        """All of them, newest first, without their documents: these may take gigabytes."""
+        has_thumbnail = func.coalesce(LookRow.thumbnail_of == LookRow.etag, False)
+        created = func.coalesce(LookRow.created, LookRow.modified)
+        num_bytes = func.length(LookRow.document)
+        columns = LookRow.name, LookRow.etag, LookRow.modified, created, has_thumbnail, num_bytes
+        with self._sessions() as session:
+            rows = session.execute(select(*columns).order_by(LookRow.modified.desc(), LookRow.name))
+            return [ListedLook(*row) for row in rows]
+
+    def get(self, name: str) -> SavedLook:
+        """One look. Raises NotFoundError."""
+        with self._sessions() as session:
+            row = session.get(LookRow, name)
+        if row is None:
+            raise NotFoundError(f"there is no look {name!r}; save it first")
+        return _saved(row)
+
+    def referencing(self, text: str) -> tuple[str, ...]:
+        """Names of looks whose documents hold a text, sorted; of wildcards none are known."""
+        with self._sessions() as session:
+            query = select(LookRow.name).where(LookRow.document.contains(text, autoescape=True))
+            return tuple(sorted(session.scalars(query)))
+
+    def put(
+        self,
+        name: str,
+        document: str,
+        if_match: str | None,
+        if_none_match: str | None,
+        created: float | None = None,
+    ) -> tuple[SavedLook, bool]:
+        """Save a look; whether it is new.
+
+        Args:
+            name, document: checked. if_match, if_none_match: as the headers say.
+            created: its place among the others where it is new, as of one that had another name; None: now.
+        Raises:
+            ParameterError: that is no time that has been.
+            PreconditionRequiredError: it exists and the caller does not say which version it replaces.
+            PreconditionFailedError: it is not at that version.
+        """
+        etag = '"' + hashlib.sha256(document.encode()).hexdigest()[:32] + '"'
+        now = time.time()
+        if created is not None and not 0.0 <= created <= now:
+            raise ParameterError("created", created, "a time since 1970 that is not in the future")
+        saved = SavedLook(name, document, etag, now, now if created is None else created)
+        if if_match is None:
+            if self._insert(saved):
+                return saved, True
+            if if_none_match is not None:
+                raise PreconditionFailedError(f"there is a look {name!r} already; take another name")
+            raise PreconditionRequiredError(f"look {name!r} exists; send If-Match with the version that you replace")
+        values = {"document": document, "etag": etag, "modified": saved.modified}
+        self._change(name, if_match, update(LookRow).values(**values))
+        return saved, False
+
+    def thumbnail(self, name: str) -> bytes:
+        """The picture of a look as it is, WebP. Raises NotFoundError."""
+        with self._sessions() as session:
+            row = session.get(LookRow, name)
+            if row is None or row.thumbnail is None or row.thumbnail_of != row.etag:
+                raise NotFoundError(f"there is no thumbnail of look {name!r}")
+            return row.thumbnail
+
+    def put_thumbnail(self, name: str, picture: bytes, if_match: str | None) -> None:
+        """Store a picture of a version of a look, WebP. Raises as `put` does where it is at another."""
+        if if_match is None:
+            raise PreconditionRequiredError("send If-Match with the version of the look that the thumbnail shows")
+        self._change(name, if_match, update(LookRow).values(thumbnail=picture, thumbnail_of=LookRow.etag))
+
+    def delete(self, name: str, if_match: str | None) -> None:
+        """Delete a look. Raises as `put` does."""
+        if if_match is None:
+            self.get(name)
+            raise PreconditionRequiredError("send If-Match with the version of the look that you delete")
+        self._change(name, if_match, delete(LookRow))
+
+    def _insert(self, saved: SavedLook) -> bool:
+        try:
+            with self._sessions.begin() as session:
+                if (session.scalar(select(func.count()).select_from(LookRow)) or 0) >= MAX_LOOKS:
+                    raise BusyError(f"{MAX_LOOKS:,} looks are saved; delete some first")
+                row = LookRow(name=saved.name, document=saved.document, etag=saved.etag)
+                row.modified, row.created = saved.modified, saved.created
+                session.add(row)
+        except IntegrityError:
+            return False
+        return True
+
+    def _change(self, name: str, if_match: str, statement: Any) -> None:
+        """Update or delete the row if it is still at one of those versions, in one statement."""
+        statement = statement.where(LookRow.name == name)
+        etags = [etag.strip() for etag in if_match.split(",")]
+        if etags != ["*"]:
+            statement = statement.where(LookRow.etag.in_(etags))
+        with self._sessions.begin() as session:
+            result = cast("CursorResult[Any]", session.execute(statement))
+            num_changed = result.rowcount
+        if num_changed == 0:
+            raise PreconditionFailedError(f"look {name!r} was changed or deleted in the meantime; read it again")
+
+
+def _saved(row: LookRow) -> SavedLook:
+    created = row.modified if row.created is None else row.created
+    return SavedLook(row.name, row.document, row.etag, row.modified, created, row.thumbnail_of == row.etag)

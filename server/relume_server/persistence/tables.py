@@ -1,0 +1,140 @@
+"""Tables that belong to the server, in the same database as the ledger's."""
+
+from __future__ import annotations
+
+from sqlalchemy import LargeBinary, Text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from relume_worker.database.models import Base
+
+
+class LookRow(Base):
+    """A saved look.
+
+    Attributes:
+        created, modified: seconds since 1970; the first is None in rows of a relume that did not write it down.
+        thumbnail: WebP. thumbnail_of: the version that it shows; None where there is none.
+    """
+
+    __tablename__ = "looks"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+    etag: Mapped[str]
+    modified: Mapped[float]
+    created: Mapped[float | None]
+    thumbnail: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    thumbnail_of: Mapped[str | None]
+
+
+class ShareRow(Base):
+    """What a link carries; never changed. `document` is JSON of so many bytes, `created` in seconds since 1970."""
+
+    __tablename__ = "shares"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+    bytes: Mapped[int]
+    created: Mapped[float]
+
+
+class JobRow(Base):
+    """A long work of the server, see `relume_server.jobs.queue`. `request` is the body as JSON.
+
+    `client` asked for it and `is_first` says that it goes before others; rows of an older relume have neither. Whoever
+    does a step of it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the database's clock).
+    `started` and `ended` are seconds since 1970; None: not yet, or in a row of an older relume.
+    """
+
+    __abstract__ = True
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    request: Mapped[str] = mapped_column(Text)
+    state: Mapped[str] = mapped_column(index=True)
+    done: Mapped[int]
+    problem: Mapped[str | None] = mapped_column(Text)
+    created: Mapped[float]
+    client: Mapped[str | None]
+    is_first: Mapped[bool | None]
+    owner: Mapped[str | None] = mapped_column(default=None)
+    heartbeat: Mapped[float | None] = mapped_column(default=None)
+    started: Mapped[float | None] = mapped_column(default=None)
+    ended: Mapped[float | None] = mapped_column(default=None)
+
+
+class RenderRow(JobRow):
+    """A batch of renders; `done` frames are finished."""
+
+    __tablename__ = "renders"
+
+
+class BtfRow(JobRow):
+    """A BTF that is made or imported, in one step."""
+
+    __tablename__ = "btfs"
+
+
+class ComparisonRow(JobRow):
+    """A comparison with brute force; `done` passes are finished."""
+
+    __tablename__ = "truths"
+
+
+class RoomRow(Base):
+    """Which server has the rooms of a name, see `relume_server.persistence.leases`; gone when nobody is in them.
+
+    Attributes:
+        prefix: what their names begin with. owner, heartbeat: as of a work's lease.
+    """
+
+    __tablename__ = "rooms"
+
+    prefix: Mapped[str] = mapped_column("watch", primary_key=True)  # it held the whole name once
+    owner: Mapped[str]
+    heartbeat: Mapped[float]
+
+
+class CommentRow(Base):
+    """Words pinned to a pixel, see `relume_server.persistence.comment_store`.
+
+    Attributes:
+        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: of all that.
+        created, resolved: seconds since 1970; None: open.
+    """
+
+    __tablename__ = "comments"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    scene: Mapped[str] = mapped_column(index=True)
+    pin: Mapped[str] = mapped_column(Text)
+    text: Mapped[str] = mapped_column(Text)
+    author: Mapped[str]
+    created: Mapped[float]
+    resolved: Mapped[float | None]
+    resolved_by: Mapped[str | None]
+    picture: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    has_picture: Mapped[bool]
+    num_bytes: Mapped[int]
+
+
+class IdempotencyRow(Base):
+    """A call that made something, and its answer, see `relume_server.persistence.idempotency`.
+
+    Attributes:
+        client, key: whose call it is, and how they call it. digest: of all that was sent.
+        owner: the process that answers it; see `relume_worker.lease`. created: seconds since 1970 by the database's
+            clock.
+        status: of the answer; None: there is none yet. location, media_type, body: of the answer.
+    """
+
+    __tablename__ = "idempotency"
+
+    client: Mapped[str] = mapped_column(primary_key=True)
+    key: Mapped[str] = mapped_column(primary_key=True)
+    digest: Mapped[str]
+    owner: Mapped[str]
+    created: Mapped[float] = mapped_column(index=True)
+    status: Mapped[int | None]
+    location: Mapped[str | None] = mapped_column(Text)
+    media_type: Mapped[str | None]
+    body: Mapped[bytes | None] = mapped_column(LargeBinary)

@@ -1,0 +1,1 @@
+"""Open bakes, executors, disk space and the cache as the server uses them."""

@@ -1,0 +1,73 @@
+"""Where heavy work runs: quick steps of pictures in one pool, long ones (opening, freezing) in another."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import asynccontextmanager
+from typing import Any, ParamSpec, TypeVar
+
+from relume.core.thread_pools import mark_background_thread, run_frame
+
+P = ParamSpec("P")
+T = TypeVar("T")
+NUM_QUERIES = 2
+NUM_LONG = 8  # more than cores: a view that is opened must not wait until others have frozen theirs
+
+
+class Threads:
+    """The pools of an app.
+
+    Attributes:
+        queries: for short questions to the database that must not wait for anything else: whose a room is, what is new.
+        short_slots: of sessions at the pool for quick steps, in the order in which they asked.
+    """
+
+    def __init__(self) -> None:
+        num_short = max(2, os.cpu_count() or 1)
+        self.short = ThreadPoolExecutor(num_short, "relume-frame")
+        self.short_slots = asyncio.Semaphore(num_short)
+        self.long = ThreadPoolExecutor(NUM_LONG, "relume-long", mark_background_thread)
+        self.queries = ThreadPoolExecutor(NUM_QUERIES, "relume-news")
+
+    def close(self) -> None:
+        """Take no more work; what runs is finished."""
+        self.short.shutdown(wait=True, cancel_futures=True)
+        self.long.shutdown(wait=True, cancel_futures=True)
+        self.queries.shutdown(wait=True, cancel_futures=True)
+
+
+class SerialExecutor:
+    """Runs work for one picture, and at the end waits for what still runs: a thread cannot be interrupted."""
+
+    def __init__(self, threads: Threads) -> None:
+        self._threads = threads
+        self._running: Future[Any] | None = None
+
+    @asynccontextmanager
+    async def acquire_slot(self) -> AsyncIterator[None]:
+        """Wait for a thread for short steps. What is asked of it is best said inside: until then it grows old."""
+        async with self._threads.short_slots:
+            yield
+
+    async def run_in_slot(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Run a short step inside `turn`."""
+        self._running = future = self._threads.short.submit(lambda: run_frame(work, *args, **kwargs))
+        return await asyncio.wrap_future(future)
+
+    async def run_short(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Wait for a turn, and run a short step."""
+        async with self.acquire_slot():
+            return await self.run_in_slot(work, *args, **kwargs)
+
+    def submit_long(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> asyncio.Future[T]:
+        """Start something that takes its time."""
+        self._running = future = self._threads.long.submit(work, *args, **kwargs)
+        return asyncio.wrap_future(future)
+
+    async def join(self) -> None:
+        """Wait until nothing runs."""
+        while self._running is not None and not self._running.done():
+            await asyncio.sleep(0.01)

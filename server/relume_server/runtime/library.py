@@ -1,0 +1,85 @@
+"""The real library behind sessions: opened transfers, live pictures over one shared cache, exact renders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from relume_server.runtime.protocols import Library
+from relume_worker.paths import scene_path_of_bake
+from relume_worker.storage import fetch_if_missing, open_cached
+
+if TYPE_CHECKING:
+    from relume.scene.model import Camera
+
+
+def open_library(cache_bytes: int, floor_bytes: int) -> Library:
+    """relume's own, with one memory for all sessions, renders and comparisons together.
+
+    Args:
+        cache_bytes: that it holds at most. floor_bytes: of them, of bakes that nobody uses.
+    """
+    # Imported here because they load compiled kernels, which a process that only describes the API can do without.
+    from relume.core.cache import Cache, use_for_assets
+    from relume.core.source_hash import image_code
+    from relume.live.fixed_camera.picture import Picture
+    from relume.live.fixed_camera.protocols import CameraMode
+    from relume.live.free_camera.browser.geometry_arrays import array_factories, constants
+    from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+    from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
+    from relume.methods.registry import open_bake
+    from relume.methods.static_view import StaticViewBuilder
+    from relume.output.render_image import render_image, render_small
+    from relume.output.viewport import Viewport
+    from relume.reference import render_reference
+    from relume.scene.custom_camera import with_cameras
+    from relume.scene.scene_folder import load_scene
+
+    def reference(scene: Path, camera: Camera, *args: Any, **paths: Any) -> Any:
+        return render_reference(
+            with_cameras(load_scene(fetch_if_missing(scene)), [camera]), camera.name, *args, **paths
+        )
+
+    def open_viewport(scene: Path) -> Viewport:
+        return memory.transient.get_value(
+            (str(scene), "finder"), lambda: Viewport.from_scene(load_scene(fetch_if_missing(scene)))
+        )
+
+    def static_view_builder(transfer: Any) -> StaticViewBuilder:
+        scene = scene_path_of_bake(Path(transfer.key), transfer.scene_id)
+        return memory.transient.get_value(
+            (transfer.key, "scene"),
+            lambda: StaticViewBuilder(transfer.light_transport, load_scene(fetch_if_missing(scene))),
+        )
+
+    def make_picture(transfer: Any, view: str) -> Any:
+        if transfer.camera_mode is not CameraMode.FREE:
+            return Picture(transfer, view, memory, is_watched=True)
+
+        def make_static_view(*camera_args: Any, **options: Any) -> Any:
+            return static_view_builder(transfer).make_static_view(
+                *camera_args, **options
+            )  # in the job's thread: reading a scene takes its time
+
+        return ProgressivePicture(FreeCameraPicture(transfer, view, is_watched=True), make_static_view, memory)
+
+    def render(transfer: Any, view: str, look: Any, *, exact: bool = True, **options: Any) -> Any:
+        static_views = static_view_builder(transfer) if exact and transfer.camera_mode is CameraMode.FREE else None
+        return render_image(transfer, view, look, static_views=static_views, **options)
+
+    image_code()  # of what runs now: its files may be exchanged while it does
+    memory = Cache(cache_bytes)
+    use_for_assets(memory)
+    return Library(
+        open_transfer=lambda path: open_cached(path, lambda store: open_bake(store, memory)),
+        open_transient=lambda path: open_cached(path, lambda store: open_bake(store, memory.transient)),
+        make_picture=make_picture,
+        render=render,
+        render_small=render_small,
+        reference=reference,
+        open_viewport=open_viewport,
+        shader_arrays=lambda transfer: (constants(transfer), array_factories(transfer)),
+        bytes_by_owner=memory.bytes_by_owner,
+        cache_used_bytes=lambda: memory.used_bytes,
+        trim_cache=lambda stores: memory.trim(floor_bytes, {str(store.resolve()) for store in stores}),
+    )

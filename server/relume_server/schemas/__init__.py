@@ -1,0 +1,1 @@
+"""Bodies of REST calls and messages of sessions, each declared once."""

@@ -1,0 +1,268 @@
+"""Everything that lives as long as the server: opened at start, closed at the end; routes ask for `ServicesDep`."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, NamedTuple
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from relume.assets.environments.built_in import load_built_in
+from relume.core.memory_usage import live_bytes
+from relume_server.auth import tables as access_tables  # noqa: F401  like those of persistence
+from relume_server.auth.services import AuthServices
+from relume_server.batch.pool import ProcessPool
+from relume_server.batch.prewarm import Prewarmer
+from relume_server.batch.step import Batches
+from relume_server.batch.thumbnails import Thumbnails
+from relume_server.client_state.resume import ResumeStore
+from relume_server.collaboration.comment_sync import CommentSync
+from relume_server.collaboration.room_lease import RoomLease
+from relume_server.collaboration.rooms import Rooms
+from relume_server.io.import_processes import Importers
+from relume_server.io.import_queue import Intake
+from relume_server.io.import_request import remove_strays
+from relume_server.io.streamed_responses import Answers
+from relume_server.jobs.btf_jobs import BtfQueue
+from relume_server.jobs.comparison_jobs import ComparisonQueue
+from relume_server.jobs.job import Quota
+from relume_server.jobs.job_metrics import count_jobs
+from relume_server.jobs.render_jobs import RenderQueue
+from relume_server.lifecycle.drain import DrainState
+from relume_server.persistence.comment_store import CommentStore
+from relume_server.persistence.idempotency import IdempotencyStore
+from relume_server.persistence.leases import RoomLeases
+from relume_server.persistence.look_store import LookStore
+from relume_server.persistence.share_store import ShareStore
+from relume_server.runtime.bake_pool import TransferPool
+from relume_server.runtime.cache_evictor import CacheEvictor
+from relume_server.runtime.disk_space import free_bytes
+from relume_server.runtime.executors import Threads
+from relume_server.runtime.protocols import Library
+from relume_server.runtime.single_flight import SingleFlight
+from relume_server.session.frames.bake_updates import BakeUpdates
+from relume_server.session.session import SessionServices
+from relume_server.settings import Settings
+from relume_server.telemetry.metrics import Metrics
+from relume_server.telemetry.traces import Traces, open_traces
+from relume_worker.executor import num_cores
+from relume_worker.scenes import get_scene
+from relume_worker.service import BakeService
+from relume_worker.tasks import cached_bytes
+
+
+@dataclass(frozen=True)
+class Services:
+    """What routes use.
+
+    Attributes:
+        drain: whether the server is taking it. access: who may do what, how much of it, and the audit.
+        pictures: makes small pictures, and what else takes its time and several may ask for at once.
+        answers: large ones.
+        intake: has files read, and takes over what comes of it.
+    """
+
+    settings: Settings
+    metrics: Metrics
+    drain: DrainState
+    access: AuthServices
+    bakes: BakeService
+    looks: LookStore
+    shares: ShareStore
+    comments: CommentStore
+    idempotency: IdempotencyStore
+    renders: RenderQueue
+    comparisons: ComparisonQueue
+    btfs: BtfQueue
+    threads: Threads
+    transfers: TransferPool
+    cache_evictor: CacheEvictor
+    thumbnails: Thumbnails
+    pictures: SingleFlight
+    answers: Answers
+    live: SessionServices
+    intake: Intake
+
+
+NUM_PICTURES = 2
+
+OpenLibrary = Callable[[int, int], Library]
+OpenBakes = Callable[[Settings], BakeService]
+OpenBatches = Callable[[Settings, Library], Batches]
+
+
+def open_bakes(settings: Settings) -> BakeService:
+    """relume's own bake service."""
+    return BakeService(settings.data, settings.database_url, settings.scheduler, client_weights=settings.turns)
+
+
+def open_batches(settings: Settings, library: Library) -> Batches:
+    """Processes of their own, which have a library of their own."""
+    num, num_threads = settings.batch_processes, max(1, num_cores() // settings.batch_processes)
+    limits = settings.batch_bytes, num_threads, settings.batch_nice
+    return ProcessPool(settings.data, num, *limits, settings.idle_seconds)
+
+
+@asynccontextmanager
+async def open_services(
+    settings: Settings,
+    metrics: Metrics,
+    drain: DrainState,
+    open_library: OpenLibrary,
+    bakes: OpenBakes,
+    batches: OpenBatches,
+    clock: Callable[[], float],
+) -> AsyncIterator[Services]:
+    """Open everything; close it in the reverse order, what there is of it where something cannot be opened."""
+    settings.data.mkdir(mode=0o700, parents=True, exist_ok=True)
+    remove_strays(settings.data, older_than_s=2 * settings.import_seconds)
+    async with AsyncExitStack() as ends:
+
+        def at_end(close: Callable[[], None]) -> None:
+            ends.push_async_callback(asyncio.to_thread, close)
+
+        def run_in_background(work: Coroutine[None, None, None]) -> None:
+            ends.callback(asyncio.create_task(work).cancel)
+
+        if (traces := open_traces() if settings.traces else None) is not None:
+            at_end(traces.close)
+        library, threads = open_library(settings.cache_bytes, settings.cache_floor_bytes), Threads()
+        at_end(threads.close)
+        service = await asyncio.to_thread(bakes, settings)
+        at_end(service.close)
+        batch, sessions = batches(settings, library), service.ledger.sessions
+        access = AuthServices(sessions, settings)
+        transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
+        thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
+        at_end(thumbnails.close)
+        at_end(batch.close)  # before them: they wait for it
+        pictures, answers = SingleFlight(NUM_PICTURES, "relume-picture"), Answers(settings.data)
+        at_end(pictures.close)
+        at_end(answers.close)
+        cache_evictor = CacheEvictor(transfers, threads, library.trim_cache, library.cache_used_bytes, batch.release)
+        _watch_memory(metrics, library, transfers)
+        _watch_jobs(metrics, settings, service, batch, drain)
+        await asyncio.to_thread(service.start)
+        queues = _queues(settings, service, batch, access)
+        for queue in queues:
+            at_end(queue.close)
+            queue.start()
+        prewarmer = Prewarmer(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
+        at_end(prewarmer.close)
+        if settings.ahead:
+            prewarmer.start()
+        importers = Importers()
+        at_end(importers.close)
+        if settings.importer_at_start:
+            importers.start()
+        rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
+        room_lease = RoomLease(rooms, RoomLeases(sessions), drain, threads.queries)
+        ends.push_async_callback(room_lease.close)
+        ends.callback(rooms.close)
+        for work in (cache_evictor.run(), CommentSync(rooms, comments.marks, threads.queries).run(), room_lease.run()):
+            run_in_background(work)
+        yield Services(
+            settings=settings,
+            metrics=metrics,
+            drain=drain,
+            access=access,
+            bakes=service,
+            looks=LookStore(sessions),
+            shares=ShareStore(sessions),
+            comments=comments,
+            idempotency=IdempotencyStore(sessions),
+            **queues._asdict(),
+            threads=threads,
+            transfers=transfers,
+            cache_evictor=cache_evictor,
+            thumbnails=thumbnails,
+            pictures=pictures,
+            answers=answers,
+            live=_live(settings, metrics, traces, library, threads, service, access, drain, rooms, room_lease),
+            intake=Intake(settings, service.ledger, access.quotas, importers),
+        )
+
+
+class _Queues(NamedTuple):
+    """Of long work that is done in processes of their own."""
+
+    renders: RenderQueue
+    comparisons: ComparisonQueue
+    btfs: BtfQueue
+
+
+def _queues(settings: Settings, service: BakeService, batch: Batches, access: AuthServices) -> _Queues:
+    sessions, quota = (
+        service.ledger.sessions,
+        Quota(settings.max_queued, settings.max_queued_per_client, settings.turns),
+    )
+
+    def scene_name(bake: str) -> str:
+        return get_scene(service.ledger, service.ledger.bake(bake).scene).name
+
+    def on_btf_ready(work: str, material: str, num_bytes: int) -> None:
+        access.quotas.convert(("btf-work", work), ("btf", material), num_bytes)
+
+    def on_btf_failed(work: str) -> None:
+        access.quotas.set_bytes("btf-work", work, 0)
+
+    return _Queues(
+        RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.set_bytes, "render")),
+        ComparisonQueue(sessions, settings.data, batch.run, quota),
+        BtfQueue(sessions, settings.data, batch.run, quota, on_btf_ready, on_btf_failed),
+    )
+
+
+def _live(
+    settings: Settings, metrics: Metrics, traces: Traces | None, library: Library, threads: Threads,
+    service: BakeService, access: AuthServices, drain: DrainState, rooms: Rooms, room_lease: RoomLease,
+) -> SessionServices:  # fmt: skip
+    """What live sessions need of all this."""
+    return SessionServices(
+        library=library,
+        threads=threads,
+        metrics=metrics,
+        traces=traces,
+        resumes=ResumeStore(settings.resume_seconds),
+        rooms=rooms,
+        room_lease=room_lease,
+        bake_updates=BakeUpdates(service.bakes, threads.queries),
+        access=access,
+        drain=drain,
+        ack_seconds=settings.ack_seconds,
+        drain_seconds=settings.drain_seconds,
+    )
+
+
+def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, batch: Batches, drain: DrainState) -> None:
+    """Have it shown what works and waits, and whether there is room for more."""
+    metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
+    metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions))
+    metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.least_free_bytes)
+
+
+def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -> None:
+    """Have it shown who holds memory in this process."""
+    metrics.watch_cache(library.cache_used_bytes, library.bytes_by_owner)
+    metrics.watch_owners(
+        {
+            "frozen_cache": library.cache_used_bytes,
+            "open_bakes": lambda: live_bytes(transfers.open_bakes),
+            "bake_tasks": cached_bytes,
+            "environments": lambda: live_bytes(load_built_in),
+        }
+    )
+
+
+def get_services(connection: HTTPConnection) -> Services:
+    """The app's services, for routes."""
+    app_services: Services = connection.app.state.services
+    return app_services
+
+
+ServicesDep = Annotated[Services, Depends(get_services)]

@@ -1,0 +1,1 @@
+"""Live sessions: requests of a client in, frames out."""

@@ -1,0 +1,272 @@
+"""What runs in a thread for a frame: bring the picture on, encode what the client lacks, pack the message."""
+
+from __future__ import annotations
+
+import io
+import struct
+import time
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from numpy.typing import NDArray
+from PIL import Image
+
+from relume.core.errors import ParameterError
+from relume.image_io.downsample import downsample
+from relume.image_io.tone_mapping import tone_map
+from relume.image_io.write_image import to_bytes
+from relume.look.model import DisplayLook
+from relume_server.client_state.target import CameraState, Target
+from relume_server.runtime.protocols import FixedPicture, FreeCameraPicture, Picture, Progress, Tile
+from relume_server.schemas.protocol import ArrayInfo, FrameHeader, FrameTimes, SceneUpdate
+
+if TYPE_CHECKING:
+    from relume.live.fixed_camera.jobs import Job
+    from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
+
+Format = Literal["rgb9e5", "jpeg"]
+_NOTHING = object()
+
+
+@dataclass(frozen=True)
+class FrameRequest:
+    """What a turn of the frame loop asks of a picture.
+
+    Attributes:
+        target: the look that the frame will show.
+        accepting: pictures that have not got that look yet; all take it, or none.
+        missing_tiles: tiles that the client has not got in HDR, besides those that this step changes.
+        only_exact: send nothing unless the step makes the picture exact, or first what is seen of it.
+        region: what is on the client's screen of it; None: all. has_new_region: it has not been told to the picture.
+        is_interactive: a hand waits for it: tiles out of sight come when it rests.
+        is_visible_exact: the client knows that what it sees is exact.
+        is_due: there is something to send even where this step changes nothing.
+        is_client_exact: the client knows that what it has is exact.
+        size: of the picture. jpeg_size: of a JPEG of it, no larger.
+        received_s: when the edit or the eye came in that no frame has answered yet, if there is one.
+        camera_state: that the picture is given before; None where it has its eye, or has none that moves.
+        camera_seq: number of the eye that the frame shows.
+        client_keys: keys of the parts that the client's shader has, where it draws what moves; else None.
+    """
+
+    target: Target
+    accepting: Sequence[Picture]
+    max_coefficients: int | None
+    missing_tiles: frozenset[Tile]
+    form: Format
+    quality: int
+    only_exact: bool
+    region: Tile | None
+    has_new_region: bool
+    is_interactive: bool
+    is_visible_exact: bool
+    is_due: bool
+    is_client_exact: bool
+    received_s: float | None
+    camera_state: CameraState | None
+    camera_seq: int | None
+    client_keys: Mapping[str, Hashable] | None
+    frame: int
+    view: str
+    size: tuple[int, int]
+    jpeg_size: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Painted:
+    """What came of a request.
+
+    Attributes:
+        job: what must be made before the picture can go on to where it should, or None.
+        progress: what the step changed, and what the picture shows since.
+        message: the packed frame, or None where none is to be sent.
+        started_s: when the thread began, seconds of `time.perf_counter`.
+        client_keys: keys of the parts that the client's shader has when it has got the message.
+        deferred_tiles: tiles that it lacks then.
+    """
+
+    job: Job | None
+    progress: Progress
+    message: bytes | None
+    update_ms: float
+    started_s: float
+    encode_ms: float = 0.0
+    client_keys: Mapping[str, Hashable] | None = None
+    deferred_tiles: frozenset[Tile] = frozenset()
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether all that the client has is exact when it has got the message."""
+        return self.progress.exact and not self.deferred_tiles
+
+
+def accept(pictures: Iterable[Picture], target: Target) -> None:
+    """Give pictures a look. Raises what they say where they cannot follow it, or where it needs too much memory."""
+    all_pictures = list(pictures)
+    for picture in all_pictures:
+        picture.check(target.look)
+    for picture in all_pictures:
+        picture.set_look(target.look, active_pointer=target.active_pointer, solo=target.solo)
+
+
+def prepare(pictures: Iterable[Picture], pointer: str) -> list[Job | None]:
+    """Tell pictures which curve or slider the user has in hand; what each of them needs now."""
+    all_pictures = list(pictures)
+    for picture in all_pictures:
+        picture.prepare(pointer)
+    return [picture.next_job() for picture in all_pictures]
+
+
+def install(picture: Picture, job: Job, result: Any) -> Job | None:
+    """Hand over what was made; what the picture needs next."""
+    picture.install(job, result)
+    return picture.next_job()
+
+
+def paint(picture: Picture, request: FrameRequest) -> Painted:
+    """Advance the picture as far as it can go now, and pack the frame where there is something to show."""
+    start_s = time.perf_counter()
+    accept(request.accepting, request.target)
+    if request.camera_state is not None:
+        camera_state = request.camera_state
+        cast("FreeCameraPicture", picture).set_camera(
+            camera_state.camera, camera_state.size, is_idle=camera_state.is_idle
+        )
+    if request.has_new_region:
+        cast("FixedPicture", picture).look_at(request.region)
+    progress = picture.advance(request.max_coefficients)
+    job = picture.next_job()
+    updated_s = time.perf_counter()
+    update_ms = (updated_s - start_s) * 1e3
+    if (
+        request.client_keys is not None
+        and (shader_data := cast("FreeCameraPicture", picture).array_blocks()) is not None
+    ):
+        return _pack_scene_update(request, progress, job, shader_data, start_s)
+    has_changes = bool(progress.tiles) or request.is_due
+    must_wait = request.only_exact and (progress.fidelity != "exact" or request.is_visible_exact)
+    should_send = (has_changes or not request.is_client_exact) if progress.exact else (has_changes and not must_wait)
+    if not should_send:
+        return Painted(job, progress, None, update_ms, start_s)
+    missing_tiles = request.missing_tiles.union(progress.tiles)
+    is_in_progress = request.is_interactive or (job is not None and not progress.exact)
+    deferred_tiles = _tiles_outside_region(missing_tiles, request) if is_in_progress else frozenset()
+    if (
+        missing_tiles and missing_tiles == deferred_tiles and request.received_s is None
+    ):  # nobody would see anything of it
+        return Painted(job, progress, None, update_ms, start_s, deferred_tiles=deferred_tiles)
+    tiles, payload, alpha = _payload(picture, request, missing_tiles - deferred_tiles)
+    encode_ms = (time.perf_counter() - updated_s) * 1e3
+    picture_fields = {
+        "tiles": tiles, "format": request.form, "kind": "picture", "alpha": alpha is not None,
+        "exact": progress.exact and not deferred_tiles,
+    }  # fmt: skip
+    header = _header(request, progress, times(_waited_ms(request, start_s), update_ms, encode_ms), picture_fields)
+    message = pack(header, payload + (alpha or b""))
+    return Painted(job, progress, message, update_ms, start_s, encode_ms, deferred_tiles=deferred_tiles)
+
+
+def _tiles_outside_region(missing_tiles: frozenset[Tile], request: FrameRequest) -> frozenset[Tile]:
+    """Tiles that a frame can do without while its picture is on its way."""
+    if request.region is None or request.form == "jpeg":
+        return frozenset()
+    left, top, across, down = request.region
+    return frozenset(
+        (x, y, width, height)
+        for x, y, width, height in missing_tiles
+        if x + width <= left or left + across <= x or y + height <= top or top + down <= y
+    )
+
+
+def _waited_ms(request: FrameRequest, start_s: float) -> float:
+    """How long what is answered has waited."""
+    return 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
+
+
+def _header(request: FrameRequest, progress: Progress, ms: FrameTimes, fields: Mapping[str, Any]) -> FrameHeader:
+    return FrameHeader(
+        frame=request.frame,
+        revision=request.target.revision,
+        shared=request.target.shared,
+        view=request.view,
+        width=request.size[0],
+        height=request.size[1],
+        fidelity=progress.fidelity,
+        complete=progress.complete,
+        eye=request.camera_seq,
+        was_off=progress.was_off,
+        ms=ms,
+        **fields,
+    )
+
+
+def _pack_scene_update(
+    request: FrameRequest,
+    progress: Progress,
+    job: Job | None,
+    shader_data: tuple[Mapping[str, ArrayBlock], ShaderConstants],
+    start_s: float,
+) -> Painted:
+    """Pack what the client's shader lacks; nothing where it has all, and has been told that the look is shown."""
+    blocks, shader_arrays = shader_data
+    client_keys: Mapping[str, Hashable] = request.client_keys or {}
+    progress = replace(cast("Any", progress), tiles=[])
+    updated_s = time.perf_counter()
+    update_ms = (updated_s - start_s) * 1e3
+    missing_blocks = [block for name, block in blocks.items() if client_keys.get(name, _NOTHING) != block.key]
+    if not missing_blocks and request.received_s is None and not request.is_due:
+        return Painted(job, progress, None, update_ms, start_s, client_keys=client_keys)
+    arrays = {name: array for block in missing_blocks for name, array in block.make().items()}
+    infos = [ArrayInfo(name=name, dtype=a.dtype.name, shape=a.shape) for name, a in arrays.items()]
+    scene_update = SceneUpdate(**shader_arrays._asdict(), arrays=infos)
+    payload = b"".join(array.tobytes() for array in arrays.values())
+    encode_ms = (time.perf_counter() - updated_s) * 1e3
+    update_fields = {"tiles": [], "format": "arrays", "kind": "tables", "tables": scene_update, "exact": progress.exact}
+    header = _header(request, progress, times(_waited_ms(request, start_s), update_ms, encode_ms), update_fields)
+    new_client_keys = {**client_keys, **{name: block.key for name, block in blocks.items()}}
+    return Painted(job, progress, pack(header, payload), update_ms, start_s, encode_ms, new_client_keys)
+
+
+def _payload(
+    picture: Picture, request: FrameRequest, requested_tiles: frozenset[Tile]
+) -> tuple[list[Tile], bytes, bytes | None]:
+    """The tiles of a frame, their pixels, and their coverage where they are not opaque."""
+    if request.form == "jpeg":
+        jpeg = encode_jpeg(picture, request.target.look.display, request.jpeg_size, request.quality)
+        return [(0, 0, *request.size)], jpeg, None
+    tiles = sorted(requested_tiles, key=lambda tile: (tile[1], tile[0]))
+    return tiles, picture.encode(tiles, "rgb9e5"), picture.encode_alpha(tiles)
+
+
+def encode_jpeg(picture: Picture, display: DisplayLook, size: tuple[int, int], quality: int) -> bytes:
+    """A picture as it is displayed, no larger than a size."""
+    image = downsample(picture.image(), size)
+    try:
+        displayed = tone_map(image, display.exposure, display.tone_map, use_table=True)
+    except ParameterError:  # the server has no such view: the editor says so, and shows this
+        displayed = tone_map(image, display.exposure, "agx")
+    buffer = io.BytesIO()
+    Image.fromarray(to_bytes(displayed)).save(buffer, "JPEG", quality=quality)
+    return buffer.getvalue()
+
+
+def encode_highlight(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:
+    """The payload of a brush frame: how much of each pixel comes from that stretch of the curve, 0…255."""
+    return to_bytes(picture.highlight_pixels(pointer, from_degrees, to_degrees)).tobytes()
+
+
+def pack(header: FrameHeader, payload: bytes) -> bytes:
+    """A frame as it goes over the wire."""
+    head = header.model_dump_json().encode()
+    return b"".join((struct.pack("<I", len(head)), head, payload))
+
+
+def rounded(bands: NDArray[Any]) -> list[list[float]]:
+    """Band values with six digits, as lists: what a plot needs, in half the bytes."""
+    return [[float(f"{value:.6g}") for value in channel] for channel in bands.tolist()]
+
+
+def times(wait_ms: float, update_ms: float, encode_ms: float) -> FrameTimes:
+    """Milliseconds, rounded for the header."""
+    return FrameTimes(wait=round(wait_ms, 3), update=round(update_ms, 3), encode=round(encode_ms, 3))

@@ -1,0 +1,197 @@
+"""The receiving half of a session: reads messages, checks them, and notes what the client wants."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from starlette.websockets import WebSocket
+
+from relume.core.errors import ParameterError, ProtocolError, RelumeError
+from relume.live.fixed_camera.protocols import CameraMode
+from relume.scene.custom_camera import make_custom_camera
+from relume_server.auth.rules import check_message
+from relume_server.client_state.pointers import check_parameter, find_curve
+from relume_server.client_state.target import CameraState
+from relume_server.collaboration.room import is_local_setting
+from relume_server.errors import CLOSE_POLICY
+from relume_server.schemas import protocol
+from relume_server.schemas.connection import OpenMessage, PingMessage, PongMessage
+from relume_server.schemas.rooms import PresenceMessage
+from relume_server.session.message_rate import Pace
+from relume_server.session.reader import read_message
+from relume_server.session.session_state import SessionState
+
+MAX_BAD_MESSAGES = 50
+
+
+class MessageReceiver:
+    """Runs until the client goes or breaks the rules too often."""
+
+    def __init__(self, websocket: WebSocket, state: SessionState) -> None:
+        self._websocket, self._socket, self._pending, self._visible_views = (
+            websocket,
+            state.socket,
+            state.pending,
+            state.visible_views,
+        )
+        self._window, self._look, self._transfer = state.window, state.look, state.transfer
+        self._metrics, self._traces = state.metrics, state.traces
+        self._caller, self._member, self._audit_writer = state.caller, state.member, state.audit_writer
+        self._num_bad = 0
+
+    async def run(self) -> None:
+        """Receive for ever.
+
+        Raises:
+            WebSocketDisconnect: the client is gone.
+            ProtocolError: the session must end; carries the close code.
+        """
+        pace = Pace()
+        while True:
+            received = await self._websocket.receive()
+            received_s = time.perf_counter()
+            num_in_flight = self._window.num_in_flight
+            pace.start_message()
+            await self._answer(received, received_s)
+            await pace.pause(is_due=self._window.num_in_flight < num_in_flight)
+
+    async def _answer(self, received: Any, received_s: float) -> None:
+        """Do what a message asks, or say why not."""
+        message = read_message(received)
+        if isinstance(message, protocol.Problem):
+            await self._refuse_malformed(message)
+            return
+        if isinstance(message, PingMessage):  # from here, so that no frame is waited for
+            await self._socket.send(PongMessage())
+            return
+        try:
+            self._dispatch(message, received_s)
+        except RelumeError as error:
+            revision = message.revision if isinstance(message, protocol.EditMessage) else None
+            await self._socket.refuse(error, revision)
+        else:
+            self._pending.changed.set()
+
+    async def _refuse_malformed(self, problem: protocol.Problem) -> None:
+        """A message that no client of ours sends: said each time, forgiven a number of times."""
+        self._num_bad += 1
+        if self._num_bad > MAX_BAD_MESSAGES:
+            raise ProtocolError("too many messages that cannot be understood; reload the page", CLOSE_POLICY)
+        await self._socket.refuse(problem)
+
+    def _dispatch(self, message: protocol.ClientMessage, received_s: float) -> None:
+        check_message(self._caller, _permission_key(message))
+        match message:
+            case protocol.EditMessage():
+                self._edit(message, received_s)
+            case protocol.AckMessage():
+                self._window.on_acknowledged(message.frame, received_s)
+            case protocol.ViewMessage():
+                self._show_views([message.name], message.size)
+            case protocol.ViewsMessage():
+                self._show_views(message.names, None)
+            case protocol.FocusMessage():
+                self._visible_views.set_focus(message.view)
+            case protocol.RegionMessage():
+                self._look_at(message)
+            case protocol.EncodingMessage():
+                self._pending.form, self._pending.quality = message.format, message.quality
+            case protocol.InspectMessage():
+                self._visible_views.check(message.view or self._visible_views.focus)
+                self._pending.inspect = message
+            case protocol.HighlightMessage():
+                find_curve(message.curve, self._look.document)
+                self._pending.highlight = message
+            case protocol.PrepareMessage():
+                self._prepare(message)
+            case protocol.CameraMessage():
+                self._set_camera(message, received_s)
+            case protocol.RendererMessage():
+                self._pending.evaluator = message.by
+            case PresenceMessage():
+                self._update_presence(message)
+            case OpenMessage():
+                raise ProtocolError("the session is open; send open once, as the first message", CLOSE_POLICY)
+
+    def _update_presence(self, message: PresenceMessage) -> None:
+        if self._member is None:
+            raise ProtocolError("nobody shares this session; open one with a room to work together", CLOSE_POLICY)
+        self._member.update_presence(message, self._caller.person)
+
+    def _prepare(self, message: protocol.PrepareMessage) -> None:
+        if message.curve is not None:
+            find_curve(message.curve, self._look.document)
+            self._pending.prepare_curve = message.curve
+        elif message.parameter is not None:
+            check_parameter(message.parameter, self._look.document)
+            self._pending.active_parameter = message.parameter
+
+    def _edit(self, message: protocol.EditMessage, received_s: float) -> None:
+        try:
+            target = self._look.apply(message, received_s)
+        except RelumeError as error:
+            self._metrics.edits.labels("refused").inc()
+            if self._traces is not None:
+                self._traces.record_refusal(received_s, str(error), {"revision": message.revision})
+            raise
+        if self._member is not None:
+            patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
+            target = self._member.accepted(target, patch)
+        self._pending.target = target
+        if self._audit_writer is not None:
+            self._audit_writer.add_edit(operation.path for operation in message.patch)
+        self._metrics.edits.labels("applied").inc()
+
+    def _set_camera(self, message: protocol.CameraMessage, received_s: float) -> None:
+        """Take note of an eye; a number that is not newer than the last says nothing."""
+        if self._transfer.camera_mode is not CameraMode.FREE:
+            raise ParameterError("view", message.view, "a view whose eye is free; bake the scene by method surface")
+        self._check_view(message.view)
+        width, height = message.size
+        if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_EYE_PIXELS):
+            allowed = f"at least 1×1 pixels, at most {protocol.MAX_EYE_PIXELS} in all"
+            raise ParameterError("size", list(message.size), allowed)
+        camera = make_custom_camera("eye", message.to_world, math.degrees(message.yfov)).camera
+        previous = self._pending.camera_states.get(message.view)
+        if previous is None or message.eye > previous.seq:
+            self._pending.camera_states[message.view] = CameraState(
+                message.eye, camera, message.size, received_s, message.rest == "exact"
+            )
+
+    def _look_at(self, message: protocol.RegionMessage) -> None:
+        """Take note of what is on the screen of a view."""
+        self._check_view(message.view)
+        if self._transfer.camera_mode is CameraMode.FREE:
+            raise ParameterError("view", message.view, "a view whose eye is baked")
+        if message.rect is None:
+            self._pending.regions.pop(message.view, None)
+            return
+        (x, y, _, _), view = message.rect, self._transfer.views[message.view]
+        if not (x < view.width and y < view.height):
+            raise ParameterError("rect", list(message.rect), f"some of the picture's {view.width}×{view.height} pixels")
+        self._pending.regions[message.view] = message.rect
+
+    def _check_view(self, name: str) -> None:
+        if name not in self._transfer.views:
+            raise ParameterError("view", name, "one of " + ", ".join(sorted(self._transfer.views))[:400])
+
+    def _show_views(self, names: Sequence[str], space: tuple[int, int] | None) -> None:
+        for name in names:
+            self._check_view(name)
+        self._visible_views.show(names)
+        self._pending.space = space
+
+
+def _permission_key(message: protocol.ClientMessage) -> str:
+    """What a message is to the table of roles."""
+    match message:
+        case protocol.EditMessage(patch=patch, hand=hand) if all(
+            is_local_setting(path) for path in (*(operation.path for operation in patch), *((hand,) if hand else ()))
+        ):
+            return "seen"
+        case protocol.PrepareMessage(curve=None):
+            return "hold"
+    return message.type

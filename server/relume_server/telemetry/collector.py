@@ -1,0 +1,54 @@
+"""The collector that traces go to, as the log tells of it. Importing this loads OpenTelemetry's SDK."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+from opentelemetry.sdk.trace import ReadableSpan
+from opentelemetry.sdk.trace.export import SpanExporter, SpanExportResult
+
+from relume.core.errors import RelumeError
+from relume_worker.database.failures import MissingDatabase
+
+EXPORTER = "opentelemetry.exporter.otlp.proto.http.trace_exporter"
+log = logging.getLogger(__name__)
+
+
+class TraceExporter(SpanExporter):
+    """What an exporter sends to: that it is away is one line of the log, and that it is back another.
+
+    OpenTelemetry's own writes four warnings for each batch, every five seconds; their first says why.
+    """
+
+    def __init__(self, exporter: SpanExporter) -> None:
+        """
+        Args:
+            exporter: sends.
+        """
+        self._exporter, self._messages = exporter, list[str]()
+        self._outage = MissingDatabase(log, "the collector of traces")
+        logging.getLogger(EXPORTER).addFilter(self._collect_message)
+
+    def _collect_message(self, record: logging.LogRecord) -> bool:
+        self._messages.append(record.getMessage())
+        return False
+
+    def export(self, spans: Sequence[ReadableSpan]) -> SpanExportResult:
+        """Send some; those that cannot be sent are lost."""
+        self._messages.clear()
+        result = self._exporter.export(spans)
+        if result is SpanExportResult.SUCCESS:
+            self._outage.report_recovered()
+        else:
+            self._outage.report_failure(RelumeError(self._messages[0] if self._messages else "it takes none"))
+        return result
+
+    def shutdown(self) -> None:
+        """Send no more."""
+        self._exporter.shutdown()
+        logging.getLogger(EXPORTER).removeFilter(self._collect_message)
+
+    def force_flush(self, timeout_millis: int = 30_000) -> bool:
+        """Nothing is kept here."""
+        return True

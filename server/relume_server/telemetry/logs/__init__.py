@@ -1,0 +1,1 @@
+"""Logs: lines of text or JSON with request, session, bake and user."""

@@ -1,0 +1,112 @@
+"""What the server counts and times, as Prometheus sees it; one registry per app."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.registry import Collector
+
+from relume.core.cache import CacheOwner
+from relume_worker.database.failures import DATABASE_ERRORS
+
+METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS"})
+LATENCY_S = (0.001, 0.002, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.033, 0.060, 0.100, 0.250, 1.0, 4.0)
+
+
+class _CacheCollector(Collector):
+    """What is in the memory: kinds and bakes come and go."""
+
+    def __init__(self, bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]) -> None:
+        self._bytes_by_owner = bytes_by_owner
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """One gauge."""
+        gauge = GaugeMetricFamily("relume_memory_bytes", "Bytes made from bakes, by kind", labels=["kind", "bake"])
+        for owner, num_bytes in self._bytes_by_owner().items():
+            gauge.add_metric(owner, num_bytes)
+        yield gauge
+
+
+class _JobCollector(Collector):
+    """How much long work waits and runs; nothing while the database is away."""
+
+    def __init__(self, count_jobs: Callable[[], Mapping[tuple[str, str], int]]) -> None:
+        self._count_jobs = count_jobs
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """One gauge."""
+        gauge = GaugeMetricFamily("relume_work", "Long work by kind and state", labels=["kind", "state"])
+        with suppress(*DATABASE_ERRORS):
+            for labels, count in self._count_jobs().items():
+                gauge.add_metric(labels, count)
+        yield gauge
+
+
+class Metrics:
+    """The figures by name, as Prometheus wants names: units are seconds and bytes, counters end in _total."""
+
+    def __init__(self) -> None:
+        self.registry = registry = CollectorRegistry()
+        self.sessions = Gauge("relume_sessions", "Live sessions", registry=registry)
+        self.frames = Counter("relume_frames", "Frames sent", ["kind", "format"], registry=registry)
+        self.frame_bytes = Counter("relume_frame_bytes", "Bytes of frames sent", registry=registry)
+        self.edits = Counter("relume_edits", "Edits received", ["outcome"], registry=registry)
+        self.bakes = Counter("relume_bakes", "Bakes submitted", registry=registry)
+        self.requests = Counter("relume_http_requests", "HTTP requests", ["method", "status"], registry=registry)
+        self.refused_sessions = Counter(
+            "relume_refused_sessions", "Sessions that were not opened", ["reason"], registry=registry
+        )
+        self.refused_sessions.labels("busy")  # an increase is one of what was there before
+        self.request_seconds = self._histogram("relume_http_request_seconds", "Request received to answer begun")
+        self._draining = Gauge("relume_leaving", "Whether the server is being stopped, 0 or 1", registry=registry)
+        self._free = Gauge("relume_disk_free_bytes", "Room on the disk of the data directory", registry=registry)
+        self._least_free = Gauge("relume_disk_floor_bytes", "Room below which /readyz says no", registry=registry)
+        self.edit_to_socket = self._histogram("relume_edit_to_socket_seconds", "Edit received to frame handed over")
+        self.update = self._histogram("relume_frame_update_seconds", "Updating the picture")
+        self.encode = self._histogram("relume_frame_encode_seconds", "Encoding a frame")
+        self.freeze = self._histogram("relume_freeze_seconds", "Freezing a curve")
+        self._cache = Gauge("relume_frozen_cache_bytes", "Bytes of all that was made from bakes", registry=registry)
+        self._live_bytes = Gauge(
+            "relume_held_bytes", "Bytes of arrays that the server holds", ["holder"], registry=registry
+        )
+        self._workers = Gauge(
+            "relume_workers_resident_bytes", "Memory of the server's own worker processes", registry=registry
+        )
+        ProcessCollector(registry=registry)  # process_resident_memory_bytes and the like
+
+    def watch_cache(
+        self, used_bytes: Callable[[], int], bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]
+    ) -> None:
+        """Where it is read from what the memory holds, in all and by kind and bake."""
+        self._cache.set_function(used_bytes)
+        self.registry.register(_CacheCollector(bytes_by_owner))
+
+    def watch_owners(self, owners: Mapping[str, Callable[[], int]]) -> None:
+        """Where it is read from who holds memory in this process; what two hold is counted by one."""
+        for owner, get_bytes in owners.items():
+            self._live_bytes.labels(owner).set_function(get_bytes)
+
+    def watch_workers(self, resident_bytes: Callable[[], int]) -> None:
+        """Where the memory of the server's own worker processes is read from."""
+        self._workers.set_function(resident_bytes)
+
+    def watch_jobs(self, count_jobs: Callable[[], Mapping[tuple[str, str], int]]) -> None:
+        """Where it is read from how much long work there is, by kind and state."""
+        self.registry.register(_JobCollector(count_jobs))
+
+    def watch_readiness(self, is_draining: Callable[[], bool], free_bytes: Callable[[], int], least_bytes: int) -> None:
+        """Where it is read from what /readyz asks."""
+        self._draining.set_function(is_draining)
+        self._free.set_function(free_bytes)
+        self._least_free.set(least_bytes)
+
+    def count_request(self, method: str, status: int, seconds: float) -> None:
+        """One HTTP response; a method that nobody knows must not become a label of its own."""
+        self.request_seconds.observe(seconds)
+        self.requests.labels(method if method in METHODS else "other", str(status)).inc()
+
+    def _histogram(self, name: str, text: str) -> Histogram:
+        return Histogram(name, text, buckets=LATENCY_S, registry=self.registry)

@@ -1,1 +1,0 @@
-"""One route group per file."""

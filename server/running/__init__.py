@@ -1,1 +1,0 @@
-"""How the server takes leave: it says so, lets sessions go, stops what takes long, and is gone within a bound."""

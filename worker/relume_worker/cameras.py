@@ -1,0 +1,117 @@
+"""Cameras that people placed in a scene, beside those that came with it."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import TypeAlias
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from relume.core.errors import NotFoundError, ParameterError
+from relume.scene.custom_camera import CustomCamera, read_custom_camera
+from relume_worker.database.models import CameraRow
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import SceneRecord, get_scene
+
+Views: TypeAlias = tuple[tuple[str, ...], tuple[CustomCamera, ...]]
+"""Names of views, and those of them that somebody placed, as a recipe has them."""
+
+MAX_CAMERAS = 200  # of a scene, placed by people
+
+
+def list_cameras(ledger: Ledger, scene_id: str) -> list[CustomCamera]:
+    """The cameras that people placed in a scene, by name."""
+    with ledger.sessions() as session:
+        rows = session.scalars(select(CameraRow).where(CameraRow.scene_id == scene_id).order_by(CameraRow.name))
+        return [read_custom_camera(json.loads(row.document)) for row in rows]
+
+
+def camera_names_by_scene(ledger: Ledger) -> dict[str, list[str]]:
+    """Names of the cameras that people placed, by scene, in order."""
+    names: dict[str, list[str]] = defaultdict(list)
+    with ledger.sessions() as session:
+        for scene_id, name in session.execute(select(CameraRow.scene_id, CameraRow.name).order_by(CameraRow.name)):
+            names[scene_id].append(name)
+    return names
+
+
+def store_camera(ledger: Ledger, scene_id: str, camera: CustomCamera) -> bool:
+    """Keep a camera under its name; bakes of an earlier one stay what they are.
+
+    Args:
+        ledger: where it is listed. scene_id: of its scene.
+    Returns:
+        Whether there was none of this name.
+    Raises:
+        NotFoundError: there is no such scene. ParameterError: the file's own camera has this name, or there are too
+            many.
+    """
+    _reject_scene_camera(get_scene(ledger, scene_id), camera.name)
+    new_row = CameraRow(scene_id=scene_id, name=camera.name, document=json.dumps(camera.document()))
+    try:
+        with ledger.sessions.begin() as session:
+            row = session.get(CameraRow, (scene_id, camera.name))
+            if row is None and _count(session, scene_id) >= MAX_CAMERAS:
+                allowed = f"the name of one of the {MAX_CAMERAS} cameras, or delete one"
+                raise ParameterError("name", camera.name, allowed)
+            session.merge(new_row)
+    except IntegrityError:
+        get_scene(ledger, scene_id)  # it was deleted in this moment
+        return False  # or somebody else has kept one under this name
+    return row is None
+
+
+def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
+    """Forget a camera that somebody placed.
+
+    Args:
+        ledger: where it is listed. scene_id: of its scene. name: its own.
+    Raises:
+        NotFoundError: there is none. ParameterError: the file's own camera has this name.
+    """
+    _reject_scene_camera(get_scene(ledger, scene_id), name)
+    with ledger.sessions.begin() as session:
+        statement = (
+            delete(CameraRow).where(CameraRow.scene_id == scene_id, CameraRow.name == name).returning(CameraRow.name)
+        )
+        if session.scalars(statement).first() is None:
+            raise NotFoundError(f"the scene has no camera {name[:80]!r} that somebody placed")
+
+
+def resolve_views(ledger: Ledger, record: SceneRecord, requested: Sequence[str | CustomCamera]) -> Views:
+    """What a recipe says of views.
+
+    Args:
+        ledger: that lists the scene's cameras. record: of the scene.
+        requested: names of the scene's own or kept cameras, or cameras; empty for all that came with the scene.
+    Returns:
+        Names of all views, each once, in order; and those of them that somebody placed.
+    Raises:
+        ParameterError: there is no such view, or two cameras of one name.
+    """
+    stored = {camera.name: camera for camera in list_cameras(ledger, record.id)}
+    custom_cameras: dict[str, CustomCamera] = {}
+    for view in requested:
+        if isinstance(view, str) and view not in record.views and view not in stored:
+            raise ParameterError("views", view, "some of " + ", ".join((*record.views, *stored))[:400])
+        camera = stored.get(view) if isinstance(view, str) else view
+        if camera is None:
+            continue
+        _reject_scene_camera(record, camera.name)
+        if custom_cameras.setdefault(camera.name, camera) != camera:
+            raise ParameterError("views", camera.name, "each camera a name of its own")
+    names = dict.fromkeys(view if isinstance(view, str) else view.name for view in requested or record.views)
+    return tuple(names), tuple(custom_cameras.values())
+
+
+def _reject_scene_camera(record: SceneRecord, name: str) -> None:
+    if name in record.views:
+        raise ParameterError("name", name, "a name that none of the scene's own cameras has")
+
+
+def _count(session: Session, scene_id: str) -> int:
+    return session.scalar(select(func.count()).select_from(CameraRow).where(CameraRow.scene_id == scene_id)) or 0

@@ -1,0 +1,95 @@
+"""Opens the database: SQLite, set up for several processes that write, or PostgreSQL."""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import URL, Engine, create_engine, event
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError
+
+from relume.core.errors import ParameterError
+from relume_worker.database.failures import translate_error
+from relume_worker.database.postgresql import TLS_MODES, connect_postgresql
+from relume_worker.database.upgrading import upgrade
+
+BUSY_TIMEOUT_MS = 30_000
+_RETRY_S = 0.01
+POOL_TIMEOUT_S = 10.0
+MAX_OVERFLOW = 30  # connections beside the five that are kept: threads of the server that may ask at once
+
+
+def open_database(url: str) -> Engine:
+    """An engine on `url`, its tables made or upgraded where that only adds.
+
+    Raises:
+        ParameterError: `url` is neither of SQLite nor of PostgreSQL.
+        DatabaseDamagedError, DiskFullError: what the file says. LedgerVersionError: see `upgrading`.
+    """
+    engine = connect(url)
+    try:
+        upgrade(engine, is_requested=False)
+    except Exception:
+        engine.dispose()
+        raise
+    return engine
+
+
+def connect(url: str) -> Engine:
+    """An engine on `url`, its tables as they are. Raises ParameterError."""
+    database_url = _parse(url)
+    if database_url.get_backend_name() == "postgresql":
+        waits = {"pool_timeout": POOL_TIMEOUT_S, "max_overflow": MAX_OVERFLOW}
+        engine = create_engine(database_url, pool_pre_ping=True, **waits)
+        event.listen(engine, "do_connect", connect_postgresql)
+    else:
+        if database_url.database:
+            Path(database_url.database).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            Path(database_url.database).touch(mode=0o600)  # SQLite would let everybody read it
+        # of connections beside the five that are kept SQLite keeps the file open: its locks are of the process
+        engine = create_engine(database_url)
+        event.listen(engine, "connect", _set_up_sqlite)
+    event.listen(engine, "handle_error", translate_error)
+    return engine
+
+
+def _parse(url: str) -> URL:
+    allowed = "a URL such as postgresql://user:password@host/name or sqlite:////folder/relume.db"
+    try:
+        database_url = make_url(url)
+    except ArgumentError:
+        raise ParameterError("RELUME_DATABASE", "something else", allowed) from None  # it may hold a password
+    if database_url.drivername == "sqlite":
+        return database_url
+    if database_url.drivername not in ("postgres", "postgresql", "postgresql+pg8000"):
+        raise ParameterError("RELUME_DATABASE", database_url.drivername, allowed)
+    if not (database_url.username and database_url.host):
+        raise ParameterError("RELUME_DATABASE", "a URL without user or host", allowed)
+    if not (database_url.query.keys() <= {"sslmode"} and database_url.query.get("sslmode", TLS_MODES[0]) in TLS_MODES):
+        raise ParameterError("RELUME_DATABASE", "other options after ?", f"sslmode={', '.join(TLS_MODES)}, or none")
+    return database_url.set(drivername="postgresql+pg8000")
+
+
+def _set_up_sqlite(connection: Any, _: object) -> None:
+    """Write-ahead log: readers never wait for a writer. Writers wait for each other instead of failing."""
+    connection.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
+    _enable_write_ahead_log(connection)
+    for pragma in ("synchronous = NORMAL", "foreign_keys = ON"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _enable_write_ahead_log(connection: Any) -> None:
+    """Switch a file that has none to a write-ahead log; SQLite itself does not wait where two begin it at once."""
+    deadline_s = time.monotonic() + BUSY_TIMEOUT_MS / 1e3
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > deadline_s:
+                raise
+            time.sleep(_RETRY_S)
+        else:
+            return

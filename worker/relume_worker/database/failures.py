@@ -1,0 +1,144 @@
+"""What the database says when it fails, in words; and loops that go on meanwhile and say each fault once."""
+
+from __future__ import annotations
+
+import logging
+import sqlite3
+import threading
+
+import pg8000
+from sqlalchemy.engine import ExceptionContext
+from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
+
+from relume.core.errors import DatabaseDamagedError, DiskFullError, RelumeError
+
+log = logging.getLogger(__name__)
+
+DATABASE_ERRORS = (SQLAlchemyError, DatabaseDamagedError, DiskFullError)
+"""What reading or writing the database raises while it is away, damaged, or without room."""
+
+MAX_MESSAGE_LENGTH = 300  # characters
+_DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+_DISK_FULL = "53100"  # of PostgreSQL, as are these: connections that fail, ends by an operator, too many clients
+_UNAVAILABLE_STATES = ("08", "57P", "53300")
+_INTEGRITY_CLASS = "23"
+
+
+def translate_error(context: ExceptionContext) -> None:
+    """Raise what a failure of the database means where that is known; listens to `handle_error` of an engine.
+
+    Raises:
+        DiskFullError, DatabaseDamagedError: it is one of these.
+        OperationalError, IntegrityError: a server does not answer, or refuses a row; pg8000 calls them otherwise.
+    """
+    cause = context.original_exception
+    code = getattr(cause, "sqlite_errorcode", 0) & 0xFF  # the rest tells kinds of it apart
+    if code == sqlite3.SQLITE_FULL or _state(cause) == _DISK_FULL:
+        raise DiskFullError("the database") from cause
+    if code in _DAMAGED:
+        raise DatabaseDamagedError(str(cause)) from cause
+    statement, values, is_lost = context.statement, context.parameters, context.is_disconnect
+    if _is_unanswered(cause):
+        raise OperationalError(statement, values, cause, connection_invalidated=is_lost) from cause
+    if _state(cause).startswith(_INTEGRITY_CLASS):
+        raise IntegrityError(statement, values, cause) from cause
+
+
+def is_unavailable(error: Exception) -> bool:
+    """Whether a database server does not answer, so that asking again in a while may help."""
+    return isinstance(error, DBAPIError) and _is_unanswered(error.orig)
+
+
+def make_unavailable_error(line: str) -> OperationalError:
+    """What another process met, as it would have been met here. line: as `told` puts it."""
+    return OperationalError(None, None, pg8000.InterfaceError(line))
+
+
+def describe_error(error: Exception) -> str:
+    """A failure in one line."""
+    cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
+    return " ".join(_reply(cause).get("M", str(cause)).split()) or type(cause).__name__
+
+
+def _reply(cause: BaseException | None) -> dict[str, str]:
+    """The fields of a PostgreSQL's error message, by their letters; empty where it has not answered."""
+    fields = cause.args[0] if isinstance(cause, pg8000.Error) and cause.args else None
+    return fields if isinstance(fields, dict) else {}
+
+
+def _state(cause: BaseException | None) -> str:
+    """SQLSTATE; empty where there is none."""
+    return _reply(cause).get("C", "")
+
+
+def _is_unanswered(cause: BaseException | None) -> bool:
+    state = _state(cause)
+    return state.startswith(_UNAVAILABLE_STATES) if state else isinstance(cause, pg8000.InterfaceError)
+
+
+class DatabaseError:
+    """Says what a loop meets in one line, and not again until it has gone or another has come; from any thread.
+
+    A database server that is away is said once for the whole process, however many loops meet that.
+
+    Args:
+        log: where. label: cannot be done, as a sentence begins.
+        asks_database: whether the loop does, so that all is well with that where all is well here.
+    """
+
+    def __init__(self, log: logging.Logger, label: str, asks_database: bool = True) -> None:
+        self._log, self._label, self._asks_database = log, label, asks_database
+        self._lock = threading.Lock()
+        self._reported = ""
+
+    def report_failure(self, error: Exception) -> None:
+        """Something failed; what nobody foresaw is told with its trace."""
+        if is_unavailable(error):
+            database_outage.report_failure(error)
+            return
+        line, is_expected = describe_error(error), isinstance(error, (*DATABASE_ERRORS, RelumeError, OSError))
+        with self._lock:
+            if line == self._reported:
+                return
+            self._reported = line
+        self._log.error("%s (%s); trying again", self._label, line, exc_info=None if is_expected else error)
+
+    def report_recovered(self) -> None:
+        """It works."""
+        if self._asks_database:
+            database_outage.report_recovered()
+        with self._lock:
+            was_reported, self._reported = self._reported, ""
+        if was_reported:
+            self._log.warning("%s: that is over", self._label)
+
+
+class MissingDatabase:
+    """Says that a server does not answer, and that it does again: whatever the reasons are meanwhile.
+
+    Args:
+        log: where. label: does not answer.
+    """
+
+    def __init__(self, log: logging.Logger, label: str) -> None:
+        self._log, self._label = log, label
+        self._is_reported, self._lock = False, threading.Lock()
+
+    def report_failure(self, error: Exception) -> None:
+        """It did not."""
+        with self._lock:
+            was_reported, self._is_reported = self._is_reported, True
+        if not was_reported:
+            self._log.error(
+                "%s does not answer (%s); trying again", self._label, describe_error(error)[:MAX_MESSAGE_LENGTH]
+            )
+
+    def report_recovered(self) -> None:
+        """It did."""
+        with self._lock:
+            was_reported, self._is_reported = self._is_reported, False
+        if was_reported:
+            self._log.warning("%s does not answer: that is over", self._label)
+
+
+database_outage = MissingDatabase(log, "the database")

@@ -1,0 +1,89 @@
+"""Tables of the ledger, as they are now; `revisions` beside this file has the ways from older ones."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from sqlalchemy import BigInteger, ForeignKey, Index, Integer, Text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+
+class Base(DeclarativeBase):
+    """The root of all tables in relume's database."""
+
+    type_annotation_map: ClassVar[dict[Any, Any]] = {int: BigInteger().with_variant(Integer(), "sqlite")}  # bytes, rays
+
+
+class SceneRow(Base):
+    """A registered scene; its files lie in scenes/<id>/.
+
+    Attributes:
+        summary: JSON for lists: views, materials, warnings, number of triangles.
+    """
+
+    __tablename__ = "scenes"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    created: Mapped[float]
+    summary: Mapped[str] = mapped_column(Text)
+
+
+class CameraRow(Base):
+    """A camera that somebody placed in a scene; `document` is its JSON, see `relume.scene.make_custom_camera`."""
+
+    __tablename__ = "cameras"
+
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), primary_key=True)
+    name: Mapped[str] = mapped_column(primary_key=True)
+    document: Mapped[str] = mapped_column(Text)
+
+
+class BakeRow(Base):
+    """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970
+    by the database's clock).
+
+    Attributes:
+        code: names the code that makes or made it; None in rows of a relume that did not write that down.
+        client: who asked for it first; None in rows of a relume that did not write that down.
+        run: names its beginning, see `relume_worker.run_marker`; None in rows of a relume that did not.
+        crowding: see `relume_worker.estimate`; None where it is not ready, or was baked before that was measured.
+    """
+
+    __tablename__ = "bakes"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
+    recipe: Mapped[str] = mapped_column(Text)
+    plan: Mapped[str] = mapped_column(Text)
+    state: Mapped[str] = mapped_column(index=True)
+    created: Mapped[float]
+    queued: Mapped[float]
+    progress: Mapped[float] = mapped_column(default=0.0)
+    phase: Mapped[str | None] = mapped_column(default=None)
+    phase_since: Mapped[float | None] = mapped_column(default=None)
+    crowding: Mapped[float | None] = mapped_column(default=None)
+    code: Mapped[str | None] = mapped_column(default=None)
+    run: Mapped[str | None] = mapped_column(default=None)
+    client: Mapped[str | None] = mapped_column(default=None)
+    rays_per_second: Mapped[float | None] = mapped_column(default=None)
+    seconds_left: Mapped[float | None] = mapped_column(default=None)
+    bytes: Mapped[int] = mapped_column(default=0)
+    problem: Mapped[str | None] = mapped_column(Text, default=None)
+    owner: Mapped[str | None] = mapped_column(default=None)
+    heartbeat: Mapped[float] = mapped_column(default=0.0)
+
+
+class TaskRow(Base):
+    """A finished task of a bake. A row means that its shards are on disk; nothing else does."""
+
+    __tablename__ = "tasks"
+    __table_args__ = (Index("tasks_of_bake", "bake_id"),)
+
+    bake_id: Mapped[str] = mapped_column(ForeignKey("bakes.id"), primary_key=True)
+    stage: Mapped[int] = mapped_column(primary_key=True)
+    index: Mapped[int] = mapped_column("task_index", primary_key=True)
+    attempts: Mapped[int]
+    rays: Mapped[int]
+    trace_s: Mapped[float]
+    seconds: Mapped[float]

@@ -1,0 +1,328 @@
+"""Runs one bake: stages in order, what is not done goes to an executor, what is finished goes into the ledger.
+
+Killed at any moment, the next run continues where the ledger stands and the published store is the same, bit for bit:
+a task is pure, its shards appear by rename, and only a recorded task counts as done.
+"""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import CancelledError as FutureCancelledError
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+
+from relume.core.errors import (
+    CancelledError,
+    ChunkDamagedError,
+    DiskFullError,
+    NotFoundError,
+    RelumeError,
+    StorageError,
+    bytes_text,
+    is_disk_full,
+)
+from relume.core.filesystem import remove_folder
+from relume.core.folder_size import folder_bytes
+from relume.scene.model import Scene
+from relume.store import open_store, publish, read_code, run_bake
+from relume.store.bake_protocol import Task
+from relume.store.room import check_disk_space
+from relume_worker.database.retry import Given, Result, with_retry
+from relume_worker.lease import HEARTBEAT_S, LeaseRenewer, log_lost_lease
+from relume_worker.ledger import Ledger
+from relume_worker.paths import bake_path, staging_path
+from relume_worker.progress import ExpectedWork, Progress
+from relume_worker.run_marker import delete_run, get_run, set_run, start_run
+from relume_worker.status import Phase, TaskCost
+from relume_worker.storage import push
+from relume_worker.storage.partial_uploads import PartialUploads, delete_partial, fetch_partial
+from relume_worker.task_notes import delete_note, read_note
+from relume_worker.tasks import Job, idle_timer, load_registered_scene, run_task
+
+SCHEDULER_LOST_MESSAGE = "the scheduler went away; start it, then bake again; finished parts are kept"
+CODE_CHANGED_MESSAGE = (
+    "relume has changed since this bake was begun; it starts again, so that its parts are of one version"
+)
+TAKEN_OVER_MESSAGE = "another machine had begun this bake; it starts again here"
+log = logging.getLogger(__name__)
+
+MAX_ATTEMPTS = 3
+LOSS_LOG_INTERVAL_S = 1.0
+
+
+@dataclass
+class BakeRunner:
+    """One run of a bake whose lease `owner` holds.
+
+    Attributes:
+        max_in_flight: how many tasks may be handed out at once now; the rest wait here, so that a cancel takes effect
+            at once.
+        on_change: called after every change of the ledger.
+        is_stopped: the service is closing; the bake stays `running` for the next start.
+        expected_work: what finished bakes tell of this one.
+        working_since: when its first task began, by `time.monotonic`; None before.
+    """
+
+    ledger: Ledger
+    job: Job
+    owner: str
+    executor: Executor
+    max_in_flight: Callable[[], int]
+    on_change: Callable[[], None] = lambda: None
+    is_stopped: Callable[[], bool] = lambda: False
+    expected_work: ExpectedWork = field(default_factory=ExpectedWork)
+    working_since: float | None = None
+    _in_flight: dict[Future[TaskCost], tuple[Task, int]] = field(default_factory=dict)
+    _phase_entered: tuple[Phase | None, float] = (None, 0.0)
+    _partial_uploads: PartialUploads | None = None
+    _last_loss_s: float = -inf
+
+    def run(self) -> None:
+        """Bake and publish; every failure ends in the ledger as a state and a sentence."""
+        with LeaseRenewer(self.ledger.renew_lease, self.job.bake_id, self.owner), idle_timer.keep_awake():
+            delete_note(self._staging)  # of an earlier run
+            self._run()
+            delete_note(self._staging)
+        self.on_change()
+
+    def _run(self) -> None:
+        identity = self.job.bake_id
+        try:
+            num_bytes = self._bake()
+            push(self._target)
+            self._renew_lease()
+            delete_run(self._staging)
+            with suppress(StorageError):  # the bake is there; what is left over is deleted with its scene
+                delete_partial(identity)
+        except CancelledError:
+            self._drain()
+            has_lease = self._call_ledger(self.ledger.release, identity, self.owner)
+        except Exception as error:  # whatever a method raises must not end the service
+            self._drain()
+            if not self._exists():  # deleted in the middle of a task, with what that wrote to
+                return
+            if not isinstance(error, RelumeError | OSError):
+                log.exception("bake %s failed", identity, extra={"fields": {"bake": identity}})
+            has_lease = self._call_ledger(
+                self.ledger.finish, identity, self.owner, "failed", self._error_message(error)
+            )
+        else:
+            has_lease = self._call_ledger(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
+        if not has_lease and self._exists():
+            log_lost_lease("bake", identity)
+
+    def _renew_lease(self) -> None:
+        """Renew the lease before files are changed that another process, if it has the bake now, goes on with.
+
+        Raises:
+            CancelledError: it has.
+        """
+        if not self._call_ledger(self.ledger.renew_lease, self.job.bake_id, self.owner):
+            raise CancelledError("another process has the bake")
+
+    def _bake(self) -> int:
+        job, target, staging = self.job, self._target, self._staging
+        if target.exists():  # published, and then killed before the ledger knew
+            return folder_bytes(target)
+        self._start_or_resume()
+        status = self._call_ledger(self.ledger.bake, job.bake_id)
+        initial_progress = status.progress if self._call_ledger(self.ledger.finished_tasks, job.bake_id) else 0.0
+        progress = Progress(status.plan, initial_progress, self.expected_work)
+        self._heartbeat(progress, "reading")
+        scene = job.recipe.add_cameras(load_registered_scene(job.data_dir, job.scene_id))
+        run_bake.create_staging_store(job.method, scene, job.recipe, staging)
+        for stage in range(len(job.method.stages)):
+            self._run_stage(scene, stage, progress)
+        self._heartbeat(progress, "publishing")
+        try:
+            return publish(staging, target, self._renew_lease)
+        except ChunkDamagedError:
+            if self._call_ledger(self.ledger.delete_tasks, job.bake_id, self.owner):
+                shutil.rmtree(staging, ignore_errors=True)
+            raise
+
+    def _start_or_resume(self) -> None:
+        """Keep what an earlier run has finished where it is here and of the same code; else start from nothing."""
+        identity, staging = self.job.bake_id, self._staging
+        run = self._call_ledger(self.ledger.get_run, identity)
+        is_local = staging.exists() and get_run(staging) == run
+        finished_tasks = self._call_ledger(self.ledger.finished_tasks, identity)
+        if not is_local and run is not None and fetch_partial(staging, identity, run, finished_tasks):
+            is_local = True
+            set_run(staging, run)
+        if is_local and read_code(staging) == self.job.code:
+            self._partial_uploads = PartialUploads(staging, identity, run, finished_tasks) if run is not None else None
+            return
+        # where nothing is finished, what is here is left of one that was deleted
+        reason = None if not finished_tasks else CODE_CHANGED_MESSAGE if is_local else TAKEN_OVER_MESSAGE
+        if reason is not None:
+            log.warning("bake %s: %s", identity, reason, extra={"fields": {"bake": identity}})
+        self._renew_lease()
+        shutil.rmtree(staging, ignore_errors=True)
+        run = start_run(staging)
+        if not self._call_ledger(self.ledger.restart, identity, self.owner, self.job.code, run, reason):
+            raise CancelledError("the bake was stopped")
+        self._partial_uploads = PartialUploads(staging, identity, run, ())
+
+    def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
+        job = self.job
+        tasks = run_bake.create_stage(job.method, scene, job.recipe, self._staging, stage)
+        progress.begin_stage(tasks, last=stage == len(job.method.stages) - 1)
+        finished_costs = self._call_ledger(self.ledger.finished_tasks, job.bake_id)
+        pending: deque[tuple[Task, int]] = deque()
+        for task in tasks:
+            if (cost := finished_costs.get((stage, task.index))) is not None:
+                progress.add(task, cost, is_local=False)
+            else:
+                pending.append((task, 1))
+        self._heartbeat(progress, self._phase(stage, progress))
+        while pending or self._in_flight:
+            check_disk_space(job.data_dir)
+            num_free = self._num_free_slots(len(pending))
+            while pending and num_free > 0:
+                num_free -= 1
+                task, attempt = pending.popleft()
+                self._in_flight[self.executor.submit(run_task, job, task)] = task, attempt
+            done_futures, _ = wait(self._in_flight, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
+            for future in done_futures:
+                self._collect(future, pending, progress)
+            self._heartbeat(progress, self._phase(stage, progress))
+
+    def _num_free_slots(self, num_pending: int) -> int:
+        """How many tasks more may be handed out. Of the last none waits behind another at one process while the next is
+        idle: a stage may have but one long task for each view."""
+        num_in_flight, max_tasks = len(self._in_flight), self.max_in_flight()
+        return (max_tasks if num_pending + num_in_flight > max_tasks else max(1, max_tasks // 2)) - num_in_flight
+
+    def _phase(self, stage: int, progress: Progress) -> Phase:
+        """What the processes are at: until one of them works, what they do to get ready."""
+        note = read_note(self._staging)
+        if note == "compiling":
+            return note
+        if self.working_since is None and note != "working":
+            return note or "loading"
+        if self.working_since is None:
+            self.working_since = time.monotonic()
+            progress.begin_work()
+        return "sampling" if stage == 0 else "tracing"
+
+    def _collect(self, future: Future[TaskCost], pending: deque[tuple[Task, int]], progress: Progress) -> None:
+        task, attempt = self._in_flight.pop(future)
+        try:
+            cost = future.result()
+        except FutureCancelledError as error:  # nobody here cancels a task
+            self._in_flight.clear()  # handed out while the scheduler went away, they would never end
+            raise RelumeError(SCHEDULER_LOST_MESSAGE) from error
+        except Exception as error:
+            if not _is_lost_process(error):
+                raise
+            if attempt == MAX_ATTEMPTS:
+                raise RelumeError(
+                    f"{attempt} worker processes died of the same task, most likely for want of memory; free memory "
+                    "or take fewer lights or a smaller size, then bake again; finished parts are kept"
+                ) from error
+            self._log_lost_worker()
+            pending.append((task, attempt + 1))
+            return
+        self._record(task, cost, attempt)
+        self.working_since = self.working_since or time.monotonic() - cost.seconds
+        progress.add(task, cost, is_local=True)
+
+    def _log_lost_worker(self) -> None:
+        """Once of a process, which had more than one task."""
+        now_s = time.monotonic()
+        if now_s > self._last_loss_s + LOSS_LOG_INTERVAL_S:
+            extra = {"fields": {"bake": self.job.bake_id}}
+            log.warning("a worker process died; what it was at is given to another", extra=extra)
+        self._last_loss_s = now_s
+
+    def _record(self, task: Task, cost: TaskCost, attempt: int) -> None:
+        """A task is finished: its shards are stored, where others may go on with them, before it counts."""
+        if self._partial_uploads is not None:
+            self._partial_uploads.store((task.stage, task.index))
+        if not self._call_ledger(self.ledger.finish_task, self.job.bake_id, self.owner, task, cost, attempt):
+            raise CancelledError("the bake was deleted, or another process has it")
+
+    def _heartbeat(self, progress: Progress, phase: Phase) -> None:
+        """Record progress; raise CancelledError where somebody wants this run to end."""
+        if phase != self._phase_entered[0]:
+            self._phase_entered = phase, time.time()
+        phase_fields = dict(zip(("phase", "phase_since"), self._phase_entered, strict=True))
+        if self.is_stopped() or not self._call_ledger(
+            self.ledger.heartbeat, self.job.bake_id, self.owner, **progress.fields(), **phase_fields
+        ):
+            raise CancelledError("the bake was stopped")
+        self.on_change()
+
+    def _drain(self) -> None:
+        """Wait for the tasks that run and keep what they finished; they would write after us otherwise."""
+        deadline = time.monotonic() + (0 if self.is_stopped() else 600)
+        while self._in_flight and time.monotonic() < deadline:
+            done_futures, _ = wait(self._in_flight, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
+            for future in done_futures:
+                task, attempt = self._in_flight.pop(future)
+                if not future.cancelled() and future.exception() is None:
+                    try:
+                        self._record(task, future.result(), attempt)
+                    except CancelledError:
+                        return
+
+    def _call_ledger(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
+        """Call the ledger; one that is away for a while delays the bake and ends nothing."""
+        return with_retry(self.is_stopped, call, *args, **kwargs)
+
+    def _exists(self) -> bool:
+        try:
+            self._call_ledger(self.ledger.bake, self.job.bake_id)
+        except NotFoundError:
+            return False
+        return True
+
+    def _error_message(self, error: Exception) -> str:
+        """What went wrong and what to do, in one line."""
+        if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_disk_full(error)):
+            needed_bytes = self._call_ledger(self.ledger.bake, self.job.bake_id).plan.planned_bytes
+            missing_text = bytes_text(max(1_000_000, needed_bytes - folder_bytes(self._staging)))
+            return f"disk full; free {missing_text}, then bake again; finished parts are kept"
+        if isinstance(error, RelumeError):
+            return " ".join(str(error).split())
+        if type(error).__name__ == "CommClosedError":  # submitting met a closed connection
+            return SCHEDULER_LOST_MESSAGE
+        if isinstance(error, MemoryError):
+            return "out of memory; take fewer lights or a smaller size, then bake again; finished parts are kept"
+        if isinstance(error, OSError):
+            return f"a file cannot be read or written ({error.strerror}); see to it, then bake again"
+        return f"a defect: {type(error).__name__}: {str(error)[:200]}; the log has the trace"
+
+    @property
+    def _target(self) -> Path:
+        return bake_path(self.job.data_dir, self.job.bake_id)
+
+    @property
+    def _staging(self) -> Path:
+        return staging_path(self.job.data_dir, self.job.bake_id)
+
+
+def _is_lost_process(error: Exception) -> bool:
+    """Whether a task ended because its process did."""
+    if isinstance(error, BrokenExecutor):
+        return True
+    return type(error).__name__ in ("KilledWorker", "CommClosedError")
+
+
+def check_published(path: Path) -> bool:
+    """Whether a bake's store is there and can be opened; one that cannot is removed, so that it is baked again."""
+    try:
+        open_store(path)
+    except RelumeError:
+        with suppress(OSError):
+            remove_folder(path)
+        return False
+    return True

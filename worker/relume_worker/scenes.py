@@ -1,0 +1,202 @@
+"""The scene registry: scenes/<id>/ on disk, one row each in the ledger's database."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import delete, select
+from sqlalchemy.exc import IntegrityError
+
+from relume.core.errors import DiskFullError, NotFoundError
+from relume.core.filesystem import remove_folder
+from relume.core.import_warnings import ImportRemark, warning_of
+from relume.scene.model import Scene
+from relume.scene.scene_folder import save_scene
+from relume.scene.triplanar import find_triplanar
+from relume_worker.database.models import CameraRow, SceneRow
+from relume_worker.ledger import Ledger
+from relume_worker.paths import bake_path, scene_path, staging_path
+from relume_worker.run_marker import delete_run
+from relume_worker.storage import delete_remote, push
+
+
+@dataclass(frozen=True)
+class SceneRecord:
+    """What lists show of a scene, without reading its arrays.
+
+    Attributes:
+        created: seconds since 1970.
+        views: camera names, in order. aspects: of each the width ÷ height that its file says, or None.
+        materials: {"name", "terms", "catcher", "is_projected", "is_glass"} each, in the order of material ids; old ones
+            lack the last three.
+        variants: partial looks that the file brought, by name.
+        lights: names of the scene's own.
+    """
+
+    id: str
+    name: str
+    created: float
+    views: tuple[str, ...]
+    materials: tuple[dict[str, Any], ...]
+    warnings: tuple[ImportRemark, ...]
+    num_triangles: int
+    variants: dict[str, dict[str, Any]]
+    lights: tuple[str, ...] = ()
+    aspects: tuple[float | None, ...] = ()
+
+
+def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
+    """Keep a scene; the same content twice is the same scene, its newest name and warnings win.
+
+    Args:
+        data_dir: where scenes are kept. ledger: where they are listed.
+        scene: as an importer has made it.
+    Returns:
+        The scene's id.
+    """
+    save_scene(scene, scene_path(data_dir, scene.id))
+    insert_scene(data_dir, ledger, scene.id, summarize_scene(scene))
+    return scene.id
+
+
+def summarize_scene(scene: Scene) -> dict[str, Any]:
+    """What lists show of a scene, its name too."""
+    return {
+        "name": scene.name,
+        "views": [camera.name for camera in scene.cameras],
+        "aspects": [camera.aspect for camera in scene.cameras],
+        "materials": [
+            {
+                "name": material.name,
+                "terms": list(material.terms),
+                "catcher": material.shadow_catcher,
+                "is_projected": is_triplanar,
+                "is_glass": material.glass is not None,
+            }
+            for material, is_triplanar in zip(scene.materials, find_triplanar(scene), strict=True)
+        ],
+        "warnings": [warning.document() for warning in scene.warnings],
+        "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
+        "variants": scene.variants,
+        "lights": [light.name for light in scene.lights],
+    }
+
+
+def insert_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[str, Any]) -> None:
+    """List a scene whose files are in their place.
+
+    Args:
+        data_dir: where scenes are kept. ledger: where they are listed.
+        scene_id: of the scene. summary: of it, see `summarize_scene`.
+    """
+    push(scene_path(data_dir, scene_id))
+    row = SceneRow(id=scene_id, name=summary["name"], created=time.time(), summary=json.dumps(summary))
+    try:
+        with ledger.sessions.begin() as session:
+            session.add(row)
+    except IntegrityError:
+        with ledger.sessions.begin() as session:
+            if (existing := session.get(SceneRow, scene_id)) is not None:
+                existing.name, existing.summary = summary["name"], json.dumps(summary)
+
+
+def list_scenes(ledger: Ledger) -> list[SceneRecord]:
+    """All scenes, newest first."""
+    with ledger.sessions() as session:
+        return [_record(row) for row in session.scalars(select(SceneRow).order_by(SceneRow.created.desc()))]
+
+
+def get_scene(ledger: Ledger, scene_id: str) -> SceneRecord:
+    """A scene by id. Raises NotFoundError."""
+    with ledger.sessions() as session:
+        row = session.get(SceneRow, scene_id)
+    if row is None:
+        raise NotFoundError(f"there is no scene {scene_id[:40]}; import it first")
+    return _record(row)
+
+
+def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
+    """Delete a scene with its bakes and their stores: they are of no use without it.
+
+    Args:
+        data_dir: where scenes and stores are kept. ledger: where they are listed.
+        scene_id: of the scene; its bakes that run are cancelled.
+    Raises:
+        NotFoundError: there is no such scene.
+    """
+    get_scene(ledger, scene_id)
+    delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
+    while not _delete_scene_row(ledger, scene_id):  # somebody has asked for a bake of it meanwhile
+        delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
+    delete_remote(scene_path(data_dir, scene_id))
+    _remove(scene_path(data_dir, scene_id))
+
+
+def _delete_scene_row(ledger: Ledger, scene_id: str) -> bool:
+    """Whether a scene is in the ledger no more; false where there is a bake or a camera of it."""
+    try:
+        with ledger.sessions.begin() as session:
+            session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
+            session.execute(delete(SceneRow).where(SceneRow.id == scene_id))
+    except IntegrityError:
+        return False
+    return True
+
+
+def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
+    """Delete bakes with their stores, finished or not.
+
+    Args:
+        data_dir: where stores are kept. ledger: where they are listed.
+        ids: of bakes; those that run are cancelled.
+    """
+    try:
+        _delete_bake_rows(ledger, ids)
+    except DiskFullError:  # to delete takes room, too: theirs
+        _remove_stores(data_dir, ids)
+        _delete_bake_rows(ledger, ids)
+    for identity in ids:
+        delete_remote(bake_path(data_dir, identity))
+    _remove_stores(data_dir, ids)
+
+
+def _delete_bake_rows(ledger: Ledger, ids: Sequence[str]) -> None:
+    for identity in ids:
+        ledger.cancel(identity)
+    ledger.delete_bakes(ids)
+
+
+def _remove_stores(data_dir: Path, ids: Sequence[str]) -> None:
+    for identity in ids:
+        _remove(bake_path(data_dir, identity))
+        shutil.rmtree(staging_path(data_dir, identity), ignore_errors=True)
+        delete_run(staging_path(data_dir, identity))
+
+
+def _remove(store: Path) -> None:
+    """Delete a store that no ledger names any more, where there is one."""
+    with suppress(OSError):
+        remove_folder(store)
+
+
+def _record(row: SceneRow) -> SceneRecord:
+    summary = json.loads(row.summary)
+    return SceneRecord(
+        id=row.id,
+        name=row.name,
+        created=row.created,
+        views=tuple(summary["views"]),
+        materials=tuple(summary["materials"]),
+        warnings=tuple(warning_of(warning) for warning in summary["warnings"]),
+        num_triangles=summary["num_triangles"],
+        variants=summary.get("variants", {}),  # rows of before there were any
+        lights=tuple(summary.get("lights", ())),
+        aspects=tuple(summary.get("aspects", ())),
+    )

@@ -1,0 +1,365 @@
+"""The bake service: what the server and the command line use. It owns the threads that run bakes; the ledger and the
+stores own everything that must survive them."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from relume.core.errors import NotFoundError, ParameterError, StorageError
+from relume.core.source_hash import bake_code
+from relume.store import read_code
+from relume.store.bake_protocol import BakeMethod, Plan, Recipe
+from relume_worker.backup.restore import refuse_unfinished
+from relume_worker.budget import check_budget
+from relume_worker.database import open_database
+from relume_worker.database.failures import DatabaseError
+from relume_worker.estimate import crowding, estimate_seconds, machine_load
+from relume_worker.executor import Executors, is_tiny
+from relume_worker.fair_share import FairShare
+from relume_worker.idle_timer import idle_seconds
+from relume_worker.lease import new_owner
+from relume_worker.ledger import Ledger
+from relume_worker.paths import bake_path, scene_path
+from relume_worker.progress import ExpectedWork
+from relume_worker.run_marker import delete_run, get_run
+from relume_worker.runner import BakeRunner, check_published
+from relume_worker.status import BakeStatus, bake_id
+from relume_worker.status_bus import BlockedBake, StatusBus, Subscription
+from relume_worker.storage import get_storage, is_in_storage, push
+from relume_worker.storage.partial_uploads import delete_partial
+from relume_worker.task_notes import delete_note
+from relume_worker.tasks import Job, idle_timer, load_registered_scene
+
+log = logging.getLogger(__name__)
+
+POLL_S = 1.0
+CLOSE_S = 10.0
+STOPPED_RETENTION_S = 7 * 86_400.0  # what a failed or cancelled bake has finished, for whoever asks for it again
+START_S = 8.0  # until worker processes are at work, where none has been started yet: measured on two cores
+NUM_REFERENCE_BAKES = 8  # finished bakes that an estimate looks at
+
+
+class BakeService:
+    """Queues, runs and follows bakes. Several services may share a data directory and a ledger."""
+
+    def __init__(
+        self,
+        data_dir: Path,
+        ledger_url: str | None = None,
+        scheduler: str | None = None,
+        num_workers: int | None = None,
+        methods: Mapping[str, BakeMethod] | None = None,
+        client_weights: Mapping[str, float] | None = None,
+    ) -> None:
+        """
+        Args:
+            data_dir: folder of scenes and bakes; made where it is missing.
+            ledger_url: of SQLite or PostgreSQL; None: relume.db in the data directory.
+            scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
+            num_workers: processes of the embedded cluster; None: one per core.
+            methods: what can be baked, by name; None: relume's registry.
+            client_weights: of some clients, see `relume_worker.fair_share.FairShare`.
+        """
+        get_storage()  # what is wrong with its address is said before anything runs
+        bake_code()  # of what runs now: its files may be exchanged while it does
+        self.data_dir = data_dir.resolve()
+        self.data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
+        refuse_unfinished(self.data_dir)
+        self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
+        self._methods = methods
+        self._executors = Executors(scheduler, num_workers)
+        self._blocked_bakes = BlockedBake()
+        self._status_bus = StatusBus(self.get)
+        self._database_errors = {
+            tiny: DatabaseError(log, f"the queue of {kind} cannot be worked on")
+            for tiny, kind in ((False, "bakes"), (True, "small bakes"))
+        }
+        self._owner = new_owner()
+        self._closing = threading.Event()
+        self._is_crowding = threading.Event()
+        self._start_s = START_S
+        self._fair_shares = {is_tiny_lane: FairShare(client_weights or {}) for is_tiny_lane in (True, False)}
+        self._wakes = {True: threading.Event(), False: threading.Event()}
+        self._threads: list[threading.Thread] = []
+
+    def start(self) -> None:
+        """Start running bakes: those in the queue, and those that a process left behind when it died."""
+        self._delete_orphans()
+        for tiny in (True, False):
+            name = "relume-tiny-bakes" if tiny else "relume-bakes"
+            self._threads.append(threading.Thread(target=self._run_lane, args=(tiny,), name=name, daemon=True))
+            self._threads[-1].start()
+
+        if get_storage() is not None:
+            self._threads.append(threading.Thread(target=self._store_all, name="relume-storage", daemon=True))
+            self._threads[-1].start()
+
+    def close(self) -> None:
+        """Stop running bakes; an unfinished one continues at the next start."""
+        self._closing.set()
+        self._notify_change()
+        for thread in self._threads:
+            thread.join(CLOSE_S)
+        self._executors.close()
+        idle_timer.end()
+        self._status_bus.close()
+        self.ledger.close()
+
+    def __enter__(self) -> BakeService:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def plan(self, scene_id: str, recipe: Recipe) -> Plan:
+        """What a bake would cost, checked against this machine's memory and disk.
+
+        A little of it is baked where its bound on disk is large: a second for the first plan of a scene.
+
+        Raises:
+            NotFoundError: there is no such scene.
+            PlanError: the recipe does not fit the scene; MemoryBudgetError: it does not fit the machine.
+            ParameterError: there is no such method.
+        """
+        from relume.methods.disk import estimate_disk
+
+        identity = self._resolve_scene_id(scene_id)
+        with idle_timer.keep_awake():
+            scene = recipe.add_cameras(load_registered_scene(self.data_dir, identity))
+            method = self._method(recipe.method)
+            plan = method.plan(scene, recipe)
+            disk = estimate_disk(method, scene, recipe, plan)
+        plan = replace(plan, disk_bytes=disk.store, scratch_bytes=disk.scratch)
+        processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
+        check_budget(plan, self.data_dir, processes)
+        return plan
+
+    def submit(self, scene_id: str, recipe: Recipe, client: str = "") -> str:
+        """Queue a bake of `scene_id` by a recipe for a client, and return its id; raises what `plan` raises.
+
+        The same recipe under the same code is the same bake: one that is queued, running or ready stays as it is, one
+        that failed or was cancelled goes on where it stopped.
+        """
+        identity = bake_id(scene_id, recipe)
+        if self._is_ready(identity):
+            return identity
+        self.ledger.submit(scene_id, recipe, self.plan(scene_id, recipe), client)
+        self._notify_change()
+        return identity
+
+    def get(self, bake_id: str) -> BakeStatus:
+        """A bake. Raises NotFoundError."""
+        return self._blocked_bakes.with_reason(self.ledger.bake(bake_id))
+
+    def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
+        """All bakes, or those of a scene; newest first."""
+        return [self._blocked_bakes.with_reason(status) for status in self.ledger.bakes(scene_id)]
+
+    def subscribe(self, bake_id: str) -> Subscription:
+        """Follow a bake, whichever process runs it. Raises NotFoundError."""
+        return self._status_bus.subscribe(bake_id)
+
+    def cancel(self, bake_id: str) -> bool:
+        """Cancel a bake; finished tasks are kept for a resume. False where it is not under way: it stays as it is."""
+        self.get(bake_id)
+        is_canceled = self.ledger.cancel(bake_id)
+        self._notify_change()
+        return is_canceled
+
+    def delete(self, bake_id: str) -> None:
+        """Delete a bake in whatever state it is, with its store. Raises NotFoundError, StorageError."""
+        from relume_worker.scenes import delete_bakes
+
+        self.get(bake_id)
+        delete_bakes(self.data_dir, self.ledger, [bake_id])
+        self._notify_change()
+
+    def store_path(self, bake_id: str) -> Path:
+        """Where the published store of a bake lies. Raises NotFoundError where the id is malformed."""
+        return bake_path(self.data_dir, bake_id)
+
+    def estimate_seconds(self, plan: Plan) -> float | None:
+        """Seconds that a bake will take, by those that took place here; None where there were none.
+
+        Processes that have to be started for it, and to load the kernels, are part of it.
+        """
+        work_s = self._work_s(plan)
+        is_cold = not is_tiny(plan) and not self._executors.has_cluster
+        return work_s if work_s is None or not is_cold else work_s + self._start_s
+
+    def _work_s(self, plan: Plan) -> float | None:
+        """Seconds from the first task's begin on."""
+        load = machine_load()
+        if is_tiny(plan) or not self._is_crowding.is_set():  # else a bake that ends before this one is counted already
+            load += self._executors.num_workers
+        completed = self.ledger.finished_bakes(NUM_REFERENCE_BAKES)
+        return estimate_seconds(plan, completed, self._executors.num_workers, crowding(load))
+
+    def _expect_work(self, status: BakeStatus, parallel: int) -> ExpectedWork:
+        method = self._method(status.recipe.method)
+        seconds = self.ledger.stage_seconds(status.scene, method.name, self._executors.num_workers, NUM_REFERENCE_BAKES)
+        total, stages = sum(seconds.values()), range(len(method.stages))
+        stage_fractions = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
+        return ExpectedWork(self._work_s(status.plan), stage_fractions, parallel)
+
+    def workers_resident_bytes(self) -> int:
+        """Memory of the worker processes that this service has started."""
+        return self._executors.resident_bytes()
+
+    def _resolve_scene_id(self, scene_id: str) -> str:
+        from relume_worker.scenes import get_scene
+
+        return get_scene(self.ledger, scene_id).id
+
+    def _method(self, name: str) -> BakeMethod:
+        if self._methods is None:
+            from relume.methods.registry import METHODS
+
+            self._methods = METHODS
+        if name not in self._methods:
+            raise ParameterError("method", name, f"one of {', '.join(sorted(self._methods))}")
+        return self._methods[name]
+
+    def _is_ready(self, identity: str) -> bool:
+        """Whether a bake is finished and its store usable; a lost or damaged store is queued again."""
+        try:
+            state = self.ledger.bake(identity).state
+        except NotFoundError:
+            return False
+        if state != "ready":
+            return False
+        if check_published(self.store_path(identity)) or is_in_storage(self.store_path(identity)):
+            return True
+        self.ledger.delete_tasks(identity)
+        self.ledger.requeue(identity, ("ready",))
+        return False
+
+    def _notify_change(self) -> None:
+        self._status_bus.notify_change()
+        for wake in self._wakes.values():
+            wake.set()
+
+    def _run_lane(self, tiny: bool) -> None:
+        """Run bakes one after another. Tiny ones have a lane of their own: a preview never waits for a long bake."""
+        last_active_s = time.monotonic()
+        while not self._closing.is_set():
+            try:
+                self._wakes[tiny].clear()
+                has_run = self._run_next(tiny)
+                if has_run or not self._blocked_bakes:  # a bake that waits for its own lease says nothing of the disk
+                    self._database_errors[tiny].report_recovered()
+                if has_run:
+                    last_active_s = time.monotonic()
+                    continue
+                if not tiny and time.monotonic() - last_active_s > idle_seconds():
+                    self._executors.stop_cluster()
+                self._wakes[tiny].wait(POLL_S)
+            except Exception as error:  # the database may be away for a while; the lane must outlive that
+                self._database_errors[tiny].report_failure(error)
+                self._closing.wait(POLL_S)
+
+    def _run_next(self, tiny: bool) -> bool:
+        fair_share = self._fair_shares[tiny]
+        for waiting_bake in fair_share.sort(self.ledger.claimable()):
+            status = self.ledger.bake(waiting_bake.id)
+            try:
+                if is_tiny(status.plan) == tiny and self.ledger.claim(waiting_bake.id, self._owner):
+                    self._blocked_bakes.report_resumed(waiting_bake.id)
+                    fair_share.pick_next(waiting_bake.client)
+                    self._run(status, tiny)
+                    return True
+            except Exception as error:
+                self._blocked_bakes.report_blocked(self.ledger.bake(waiting_bake.id), error)
+                raise
+        return False
+
+    def _run(self, status: BakeStatus, tiny: bool) -> None:
+        self._status_bus.notify_change()
+        start_s, is_cold = time.monotonic(), not self._executors.has_cluster
+        try:
+            method = self._method(status.recipe.method)
+            expected_work = self._expect_work(status, 1 if tiny else self._executors.num_workers)
+            if not tiny:
+                self.ledger.heartbeat(status.id, self._owner, phase="starting", phase_since=time.time())
+                self._status_bus.notify_change()
+            executor = self._executors.local() if tiny else self._executors.cluster()
+        except SQLAlchemyError:  # its lease runs out, and it is claimed again
+            raise
+        except Exception as error:
+            self.ledger.finish(status.id, self._owner, "failed", str(error))
+            self._status_bus.notify_change()
+            return
+        runner = BakeRunner(
+            ledger=self.ledger,
+            job=Job(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
+            owner=self._owner,
+            executor=executor,
+            max_in_flight=(lambda: 1) if tiny else (lambda: 2 * self._executors.cluster_threads()),
+            on_change=self._status_bus.notify_change,
+            is_stopped=self._closing.is_set,
+            expected_work=expected_work,
+        )
+        if tiny:
+            runner.run()
+            return
+        self._is_crowding.set()
+        try:
+            runner.run()
+        finally:
+            self._is_crowding.clear()
+        if is_cold and runner.working_since is not None:
+            self._start_s = runner.working_since - start_s
+
+    def _store_all(self) -> None:
+        """Store what is here and not in the storage: from before there was one, or from while it was away."""
+        try:
+            statuses = self.ledger.bakes()
+            scenes = [scene_path(self.data_dir, scene) for scene in dict.fromkeys(bake.scene for bake in statuses)]
+            ready_paths = [bake_path(self.data_dir, status.id) for status in statuses if status.state == "ready"]
+            for path in (path for path in (*scenes, *ready_paths) if path.exists()):
+                if self._closing.is_set():
+                    return
+                push(path)
+        except Exception as error:  # bakes go on
+            DatabaseError(log, "what is in the data directory cannot be put into the object storage").report_failure(
+                error
+            )
+
+    def _delete_orphans(self) -> None:
+        """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again, and those
+        of bakes that were stopped and not asked for again for long."""
+        folders = list((self.data_dir / "bakes" / "staging").glob("*.zarr"))
+        # asked after the folders: of a bake that another process begins meanwhile the row comes first
+        states = {status.id: status.state for status in self.ledger.bakes()}
+        for folder in folders:
+            identity = folder.name.removesuffix(".zarr")
+            state = states.get(identity, "ready")
+            is_stopped = state in ("failed", "cancelled")
+            if state == "ready" or (
+                is_stopped and (read_code(folder) != bake_code() or _age_s(folder) > STOPPED_RETENTION_S)
+            ):
+                if is_stopped and get_run(folder) == self.ledger.get_run(
+                    identity
+                ):  # else its tasks are another machine's
+                    self.ledger.delete_tasks(identity)
+                    with suppress(StorageError):  # what is left over is deleted with the bake
+                        delete_partial(identity)
+                shutil.rmtree(folder, ignore_errors=True)
+                delete_note(folder)
+                delete_run(folder)
+
+
+def _age_s(folder: Path) -> float:
+    """How long ago anything was written in a folder."""
+    latest = max((path.stat().st_mtime for path in (folder, *folder.rglob("*")) if path.exists()), default=0.0)
+    return time.time() - latest

@@ -1,0 +1,96 @@
+"""One task in one process: load the scene once, compute, write whole shards."""
+
+from __future__ import annotations
+
+import pickle
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from relume.core.errors import StoreError
+from relume.core.memory_usage import live_bytes, trim_heap
+from relume.core.source_hash import bake_code
+from relume.scene.model import Scene
+from relume.scene.scene_folder import load_scene
+from relume.store import run_bake
+from relume.store.bake_protocol import BakeMethod, Recipe, Task
+from relume_worker.idle_timer import IdleTimer, idle_seconds
+from relume_worker.paths import scene_path, staging_path
+from relume_worker.status import TaskCost
+from relume_worker.storage import fetch_if_missing
+from relume_worker.task_notes import TaskNotes
+
+CODE_MISMATCH_MESSAGE = (
+    "a worker process runs another version of relume than the server; start both again, then bake again"
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a process must know to run any task of a bake; small, it travels with every task.
+
+    Attributes:
+        data_dir: the data directory, at the same path on every machine of a cluster.
+        code: names the code of the process that hands the tasks out.
+    """
+
+    data_dir: Path
+    bake_id: str
+    scene_id: str
+    recipe: Recipe
+    method: BakeMethod
+    code: str
+
+
+@lru_cache(maxsize=2)
+def load_registered_scene(data_dir: Path, scene_id: str) -> Scene:
+    """A registered scene; a process keeps the last two."""
+    return load_scene(fetch_if_missing(scene_path(data_dir, scene_id)))
+
+
+_methods: dict[bytes, BakeMethod] = {}
+
+
+def _intern_method(method: BakeMethod) -> BakeMethod:
+    """This process's own copy of a method, which keeps what it built for a scene: each task brings a fresh one."""
+    return _methods.setdefault(pickle.dumps(method), method)
+
+
+def _release_caches() -> None:
+    """Let go of scenes, of what methods built for them, and of what was read of stores."""
+    load_registered_scene.cache_clear()
+    _methods.clear()
+    run_bake.open_stage_reader.cache_clear()
+    trim_heap()
+
+
+idle_timer = IdleTimer(idle_seconds, _release_caches)
+"""Of this process: what it keeps between tasks goes when no task has come for a while."""
+
+
+def cached_bytes() -> int:
+    """What this process keeps between tasks; Embree's structures, about as much again, are not counted."""
+    return live_bytes(load_registered_scene, _methods, run_bake.open_stage_reader)
+
+
+def run_task(job: Job, task: Task) -> TaskCost:
+    """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes.
+
+    Raises:
+        StoreError: this process runs other code than the one that hands the tasks out; a store has one code's alone.
+    """
+    if job.code != bake_code():
+        raise StoreError(CODE_MISMATCH_MESSAGE)
+    start_s = time.perf_counter()
+    staging = staging_path(job.data_dir, job.bake_id)
+    notes = TaskNotes(staging)
+    with idle_timer.keep_awake(), notes.watching_compiler():
+        notes.note("reading")
+        scene = job.recipe.add_cameras(load_registered_scene(job.data_dir, job.scene_id))
+        method = _intern_method(job.method)
+        notes.note("building")
+        method.prepare(scene)
+        notes.note("working")
+        written = run_bake.run_task(method, scene, job.recipe, staging, task)
+    return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - start_s)
