@@ -1,7 +1,7 @@
-// Written by `python -m server.typescript` from the server's models. Do not edit.
+// Written by `python -m relume_server.typescript` from the server's models. Do not edit.
 
 
-/** What the eye sees where no surface is; it lights nothing. The map of the environment, the same `blurred` by that many degrees, one `color` (radiance), or nothing. */
+/** The background: what the camera sees where no surface is; it lights nothing. The map of the environment, the same `blurred` by that many degrees, one `color` (radiance), or nothing. */
 export interface BackgroundLook {
   kind: "map" | "blurred" | "color" | "transparent";
   color: [number, number, number];
@@ -34,7 +34,7 @@ export interface DrawnCurve {
   channels?: string;
 }
 
-/** The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise seen from above. `map` names it, see `relume.environments`; None: the scene's own. */
+/** The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise seen from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
 export interface EnvironmentLook {
   map: string | null;
   scale: number;

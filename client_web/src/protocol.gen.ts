@@ -1,4 +1,4 @@
-// Written by `python -m server.typescript` from the server's models. Do not edit.
+// Written by `python -m relume_server.typescript` from the server's models. Do not edit.
 
 
 export const SUBPROTOCOL = "relume.v1";
@@ -45,14 +45,6 @@ export interface BakeRequest {
   dry_run?: boolean;
 }
 
-/** client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "brush". */
-export interface BrushMessage {
-  type: "brush";
-  curve: string;
-  from: number;
-  to: number;
-}
-
 /** A camera that a person placed, by name. */
 export interface CameraBody {
   to_world: number[];
@@ -64,6 +56,23 @@ export interface CameraBody {
 export interface CameraFrame {
   to_world: number[];
   yfov: number;
+}
+
+/** client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as in an edit; nothing is prepared for it. `rest`: "exact", an exact picture from there follows when the eye rests, and edits go on in it; "stay", none does. */
+export interface CameraMessage {
+  type: "eye";
+  view: string;
+  eye: number;
+  to_world: number[];
+  yfov: number;
+  size: [number, number];
+  hand?: string | null;
+  rest?: "exact" | "stay";
+}
+
+/** From camera to camera, at even shares of the frames; one frame each where no number of frames is given. */
+export interface CameraPath {
+  eyes: CameraFrame[];
 }
 
 /** Whether a comment is settled. */
@@ -84,6 +93,18 @@ export interface CommentRequest {
   picture?: string | null;
 }
 
+/** Compare a look with brute force, in so many passes; figures come from the second on. `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone, which is sooner done. Where the eye moves: `camera`, from where it is seen, and `size` of the picture; by default as it was baked. */
+export interface ComparisonRequest {
+  bake: string;
+  view: string;
+  look?: Record<string, unknown>;
+  camera?: CameraFrame | null;
+  size?: [number, number] | null;
+  paths?: "all" | "method";
+  passes?: number;
+  dry_run?: boolean;
+}
+
 /** client → server: change the look; `revision` must be newer than the last. `hand` is what the hand is on: a curve, or what a touch may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
 export interface EditMessage {
   type: "edit";
@@ -93,27 +114,11 @@ export interface EditMessage {
   solo?: string[] | null;
 }
 
-/** client → server: who finds the pixels of views whose eye is "free" while they move. "browser": from now on frames of kind "tables" bring what a shader needs, beside what GET /api/bakes/{id}/surface gave once, each part again where it has changed; no frame comes for an eye alone. Exact pictures come as ever. */
-export interface EvaluateMessage {
-  type: "evaluate";
-  by: "browser" | "server";
-}
-
-/** client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as in an edit; nothing is prepared for it. `rest`: "exact", an exact picture from there follows when the eye rests, and edits go on in it; "stay", none does. */
-export interface EyeMessage {
-  type: "eye";
-  view: string;
-  eye: number;
-  to_world: number[];
-  yfov: number;
-  size: [number, number];
-  hand?: string | null;
-  rest?: "exact" | "stay";
-}
-
-/** From camera to camera, at even shares of the frames; one frame each where no number of frames is given. */
-export interface EyePath {
-  eyes: CameraFrame[];
+/** client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it. */
+export interface EncodingMessage {
+  type: "stream";
+  format: "hdr" | "jpeg" | "auto";
+  quality?: number;
 }
 
 /** client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first. */
@@ -122,13 +127,29 @@ export interface FocusMessage {
   view: string;
 }
 
+/** client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "brush". */
+export interface HighlightMessage {
+  type: "brush";
+  curve: string;
+  from: number;
+  to: number;
+}
+
+/** client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `InspectAnswer`. */
+export interface InspectMessage {
+  type: "probe";
+  view?: string | null;
+  x: number;
+  y: number;
+}
+
 /** What each frame of an animation shows; `view`: of which `path` is a way. */
 export interface LooksRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
   between?: "parameters" | "map";
-  path?: Turntable | EyePath | null;
+  path?: Turntable | CameraPath | null;
   view?: string | null;
 }
 
@@ -156,19 +177,18 @@ export interface PingMessage {
   type: "ping";
 }
 
+/** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the environment: prepare for it, the open curve stays open. */
+export interface PrepareMessage {
+  type: "touch";
+  curve?: string | null;
+  parameter?: string | null;
+}
+
 /** client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and the material in hand. */
 export interface PresenceMessage {
   type: "presence";
   name?: string | null;
   material?: string | null;
-}
-
-/** client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `ProbeAnswer`. */
-export interface ProbeMessage {
-  type: "probe";
-  view?: string | null;
-  x: number;
-  y: number;
 }
 
 /** client → server: of a view whose eye is "baked" this region is on the screen: x, y, width, height in pixels of its picture. It is exact before the rest, frames of what is on its way bring its tiles alone, and `fidelity` is that of what is in it. null: all of the picture, as it is before anything is said. */
@@ -184,7 +204,7 @@ export interface RenderRequest {
   looks: Record<string, unknown>[];
   frames?: number | null;
   between?: "parameters" | "map";
-  path?: Turntable | EyePath | null;
+  path?: Turntable | CameraPath | null;
   view: string;
   format: "exr" | "png" | "webp" | "mp4";
   size?: [number, number] | null;
@@ -194,6 +214,12 @@ export interface RenderRequest {
   color_space?: string | null;
   fps?: number;
   exact?: boolean;
+}
+
+/** client → server: who finds the pixels of views whose eye is "free" while they move. "browser": from now on frames of kind "tables" bring what a shader needs, beside what GET /api/bakes/{id}/surface gave once, each part again where it has changed; no frame comes for an eye alone. Exact pictures come as ever. */
+export interface RendererMessage {
+  type: "evaluate";
+  by: "browser" | "server";
 }
 
 /** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name; `sizes`: of their pictures, pixels, where they are not as large as was baked. */
@@ -215,13 +241,6 @@ export interface SharedPaths {
   bounces: number;
 }
 
-/** client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it. */
-export interface StreamMessage {
-  type: "stream";
-  format: "hdr" | "jpeg" | "auto";
-  quality?: number;
-}
-
 /** A BTF to be rendered from a small geometry, `size` texels wide; nothing of it is measured. */
 export interface SyntheticBtfRequest {
   geometry: "weave" | "pebbles" | "corduroy";
@@ -233,25 +252,6 @@ export interface SyntheticBtfRequest {
 /** Terms as they stand in a look. */
 export interface TermsRequest {
   terms: Record<string, unknown>[];
-}
-
-/** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the environment: prepare for it, the open curve stays open. */
-export interface TouchMessage {
-  type: "touch";
-  curve?: string | null;
-  parameter?: string | null;
-}
-
-/** Compare a look with brute force, in so many passes; figures come from the second on. `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone, which is sooner done. Where the eye moves: `camera`, from where it is seen, and `size` of the picture; by default as it was baked. */
-export interface TruthRequest {
-  bake: string;
-  view: string;
-  look?: Record<string, unknown>;
-  camera?: CameraFrame | null;
-  size?: [number, number] | null;
-  paths?: "all" | "method";
-  passes?: number;
-  dry_run?: boolean;
 }
 
 /** Once around an upright line, in so many frames; `start`: the first of them, by default where the view begins. `about`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows. `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps that stay, too; or the `environment` alone, which needs no bake whose eye moves. */
@@ -339,7 +339,7 @@ export interface BtfBody {
 }
 
 /** A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. */
-export interface BtfWorkBody {
+export interface BtfJobBody {
   id: string;
   name: string;
   user: string;
@@ -352,15 +352,6 @@ export interface BtfWorkBody {
   seconds_left: number | null;
   material: string | null;
   problem: string | null;
-}
-
-/** A scene made by code; `size` and `method` of a bake show it well. */
-export interface BuiltInBody {
-  name: string;
-  label: string;
-  description: string;
-  size: [number, number];
-  method: string;
 }
 
 /** A camera of a scene; `is_placed`: somebody placed it, it did not come with the scene. */
@@ -409,6 +400,45 @@ export interface CommentsMessage {
   type: "comments";
 }
 
+/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
+export interface ComparisonBody {
+  id: string;
+  user: string;
+  bake: string;
+  view: string;
+  state: "queued" | "running" | "ready" | "failed" | "stopped";
+  created: string;
+  started: string | null;
+  ended: string | null;
+  passes: number;
+  total: number;
+  progress: number;
+  seconds_left: number | null;
+  paths: "all" | "method";
+  left_out: string[];
+  untraced: string[];
+  found: ComparisonFigures | null;
+  found_of_method: ComparisonFigures | null;
+  problem: string | null;
+}
+
+/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its `standard_error`: null where that cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
+export interface ComparisonFigures {
+  rmse: number;
+  noise: number;
+  error: number | null;
+  standard_error: number | null;
+  limit: number;
+  significant: number;
+}
+
+/** The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn. `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment. */
+export interface ComparisonPlanBody {
+  passes: number;
+  seconds: number;
+  is_measured: boolean;
+}
+
 /** An editable factor of a term; an outgoing one multiplies the finished pixel. */
 export interface CurveBody {
   name: string;
@@ -435,6 +465,12 @@ export interface DisplayBody {
   views: string[];
 }
 
+/** server → client: the server is being stopped. Open the session again, there or on another server, within so many seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token. */
+export interface DrainMessage {
+  type: "leaving";
+  seconds: number;
+}
+
 /** The answer to a dry run: nothing was queued. */
 export interface DryRunBody {
   id: string;
@@ -452,14 +488,16 @@ export interface EnvironmentBody {
   thumbnail: string;
 }
 
-/** The corners of a scene, metres, and a camera that sees all of it. */
-export interface FinderBody {
-  lowest: number[];
-  highest: number[];
-  framing: CameraFrame;
+/** A scene made by code; `size` and `method` of a bake show it well. */
+export interface ExampleSceneBody {
+  name: string;
+  label: string;
+  description: string;
+  size: [number, number];
+  method: string;
 }
 
-/** Header of a binary frame. `shared`: as in the last `SharedMessage` whose look it shows. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone. */
+/** Header of a binary frame. `shared`: as in the last `RoomUpdate` whose look it shows. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone. */
 export interface FrameHeader {
   frame: number;
   revision: number;
@@ -476,7 +514,7 @@ export interface FrameHeader {
   alpha: boolean;
   eye: number | null;
   was_off: number | null;
-  tables: TablesInfo | null;
+  tables: SceneUpdate | null;
   ms: FrameTimes;
 }
 
@@ -485,6 +523,26 @@ export interface FrameTimes {
   wait: number;
   update: number;
   encode: number;
+}
+
+/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
+export interface FreeCameraBody {
+  functions: number;
+  rows: number;
+  columns: number;
+  ladder: RecurrenceBody;
+  expansions: number[][];
+  first_points: number[];
+  lobe_lists: LobeListsBody;
+  shapes: LobeShapesBody;
+  has_holes: boolean;
+  arrays: string[];
+}
+
+/** How far pictures are from the exact ones while an eye moves, measured in the bake: relative RMS over the surfaces that a few eyes see, in the scene's own look. */
+export interface FreeCameraError {
+  value: number;
+  standard_error: number;
 }
 
 /** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`: where others share the look, null for a session of one. `moving_error`: null where no eye moves, of bakes of before, and where it could not be measured. */
@@ -506,7 +564,7 @@ export interface HelloMessage {
   resume: string;
   role: "view" | "edit" | "admin";
   room: RoomInfo | null;
-  moving_error: MovingError | null;
+  moving_error: FreeCameraError | null;
 }
 
 /** An image that looks may name in the place of a material's own: `texture` or `roughness_map` of its terms, its `normal_map`. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says where it is metal; `base`: its base colour, an image, "diffuse" or "scene" of the scene's own textures, or null where that is the same everywhere. */
@@ -523,29 +581,18 @@ export interface ImageBody {
   thumbnail: string;
 }
 
-/** How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
-export interface InOutBody {
-  functions: number;
-  missed: number;
-  needed: number | null;
-  is_mirror: boolean;
-}
-
-/** How the functions of the in-basis follow from each other; see `relume.basis.zernike.Recurrence`. */
-export interface LadderBody {
-  order: number[];
-  norm: number[];
-  cosine: number[];
-  sine: number[];
-  a: number[];
-  b: number[];
-  c: number[];
-}
-
-/** server → client: the server is being stopped. Open the session again, there or on another server, within so many seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token. */
-export interface LeavingMessage {
-  type: "leaving";
-  seconds: number;
+/** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. `position` and `normal` are of the surface that covers most of it, world space; null for background. */
+export interface InspectAnswer {
+  type: "probe";
+  view: string;
+  x: number;
+  y: number;
+  material: string | null;
+  position: [number, number, number] | null;
+  normal: [number, number, number] | null;
+  radiance: [number, number, number];
+  curve: string | null;
+  bands: number[][] | null;
 }
 
 /** Lists of lights that lobes look for: `side` of the map of directions, how many are `listed` for each and how many `lights_a_lamp`; the `narrowest` σ, radians, of so many `widths`, each √2 times the one before. */
@@ -555,6 +602,14 @@ export interface LobeListsBody {
   lights_a_lamp: number;
   narrowest: number;
   widths: number;
+}
+
+/** Sizes of tables of highlights, see `relume.live.free_camera.basis.lobe_shapes`. Rings, half an octave each, from the float that has the bits `least_bits`; spokes; widths of lights. */
+export interface LobeShapesBody {
+  rings: number;
+  spokes: number;
+  widths: number;
+  least_bits: number;
 }
 
 /** A saved look in the list of them. `created`: when it was saved first, which editors sort by. `thumbnail`: address of the picture of this version, relative to the server, null where there is none. */
@@ -639,12 +694,6 @@ export interface ModelBody {
   curves: CurveBody[];
 }
 
-/** How far pictures are from the exact ones while an eye moves, measured in the bake: relative RMS over the surfaces that a few eyes see, in the scene's own look. */
-export interface MovingError {
-  value: number;
-  standard_error: number;
-}
-
 /** A number that generates curves; `scale` says how a slider moves. One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. Values are multiples of `step`, where it is given. */
 export interface ParameterBody {
   name: string;
@@ -670,7 +719,7 @@ export interface Person {
 }
 
 /** World space, metres; null where nothing is there. */
-export interface PlaceBody {
+export interface PickBody {
   position: number[] | null;
 }
 
@@ -686,20 +735,6 @@ export interface PlanBody {
 /** server → client: the answer to a `PingMessage`. */
 export interface PongMessage {
   type: "pong";
-}
-
-/** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. `position` and `normal` are of the surface that covers most of it, world space; null for background. */
-export interface ProbeAnswer {
-  type: "probe";
-  view: string;
-  x: number;
-  y: number;
-  material: string | null;
-  position: [number, number, number] | null;
-  normal: [number, number, number] | null;
-  radiance: [number, number, number];
-  curve: string | null;
-  bands: number[][] | null;
 }
 
 /** RFC 9457. `type` names the kind, `detail` says what happened and what to do. */
@@ -729,6 +764,17 @@ export interface RecipeBody {
   gather_rays: number | null;
   relightable: boolean;
   cameras: CameraBody[];
+}
+
+/** How the functions of the in-basis follow from each other; see `relume.math.zernike.Recurrence`. */
+export interface RecurrenceBody {
+  order: number[];
+  norm: number[];
+  cosine: number[];
+  sine: number[];
+  a: number[];
+  b: number[];
+  c: number[];
 }
 
 /** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs in. `created`, `started` and `ended` are times; null: not yet. */
@@ -769,6 +815,15 @@ export interface RoomMessage {
   people: Person[];
 }
 
+/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `shared` counts its changes, and frames say which they show. `by`: numbers of those who edited. */
+export interface RoomUpdate {
+  type: "shared";
+  revision: number;
+  shared: number;
+  patch: SharedOperation[];
+  by: number[];
+}
+
 /** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `remarks` are the `warnings` with what each does to the picture, the worst first. */
 export interface SceneBody {
   id: string;
@@ -779,13 +834,13 @@ export interface SceneBody {
   lights: string[];
   variants: SceneVariant[];
   warnings: string[];
-  remarks: SceneRemark[];
+  remarks: SceneWarning[];
   triangles: number;
   thumbnail: string | null;
   bakes: string[];
 }
 
-/** A material and its default terms, in look-document form; `catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles have no place in textures, and take a projection. `is_glass`: light passes it, as the scene's file says and no look changes. */
+/** A material and its default terms, in look-document form. `catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles have no texture coordinates, and take a projection. `is_glass`: light passes it, as the scene's file says and no look changes. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
@@ -794,10 +849,19 @@ export interface SceneMaterial {
   is_glass: boolean;
 }
 
-/** What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it. */
-export interface SceneRemark {
-  text: string;
-  effect: "wrong" | "simplified" | "unused";
+/** What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height and width of each. `lamps`: of the sky, that lobes show apart: direction, light, spread. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
+export interface SceneUpdate {
+  gain: [number, number, number];
+  sky_gain: [number, number, number];
+  background_gain: [number, number, number];
+  sky_turn: number;
+  sky_levels: [number, number, number][];
+  lamps: [number, number, number, number, number, number, number][];
+  background: "map" | "blurred" | "color" | "transparent";
+  background_color: [number, number, number];
+  background_size: [number, number];
+  is_direct: boolean;
+  arrays: ArrayInfo[];
 }
 
 /** A look that came with the scene's file; partial, in look-document form. */
@@ -813,12 +877,10 @@ export interface SceneView {
   is_placed: boolean;
 }
 
-/** Sizes of tables of highlights, see `relume.moving.basis.shapes`: rings, half an octave each, from the float that has the bits `least_bits`; spokes; widths of lights. */
-export interface ShapesBody {
-  rings: number;
-  spokes: number;
-  widths: number;
-  least_bits: number;
+/** What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it. */
+export interface SceneWarning {
+  text: string;
+  effect: "wrong" | "simplified" | "unused";
 }
 
 /** What a link shows; `lacking`: what of it is not here any more, one sentence each. */
@@ -844,15 +906,6 @@ export interface ShareEntry {
   url: string;
 }
 
-/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `shared` counts its changes, and frames say which they show. `by`: numbers of those who edited. */
-export interface SharedMessage {
-  type: "shared";
-  revision: number;
-  shared: number;
-  patch: SharedOperation[];
-  by: number[];
-}
-
 /** One operation of what a shared look has become. A path may be there already where it says `add`, and gone where it says `remove`. */
 export interface SharedOperation {
   op: "replace" | "add" | "remove";
@@ -867,74 +920,6 @@ export interface StatusMessage {
   view: string;
   what: string;
   progress: number;
-}
-
-/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
-export interface SurfaceBody {
-  functions: number;
-  rows: number;
-  columns: number;
-  ladder: LadderBody;
-  expansions: number[][];
-  first_points: number[];
-  lobe_lists: LobeListsBody;
-  shapes: ShapesBody;
-  has_holes: boolean;
-  arrays: string[];
-}
-
-/** What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height and width of each. `lamps`: of the sky, that lobes show apart: direction, light, spread. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
-export interface TablesInfo {
-  gain: [number, number, number];
-  sky_gain: [number, number, number];
-  background_gain: [number, number, number];
-  sky_turn: number;
-  sky_levels: [number, number, number][];
-  lamps: [number, number, number, number, number, number, number][];
-  background: "map" | "blurred" | "color" | "transparent";
-  background_color: [number, number, number];
-  background_size: [number, number];
-  is_direct: boolean;
-  arrays: ArrayInfo[];
-}
-
-/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
-export interface TruthBody {
-  id: string;
-  user: string;
-  bake: string;
-  view: string;
-  state: "queued" | "running" | "ready" | "failed" | "stopped";
-  created: string;
-  started: string | null;
-  ended: string | null;
-  passes: number;
-  total: number;
-  progress: number;
-  seconds_left: number | null;
-  paths: "all" | "method";
-  left_out: string[];
-  untraced: string[];
-  found: TruthFigures | null;
-  found_of_method: TruthFigures | null;
-  problem: string | null;
-}
-
-/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its `standard_error`: null where that cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
-export interface TruthFigures {
-  rmse: number;
-  noise: number;
-  error: number | null;
-  standard_error: number | null;
-  limit: number;
-  significant: number;
-}
-
-/** The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn. `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment. */
-export interface TruthPlanBody {
-  passes: number;
-  seconds: number;
-  is_measured: boolean;
 }
 
 /** A view of a display, as looks name it in `display.tone_map`. */
@@ -953,6 +938,21 @@ export interface ViewInfo {
   bounds: [number[], number[]] | null;
 }
 
+/** The corners of a scene, metres, and a camera that sees all of it. */
+export interface ViewportBody {
+  lowest: number[];
+  highest: number[];
+  framing: CameraFrame;
+}
+
+/** How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
+export interface ZernikeFitBody {
+  functions: number;
+  missed: number;
+  needed: number | null;
+  is_mirror: boolean;
+}
+
 export type ClientMessage =
   | OpenMessage
   | EditMessage
@@ -961,12 +961,12 @@ export type ClientMessage =
   | FocusMessage
   | RegionMessage
   | AckMessage
-  | StreamMessage
-  | ProbeMessage
-  | BrushMessage
-  | TouchMessage
-  | EyeMessage
-  | EvaluateMessage
+  | EncodingMessage
+  | InspectMessage
+  | HighlightMessage
+  | PrepareMessage
+  | CameraMessage
+  | RendererMessage
   | PresenceMessage
   | PingMessage;
 
@@ -974,11 +974,11 @@ export type ServerMessage =
   | HelloMessage
   | StatusMessage
   | ProblemMessage
-  | ProbeAnswer
+  | InspectAnswer
   | CurveMessage
   | BakeMessage
-  | LeavingMessage
+  | DrainMessage
   | RoomMessage
-  | SharedMessage
+  | RoomUpdate
   | CommentsMessage
   | PongMessage;

@@ -7,8 +7,8 @@ export type {
   BakeBody,
   BakeMessage,
   BakeRequest,
-  BtfWorkBody,
-  BuiltInBody,
+  BtfJobBody,
+  ExampleSceneBody,
   ColorBody,
   CameraEntry,
   CommentBody,
@@ -19,11 +19,11 @@ export type {
   DryRunBody,
   EnvironmentBody,
   ImageBody,
-  FinderBody,
+  ViewportBody,
   FrameHeader,
   HelloMessage,
   AlbedoBody,
-  InOutBody,
+  ZernikeFitBody,
   LooksRequest,
   LookEntry,
   LooksBody,
@@ -32,10 +32,10 @@ export type {
   OpenMessage,
   ModelBody,
   ParameterBody,
-  PlaceBody,
+  PickBody,
   Person,
   PlanBody,
-  ProbeAnswer,
+  InspectAnswer,
   Problem,
   ProblemMessage,
   RenderBody,
@@ -45,13 +45,13 @@ export type {
   ServerMessage,
   ShareEntry,
   ShareRequest,
-  SharedMessage,
+  RoomUpdate,
   SyntheticBtfRequest,
   StatusMessage,
-  SurfaceBody,
-  TruthBody,
-  TruthPlanBody,
-  TruthRequest,
+  FreeCameraBody,
+  ComparisonBody,
+  ComparisonPlanBody,
+  ComparisonRequest,
   Turntable,
 } from "./protocol.gen";
 export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, OcioView, TransportLook as Transport } from "./look.gen";
@@ -66,7 +66,7 @@ export type PatchOp = gen.PatchOperation;
 
 export type Fidelity = gen.FrameHeader["fidelity"];
 
-/** A term as people write it: what it leaves out is as its model says. */
+/** A partial term: omitted fields are as its model says. */
 export type Term = Pick<doc.TermLook, "model" | "color"> & Partial<doc.TermLook>;
 export type ParamValue = doc.TermLook["params"][string];
 export type CurveEdits = doc.TermLook["curves"][string];

@@ -1,30 +1,30 @@
 import { beforeEach, expect, test } from "vitest";
-import { connectionWords } from "../src/app/connectionWords";
-import { bake, coming } from "../src/state/bakes";
-import { connection, offline, refusedBecause, retryInMs } from "../src/state/connection";
+import { connectionMessage } from "../src/app/connectionMessages";
+import { bake, pendingBake } from "../src/state/bakes";
+import { connection, isOffline, rejectionMessage, retryInMs } from "../src/state/connection";
 
 beforeEach(() => {
   connection.value = "connecting";
-  bake.value = coming.value = refusedBecause.value = null;
+  bake.value = pendingBake.value = rejectionMessage.value = null;
 });
 
 test("what was never baked waits for its bake, it does not connect", () => {
-  coming.value = { id: "a" } as NonNullable<typeof coming.value>;
-  expect(connectionWords()).toBe("Waiting for the bake");
+  pendingBake.value = { id: "a" } as NonNullable<typeof pendingBake.value>;
+  expect(connectionMessage()).toBe("Waiting for the bake");
   bake.value = "b";
-  expect(connectionWords()).toBe("Connecting…");
+  expect(connectionMessage()).toBe("Connecting…");
 });
 
 test("a lost connection says that edits are kept and when it is tried again", () => {
   connection.value = "reconnecting";
   retryInMs.value = 4000;
-  expect(connectionWords()).toBe("Connection lost. Edits are kept; trying again in 4 s");
+  expect(connectionMessage()).toBe("Connection lost. Edits are kept; trying again in 4 s");
 });
 
 test("silence says that edits are kept, and whether the browser is offline", () => {
   connection.value = "silent";
-  expect(connectionWords()).toBe("No answer from the server. Edits are kept");
-  offline.value = true;
-  expect(connectionWords()).toBe("Offline. Edits are kept");
-  offline.value = false;
+  expect(connectionMessage()).toBe("No answer from the server. Edits are kept");
+  isOffline.value = true;
+  expect(connectionMessage()).toBe("Offline. Edits are kept");
+  isOffline.value = false;
 });

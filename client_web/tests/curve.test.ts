@@ -1,13 +1,13 @@
 import { describe, expect, test } from "vitest";
-import { degreesAt, niceTop, valueAt, xFraction, yFraction, type Axes } from "../src/curve/model/axes";
-import { joined, readChannels, writeChannels } from "../src/curve/model/channels";
-import { bandSamples, fitPoints, knotSamples, MAX_POINTS, Stroke } from "../src/curve/model/fit";
-import { bandsOfPoints, pchip } from "../src/curve/model/pchip";
+import { degreesAt, niceTop, valueAt, xFraction, yFraction, type CurveAxes } from "../src/curve/model/axes";
+import { joinChannels, readChannels, writeChannels } from "../src/curve/model/channels";
+import { bandSamples, fitPoints, knotSamples, MAX_POINTS, BrushStroke } from "../src/curve/model/fit";
+import { averageBands, pchip } from "../src/curve/model/pchip";
 import { addPoint, movePoint, removePoint } from "../src/curve/model/points";
-import { mainStretch, shareOf } from "../src/curve/model/stretch";
+import { mainInterval, outputShares } from "../src/curve/model/interval";
 import type { DrawnCurve, Point } from "../src/protocol";
 
-const LINEAR: Axes = { stretched: false, log: false, top: 5 };
+const LINEAR: CurveAxes = { stretched: false, log: false, top: 5 };
 const POINTS: Point[] = [
   [0, 4],
   [5, 3.8],
@@ -58,10 +58,10 @@ describe("pchip", () => {
       [0, 0],
       [90, 9],
     ];
-    bandsOfPoints(straight, 64).forEach((v, j) => expect(v).toBeCloseTo((9 * (j + 0.5)) / 64, 12));
+    averageBands(straight, 64).forEach((v, j) => expect(v).toBeCloseTo((9 * (j + 0.5)) / 64, 12));
     const curve = pchip(POINTS);
     const fine = (j: number) => Array.from({ length: 400 }, (_, i) => curve((90 * (j + (i + 0.5) / 400)) / 64));
-    bandsOfPoints(POINTS, 64).forEach((v, j) => {
+    averageBands(POINTS, 64).forEach((v, j) => {
       expect(Math.abs(v - fine(j).reduce((a, b) => a + b, 0) / 400)).toBeLessThan(2e-3);
     });
   });
@@ -97,7 +97,7 @@ describe("axes", () => {
 describe("fitPoints", () => {
   test.each([0.05, 0.2, 0.6])("a few points carry a Beckmann lobe of σ = %d", (sigma) => {
     const samples = bandSamples(beckmann(sigma));
-    const axes: Axes = { stretched: true, log: false, top: niceTop(Math.max(...beckmann(sigma)), false) };
+    const axes: CurveAxes = { stretched: true, log: false, top: niceTop(Math.max(...beckmann(sigma)), false) };
     const points = fitPoints(samples, axes);
     expectValid(points);
     expect(points.length).toBeLessThanOrEqual(24);
@@ -123,7 +123,7 @@ describe("fitPoints", () => {
 
 describe("Stroke", () => {
   test("fills the bands between two events and forgets nothing outside", () => {
-    const stroke = new Stroke(90, LINEAR);
+    const stroke = new BrushStroke(90, LINEAR);
     stroke.add(10, 0);
     stroke.add(20, 1);
     const heights = stroke.heights(0);
@@ -133,7 +133,7 @@ describe("Stroke", () => {
   });
 
   test("the newest pass wins", () => {
-    const stroke = new Stroke(90, LINEAR);
+    const stroke = new BrushStroke(90, LINEAR);
     stroke.add(10, 0.2);
     stroke.add(30, 0.2);
     stroke.add(20, 0.8);
@@ -142,8 +142,8 @@ describe("Stroke", () => {
   });
 
   test("smoothing takes the shake out and keeps a straight line", () => {
-    const shaky = new Stroke(256, LINEAR);
-    const straight = new Stroke(256, LINEAR);
+    const shaky = new BrushStroke(256, LINEAR);
+    const straight = new BrushStroke(256, LINEAR);
     for (let j = 0; j <= 128; j++) {
       shaky.add(((j + 0.5) / 256) * 90, 0.5 + (j % 2 ? 0.1 : -0.1));
       straight.add(((j + 0.5) / 256) * 90, j / 256);
@@ -190,7 +190,7 @@ describe("points", () => {
 
   test("others stay the objects they were", () => {
     const { points } = addPoint(POINTS, 20, 3, BAND);
-    for (const kept of POINTS) expect(points).toContain(kept);
+    for (const stored of POINTS) expect(points).toContain(stored);
     expect(movePoint(POINTS, 2, 11, 1, BAND).filter((p) => POINTS.includes(p))).toHaveLength(POINTS.length - 1);
   });
 
@@ -222,8 +222,8 @@ describe("channels", () => {
       { ...rest, channels: "b" },
     ]);
     expect(readChannels(writeChannels(mixed), 2)).toEqual(mixed);
-    expect(joined(readChannels(red, 2))).toBe(true);
-    expect(joined(mixed)).toBe(false);
+    expect(joinChannels(readChannels(red, 2))).toBe(true);
+    expect(joinChannels(mixed)).toBe(false);
   });
 
   test("rows of bands are flat, per channel, or for one channel", () => {
@@ -237,7 +237,7 @@ describe("channels", () => {
 
 test("a pixel's share through a curve, and nothing where only rounding is left", () => {
   expect(
-    shareOf(
+    outputShares(
       [
         [0.1, 0.1],
         [0.05, 0.05],
@@ -247,7 +247,7 @@ test("a pixel's share through a curve, and nothing where only rounding is left",
     ),
   ).toBeCloseTo(0.5, 12);
   expect(
-    shareOf(
+    outputShares(
       [
         [1e-12, -1e-12],
         [0, 0],
@@ -256,15 +256,15 @@ test("a pixel's share through a curve, and nothing where only rounding is left",
       [0.4, 0.2, 0],
     ),
   ).toBe(0);
-  expect(shareOf([[1], [1], [1]], [0, 0, 0])).toBe(0);
+  expect(outputShares([[1], [1], [1]], [0, 0, 0])).toBe(0);
 });
 
 test("mainStretch finds the narrowest run that carries the light", () => {
   const bands = Array<number>(90).fill(0.01);
   bands.fill(10, 3, 7);
-  expect(mainStretch([bands, bands, bands])).toEqual([3, 7]);
+  expect(mainInterval([bands, bands, bands])).toEqual([3, 7]);
   expect(
-    mainStretch([
+    mainInterval([
       [0, 0],
       [0, 0],
       [0, 0],

@@ -1,13 +1,13 @@
 import { describe, expect, test } from "vitest";
-import { luminance } from "../src/color/tonemap";
-import { emissionOf, LUMENS_A_WATT, measureOf, wattsOf } from "../src/lights/power";
-import { atKelvin, kelvinOf, planckian, rgbOfKelvin } from "../src/lights/temperature";
+import { luminance } from "../src/render/color/tonemap";
+import { emissionForWatts, LUMENS_PER_WATT, unitsOf, wattsOf } from "../src/panels/lights/power";
+import { withKelvin, kelvinOf, planckian, rgbOfKelvin } from "../src/panels/lights/temperature";
 import type { Light } from "../src/protocol";
 
 const common = { scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1] } as const;
 const light = (fields: object) => ({ ...common, ...fields }) as unknown as Light;
 
-/** Power of a spot by adding up directions, with the falloff that pictures have. */
+/** Power of a spot by adding up directions, with the falloff that images have. */
 function addedUp([full, edge]: [number, number], steps = 20_000): number {
   const [cosFull, cosEdge] = [full, edge].map((angle) => Math.cos((angle * Math.PI) / 180)) as [number, number];
   let sum = 0;
@@ -29,19 +29,19 @@ describe("the power of a light", () => {
 
   test("counts intensity and tint, and luminance alone", () => {
     expect(wattsOf(light({ kind: "directional", scale: 3, color: [0, 1, 0] }))).toBeCloseTo(3 * luminance([0, 1, 0]), 9);
-    expect(measureOf(light({ kind: "directional" })).lumens).toBe("lx");
+    expect(unitsOf(light({ kind: "directional" })).lumens).toBe("lx");
   });
 
   test("a bulb of 806 lumens has them after they were typed", () => {
     const bulb = light({ kind: "point", emission: [3, 2, 1], scale: 0.5 });
-    const emission = emissionOf(bulb, 806 / LUMENS_A_WATT);
-    expect(LUMENS_A_WATT * wattsOf({ ...bulb, emission } as Light)).toBeCloseTo(806, 2);
-    expect((emission?.[0] ?? 0) / (emission?.[2] ?? 1)).toBeCloseTo(3, 4); // the same colour
+    const emission = emissionForWatts(bulb, 806 / LUMENS_PER_WATT);
+    expect(LUMENS_PER_WATT * wattsOf({ ...bulb, emission } as Light)).toBeCloseTo(806, 2);
+    expect((emission?.[0] ?? 0) / (emission?.[2] ?? 1)).toBeCloseTo(3, 4); // the same color
   });
 
   test("a dark light becomes white, one that is turned down to nothing stays as it is", () => {
-    expect(emissionOf(light({ kind: "directional", emission: [0, 0, 0] }), 2)).toEqual([2, 2, 2]);
-    expect(emissionOf(light({ kind: "point", scale: 0 }), 2)).toBeNull();
+    expect(emissionForWatts(light({ kind: "directional", emission: [0, 0, 0] }), 2)).toEqual([2, 2, 2]);
+    expect(emissionForWatts(light({ kind: "point", scale: 0 }), 2)).toBeNull();
   });
 });
 
@@ -60,12 +60,12 @@ describe("the temperature of a light", () => {
     expect(Math.abs(kelvinOf([1, 1, 1]).kelvin - 6500)).toBeLessThan(60);
     for (const kelvin of [2000, 2700, 4000, 6500, 10_000, 14_000])
       expect(Math.abs(kelvinOf(rgbOfKelvin(kelvin)).kelvin / kelvin - 1)).toBeLessThan(0.01);
-    expect(kelvinOf(rgbOfKelvin(3000)).coloured).toBe(false);
-    expect(kelvinOf([0, 1, 0]).coloured).toBe(true);
+    expect(kelvinOf(rgbOfKelvin(3000)).isColored).toBe(false);
+    expect(kelvinOf([0, 1, 0]).isColored).toBe(true);
   });
 
   test("changes the colour of a light, not how bright it is", () => {
-    const warm = atKelvin([5, 5, 5], 2700);
+    const warm = withKelvin([5, 5, 5], 2700);
     expect(luminance(warm)).toBeCloseTo(5, 4);
     expect(warm[0]).toBeGreaterThan(2 * warm[2]);
   });

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { changeAt } from "../src/document/change";
-import { environmentOf } from "../src/outline/environments";
-import { LOOK } from "./look";
+import { changeValue } from "../src/state/document/jsonPatch";
+import { environmentOf } from "../src/panels/scene/environments";
+import { LOOK } from "./exampleLook";
 
 const file = (name: string) => new File([], name);
 
@@ -19,9 +19,9 @@ describe("an environment among dropped files", () => {
 
 describe("another environment", () => {
   it("travels as one operation", () => {
-    const lit = changeAt(LOOK, "/environment/map", "env:0123456789abcdef");
+    const lit = changeValue(LOOK, "/environment/map", "env:0123456789abcdef");
     expect(lit.patch).toEqual([{ op: "replace", path: "/environment/map", value: "env:0123456789abcdef" }]);
-    const back = changeAt(lit.after, "/environment/map", null);
+    const back = changeValue(lit.after, "/environment/map", null);
     expect(back.patch).toEqual([{ op: "replace", path: "/environment/map", value: null }]);
   });
 });

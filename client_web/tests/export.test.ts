@@ -1,14 +1,14 @@
 import { expect, test, vi } from "vitest";
-import { fileStem } from "../src/looks/export";
+import { fileStem } from "../src/panels/looks/exportImage";
 import type { SceneBody } from "../src/protocol";
 import { scene } from "../src/state/scene";
-import { viewName } from "../src/state/views";
+import { activeViewName } from "../src/state/views";
 
-vi.mock("../src/live/live", () => ({ whenExact: () => Promise.resolve() }));
+vi.mock("../src/session/fidelityState", () => ({ untilExact: () => Promise.resolve() }));
 
 function called(name: string, view: string): string {
   scene.value = { name } as SceneBody;
-  viewName.value = view;
+  activeViewName.value = view;
   return fileStem();
 }
 

@@ -1,10 +1,10 @@
 import { expect, test } from "vitest";
-import type { Dropped } from "../src/files/dropped";
-import { isOfUse, sortFiles, stem, together } from "../src/files/files";
-import { resolve } from "../src/files/named";
-import { previewSize, recipeProblem } from "../src/scene/recipe";
+import type { DroppedFile } from "../src/start/files/dropTypes";
+import { isImportable, sortFiles, fileBaseName, mergeFiles } from "../src/start/files/sceneFiles";
+import { resolvePath } from "../src/start/files/references";
+import { previewSize, validateRecipe } from "../src/session/scene/recipe";
 
-const dropped = (path: string, content: BlobPart = ""): Dropped => ({
+const dropped = (path: string, content: BlobPart = ""): DroppedFile => ({
   path,
   file: new File([content], path.replace(/^.*\//, "")),
 });
@@ -15,9 +15,9 @@ test("dropped files find their role", async () => {
   const { scenes, environment } = await sortFiles(files);
   expect(scenes.map(({ path }) => path)).toEqual(["a.GLB", "b.ply"]);
   expect(environment?.name).toBe("sky.exr");
-  expect(files.every(isOfUse)).toBe(true);
-  expect(isOfUse(dropped("notes.txt"))).toBe(false);
-  expect(["tea.pot.obj", "plain", "a/b/c.d.glb"].map(stem)).toEqual(["tea.pot", "plain", "c.d"]);
+  expect(files.every(isImportable)).toBe(true);
+  expect(isImportable(dropped("notes.txt"))).toBe(false);
+  expect(["tea.pot.obj", "plain", "a/b/c.d.glb"].map(fileBaseName)).toEqual(["tea.pot", "plain", "c.d"]);
 });
 
 test("a scene takes along what it names, wherever that lies in the folder, and no more", async () => {
@@ -53,13 +53,13 @@ test("what a binary glTF names stands in its first chunk; damaged files name not
 });
 
 test("of two files of one name the new one counts", () => {
-  const [old, other, news] = [dropped("a.glb"), dropped("b.hdr"), dropped("a.glb")];
-  expect(together([old, other], [news])).toEqual([news, other]);
+  const [old, otherFile, news] = [dropped("a.glb"), dropped("b.hdr"), dropped("a.glb")];
+  expect(mergeFiles([old, otherFile], [news])).toEqual([news, otherFile]);
 });
 
 test("names lead from the scene's folder, as far as there are folders", () => {
-  expect(resolve("a/b/c.gltf", "./d/../e.bin")).toBe("a/b/e.bin");
-  expect(resolve("c.gltf", "../../e.bin")).toBe("e.bin");
+  expect(resolvePath("a/b/c.gltf", "./d/../e.bin")).toBe("a/b/e.bin");
+  expect(resolvePath("c.gltf", "../../e.bin")).toBe("e.bin");
 });
 
 test("a preview has the shape of what was asked for and is never larger", () => {
@@ -71,12 +71,12 @@ test("a preview has the shape of what was asked for and is never larger", () => 
 });
 
 test("recipes are whole numbers within bounds", () => {
-  expect(recipeProblem({ size: [16, 16384], lights: 1 })).toBeNull();
+  expect(validateRecipe({ size: [16, 16384], lights: 1 })).toBeNull();
   for (const size of [[0, 9], [640, Number.NaN], [20.5, 20], [99999, 100]] as [number, number][])
-    expect(recipeProblem({ size, lights: 9 })).toMatch("whole pixels");
-  expect(recipeProblem({ size: [640, 480], lights: 0 })).toMatch("light triangles");
+    expect(validateRecipe({ size, lights: 9 })).toMatch("whole pixels");
+  expect(validateRecipe({ size: [640, 480], lights: 0 })).toMatch("light triangles");
   const good = { size: [640, 480] as [number, number], lights: 9 };
-  expect(recipeProblem({ ...good, gather_samples: 64, gather_rays: 4096 })).toBeNull();
-  expect(recipeProblem({ ...good, gather_samples: 63 })).toMatch("64 to 65,535 gather samples");
-  for (const gather_rays of [15, 4097, 20.5, Number.NaN]) expect(recipeProblem({ ...good, gather_rays })).toMatch("rays a sample");
+  expect(validateRecipe({ ...good, gather_samples: 64, gather_rays: 4096 })).toBeNull();
+  expect(validateRecipe({ ...good, gather_samples: 63 })).toMatch("64 to 65,535 gather samples");
+  for (const gather_rays of [15, 4097, 20.5, Number.NaN]) expect(validateRecipe({ ...good, gather_rays })).toMatch("rays a sample");
 });

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
-import { decodeRgb9e5, encodeRgb9e5 } from "../src/color/rgb9e5";
-import { FrameError, parseFrame } from "../src/net/binaryFrame";
-import { applyFrame, brushImage, emptyPixels, normalised } from "../src/picture/pixels";
+import { decodeRgb9e5, encodeRgb9e5 } from "../src/render/color/rgb9e5";
+import { FrameError, parseFrame } from "../src/session/net/binaryFrame";
+import { applyFrame, brushImage, emptyPixels, normalizeWeights } from "../src/render/pixels";
 
 const HEADER = {
   frame: 12,
@@ -115,23 +115,23 @@ describe("rgb9e5", () => {
 
 describe("applyFrame", () => {
   test("a tile lands where it belongs and nowhere else", () => {
-    const words = Uint32Array.from([1, 2, 3, 4]);
+    const encoded = Uint32Array.from([1, 2, 3, 4]);
     const pixels = emptyPixels(4, 3);
-    applyFrame(pixels, parseFrame(pack(HEADER, new Uint8Array(words.buffer))));
-    expect([...pixels.words]).toEqual([0, 0, 0, 0, 0, 1, 2, 0, 0, 3, 4, 0]);
+    applyFrame(pixels, parseFrame(pack(HEADER, new Uint8Array(encoded.buffer))));
+    expect([...pixels.encoded]).toEqual([0, 0, 0, 0, 0, 1, 2, 0, 0, 3, 4, 0]);
   });
 
   test("floats become the nearest shared-exponent words", () => {
     const floats = Float32Array.from({ length: 12 }, (_, i) => i / 4);
     const pixels = emptyPixels(4, 3);
     applyFrame(pixels, parseFrame(pack({ ...HEADER, format: "f32" }, new Uint8Array(floats.buffer))));
-    expect(decodeRgb9e5(pixels.words[5] as number)).toEqual([0, 0.25, 0.5]);
+    expect(decodeRgb9e5(pixels.encoded[5] as number)).toEqual([0, 0.25, 0.5]);
   });
 
   test("a brush has one byte a pixel", () => {
     const frame = parseFrame(pack({ ...HEADER, kind: "brush", format: "r8" }, Uint8Array.from([10, 20, 30, 40])));
     expect([...brushImage(frame)]).toEqual([0, 0, 0, 0, 0, 10, 20, 0, 0, 30, 40, 0]);
-    expect(Math.max(...normalised(brushImage(frame)))).toBe(255);
-    expect(Math.max(...normalised(Uint8Array.from([0, 1])))).toBe(51);
+    expect(Math.max(...normalizeWeights(brushImage(frame)))).toBe(255);
+    expect(Math.max(...normalizeWeights(Uint8Array.from([0, 1])))).toBe(51);
   });
 });

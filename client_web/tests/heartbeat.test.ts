@@ -1,6 +1,6 @@
 /** A server that no longer answers, on a connection that nobody closed. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { LiveSocket } from "../src/net/socket";
+import { SessionSocket } from "../src/session/net/socket";
 
 class FakeSocket {
   static readonly OPEN = 1;
@@ -26,7 +26,7 @@ class FakeSocket {
 const PING = '{"type":"ping"}';
 const connection = vi.fn();
 const newest = () => FakeSocket.opened.at(-1) as FakeSocket;
-let socket: LiveSocket;
+let socket: SessionSocket;
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -35,9 +35,9 @@ beforeEach(() => {
   vi.stubGlobal("window", globalThis);
   FakeSocket.opened = [];
   connection.mockClear();
-  socket = new LiveSocket("bake", { connection, received: () => undefined, ended: () => undefined });
+  socket = new SessionSocket("bake", { connection, received: () => undefined, ended: () => undefined });
   socket.connect();
-  socket.greet("token");
+  socket.onHello("token");
   connection.mockClear();
 });
 
@@ -95,8 +95,8 @@ test("when the network is back, a silent connection is left at once, and a good 
 });
 
 test("reason to doubt the connection asks at once", () => {
-  socket.check();
-  socket.check();
+  socket.checkConnection();
+  socket.checkConnection();
   expect(newest().sent).toEqual([PING]);
   vi.advanceTimersByTime(2500);
   expect(connection.mock.calls).toEqual([["silent", 0]]);

@@ -1,8 +1,8 @@
 import { beforeEach, describe, expect, test } from "vitest";
-import { changeAt } from "../src/document/change";
-import { History, type Perform } from "../src/edit/history";
+import { changeValue } from "../src/state/document/jsonPatch";
+import { History, type PerformStep } from "../src/edit/history";
 import type { Look } from "../src/protocol";
-import { LOOK, lookWith } from "./look";
+import { LOOK, lookWith } from "./exampleLook";
 
 let value = 0;
 let now = 0;
@@ -12,15 +12,15 @@ const EXPOSURE = "/display/exposure";
 const exposed = (exposure: number): Look => lookWith(LOOK, EXPOSURE, exposure);
 
 /** The look is a number here: its exposure. */
-const perform: Perform = (step, back) => {
-  if (step.of === "look") value = (back ? step.before : step.after).display.exposure;
+const perform: PerformStep = (step, back) => {
+  if (step.kind === "look") value = (back ? step.before : step.after).display.exposure;
 };
 const goTo = (count: number) => history.goTo(count, perform);
 const undo = () => goTo(history.cursor.value - 1);
 const redo = () => goTo(history.cursor.value + 1);
 
 function change(to: number, key?: string): void {
-  const step = { of: "look" as const, label: `to ${to}`, ...changeAt(exposed(value), EXPOSURE, to) };
+  const step = { kind: "look" as const, label: `to ${to}`, ...changeValue(exposed(value), EXPOSURE, to) };
   value = to;
   history.record(key === undefined ? step : { ...step, key });
 }
@@ -43,14 +43,14 @@ describe("History", () => {
 
   test("presses while a step is being undone count too, and so do those the other way", async () => {
     [1, 2, 3].forEach((v) => change(v));
-    const slow: Perform = async (step, back) => {
+    const slow: PerformStep = async (step, back) => {
       await Promise.resolve();
       void perform(step, back);
     };
-    const press = (by: number) => history.goTo(history.heading + by, slow);
+    const press = (by: number) => history.goTo(history.targetCursor + by, slow);
     const first = press(-1);
     await Promise.all([first, press(-1), press(-1)]);
-    expect([value, history.cursor.value, history.heading]).toEqual([0, 0, 0]);
+    expect([value, history.cursor.value, history.targetCursor]).toEqual([0, 0, 0]);
     await Promise.all([press(1), press(1), press(-1)]);
     expect([value, history.cursor.value]).toEqual([1, 1]);
   });
@@ -58,12 +58,12 @@ describe("History", () => {
   test("undone steps can be kept: nothing that comes takes them away", async () => {
     [1, 2, 3].forEach((v) => change(v));
     const saved = { name: "Look 1", look: LOOK };
-    history.record({ of: "shelf", label: "Save Look 1", before: null, after: saved });
+    history.record({ kind: "shelf", label: "Save Look 1", before: null, after: saved });
     await goTo(1);
-    expect(history.keepUndone()).toBe(true);
+    expect(history.commitUndone()).toBe(true);
     expect(history.canRedo).toBe(false);
     change(7);
-    expect(history.keepUndone()).toBe(false);
+    expect(history.commitUndone()).toBe(false);
     expect(history.steps.value.map((step) => step.label)).toEqual([
       "to 1",
       "to 2",
@@ -73,7 +73,7 @@ describe("History", () => {
       "Back to “to 1”",
       "to 7",
     ]);
-    expect(history.steps.value[4]).toMatchObject({ of: "shelf", before: saved, after: null });
+    expect(history.steps.value[4]).toMatchObject({ kind: "shelf", before: saved, after: null });
     await undo();
     expect(value).toBe(1);
     await undo();
@@ -85,7 +85,7 @@ describe("History", () => {
   test("a drag is one step, back to where it began", async () => {
     change(1);
     for (let v = 10; v < 60; v++) change(v, "/sigma");
-    history.seal();
+    history.endGesture();
     expect(history.steps.value).toHaveLength(2);
     expect(history.steps.value[1]).toMatchObject({
       patch: [{ op: "replace", path: EXPOSURE, value: 59 }],
@@ -99,7 +99,7 @@ describe("History", () => {
 
   test("another gesture, another pointer or a pause begins a new step", () => {
     change(1, "/sigma");
-    history.seal();
+    history.endGesture();
     change(2, "/sigma");
     change(3, "/ior");
     now += 5000;
@@ -111,7 +111,7 @@ describe("History", () => {
     change(1, "/sigma");
     for (let i = 0; i < 10; i++) {
       now += 700;
-      history.hold();
+      history.extendGesture();
     }
     change(2, "/sigma");
     expect(history.steps.value).toHaveLength(1);
@@ -128,7 +128,7 @@ describe("History", () => {
   });
 
   test("an operation that fails to undo leaves the cursor where it was", async () => {
-    history.record({ of: "shelf", label: "delete look", before: { name: "Look", look: {} }, after: null });
+    history.record({ kind: "shelf", label: "delete look", before: { name: "Look", look: {} }, after: null });
     await expect(history.goTo(0, () => Promise.reject(new Error("offline")))).rejects.toThrow("offline");
     expect(history.cursor.value).toBe(1);
     expect(history.canUndo).toBe(true);

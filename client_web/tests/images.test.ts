@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import { baseTexture, withBaseImage, withoutBaseImage, withTexture } from "../src/images/colour";
-import { mapNamed } from "../src/images/mapNames";
+import { baseTexture, withBaseImage, withoutBaseImage, withTexture } from "../src/panels/inspector/images/baseColor";
+import { detectMap } from "../src/panels/inspector/images/mapNames";
 import type { ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -40,11 +40,11 @@ test("terms that share a channel change their texture together; others stay", ()
   ]);
 });
 
-test("maps that are no colours are known by their names", () => {
+test("maps that are no colors are known by their names", () => {
   const named = ["oak_rough_2k.jpg", "Metal049A_1K-JPG_Metalness.jpg", "rust_arm_4k.png", "bricks-normalGL.png", "wall_AO.png"];
-  const others = ["oak_nor_dx_2k.jpg", "oak_nor_gl_2k.jpg", "tiles_height.png", "lamp_emissive.png"];
-  expect(named.map(mapNamed)).toEqual(["roughness", "metal", "roughness and metal", "normals", "occlusion"]);
-  expect(others.map(mapNamed)).toEqual(["normals for DirectX", "normals", "heights", "what shines"]);
-  const colours = ["rough_plaster_diff_2k.jpg", "Metal049A_1K-JPG_Color.jpg", "armchair.webp", "rough.png", "IMG_1234.jpg"];
-  expect(colours.map(mapNamed)).toEqual(colours.map(() => null));
+  const otherTerms = ["oak_nor_dx_2k.jpg", "oak_nor_gl_2k.jpg", "tiles_height.png", "lamp_emissive.png"];
+  expect(named.map(detectMap)).toEqual(["roughness", "metal", "roughness and metal", "normals", "occlusion"]);
+  expect(otherTerms.map(detectMap)).toEqual(["normals for DirectX", "normals", "heights", "what shines"]);
+  const colors = ["rough_plaster_diff_2k.jpg", "Metal049A_1K-JPG_Color.jpg", "armchair.webp", "rough.png", "IMG_1234.jpg"];
+  expect(colors.map(detectMap)).toEqual(colors.map(() => null));
 });

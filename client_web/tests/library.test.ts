@@ -1,32 +1,32 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { elsewhere, group, importMaterial, isFound, library, model, query, showAll, shown } from "../src/library/library";
-import { highlightOf, placeOf, pointOf, rangeOf } from "../src/library/map";
+import { otherGroupMatches, group, importMaterial, matchesSearch, library, model, query, showGroup, visibleEntries } from "../src/panels/library/libraryItems";
+import { highlightOf, positionOf, highlightAt, mapRange } from "../src/panels/library/navigationMap";
 
 const POINTS = [
   { f0: 0.04, sigma: 0.02 },
   { f0: 0.81, sigma: 0.5 },
   { f0: 0.25, sigma: 0.1 },
 ];
-const RANGE = rangeOf(POINTS);
+const RANGE = mapRange(POINTS);
 
 describe("the map of materials", () => {
   it("has its corners at the smoothest darkest and the roughest brightest", () => {
-    expect(placeOf({ f0: 0.04, sigma: 0.02 }, RANGE)).toEqual({ x: 0, y: 0 });
-    const { x, y } = placeOf({ f0: 0.81, sigma: 0.5 }, RANGE);
+    expect(positionOf({ f0: 0.04, sigma: 0.02 }, RANGE)).toEqual({ x: 0, y: 0 });
+    const { x, y } = positionOf({ f0: 0.81, sigma: 0.5 }, RANGE);
     expect([x, y]).toEqual([expect.closeTo(1), expect.closeTo(1)]);
   });
 
   it("finds the way back from any place", () => {
     for (const point of POINTS) {
-      const again = pointOf(placeOf(point, RANGE), RANGE);
+      const again = highlightAt(positionOf(point, RANGE), RANGE);
       expect(again.f0).toBeCloseTo(point.f0);
       expect(again.sigma).toBeCloseTo(point.sigma);
     }
   });
 
   it("keeps places outside on the edge", () => {
-    expect(pointOf({ x: -3, y: 0 }, RANGE).f0).toBeCloseTo(0.04);
-    expect(pointOf({ x: 0, y: 9 }, RANGE).sigma).toBeCloseTo(0.5);
+    expect(highlightAt({ x: -3, y: 0 }, RANGE).f0).toBeCloseTo(0.04);
+    expect(highlightAt({ x: 0, y: 9 }, RANGE).sigma).toBeCloseTo(0.5);
   });
 });
 
@@ -42,11 +42,11 @@ describe("the highlight of a material on the map", () => {
 });
 
 describe("the search in the library", () => {
-  const brass = { name: "alum-bronze", about: "alum-bronze. Cook–Torrance, Ngan 2005" };
+  const brass = { name: "alum-bronze", description: "alum-bronze. Cook–Torrance, Ngan 2005" };
 
   it("finds by any part of the words, in any order, with a blank for a hyphen", () => {
-    for (const typed of ["", "bronze", "ALUM BR", "bronze alum", "ngan", "alum-bronze "]) expect(isFound(brass, typed)).toBe(true);
-    for (const typed of ["brass", "bronze 2006"]) expect(isFound(brass, typed)).toBe(false);
+    for (const typed of ["", "bronze", "ALUM BR", "bronze alum", "ngan", "alum-bronze "]) expect(matchesSearch(brass, typed)).toBe(true);
+    for (const typed of ["brass", "bronze 2006"]) expect(matchesSearch(brass, typed)).toBe(false);
   });
 });
 
@@ -56,15 +56,15 @@ describe("what is found elsewhere", () => {
   it("is told where nothing that is shown is called so, and shown whole", () => {
     library.value = [fitted("a", "Gold", "ward", "metal"), fitted("b", "Felt", "cook_torrance", "fabric")];
     [query.value, group.value] = ["felt", "all"];
-    expect(elsewhere.value).toEqual([]);
-    for (const [typed, of, found] of [["gold", "all", "ward"], ["felt", "metal", "cook_torrance"]] as const) {
-      [query.value, group.value] = [typed, of];
-      expect(elsewhere.value).toEqual([[found, 1]]);
-      showAll(found);
-      expect([shown.value.length, elsewhere.value]).toEqual([1, []]);
+    expect(otherGroupMatches.value).toEqual([]);
+    for (const [typed, groupName, model] of [["gold", "all", "ward"], ["felt", "metal", "cook_torrance"]] as const) {
+      [query.value, group.value] = [typed, groupName];
+      expect(otherGroupMatches.value).toEqual([[model, 1]]);
+      showGroup(model);
+      expect([visibleEntries.value.length, otherGroupMatches.value]).toEqual([1, []]);
     }
     query.value = "brass";
-    expect(elsewhere.value).toEqual([]);
+    expect(otherGroupMatches.value).toEqual([]);
     query.value = "";
     model.value = "cook_torrance";
   });
@@ -78,12 +78,12 @@ describe("files for the library", () => {
     ["carpet01_W400xH400.BTF", "/api/materials/btf-works"],
     ["gold.binary", "/api/materials/measured"],
   ])("%s goes where it is read", async (name, path) => {
-    const asked: string[] = [];
+    const requests: string[] = [];
     class Request {
       upload = {};
       onerror?: () => void;
       open(_method: string, to: string) {
-        asked.push(to);
+        requests.push(to);
       }
       send() {
         this.onerror?.();
@@ -92,6 +92,6 @@ describe("files for the library", () => {
     vi.stubGlobal("window", globalThis);
     vi.stubGlobal("XMLHttpRequest", Request);
     await importMaterial(new File(["!"], name));
-    expect(asked).toEqual([path]);
+    expect(requests).toEqual([path]);
   });
 });

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { mayBeMetal, metalnessOf, withoutMetalness } from "../src/images/metalness";
+import { canBeMetal, metalnessOf, withoutMetalness } from "../src/panels/inspector/images/metalness";
 import type { ImageBody, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -14,33 +14,33 @@ models.value = [
 
 const lambert = (texture: string | null, color: Term["color"] = [0.5, 0.2, 0.1]): Term => ({ model: "lambert", texture, color });
 const ggx = (texture: string | null, f0: number | Term["color"] = 0.04): Term => ({ model: "ggx", texture, color: [1, 1, 1], params: { f0 } });
-const found = (base: string | null) => (texture: string) =>
+const imageNamed = (base: string | null) => (texture: string) =>
   (texture === COLOUR ? { texture, metalness: null, base: null } : { texture, metalness: METAL, base }) as ImageBody;
 const made = [lambert(SCATTERS), ggx(SHINES, [0.5, 0.3, 0.2])];
 
 test("the image of metalness is what the others were made of", () => {
-  expect(metalnessOf(made, found(null))).toBe(METAL);
-  expect(metalnessOf([lambert(COLOUR), ggx(null)], found(null))).toBeNull();
-  expect(metalnessOf([lambert("diffuse"), ggx("specular")], found(null))).toBeNull();
+  expect(metalnessOf(made, imageNamed(null))).toBe(METAL);
+  expect(metalnessOf([lambert(COLOUR), ggx(null)], imageNamed(null))).toBeNull();
+  expect(metalnessOf([lambert("diffuse"), ggx("specular")], imageNamed(null))).toBeNull();
   expect(metalnessOf(made, () => undefined)).toBeNull();
 });
 
 test("only what scatters light and has a reflectance may be metal", () => {
-  expect(mayBeMetal(made)).toBe(true);
-  expect(mayBeMetal([lambert(null), { ...ggx(null), model: "phong" }])).toBe(false);
-  expect(mayBeMetal([ggx(null)])).toBe(false);
+  expect(canBeMetal(made)).toBe(true);
+  expect(canBeMetal([lambert(null), { ...ggx(null), model: "phong" }])).toBe(false);
+  expect(canBeMetal([ggx(null)])).toBe(false);
 });
 
 test("without it the base colour that was under it is back, and the scene's own highlights", () => {
   const own = [lambert("diffuse", [1, 1, 1]), ggx(null)];
-  expect(withoutMetalness(made, own, found(COLOUR))).toEqual([lambert(COLOUR), ggx(null)]);
-  expect(withoutMetalness(made, own, found("diffuse"))).toEqual([lambert("diffuse"), ggx(null)]);
-  expect(withoutMetalness(made, [lambert(null, [1, 1, 1]), ggx(null)], found(null))).toEqual([lambert(null), ggx(null)]);
+  expect(withoutMetalness(made, own, imageNamed(COLOUR))).toEqual([lambert(COLOUR), ggx(null)]);
+  expect(withoutMetalness(made, own, imageNamed("diffuse"))).toEqual([lambert("diffuse"), ggx(null)]);
+  expect(withoutMetalness(made, [lambert(null, [1, 1, 1]), ggx(null)], imageNamed(null))).toEqual([lambert(null), ggx(null)]);
 });
 
 test("what the file shared out between both is back as it was", () => {
   const own = [lambert("diffuse", [0.9, 0.9, 0.9]), ggx("specular", 0.6)];
-  expect(withoutMetalness(made, own, found("scene"))).toEqual(own);
+  expect(withoutMetalness(made, own, imageNamed("scene"))).toEqual(own);
   const metal = [lambert(null, [0, 0, 0]), ggx(null, 0.9)];
-  expect(withoutMetalness(made, metal, found(null))).toEqual(metal);
+  expect(withoutMetalness(made, metal, imageNamed(null))).toEqual(metal);
 });

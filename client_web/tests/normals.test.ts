@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { withNormals, withoutNormals } from "../src/images/normals";
+import { withNormals, withoutNormals } from "../src/panels/inspector/images/normals";
 import type { MaterialLook, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -17,8 +17,8 @@ const ggx = (roughness: number, follows?: Term["roughness_map"]): Term =>
 const own: MaterialLook = { terms: [lambert, ggx(0.3), ggx(0.01), { model: "ward", color, params: { alpha: 0.2 } }] };
 
 test("bumps widen highlights that are no mirrors, as of files that have a normal map", () => {
-  const [first, second, ...others] = own.terms as [Term, Term, Term, Term];
-  const terms = [first, { ...second, roughness_map: true }, ...others];
+  const [first, second, ...otherTerms] = own.terms as [Term, Term, Term, Term];
+  const terms = [first, { ...second, roughness_map: true }, ...otherTerms];
   expect(withNormals(own, IMAGE)).toEqual({ terms, normal_map: { image: IMAGE, scale: 1 } });
 });
 

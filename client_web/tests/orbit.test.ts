@@ -1,14 +1,14 @@
 import { describe, expect, it, vi } from "vitest";
-import { freeName } from "../src/cameras/calls";
-import { Fingers } from "../src/cameras/fingers";
-import { keepAs } from "../src/cameras/keeping";
-import { Pictures } from "../src/cameras/pictures";
-import { approached, between, frameOf, isNear, levelled, orbitOf, panned, turned, withAngle, type Orbit } from "../src/cameras/orbit";
+import { nextCameraName } from "../src/viewport/cameras/cameraRequests";
+import { TouchGestures } from "../src/viewport/cameras/touchGestures";
+import { saveCameraAs } from "../src/viewport/cameras/savedCameras";
+import { PlacementImages } from "../src/viewport/cameras/placementImages";
+import { dollyOrbit, interpolateOrbits, poseOf, isClose, levelOrbit, orbitOf, panOrbit, rotateOrbit, withFieldOfView, type Orbit } from "../src/viewport/cameras/orbit";
 
 const bounds = { lowest: [-1, 0, -1] as const, highest: [1, 2, 1] as const } as never;
 const orbit: Orbit = { target: [0, 1, 0], distance: 4, azimuth: 0.4, elevation: 0.3, roll: 0, yfov: 40 };
-const eyeOf = (of: Orbit) => [3, 7, 11].map((k) => frameOf(of).to_world[k] as number);
-const column = (of: Orbit, k: number) => [0, 4, 8].map((row) => frameOf(of).to_world[row + k] as number);
+const positionOf = (orbit: Orbit) => [3, 7, 11].map((k) => poseOf(orbit).to_world[k] as number);
+const column = (orbit: Orbit, k: number) => [0, 4, 8].map((row) => poseOf(orbit).to_world[row + k] as number);
 const dot = (a: number[], b: number[]) => a.reduce((sum, value, k) => sum + value * (b[k] as number), 0);
 
 describe("a camera that goes round a place", () => {
@@ -18,8 +18,8 @@ describe("a camera that goes round a place", () => {
     for (const [a, b] of [[x, y], [y, z], [z, x]] as const) expect(dot(a, b)).toBeCloseTo(0, 12);
     expect(x[1]).toBe(0);
     expect(y[1]).toBeGreaterThan(0);
-    const eye = eyeOf(orbit);
-    orbit.target.forEach((at, k) => expect((eye[k] as number) - 4 * (z[k] as number)).toBeCloseTo(at, 12));
+    const position = positionOf(orbit);
+    orbit.target.forEach((at, k) => expect((position[k] as number) - 4 * (z[k] as number)).toBeCloseTo(at, 12));
     const determinant = dot(x, [
       (y[1] as number) * (z[2] as number) - (y[2] as number) * (z[1] as number),
       (y[2] as number) * (z[0] as number) - (y[0] as number) * (z[2] as number),
@@ -29,41 +29,41 @@ describe("a camera that goes round a place", () => {
   });
 
   it("is found again from its frame", () => {
-    const again = orbitOf(frameOf(orbit), bounds);
-    frameOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(frameOf(orbit).to_world[k] as number, 9));
+    const again = orbitOf(poseOf(orbit), bounds);
+    poseOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(poseOf(orbit).to_world[k] as number, 9));
     expect(again.yfov).toBe(40);
   });
 
   it("is found again from a tilted frame and from one that looks straight down", () => {
-    for (const of of [{ ...orbit, roll: 0.5 }, { ...orbit, roll: -3 }]) {
-      const again = orbitOf(frameOf(of), bounds);
-      expect(again.roll).toBeCloseTo(of.roll, 9);
-      frameOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(frameOf(of).to_world[k] as number, 9));
-      expect(between(orbit, of, 1)).toEqual(of);
-      expect(isNear(orbit, of)).toBe(false);
-      expect(frameOf(levelled(again)).to_world[4]).toBe(0); // its right is level
+    for (const target of [{ ...orbit, roll: 0.5 }, { ...orbit, roll: -3 }]) {
+      const again = orbitOf(poseOf(target), bounds);
+      expect(again.roll).toBeCloseTo(target.roll, 9);
+      poseOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(poseOf(target).to_world[k] as number, 9));
+      expect(interpolateOrbits(orbit, target, 1)).toEqual(target);
+      expect(isClose(orbit, target)).toBe(false);
+      expect(poseOf(levelOrbit(again)).to_world[4]).toBe(0); // its right is level
     }
     const [cosine, sine] = [Math.cos(0.7), Math.sin(0.7)];
     const down = { to_world: [cosine, -sine, 0, 0, 0, 0, 1, 5, -sine, -cosine, 0, 0, 0, 0, 0, 1], yfov: 40 };
-    frameOf(orbitOf(down, bounds)).to_world.forEach((value, k) => expect(value).toBeCloseTo(down.to_world[k] as number, 1));
+    poseOf(orbitOf(down, bounds)).to_world.forEach((value, k) => expect(value).toBeCloseTo(down.to_world[k] as number, 1));
   });
 
   it("turns about what the middle of the picture shows", () => {
-    const { target } = orbitOf(frameOf({ ...orbit, distance: 3 }), bounds, orbit.target);
+    const { target } = orbitOf(poseOf({ ...orbit, distance: 3 }), bounds, orbit.target);
     target.forEach((at, k) => expect(at).toBeCloseTo(orbit.target[k] as number, 9));
   });
 
   it("turns round its target and never over the top", () => {
-    const next = turned(orbit, 1, 9);
+    const next = rotateOrbit(orbit, 1, 9);
     expect(next.target).toEqual(orbit.target);
     expect(next.elevation).toBeLessThan(Math.PI / 2);
     expect(column(next, 1)[1]).toBeGreaterThan(0);
   });
 
   it("slides so that what is at its target's depth follows the hand", () => {
-    const next = panned(orbit, 0.25, 0.1);
+    const next = panOrbit(orbit, 0.25, 0.1);
     const [x, y, z] = [0, 1, 2].map((k) => column(next, k)) as [number[], number[], number[]];
-    const towards = orbit.target.map((at, k) => at - (eyeOf(next)[k] as number));
+    const towards = orbit.target.map((at, k) => at - (positionOf(next)[k] as number));
     const height = 2 * 4 * Math.tan((20 * Math.PI) / 180);
     expect(dot(towards, x) / height).toBeCloseTo(0.25, 9); // it is seen that much farther right
     expect(-dot(towards, y) / height).toBeCloseTo(0.1, 9); // and farther down
@@ -71,49 +71,49 @@ describe("a camera that goes round a place", () => {
   });
 
   it("goes neither through its target nor out of sight", () => {
-    expect(approached(orbit, 0, bounds).distance).toBeGreaterThan(0);
-    expect(approached(orbit, 1e9, bounds).distance).toBeLessThan(1e4);
-    expect(withAngle(orbit, 0).yfov).toBe(1);
-    expect(withAngle(orbit, 500).yfov).toBe(120);
+    expect(dollyOrbit(orbit, 0, bounds).distance).toBeGreaterThan(0);
+    expect(dollyOrbit(orbit, 1e9, bounds).distance).toBeLessThan(1e4);
+    expect(withFieldOfView(orbit, 0).yfov).toBe(1);
+    expect(withFieldOfView(orbit, 500).yfov).toBe(120);
   });
 
   it("comes to where it is sent, the short way round", () => {
     const goal = { ...orbit, azimuth: orbit.azimuth + 2 * Math.PI - 0.2, distance: 1 };
-    const half = between(orbit, goal, 0.5);
+    const half = interpolateOrbits(orbit, goal, 0.5);
     expect(half.azimuth).toBeCloseTo(orbit.azimuth - 0.1, 9);
     expect(half.distance).toBeCloseTo(2, 9);
-    expect(isNear(between(orbit, goal, 1), goal)).toBe(true);
-    expect(isNear(orbit, goal)).toBe(false);
+    expect(isClose(interpolateOrbits(orbit, goal, 1), goal)).toBe(true);
+    expect(isClose(orbit, goal)).toBe(false);
   });
 });
 
 describe("pictures of where a camera is", () => {
   it("are asked for one at a time, then the newest; what fails does not end it", async () => {
-    const asked: number[] = [];
+    const requests: number[] = [];
     const drawn: unknown[] = [];
     const failed: unknown[] = [];
     const answers: ((picture: Blob | null) => void)[] = [];
-    const pictures = new Pictures(
+    const images = new PlacementImages(
       (_, size) =>
         new Promise((resolve, reject) => {
-          asked.push(size[0]);
+          requests.push(size[0]);
           answers.push((picture) => (picture === null ? reject(new Error("gone")) : resolve(picture)));
         }),
       async (picture) => void drawn.push(picture),
       (error) => failed.push(error),
     );
     const settle = () => new Promise((resolve) => setTimeout(resolve));
-    for (const width of [1, 2, 3]) pictures.show(frameOf(orbit), [width, 1]);
-    expect(asked).toEqual([1]);
+    for (const width of [1, 2, 3]) images.show(poseOf(orbit), [width, 1]);
+    expect(requests).toEqual([1]);
     answers[0]?.(null);
     await settle();
-    expect(asked).toEqual([1, 3]);
+    expect(requests).toEqual([1, 3]);
     expect(failed).toHaveLength(1);
     answers[1]?.(new Blob());
     await settle();
     expect(drawn).toHaveLength(1);
-    pictures.show(frameOf(orbit), [4, 1]);
-    pictures.close();
+    images.show(poseOf(orbit), [4, 1]);
+    images.close();
     answers[2]?.(new Blob());
     await settle();
     expect(drawn).toHaveLength(1);
@@ -122,8 +122,8 @@ describe("pictures of where a camera is", () => {
 
 describe("names of new cameras", () => {
   it("are the first that is free", () => {
-    expect(freeName([])).toBe("View 1");
-    expect(freeName(["front", "View 1", "View 3"])).toBe("View 2");
+    expect(nextCameraName([])).toBe("View 1");
+    expect(nextCameraName(["front", "View 1", "View 3"])).toBe("View 2");
   });
 });
 
@@ -131,12 +131,12 @@ describe("fingers", () => {
   const at = (pointerId: number, clientX: number, clientY: number) => ({ pointerId, clientX, clientY });
 
   it("pull what they hold, and two of them spread it", () => {
-    const fingers = new Fingers();
+    const fingers = new TouchGestures();
     expect(fingers.move(at(1, 0, 0))).toBeNull();
     fingers.press(at(1, 0, 0));
     expect(fingers.move(at(1, 10, 4))).toMatchObject({ count: 1, across: 10, down: 4, spread: 1 });
     fingers.press(at(2, 30, 4));
-    expect(fingers.move(at(2, 50, 4))).toMatchObject({ count: 2, across: 10, down: 0, spread: 2, middle: { x: 30, y: 4 } });
+    expect(fingers.move(at(2, 50, 4))).toMatchObject({ count: 2, across: 10, down: 0, spread: 2, center: { x: 30, y: 4 } });
     expect(fingers.only).toBeNull();
     expect(fingers.lift(at(1, 0, 0))).toBe(true);
     expect(fingers.lift(at(1, 0, 0))).toBe(false);
@@ -146,22 +146,22 @@ describe("fingers", () => {
 
 describe("cameras that are kept", () => {
   const calls: string[] = [];
-  const frame = frameOf(orbit);
+  const frame = poseOf(orbit);
   vi.stubGlobal("fetch", async (path: string, { method = "GET" } = {}) => {
     calls.push(`${method} ${path.split("/").at(-1)}`);
     return new Response(method === "DELETE" ? null : JSON.stringify([{ name: "A", is_placed: true }, { name: "B", is_placed: true }, { name: "Own", is_placed: false }]), { status: method === "DELETE" ? 204 : 200 });
   });
 
   it("leave their old name behind, and take nobody else's", async () => {
-    await keepAs("s", "C", frame, "A");
+    await saveCameraAs("s", "C", frame, "A");
     expect(calls.splice(0)).toEqual(["GET cameras", "PUT C", "DELETE A"]);
-    await keepAs("s", "A", frame, "A");
+    await saveCameraAs("s", "A", frame, "A");
     expect(calls.splice(0)).toEqual(["PUT A"]);
-    await expect(keepAs("s", "B", frame, "A")).rejects.toThrow("There is a camera “B” already");
+    await expect(saveCameraAs("s", "B", frame, "A")).rejects.toThrow("There is a camera “B” already");
     expect(calls.splice(0)).toEqual(["GET cameras"]);
-    await expect(keepAs("s", "Own", frame, "A")).rejects.toThrow("the scene’s own cameras");
+    await expect(saveCameraAs("s", "Own", frame, "A")).rejects.toThrow("the scene’s own cameras");
     expect(calls.splice(0)).toEqual(["GET cameras"]);
-    await expect(keepAs("s", "a/b", frame, "A")).rejects.toThrow("no slashes");
+    await expect(saveCameraAs("s", "a/b", frame, "A")).rejects.toThrow("no slashes");
     expect(calls.splice(0)).toEqual([]);
   });
 });

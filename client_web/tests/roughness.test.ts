@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import { mapNamed } from "../src/images/mapNames";
-import { roughPlaces, roughnessImage, withMap, withoutRoughnessImage, withRoughnessImage } from "../src/images/roughness";
+import { detectMap } from "../src/panels/inspector/images/mapNames";
+import { roughTermIndices, roughnessImage, withMap, withoutRoughnessImage, withRoughnessImage } from "../src/panels/inspector/images/roughness";
 import type { ImageBody, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -22,9 +22,9 @@ const term = (model: string, params: Term["params"] = {}, roughness_map?: Term["
   ({ model, params, texture: null, ...(roughness_map === undefined ? {} : { roughness_map }) }) as Term;
 
 test("an image is for the terms that follow the scene's map, else for all that have a width", () => {
-  expect(roughPlaces([term("lambert"), term("ggx", {}, true), term("ggx")])).toEqual([1]);
-  expect(roughPlaces([term("lambert"), term("ggx"), term("ward")])).toEqual([1, 2]);
-  expect(roughPlaces([term("lambert")])).toEqual([]);
+  expect(roughTermIndices([term("lambert"), term("ggx", {}, true), term("ggx")])).toEqual([1]);
+  expect(roughTermIndices([term("lambert"), term("ggx"), term("ward")])).toEqual([1, 2]);
+  expect(roughTermIndices([term("lambert")])).toEqual([]);
 });
 
 test("sliders show the mean of the image, in their own measure where that is a power of it", () => {
@@ -38,13 +38,13 @@ test("sliders show the mean of the image, in their own measure where that is a p
 });
 
 test("terms of a material follow one map", () => {
-  const other = "image:fedcba9876543210";
+  const otherTerm = "image:fedcba9876543210";
   const given = [term("ggx", {}, true), term("ggx", {}, false), term("ggx", {}, true)];
-  const made = withMap(given, 0, other);
-  expect(made).toEqual([term("ggx", {}, other), term("ggx", {}, false), term("ggx", {}, other)]);
-  expect(roughnessImage(made)).toBe(other);
+  const made = withMap(given, 0, otherTerm);
+  expect(made).toEqual([term("ggx", {}, otherTerm), term("ggx", {}, false), term("ggx", {}, otherTerm)]);
+  expect(roughnessImage(made)).toBe(otherTerm);
   expect(withMap(made, 2, true)).toEqual(given);
-  expect(withMap(made, 0, false)).toEqual([term("ggx", {}, false), term("ggx", {}, false), term("ggx", {}, other)]);
+  expect(withMap(made, 0, false)).toEqual([term("ggx", {}, false), term("ggx", {}, false), term("ggx", {}, otherTerm)]);
   expect(withMap(given, 0, false)).toEqual([term("ggx", {}, false), term("ggx", {}, false), term("ggx", {}, true)]);
 });
 
@@ -54,5 +54,5 @@ test("without it the scene's own map and slider are back", () => {
 });
 
 test("maps of gloss are none of roughness", () => {
-  expect(mapNamed("oak_gloss_2k.jpg")).toBe("gloss");
+  expect(detectMap("oak_gloss_2k.jpg")).toBe("gloss");
 });

@@ -1,9 +1,9 @@
 /** A session over a socket that is made here: hello, edits, acknowledgements, losing the connection and finding it again. */
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
-import { changeAt } from "../src/document/change";
-import { Session, type SessionHandlers } from "../src/net/session";
+import { changeValue } from "../src/state/document/jsonPatch";
+import { Session, type SessionHandlers } from "../src/session/net/session";
 import type { ClientMessage, Look } from "../src/protocol";
-import { LOOK, lookWith } from "./look";
+import { LOOK, lookWith } from "./exampleLook";
 
 const SIGMA = "/materials/Teapot/terms/1/params/sigma";
 
@@ -59,10 +59,10 @@ const handlers = {
   room: vi.fn(),
   comments: vi.fn(),
   shared: vi.fn(),
-  sent: vi.fn(),
+  onEditSent: vi.fn(),
   readOnly: vi.fn(),
   ended: vi.fn(),
-  broken: vi.fn(),
+  invalidMessage: vi.fn(),
 } satisfies SessionHandlers;
 
 let nextFrame: (() => void)[];
@@ -76,7 +76,7 @@ function animate(): void {
 /** The server says hello with the look that is wanted. */
 function greet(): void {
   socket().hello(LOOK, 0);
-  session.want({ look: LOOK, hand: null, solo: null, inputTime: 0 });
+  session.setTarget({ look: LOOK, activeControl: null, solo: null, inputTime: 0 });
   animate();
 }
 
@@ -91,10 +91,10 @@ function frameOf(revision: number): ArrayBuffer {
   return bytes.buffer;
 }
 
-/** Edit a look, as a hand on this pointer does. */
+/** Edit a look at this pointer, the active control. */
 function edit(look: Look, path: string, value: unknown): Look {
-  const change = changeAt(look, path, value);
-  session.want({ look: change.after, hand: path, solo: null, inputTime: 0 }, change);
+  const change = changeValue(look, path, value);
+  session.setTarget({ look: change.after, activeControl: path, solo: null, inputTime: 0 }, change);
   return change.after;
 }
 
@@ -116,7 +116,7 @@ afterEach(() => {
 });
 
 test("the server's look that is the wanted one needs no edit", () => {
-  session.want({ look: LOOK, hand: null, solo: null, inputTime: 0 });
+  session.setTarget({ look: LOOK, activeControl: null, solo: null, inputTime: 0 });
   expect(socket().url.href).toBe("ws://host/api/bakes/b1/session");
   socket().hello(structuredClone(LOOK), 0);
   expect(socket().sent).toEqual([]);
@@ -144,7 +144,7 @@ test("another server in place of one that is gone knows of no edit: its first fr
   socket().hello(structuredClone(look), 0); // somebody else has brought it
   animate();
   expect(socket().edits).toEqual([]);
-  expect(session.pending).toBe(false);
+  expect(session.hasPendingEdits).toBe(false);
   expect(session.revision).toBe(0);
   edit(look, SIGMA, 0.4);
   animate();
@@ -168,7 +168,7 @@ test("while two edits wait for a frame the next grows newer, until one comes or 
   animate();
   expect(sent()).toEqual([0.3, 0.4, 0.6]);
   drag(0.7);
-  expect(session.ask({ type: "probe", x: 1, y: 2 })).toBe(true);
+  expect(session.sendAfterEdits({ type: "probe", x: 1, y: 2 })).toBe(true);
   expect(sent()).toEqual([0.3, 0.4, 0.6, 0.7]);
   drag(0.8);
   vi.advanceTimersByTime(100);
@@ -183,14 +183,14 @@ test("who may only look sends no edits and takes hold of nothing", () => {
   edit(look, SIGMA, 0.3);
   animate();
   expect(handlers.readOnly).toHaveBeenCalledTimes(1);
-  expect(session.pending).toBe(false);
+  expect(session.hasPendingEdits).toBe(false);
   expect(session.send({ type: "touch", parameter: SIGMA })).toBe(false);
   expect(session.send({ type: "touch", curve: "/materials/A/terms/0/curves/theta_h" })).toBe(true); // to be told its values
-  session.want({ look, hand: null, solo: ["environment"], inputTime: 0 });
+  session.setTarget({ look, activeControl: null, solo: ["environment"], inputTime: 0 });
   expect(session.send({ type: "probe", x: 1, y: 2 })).toBe(true);
   animate();
   const direct = { ...look.transport, show: "direct" as const };
-  session.want({ look: { ...look, transport: direct }, hand: null, solo: ["environment"], inputTime: 0 });
+  session.setTarget({ look: { ...look, transport: direct }, activeControl: null, solo: ["environment"], inputTime: 0 });
   animate();
   expect(handlers.readOnly).toHaveBeenCalledTimes(1);
   expect(socket().sent).toEqual([
@@ -211,7 +211,7 @@ test("a server that is being stopped is left, and the look goes to the one that 
   vi.advanceTimersByTime(1000);
   expect(FakeSocket.opened).toHaveLength(2);
   socket().hello(LOOK, 0);
-  session.want({ look, hand: null, solo: null, inputTime: 0 });
+  session.setTarget({ look, activeControl: null, solo: null, inputTime: 0 });
   animate();
   expect(socket().edits.at(-1)).toMatchObject({ patch: [{ op: "replace", path: SIGMA, value: 0.3 }] });
   expect(left.edits).toEqual([]);
@@ -226,10 +226,10 @@ test("a session begins with what it is asked to, each time it connects", () => {
 
 test("of a room the address has what finds its server, and nothing that opens it", () => {
   const room = "0123456789abcdef0123456789abcdef";
-  for (const asked of [{ room, seat: "s" }, { watch: room }]) {
-    new Session("b1", handlers, () => asked).connect();
+  for (const parameters of [{ room, seat: "s" }, { watch: room }]) {
+    new Session("b1", handlers, () => parameters).connect();
     socket().onopen();
-    expect(socket().opening).toEqual({ type: "open", ...asked, resume: null });
+    expect(socket().opening).toEqual({ type: "open", ...parameters, resume: null });
     expect(socket().url.href).toBe("ws://host/api/bakes/b1/session?room_prefix=01234567");
   }
 });
@@ -307,7 +307,7 @@ test("an edit that is refused: the look that was accepted last is known, and the
   const message = { type: "problem", revision: 1, problem: { detail: "too much" } };
   socket().says(message);
   expect(handlers.problem).toHaveBeenCalledWith(message, LOOK);
-  session.want({ look: lookWith(LOOK, SIGMA, 0.3), hand: null, solo: null, inputTime: 0 });
+  session.setTarget({ look: lookWith(LOOK, SIGMA, 0.3), activeControl: null, solo: null, inputTime: 0 });
   animate();
   expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: "" }] });
 });
@@ -315,8 +315,8 @@ test("an edit that is refused: the look that was accepted last is known, and the
 test("what is no message is said, and does no harm", () => {
   for (const text of ["{", "null", "[]", '"hello"', "{}"]) socket().onmessage({ data: text });
   socket().onmessage({ data: new ArrayBuffer(2) });
-  expect(handlers.broken).toHaveBeenCalledTimes(6);
+  expect(handlers.invalidMessage).toHaveBeenCalledTimes(6);
   socket().says({ type: "news of a later server" });
   socket().says({ type: "constructor" });
-  expect(handlers.broken).toHaveBeenCalledTimes(6);
+  expect(handlers.invalidMessage).toHaveBeenCalledTimes(6);
 });

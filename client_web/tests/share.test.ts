@@ -1,14 +1,14 @@
 import { beforeEach, expect, test, vi } from "vitest";
-import { eyeOf } from "../src/cameras/eye";
-import { openShare, share } from "../src/looks/share";
+import { freeCameraOf } from "../src/viewport/cameras/freeCamera";
+import { openShare, copyShareLink } from "../src/panels/looks/shareLink";
 import type { ShareBody, ShareRequest } from "../src/protocol";
-import { seenPaths } from "../src/seen/paths";
+import { pathOverride } from "../src/state/visibility/lightPaths";
 import { bake } from "../src/state/bakes";
 import { look } from "../src/state/look";
-import { shownViews, viewName, views } from "../src/state/views";
-import { LOOK } from "./look";
+import { shownViews, activeViewName, views } from "../src/state/views";
+import { LOOK } from "./exampleLook";
 
-vi.mock("../src/scene/open", () => ({
+vi.mock("../src/session/scene/openScene", () => ({
   openScene: (_scene: string, _place: unknown, _choice: unknown, arrived: () => void) => {
     arrived();
     return Promise.resolve();
@@ -23,7 +23,7 @@ beforeEach(() => {
   bake.value = "b".repeat(16);
   look.value = LOOK;
   shownViews.value = ["front"];
-  viewName.value = "front";
+  activeViewName.value = "front";
   vi.stubGlobal("window", { setTimeout: () => 0 });
   vi.stubGlobal("location", { href: "http://relume.example/" });
   vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.resolve() } });
@@ -42,11 +42,11 @@ test("a link carries what is looked at, and a visitor's own gives way to it", as
     [PATHS, null],
     [null, PATHS],
   ]) {
-    seenPaths.value = sent ?? null;
-    await share();
-    seenPaths.value = visitors ?? null;
+    pathOverride.value = sent ?? null;
+    await copyShareLink();
+    pathOverride.value = visitors ?? null;
     await openShare("a", { room: null, watch: null });
-    expect(seenPaths.value).toEqual(sent);
+    expect(pathOverride.value).toEqual(sent);
   }
 });
 
@@ -55,17 +55,17 @@ test("a link carries from where a view is seen whose eye moves", async () => {
   const info = { name: "front", width: 4, height: 3, camera: turned };
   views.value = [{ ...info, eye: "free" }, { ...info, name: "left", eye: "fixed" }] as unknown as typeof views.value;
   shownViews.value = ["front", "left"];
-  await share();
+  await copyShareLink();
   expect(Object.keys(saved.eyes ?? {})).toEqual(["front"]);
   expect(saved.eyes?.front?.to_world).toEqual(turned.to_world);
   expect(saved.eyes?.front?.yfov).toBeCloseTo(30);
   expect(saved.sizes).toEqual({});
   vi.stubGlobal("requestAnimationFrame", () => 1);
   vi.stubGlobal("cancelAnimationFrame", () => undefined);
-  eyeOf("front")?.resize([60, 90]);
-  await share();
+  freeCameraOf("front")?.resize([60, 90]);
+  await copyShareLink();
   expect(saved.sizes).toEqual({ front: [60, 90] });
-  eyeOf("front")?.resize(null);
+  freeCameraOf("front")?.resize(null);
   await openShare("a", { room: null, watch: null });
-  await vi.waitFor(() => expect(eyeOf("front")?.chosen).toEqual([60, 90]));
+  await vi.waitFor(() => expect(freeCameraOf("front")?.customSize).toEqual([60, 90]));
 });

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
-import { energyWords } from "../src/inspector/energy";
-import { btfOf, upTo, within } from "../src/inspector/kept";
-import { mirrorsSoftly, texturesOf } from "../src/inspector/terms";
+import { albedoMessage } from "../src/panels/inspector/albedo";
+import { btfOf, limitToStored, isWithinStored } from "../src/panels/inspector/measuredInfo";
+import { isSoftMirror, texturesOf } from "../src/panels/inspector/terms";
 import type { ModelBody, ParameterBody, Rgb, SceneBody, Term } from "../src/protocol";
 import { models, scene } from "../src/state/scene";
 
@@ -19,8 +19,8 @@ test("a material offers the images that its own terms take, in their order", () 
 test("a material that was no mirror when it was baked reflects softly once it is polished", () => {
   const curves = ["theta_h", "theta_d", "theta_i"].map((name) => ({ name, angle: name }));
   models.value = [{ model: "ggx", width: "roughness", mirrors_below: 0.06, curves }] as unknown as ModelBody[];
-  const ggx = (roughness: number | Rgb, others: Partial<Term> = {}): Term => ({
-    model: "ggx", color: [1, 1, 1], params: { roughness }, texture: "specular", ...others,
+  const ggx = (roughness: number | Rgb, fields: Partial<Term> = {}): Term => ({
+    model: "ggx", color: [1, 1, 1], params: { roughness }, texture: "specular", ...fields,
   });
   const materials = [
     { name: "Chrome", terms: [ggx(0.03)] },
@@ -28,33 +28,33 @@ test("a material that was no mirror when it was baked reflects softly once it is
   ];
   scene.value = { materials } as unknown as SceneBody;
   const drawn = [{ knots: [] }] as unknown as NonNullable<Term["curves"]>[string];
-  expect(mirrorsSoftly("Paint", ggx(0.05))).toBe(true);
-  expect(mirrorsSoftly("Paint", ggx([0.3, 0.3, 0.05]))).toBe(true);
-  expect(mirrorsSoftly("Paint", ggx(0.06))).toBe(false);
-  expect(mirrorsSoftly("Paint", ggx(0.05, { texture: "diffuse" }))).toBe(false);
-  expect(mirrorsSoftly("Paint", ggx(0.05, { roughness_map: true }))).toBe(false);
-  expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_h: drawn } }))).toBe(false);
-  expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_d: drawn } }))).toBe(true);
-  expect(mirrorsSoftly("Paint", ggx(0.05, { curves: { theta_i: drawn } }))).toBe(true);
-  expect(mirrorsSoftly("Paint", ggx(0.05, { model: "lambert" }))).toBe(false);
-  expect(mirrorsSoftly("Chrome", ggx(0.02))).toBe(false);
-  expect(mirrorsSoftly("Nothing", ggx(0.02))).toBe(false);
+  expect(isSoftMirror("Paint", ggx(0.05))).toBe(true);
+  expect(isSoftMirror("Paint", ggx([0.3, 0.3, 0.05]))).toBe(true);
+  expect(isSoftMirror("Paint", ggx(0.06))).toBe(false);
+  expect(isSoftMirror("Paint", ggx(0.05, { texture: "diffuse" }))).toBe(false);
+  expect(isSoftMirror("Paint", ggx(0.05, { roughness_map: true }))).toBe(false);
+  expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_h: drawn } }))).toBe(false);
+  expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_d: drawn } }))).toBe(true);
+  expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_i: drawn } }))).toBe(true);
+  expect(isSoftMirror("Paint", ggx(0.05, { model: "lambert" }))).toBe(false);
+  expect(isSoftMirror("Chrome", ggx(0.02))).toBe(false);
+  expect(isSoftMirror("Nothing", ggx(0.02))).toBe(false);
 });
 
 test("that more light is sent back than arrives is said, and nothing else", () => {
-  expect(energyWords({ mean: [0.5, 0.5, 0.5], most: 1.01, at_deg: 89 })).toBeNull();
-  expect(energyWords({ mean: [0.7, 0.2, 0.4], most: 1.234, at_deg: 80.6 })).toBe(
+  expect(albedoMessage({ mean: [0.5, 0.5, 0.5], most: 1.01, at_deg: 89 })).toBeNull();
+  expect(albedoMessage({ mean: [0.7, 0.2, 0.4], most: 1.234, at_deg: 80.6 })).toBe(
     "Sends back more light than meets it: 123 % of it 81° from the normal, 70 % on average. No real surface does.",
   );
 });
 
 test("the quality of a texture from all sides goes as far as it has components", () => {
   const quality = { name: "components", minimum: 0, maximum: 16, default: 16 } as ParameterBody;
-  const [five, unknown, none] = [upTo(quality, 5), upTo(quality, null), upTo(quality, 0)];
+  const [five, unknown, none] = [limitToStored(quality, 5), limitToStored(quality, null), limitToStored(quality, 0)];
   expect([five.maximum, five.default, unknown.maximum, none.maximum]).toEqual([5, 5, 16, 1]);
-  expect([within(five, 16), within(five, 2), within(five, undefined)]).toEqual([5, 2, 5]);
+  expect([isWithinStored(five, 16), isWithinStored(five, 2), isWithinStored(five, undefined)]).toEqual([5, 2, 5]);
   const scale = { name: "scale", maximum: 200, default: 1 } as ParameterBody;
-  expect(upTo(scale, 5)).toBe(scale);
-  expect(within(scale, 300)).toBe(300);
+  expect(limitToStored(scale, 5)).toBe(scale);
+  expect(isWithinStored(scale, 300)).toBe(300);
   expect([btfOf({ data: "btf:12" } as Term), btfOf({ data: "merl:12" } as Term), btfOf({} as Term)]).toEqual(["12", null, null]);
 });

@@ -1,8 +1,8 @@
 /** Several images that are dropped together, as libraries of textures name them. */
 import { expect, test } from "vitest";
-import { refusalInEditor, refusalOnStart } from "../src/files/refusals";
-import { isTexture } from "../src/images/taking";
-import { planned, setName, setWords, withColorAndRoughness, withSet, type Slot } from "../src/images/textureSet";
+import { editorRejection, startPageRejection } from "../src/start/files/rejections";
+import { isTextureFile } from "../src/panels/inspector/images/importImages";
+import { planSet, setName, setMessage, withColorAndRoughness, withSet, type Slot } from "../src/panels/inspector/images/textureSet";
 import type { ImageBody, MaterialLook, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -10,20 +10,20 @@ const TYPES: Record<string, string> = { jpg: "image/jpeg", png: "image/png", tga
 const file = (name: string) => new File([], name, { type: TYPES[name.split(".").at(-1) ?? ""] ?? "" });
 
 function slotsOf(...names: string[]): Record<string, string> {
-  return Object.fromEntries([...planned(names.map(file), isTexture).slots].map(([slot, { name }]) => [slot, name]));
+  return Object.fromEntries([...planSet(names.map(file), isTextureFile).slots].map(([slot, { name }]) => [slot, name]));
 }
 
 test("each map of a set has its place, in whatever order the files come", () => {
   const names = ["Color", "Displacement", "Metalness", "Normal", "Roughness", "AmbientOcclusion"].map((map) => `Metal007_1K_${map}.jpg`);
-  const places = {
+  const slots = {
     "base color": "Metal007_1K_Color.jpg",
     metalness: "Metal007_1K_Metalness.jpg",
     normals: "Metal007_1K_Normal.jpg",
     roughness: "Metal007_1K_Roughness.jpg",
   };
-  expect(slotsOf(...names)).toEqual(places);
-  expect(slotsOf(...names.toReversed())).toEqual(places);
-  expect(planned(names.map(file), isTexture).refused.map(({ name }) => name)).toEqual([
+  expect(slotsOf(...names)).toEqual(slots);
+  expect(slotsOf(...names.toReversed())).toEqual(slots);
+  expect(planSet(names.map(file), isTextureFile).rejected.map(({ name }) => name)).toEqual([
     "Metal007_1K_Displacement.jpg",
     "Metal007_1K_AmbientOcclusion.jpg",
   ]);
@@ -35,7 +35,7 @@ test("normals for OpenGL are taken beside those for DirectX, and EXR files by wh
     normals: "oak_nor_gl_1k.exr",
     roughness: "oak_rough_1k.exr",
   });
-  expect(isTexture(file("studio_small.exr"))).toBe(false);
+  expect(isTextureFile(file("studio_small.exr"))).toBe(false);
 });
 
 test("one image may be roughness and metalness, unless one of them has its own", () => {
@@ -48,9 +48,9 @@ test("one image may be roughness and metalness, unless one of them has its own",
 });
 
 test("a preview beside the color is not used, and what cannot be read says how to save it", () => {
-  const { slots, refused } = planned(["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"].map(file), isTexture);
+  const { slots, rejected } = planSet(["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"].map(file), isTextureFile);
   expect([...slots.values()].map(({ name }) => name)).toEqual(["Marble006_1K_Color.jpg"]);
-  expect(refused).toEqual([
+  expect(rejected).toEqual([
     { name: "Marble006_Roughness.tga", reason: "save it as .png, .jpg, .webp or .exr" },
     { name: "Marble006.png", reason: "another image is the base color" },
   ]);
@@ -58,10 +58,10 @@ test("a preview beside the color is not used, and what cannot be read says how t
 
 test("one message says what is used and what is not, and a step has the name that the files share", () => {
   const refused = [{ name: "oak_ao.png", reason: "ambient occlusion; relume traces it" }];
-  expect(setWords("Seat", ["base color", "roughness", "normals"], refused)).toBe(
+  expect(setMessage("Seat", ["base color", "roughness", "normals"], refused)).toBe(
     "On “Seat”: base color, roughness and normals. Not used: oak_ao.png (ambient occlusion; relume traces it).",
   );
-  expect(setWords("Seat", ["normals"], [])).toBe("On “Seat”: normals.");
+  expect(setMessage("Seat", ["normals"], [])).toBe("On “Seat”: normals.");
   expect(setName(["Metal007_1K_Color.jpg", "Metal007_1K_Normal.jpg"])).toBe("Metal007_1K");
   expect(setName(["oak rough.png", "oak.png"])).toBe("oak");
   expect(setName(["a.png", "b.png"])).toBe("2 images");
@@ -86,11 +86,11 @@ test("a material with a set has all of it at once", () => {
 
 test("what was dropped on the wrong place is named, with where it belongs", () => {
   const dropped = (path: string) => [{ path, file: file(path) }];
-  for (const refusal of [refusalInEditor, refusalOnStart]) {
+  for (const refusal of [editorRejection, startPageRejection]) {
     expect(refusal(dropped("cayman.brdf"))).toMatch(/^cayman\.brdf: Measured materials go into the Library/);
     expect(refusal(dropped("car.fbx"))).toMatch(/^car\.fbx: .*Export it as \.glb/);
   }
-  expect(refusalInEditor(dropped("car.glb"))).toMatch(/^car\.glb: Scenes are imported on the start page/);
-  expect(refusalOnStart(dropped("gold.binary"))).toMatch(/^gold\.binary: Measured materials/);
-  expect(refusalOnStart(dropped("car.glb"))).toBeNull();
+  expect(editorRejection(dropped("car.glb"))).toMatch(/^car\.glb: Scenes are imported on the start page/);
+  expect(startPageRejection(dropped("gold.binary"))).toMatch(/^gold\.binary: Measured materials/);
+  expect(startPageRejection(dropped("car.glb"))).toBeNull();
 });

@@ -1,19 +1,19 @@
-/** Pictures of looks that have names, and of steps: of saved looks, of variants of a scene's file, of what was left. */
+/** Images of looks that have names, and of steps: of saved looks, of variants of a scene's file, of what was left. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { history } from "../src/edit/history";
-import { changeTo } from "../src/document/change";
-import { thumbnailOf, variantThumbnail } from "../src/looks/namedThumbnails";
-import { shelf } from "../src/looks/shelf";
-import { followThumbnails, giveToNamed } from "../src/looks/thumbnails";
+import { changeToLook } from "../src/state/document/jsonPatch";
+import { thumbnailOf, variantThumbnail } from "../src/panels/looks/namedThumbnails";
+import { savedLooks } from "../src/panels/looks/savedLooks";
+import { trackThumbnails, attachThumbnail } from "../src/panels/looks/thumbnails";
 import { defaultLook } from "../src/state/look";
 import { scene } from "../src/state/scene";
-import { giveThumbnail, lookThumbnail } from "../src/state/thumbnails";
-import { LOOK, lookWith } from "./look";
+import { storeThumbnail, lookThumbnail } from "../src/state/thumbnails";
+import { LOOK, lookWith } from "./exampleLook";
 
-const screen = vi.hoisted(() => ({ words: new Uint32Array([1]) }));
-vi.mock("../src/looks/image", () => ({ thumbnail: (pixels: { words: Uint32Array }) => `screen ${pixels.words[0]}` }));
-vi.mock("../src/picture/stage", () => ({
-  stage: { active: { isThere: true, get pixels() { return { width: 1, height: 1, words: screen.words }; } }, of: () => ({ revision: 0 }), shown: [] },
+const screen = vi.hoisted(() => ({ encoded: new Uint32Array([1]) }));
+vi.mock("../src/panels/looks/displayImage", () => ({ renderThumbnail: (pixels: { encoded: Uint32Array }) => `screen ${pixels.encoded[0]}` }));
+vi.mock("../src/render/renderStage", () => ({
+  stage: { active: { hasPixels: true, get pixels() { return { width: 1, height: 1, encoded: screen.encoded }; } }, imageOf: () => ({ revision: 0 }), displayed: [] },
 }));
 
 let sent: string[];
@@ -35,32 +35,32 @@ test("a look gives its picture to what it is the look of, once, and to everybody
   const bright = lookWith(LOOK, "/display/exposure", 2);
   defaultLook.value = LOOK;
   scene.value = { id: "s", materials: [], variants: [{ name: "Own", look: {} }, { name: "Bright", look: bright }] } as never;
-  shelf.value = [{ name: "Bright", etag: '"b"', created: "1", look: bright }];
-  giveToNamed(bright, "data:bright");
-  giveToNamed(bright, "data:another");
+  savedLooks.value = [{ name: "Bright", etag: '"b"', created: "1", look: bright }];
+  attachThumbnail(bright, "data:bright");
+  attachThumbnail(bright, "data:another");
   await vi.waitFor(() => expect(sent).toEqual(['PUT /api/looks/Bright/thumbnail "b" {"picture":"data:bright"}']));
   expect([thumbnailOf('"b"'), variantThumbnail("Bright"), variantThumbnail("Own")]).toEqual(["data:bright", "data:bright", null]);
-  giveToNamed(LOOK, "data:own");
+  attachThumbnail(LOOK, "data:own");
   expect(variantThumbnail("Own")).toBe("data:own");
 });
 
 test("a step that is left without a picture has what the screen showed then, and looks on a drag's way have none", () => {
   history.clear();
-  followThumbnails();
+  trackThumbnails();
   const looks = [1, 2, 3, 4].map((exposure) => lookWith(LOOK, "/display/exposure", exposure));
   const [first, onTheWay, second, third] = looks as [typeof LOOK, typeof LOOK, typeof LOOK, typeof LOOK];
   const step = (before: typeof LOOK, after: typeof LOOK, key: string) =>
-    history.record({ of: "look", label: key, key, ...changeTo(before, after) });
-  giveThumbnail(LOOK, "as opened");
+    history.record({ kind: "look", label: key, key, ...changeToLook(before, after) });
+  storeThumbnail(LOOK, "as opened");
   step(LOOK, first, "a");
-  history.seal();
-  screen.words = new Uint32Array([7]);
+  history.endGesture();
+  screen.encoded = new Uint32Array([7]);
   step(first, onTheWay, "b");
   step(onTheWay, second, "b");
-  screen.words = new Uint32Array([8]); // the picture has been drawn on while the thumbnail waits
+  screen.encoded = new Uint32Array([8]); // the image has been drawn on while the thumbnail waits
   vi.runAllTimers();
   expect([LOOK, first, onTheWay, second].map(lookThumbnail)).toEqual(["as opened", "screen 7", null, null]);
-  history.seal();
+  history.endGesture();
   step(second, third, "c");
   vi.runAllTimers();
   expect([second, third].map(lookThumbnail)).toEqual(["screen 8", null]);

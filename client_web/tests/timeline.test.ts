@@ -1,35 +1,35 @@
-/** The time line: looks shown in passing, keyframes as steps of the history, playing what the server says. */
+/** The timeline: looks shown in passing, keyframes as steps of the history, playing what the server says. */
 import { beforeEach, expect, test, vi } from "vitest";
-import type { Change } from "../src/document/change";
-import { edit, keepPassing, leavePassing, onChange, passing, showPassing } from "../src/edit/edit";
-import { hand } from "../src/edit/hand";
+import type { LookChange } from "../src/state/document/jsonPatch";
+import { editValue, commitPreview, cancelPreview, onLookChange, previewedStep, previewStep } from "../src/edit/edit";
+import { activeControl } from "../src/edit/activeControl";
 import { history } from "../src/edit/history";
-import { fromText, toText } from "../src/edit/journal";
+import { parseHistory, serializeHistory } from "../src/edit/journal";
 import {
   addKeyframe,
-  eyeWay,
-  freeKeyframeName,
+  cameraPathMode,
+  nextKeyframeName,
   keyframes,
-  loops,
+  isLooping,
   moveKeyframe,
   removeKeyframe,
   seconds,
-  seeKeyframeFrom,
-} from "../src/looks/keyframes";
-import { redo, undo } from "../src/looks/undo";
+  setKeyframeCamera,
+} from "../src/panels/looks/keyframes";
+import { redo, undo } from "../src/panels/looks/undoRedo";
 import { bake } from "../src/state/bakes";
 import { look } from "../src/state/look";
-import { placedEye } from "../src/state/eyes";
+import { placedCameraOf } from "../src/state/cameras";
 import { timelineOpen } from "../src/state/panels";
-import { shownViews, viewName, views } from "../src/state/views";
-import { at as place, frames, numFrames, pathOf, play, playing, seek, togglePlay } from "../src/timeline/play";
-import { LOOK, lookWith } from "./look";
+import { shownViews, activeViewName, views } from "../src/state/views";
+import { playhead as place, frameLookList, numFrames, renderPath, play, isPlaying, seek, togglePlay } from "../src/panels/timeline/playback";
+import { LOOK, lookWith } from "./exampleLook";
 
 const EXPOSURE = "/display/exposure";
 const exposure = () => look.value?.display.exposure;
 const [DARK, BRIGHT] = [lookWith(LOOK, EXPOSURE, -2), lookWith(LOOK, EXPOSURE, 2)];
 
-let heard: Change[];
+let changes: LookChange[];
 let ticks: FrameRequestCallback[];
 
 beforeEach(() => {
@@ -37,64 +37,64 @@ beforeEach(() => {
   vi.stubGlobal("window", { setTimeout: (run: () => void) => void run() });
   vi.stubGlobal("requestAnimationFrame", (tick: FrameRequestCallback) => ticks.push(tick));
   vi.stubGlobal("cancelAnimationFrame", (id: number) => ticks.splice(id - 1, 1, () => undefined));
-  heard = [];
+  changes = [];
   timelineOpen.value = false;
   bake.value = null;
-  passing.value = null;
+  previewedStep.value = null;
   history.clear();
   keyframes.value = [];
   look.value = LOOK;
-  onChange((change) => heard.push(change));
+  onLookChange((change) => changes.push(change));
 });
 
 async function press(key: () => void): Promise<void> {
   key();
-  await vi.waitFor(() => expect(history.heading).toBe(history.cursor.value));
+  await vi.waitFor(() => expect(history.targetCursor).toBe(history.cursor.value));
 }
 
 /** A time line from dark to bright whose frames the server has told, and from where they are seen. */
 async function prepared(cameras: { to_world: number[]; yfov: number }[] | null = null): Promise<void> {
-  const told = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)));
-  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks: told, cameras })));
+  const looks = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)));
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks, cameras })));
   bake.value = "b";
   timelineOpen.value = true;
   addKeyframe({ name: "Dark", look: DARK });
   addKeyframe({ name: "Bright", look: BRIGHT });
-  await vi.waitFor(() => expect(frames.value).not.toBeNull());
+  await vi.waitFor(() => expect(frameLookList.value).not.toBeNull());
 }
 
 test("what is asked to be played while its frames are on their way is played when they are there", async () => {
   const soon = prepared();
   togglePlay();
-  expect(playing.value).toBe(false);
+  expect(isPlaying.value).toBe(false);
   await soon;
-  expect(playing.value).toBe(true);
+  expect(isPlaying.value).toBe(true);
   togglePlay();
-  expect(playing.value).toBe(false);
+  expect(isPlaying.value).toBe(false);
   timelineOpen.value = false;
   timelineOpen.value = true;
   togglePlay();
   togglePlay();
-  await vi.waitFor(() => expect(frames.value).not.toBeNull());
-  expect(playing.value).toBe(false);
+  await vi.waitFor(() => expect(frameLookList.value).not.toBeNull());
+  expect(isPlaying.value).toBe(false);
 });
 
 test("what is shown in passing is no step, and is gone from without a trace", () => {
-  showPassing("on the way", DARK);
-  showPassing("on the way", BRIGHT);
+  previewStep("on the way", DARK);
+  previewStep("on the way", BRIGHT);
   expect(exposure()).toBe(2);
   expect(history.steps.value).toEqual([]);
-  leavePassing();
+  cancelPreview();
   expect(look.value).toEqual(LOOK);
-  expect(heard.length).toBe(3);
-  leavePassing();
-  expect(heard.length).toBe(3);
+  expect(changes.length).toBe(3);
+  cancelPreview();
+  expect(changes.length).toBe(3);
 });
 
 test("kept, it is one step from what was there before", async () => {
-  showPassing("on the way", DARK);
-  showPassing("at 1 s", BRIGHT);
-  keepPassing();
+  previewStep("on the way", DARK);
+  previewStep("at 1 s", BRIGHT);
+  commitPreview();
   expect(history.steps.value.map(({ label }) => label)).toEqual(["at 1 s"]);
   await press(undo);
   expect(look.value).toEqual(LOOK);
@@ -103,9 +103,9 @@ test("kept, it is one step from what was there before", async () => {
 });
 
 test("an edit keeps what it changes: undo goes back to that, then to before", async () => {
-  showPassing("on the way", DARK);
-  edit("Rotation", "/environment/rotation", 45);
-  expect(passing.value).toBeNull();
+  previewStep("on the way", DARK);
+  editValue("Rotation", "/environment/rotation", 45);
+  expect(previewedStep.value).toBeNull();
   await press(undo);
   expect([exposure(), look.value?.environment.rotation]).toEqual([-2, 0]);
   await press(undo);
@@ -113,8 +113,8 @@ test("an edit keeps what it changes: undo goes back to that, then to before", as
 });
 
 test("undo first leaves what is shown in passing", async () => {
-  edit("Exposure", EXPOSURE, 1);
-  showPassing("on the way", DARK);
+  editValue("Exposure", EXPOSURE, 1);
+  previewStep("on the way", DARK);
   await press(undo);
   expect(look.value).toEqual(LOOK);
   await press(redo);
@@ -133,16 +133,16 @@ test("keyframes are put on, moved and taken off in steps that can be undone and 
     await press(undo);
     expect(names()).toBe(shown);
   }
-  const text = toText({ steps: history.steps.value, cursor: history.cursor.value }, 1 << 20, () => null);
-  const kept = fromText(text, LOOK, () => undefined);
-  expect(kept?.steps).toEqual(history.steps.value);
+  const text = serializeHistory({ steps: history.steps.value, cursor: history.cursor.value }, 1 << 20, () => null);
+  const stored = parseHistory(text, LOOK, () => undefined);
+  expect(stored?.steps).toEqual(history.steps.value);
 });
 
 test("keyframes without a name are told apart", () => {
-  addKeyframe({ name: freeKeyframeName(), look: LOOK });
-  addKeyframe({ name: freeKeyframeName(), look: LOOK });
+  addKeyframe({ name: nextKeyframeName(), look: LOOK });
+  addKeyframe({ name: nextKeyframeName(), look: LOOK });
   removeKeyframe(0);
-  expect(freeKeyframeName()).not.toBe(keyframes.value[0]?.name);
+  expect(nextKeyframeName()).not.toBe(keyframes.value[0]?.name);
 });
 
 test("a place on the way shows the frame that is nearest, and closing shows what was there", async () => {
@@ -157,7 +157,7 @@ test("a place on the way shows the frame that is nearest, and closing shows what
 
 test.each([true, false])("playing goes on with the clock and %s: again from the beginning", async (again) => {
   await prepared();
-  loops.value = again;
+  isLooping.value = again;
   seek(0);
   play();
   const start = performance.now();
@@ -165,16 +165,16 @@ test.each([true, false])("playing goes on with the clock and %s: again from the 
   expect(place.value).toBeCloseTo(0.25, 1);
   ticks.at(-1)?.(start + 1100 * seconds.value);
   expect(place.value).toBeCloseTo(again ? 0.1 : 1, 1);
-  expect(playing.value).toBe(again);
-  edit("Rotation", "/environment/rotation", 45);
-  expect(playing.value).toBe(false);
+  expect(isPlaying.value).toBe(again);
+  editValue("Rotation", "/environment/rotation", 45);
+  expect(isPlaying.value).toBe(false);
 });
 
 test("a pause and a play within one frame do not play twice as fast", async () => {
   await prepared();
   seek(0);
   play();
-  playing.value = false;
+  isPlaying.value = false;
   play();
   const now = performance.now() + 100 * seconds.value;
   for (const tick of [...ticks]) tick(now);
@@ -187,15 +187,15 @@ test("the eye goes from where one key is seen to where the other is, and rests w
   const at = (x: number, yfov = 40) => ({ to_world: [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1], yfov });
   const bounds = [[-1, -1, -1], [1, 1, 1]];
   views.value = [{ name: "front", width: 4, height: 3, eye: "free", bounds, camera: at(0, 0.5) } as never];
-  [shownViews.value, viewName.value, eyeWay.value] = [["front"], "front", "along"];
-  const way = Array.from({ length: numFrames.value }, (_, k) => at(k));
-  await prepared(way);
-  seeKeyframeFrom(1, at(100));
-  expect(pathOf("along", 9)).toMatchObject({ eyes: [{ to_world: at(0).to_world }, at(100)] });
-  expect(pathOf("around", 9)).toMatchObject({ turntable: 9, start: { to_world: at(0).to_world } });
-  expect(pathOf("object", 9)).toMatchObject({ turns: "object", start: { to_world: at(0).to_world } });
-  expect(pathOf("still", 9)).toBeNull();
-  await vi.waitFor(() => expect(frames.value).not.toBeNull());
+  [shownViews.value, activeViewName.value, cameraPathMode.value] = [["front"], "front", "along"];
+  const path = Array.from({ length: numFrames.value }, (_, k) => at(k));
+  await prepared(path);
+  setKeyframeCamera(1, at(100));
+  expect(renderPath("along", 9)).toMatchObject({ eyes: [{ to_world: at(0).to_world }, at(100)] });
+  expect(renderPath("around", 9)).toMatchObject({ turntable: 9, start: { to_world: at(0).to_world } });
+  expect(renderPath("object", 9)).toMatchObject({ turns: "object", start: { to_world: at(0).to_world } });
+  expect(renderPath("still", 9)).toBeNull();
+  await vi.waitFor(() => expect(frameLookList.value).not.toBeNull());
   const x = () => views.value[0]?.camera.to_world[3];
   seek(1);
   expect(x()).toBe(numFrames.value - 1);
@@ -203,24 +203,24 @@ test("the eye goes from where one key is seen to where the other is, and rests w
   play();
   ticks.at(-1)?.(performance.now() + 500 * seconds.value);
   expect(x()).toBeCloseTo((numFrames.value - 1) / 2, -1);
-  playing.value = false;
-  expect(placedEye("front")?.camera.to_world[3]).toBe(x());
-  [views.value, viewName.value, eyeWay.value] = [[], "", "still"];
+  isPlaying.value = false;
+  expect(placedCameraOf("front")?.camera.to_world[3]).toBe(x());
+  [views.value, activeViewName.value, cameraPathMode.value] = [[], "", "still"];
 });
 
 test("one look is enough where the environment turns, and a view that was baked from one place shows it", async () => {
-  eyeWay.value = "environment";
-  const told = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, "/environment/rotation", k));
-  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks: told, cameras: null })));
+  cameraPathMode.value = "environment";
+  const looks = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, "/environment/rotation", k));
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks, cameras: null })));
   bake.value = "b";
   timelineOpen.value = true;
   addKeyframe({ name: "Dark", look: LOOK });
-  await vi.waitFor(() => expect(frames.value).not.toBeNull());
-  expect(pathOf("environment", 9)).toEqual({ turntable: 9, turns: "environment", start: null });
+  await vi.waitFor(() => expect(frameLookList.value).not.toBeNull());
+  expect(renderPath("environment", 9)).toEqual({ turntable: 9, turns: "environment", start: null });
   seek(1);
   expect(look.value?.environment.rotation).toBe(numFrames.value - 1);
-  expect(hand.value).toBe("/environment/rotation");
-  eyeWay.value = "around"; // which this view cannot
-  await vi.waitFor(() => expect(frames.value).toBeNull());
-  eyeWay.value = "still";
+  expect(activeControl.value).toBe("/environment/rotation");
+  cameraPathMode.value = "around"; // which this view cannot
+  await vi.waitFor(() => expect(frameLookList.value).toBeNull());
+  cameraPathMode.value = "still";
 });

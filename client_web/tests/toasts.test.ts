@@ -1,27 +1,27 @@
 /** Errors go when what they say is mended. */
 import { beforeEach, expect, test } from "vitest";
-import { ApiError, UnansweredError } from "../src/net/api";
-import { attempt, mended, shownWords, showError } from "../src/ui/toasts";
+import { ApiError, UnreachableError } from "../src/session/net/api";
+import { reportErrors, clearErrors, visibleTexts, showError } from "../src/ui/toasts";
 
 beforeEach(() => {
-  for (const topic of ["server", "files", "edit"] as const) mended(topic);
+  for (const topic of ["server", "files", "edit"] as const) clearErrors(topic);
 });
 
 test("an error goes with the next success in its topic, and others stay", () => {
   showError("no such format", "files");
   showError("refused", "edit");
-  mended("files");
-  expect(shownWords()).toEqual(["refused"]);
-  mended("edit");
-  expect(shownWords()).toEqual([]);
+  clearErrors("files");
+  expect(visibleTexts()).toEqual(["refused"]);
+  clearErrors("edit");
+  expect(visibleTexts()).toEqual([]);
 });
 
 test("a request that nobody answered is mended by one that somebody does", async () => {
-  await attempt(() => Promise.reject(new UnansweredError()));
-  await attempt(() => Promise.reject(new ApiError("There is no such scene.", 404)), "files");
-  expect(shownWords()).toEqual([new UnansweredError().message, "There is no such scene."]);
-  await attempt(() => Promise.resolve());
-  expect(shownWords()).toEqual(["There is no such scene."]);
-  await attempt(() => Promise.resolve(), "files");
-  expect(shownWords()).toEqual([]);
+  await reportErrors(() => Promise.reject(new UnreachableError()));
+  await reportErrors(() => Promise.reject(new ApiError("There is no such scene.", 404)), "files");
+  expect(visibleTexts()).toEqual([new UnreachableError().message, "There is no such scene."]);
+  await reportErrors(() => Promise.resolve());
+  expect(visibleTexts()).toEqual(["There is no such scene."]);
+  await reportErrors(() => Promise.resolve(), "files");
+  expect(visibleTexts()).toEqual([]);
 });

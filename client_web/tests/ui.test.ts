@@ -1,15 +1,15 @@
 import { describe, expect, test } from "vitest";
-import { gauge } from "../src/app/metrics";
-import { fromHex, strength, toHex } from "../src/color/color";
-import { defaultTerm, modelsFor, withModel } from "../src/inspector/terms";
-import { freeName } from "../src/looks/names";
+import { parseGauge } from "../src/app/parseMetrics";
+import { fromHex, peakValue, toHex } from "../src/render/color/colorMath";
+import { defaultTerm, modelsFor, withModel } from "../src/panels/inspector/terms";
+import { nextName } from "../src/panels/looks/lookNames";
 import type { ModelBody, Rgb } from "../src/protocol";
-import { placeFromUrl, placeToUrl } from "../src/scene/url";
-import { chord } from "../src/ui/chord";
+import { parseUrl, formatUrl } from "../src/session/scene/url";
+import { formatShortcut } from "../src/ui/chord";
 import {
   formatBytes,
   formatNumber,
-  formatForeseen,
+  formatEstimatedTime,
   formatSeconds,
   fromFraction,
   keyStep,
@@ -63,7 +63,7 @@ describe("numbers", () => {
     ]);
     expect(formatBytes(104_448_000)).toBe("104 MB");
     expect([0.2, 14, 200, 9000].map(formatSeconds)).toEqual(["under a second", "14 s", "3 min", "2.5 h"]);
-    expect([0.2, 14].map(formatForeseen)).toEqual(["under a second", "about 14 s"]);
+    expect([0.2, 14].map(formatEstimatedTime)).toEqual(["under a second", "about 14 s"]);
   });
 
   test("are short on an axis and keep their noughts", () => {
@@ -84,7 +84,7 @@ describe("colours", () => {
 
   test("the picker keeps a colour's strength", () => {
     const strong: Rgb = [4, 2, 1];
-    expect(strength(strong)).toBe(4);
+    expect(peakValue(strong)).toBe(4);
     fromHex(toHex(strong), strong).forEach((v, c) => expect(v).toBeCloseTo(strong[c] as number, 1));
     expect(toHex([1, 1, 1])).toBe("#ffffff");
     expect(fromHex("#ffffff", [0.2, 0.1, 0.1])).toEqual([1, 1, 1]);
@@ -146,21 +146,21 @@ describe("terms", () => {
     const measured = models.map((m) => ({ ...m, model: `measured_${m.model}`, needs_data: true, data_prefix: "merl:" }));
     const all = [...models, ...measured];
     const term = { model: "ggx", color: [1, 1, 1] as Rgb };
-    const other = { ...term, model: measured[0]!.model, data: "merl:0123456789abcdef" };
+    const otherTerm = { ...term, model: measured[0]!.model, data: "merl:0123456789abcdef" };
     expect(modelsFor(null, all)).toEqual(models);
     expect(modelsFor(term, all)).toEqual(models);
-    expect(modelsFor(other, all)).toEqual(all);
-    expect(withModel(other, measured[0]!.model, all)).toHaveProperty("data", other.data);
-    expect(withModel(other, models[0]!.model, all)).not.toHaveProperty("data");
+    expect(modelsFor(otherTerm, all)).toEqual(all);
+    expect(withModel(otherTerm, measured[0]!.model, all)).toHaveProperty("data", otherTerm.data);
+    expect(withModel(otherTerm, models[0]!.model, all)).not.toHaveProperty("data");
   });
 });
 
 test("a place survives the URL", () => {
-  const place = {
+  const urlState = {
     scene: "ab12",
     bake: "cd34",
     view: "front & left",
-    beside: [],
+    sideBySide: [],
     material: "a/b~c",
     term: 2,
     curve: "theta_h",
@@ -171,19 +171,19 @@ test("a place survives the URL", () => {
   };
   const read = (address: string) => {
     const url = new URL(address, "http://host");
-    return placeFromUrl(url.search, url.hash);
+    return parseUrl(url.search, url.hash);
   };
-  expect(read(placeToUrl(place))).toEqual(place);
-  expect(new URL(placeToUrl(place), "http://host").search).not.toContain("a1");
-  const watched = { ...place, room: null, watch: "b&2" };
-  expect(read(placeToUrl(watched))).toEqual(watched);
-  const several = { ...place, beside: ["front & left", "a, b", "c=d"] };
-  expect(read(placeToUrl(several))).toEqual(several);
-  expect(placeFromUrl("?term=-3")).toEqual({
+  expect(read(formatUrl(urlState))).toEqual(urlState);
+  expect(new URL(formatUrl(urlState), "http://host").search).not.toContain("a1");
+  const watched = { ...urlState, room: null, watch: "b&2" };
+  expect(read(formatUrl(watched))).toEqual(watched);
+  const several = { ...urlState, sideBySide: ["front & left", "a, b", "c=d"] };
+  expect(read(formatUrl(several))).toEqual(several);
+  expect(parseUrl("?term=-3")).toEqual({
     scene: null,
     bake: null,
     view: null,
-    beside: [],
+    sideBySide: [],
     material: null,
     term: 0,
     curve: null,
@@ -192,16 +192,16 @@ test("a place survives the URL", () => {
     watch: null,
     share: null,
   });
-  expect(placeFromUrl("?term=zzz").term).toBe(0);
+  expect(parseUrl("?term=zzz").term).toBe(0);
 });
 
 test("free names are free", () => {
-  expect(freeName([])).toBe("Look 1");
-  expect(freeName(["Warm", "Look 3"])).toBe("Look 4");
+  expect(nextName([])).toBe("Look 1");
+  expect(nextName(["Warm", "Look 3"])).toBe("Look 4");
 });
 
 test("chords name Shift only beside Ctrl", () => {
-  const key = (k: string, ctrlKey = false, shiftKey = false) => chord({ key: k, ctrlKey, shiftKey, metaKey: false });
+  const key = (k: string, ctrlKey = false, shiftKey = false) => formatShortcut({ key: k, ctrlKey, shiftKey, metaKey: false });
   expect([key("?", false, true), key("Z", true, true), key("z", true), key("W")]).toEqual([
     "?",
     "Ctrl+Shift+z",
@@ -213,6 +213,6 @@ test("chords name Shift only beside Ctrl", () => {
 test("a gauge is read from Prometheus text", () => {
   const text =
     "# HELP relume_frozen_cache_bytes x\nrelume_frozen_cache_bytes 1.5e+06\nrelume_frozen_cache_bytes_limit 9\n";
-  expect(gauge(text, "relume_frozen_cache_bytes")).toBe(1_500_000);
-  expect(gauge(text, "nothing")).toBeNull();
+  expect(parseGauge(text, "relume_frozen_cache_bytes")).toBe(1_500_000);
+  expect(parseGauge(text, "nothing")).toBeNull();
 });

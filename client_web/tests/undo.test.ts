@@ -1,35 +1,35 @@
 /** Edits, undo and redo as the server hears of them. */
 import { beforeEach, expect, test, vi } from "vitest";
-import type { Change } from "../src/document/change";
-import { edit, onChange, replaceLook } from "../src/edit/edit";
-import { hand, heldAt } from "../src/edit/hand";
+import type { LookChange } from "../src/state/document/jsonPatch";
+import { editValue, onLookChange, replaceLook } from "../src/edit/edit";
+import { activeControl, activePath } from "../src/edit/activeControl";
 import { history } from "../src/edit/history";
-import { redo, undo } from "../src/looks/undo";
+import { redo, undo } from "../src/panels/looks/undoRedo";
 import { look } from "../src/state/look";
-import { applyPatch } from "./apply";
-import { LOOK, lookWith } from "./look";
+import { applyPatch } from "./applyPatch";
+import { LOOK, lookWith } from "./exampleLook";
 
 const SIGMA = "/materials/Teapot/terms/1/params/sigma";
 const EXPOSURE = "/display/exposure";
 
-let heard: Change[];
-const lastPatch = () => heard.at(-1)?.patch;
+let changes: LookChange[];
+const lastPatch = () => changes.at(-1)?.patch;
 
 beforeEach(() => {
   vi.stubGlobal("window", {});
-  heard = [];
+  changes = [];
   history.clear();
   look.value = LOOK;
-  onChange((change) => heard.push(change));
+  onLookChange((change) => changes.push(change));
 });
 
 async function press(key: () => void): Promise<void> {
   key();
-  await vi.waitFor(() => expect(history.heading).toBe(history.cursor.value));
+  await vi.waitFor(() => expect(history.targetCursor).toBe(history.cursor.value));
 }
 
 test("an edit says what it changed, undo and redo the same back and again", async () => {
-  edit("σ", SIGMA, 0.5);
+  editValue("σ", SIGMA, 0.5);
   expect(lastPatch()).toEqual([{ op: "replace", path: SIGMA, value: 0.5 }]);
   await press(undo);
   expect(lastPatch()).toEqual([{ op: "replace", path: SIGMA, value: 0.2 }]);
@@ -39,40 +39,40 @@ test("an edit says what it changed, undo and redo the same back and again", asyn
 });
 
 test("an edit that changes nothing is no step, and nobody hears of it", () => {
-  edit("σ", SIGMA, 0.2);
+  editValue("σ", SIGMA, 0.2);
   replaceLook("Show a look", structuredClone(LOOK));
-  expect(heard).toEqual([]);
+  expect(changes).toEqual([]);
   expect(history.steps.value).toEqual([]);
 });
 
 test("the way of a whole drag back is one patch", async () => {
-  for (let i = 1; i <= 30; i++) edit("σ", SIGMA, i / 10);
+  for (let i = 1; i <= 30; i++) editValue("σ", SIGMA, i / 10);
   await press(undo);
   expect(lastPatch()).toEqual([{ op: "replace", path: SIGMA, value: 0.2 }]);
 });
 
 test("after an edit that the server refused, undo leads from the look that is there", async () => {
-  edit("σ", SIGMA, 0.5);
-  history.seal();
-  edit("Exposure", EXPOSURE, 1);
-  history.drop();
+  editValue("σ", SIGMA, 0.5);
+  history.endGesture();
+  editValue("Exposure", EXPOSURE, 1);
+  history.dropLastStep();
   look.value = lookWith(LOOK, EXPOSURE, 3); // what the server took last is none of the looks of the history
   await press(undo);
   expect(look.value).toBe(LOOK);
-  expect(applyPatch(heard.at(-1)?.before as object, lastPatch() ?? [])).toEqual(LOOK);
+  expect(applyPatch(changes.at(-1)?.before as object, lastPatch() ?? [])).toEqual(LOOK);
   expect(lastPatch()).toEqual([{ op: "replace", path: EXPOSURE, value: 0 }]);
 });
 
 test("what the hand is on is where it edits, and nothing while it undoes", async () => {
-  edit("σ", SIGMA, 0.5);
-  expect(hand.value).toBe(SIGMA);
+  editValue("σ", SIGMA, 0.5);
+  expect(activeControl.value).toBe(SIGMA);
   await press(undo);
-  expect(hand.value).toBeNull();
+  expect(activeControl.value).toBeNull();
 });
 
 test("the hand is on curves, parameters, colours, lights that there are, and fields of the environment", () => {
   const lit = lookWith(LOOK, "/lights/a~1b", { kind: "point" });
-  const held = (path: string) => heldAt(path, lit);
+  const held = (path: string) => activePath(path, lit);
   expect(held("/materials/a~1b/terms/0/curves/theta_h")).toBe("/materials/a~1b/terms/0/curves/theta_h");
   expect(held("/materials/a~1b/terms/0/color")).toBe("/materials/a~1b/terms/0/color");
   expect(held("/materials/a~1b/terms")).toBeNull();

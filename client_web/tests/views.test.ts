@@ -1,22 +1,22 @@
 import { describe, expect, test } from "vitest";
-import { eyeWords } from "../src/cameras/EyeBar";
-import { availableOf, shownViews, sideBySideOf, viewName } from "../src/state/views";
-import { columnsFor } from "../src/viewport/grid";
+import { cameraMessage } from "../src/viewport/cameras/CameraBar";
+import { availableViews, shownViews, chooseSideBySide, activeViewName } from "../src/state/views";
+import { columnsFor } from "../src/viewport/viewGrid";
 
 describe("views side by side", () => {
   const all = ["a", "b", "c", "d", "e", "f"];
 
   test("at most four are shown, the active one among them", () => {
-    expect(sideBySideOf(["a", "b"], "b")).toEqual(["a", "b"]);
-    expect(sideBySideOf(all, "c")).toEqual(["a", "b", "c", "d"]);
-    expect(sideBySideOf(all, "f")).toEqual(["a", "b", "c", "f"]);
-    expect(sideBySideOf(all, "gone")).toEqual(["a", "b", "c", "d"]);
+    expect(chooseSideBySide(["a", "b"], "b")).toEqual(["a", "b"]);
+    expect(chooseSideBySide(all, "c")).toEqual(["a", "b", "c", "d"]);
+    expect(chooseSideBySide(all, "f")).toEqual(["a", "b", "c", "f"]);
+    expect(chooseSideBySide(all, "gone")).toEqual(["a", "b", "c", "d"]);
   });
 
   test("what an address or another bake asks for is shown as far as it is there", () => {
-    expect(availableOf(["c", "gone", "a"], all, "b")).toEqual(["c", "a"]);
-    expect(availableOf(["gone"], all, "b")).toEqual(["b"]);
-    expect(availableOf([...all], all, "b")).toHaveLength(4);
+    expect(availableViews(["c", "gone", "a"], all, "b")).toEqual(["c", "a"]);
+    expect(availableViews(["gone"], all, "b")).toEqual(["b"]);
+    expect(availableViews([...all], all, "b")).toHaveLength(4);
   });
 });
 
@@ -37,9 +37,9 @@ describe("arrangement", () => {
 });
 
 test("of several views the buttons of the eye say whose they are", () => {
-  viewName.value = "left";
+  activeViewName.value = "left";
   shownViews.value = ["left"];
-  expect(eyeWords.value).toBe("Eye");
+  expect(cameraMessage.value).toBe("Eye");
   shownViews.value = ["front", "left"];
-  expect(eyeWords.value).toBe("Eye of left");
+  expect(cameraMessage.value).toBe("Eye of left");
 });

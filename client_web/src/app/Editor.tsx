@@ -1,43 +1,43 @@
-/** The editor's layout: what stands where. Everything but the picture collapses. */
-import { ReadOnly } from "../account/Account";
-import { CommentsPanel } from "../comments/CommentsPanel";
-import { Inspector } from "../inspector/Inspector";
-import { LibraryPanel } from "../library/LibraryPanel";
-import { Filmstrip } from "../looks/Filmstrip";
-import { Outline } from "../outline/Outline";
+/** The editor's layout: what stands where. Everything but the image collapses. */
+import { ReadOnly } from "./account/Account";
+import { CommentsPanel } from "../panels/collaboration/CommentsPanel";
+import { Inspector } from "../panels/inspector/Inspector";
+import { LibraryPanel } from "../panels/library/LibraryPanel";
+import { Filmstrip } from "../panels/looks/Filmstrip";
+import { ScenePanel } from "../panels/scene/ScenePanel";
 import { useFileDrop } from "../start/useFileDrop";
 import { filmstripOpen, helpOpen, timelineOpen } from "../state/panels";
-import { mayEdit } from "../state/me";
-import { inspectorShownWidth, panelWidths, shownPanels, type SidePanel } from "../state/room";
-import { Timeline } from "../timeline/Timeline";
-import { TruthPanel } from "../truth/TruthPanel";
+import { mayEdit } from "../state/sessionUser";
+import { inspectorShownWidth, panelWidths, shownPanels, type SidePanel } from "../state/panelWidths";
+import { Timeline } from "../panels/timeline/Timeline";
+import { ComparisonPanel } from "../panels/compare/ComparisonPanel";
 import { Splitter } from "../ui/Splitter";
-import { PictureView } from "../viewport/PictureView";
+import { Viewport } from "../viewport/Viewport";
 import { Help } from "./Help";
 import { StatusBar } from "./StatusBar";
 import { TopBar } from "./TopBar";
 import { DropHint } from "./DropHint";
-import { takeDropped } from "./dropped";
+import { handleDrop } from "./handleDrop";
 import { useKeyboard } from "./keyboard";
 
 export function Editor() {
   useKeyboard();
-  const { outline, library, truth, comments } = panelWidths.value;
-  const widths = { outline, library, truth, comments, inspector: inspectorShownWidth.value };
+  const { outline, library, truth: comparison, comments } = panelWidths.value;
+  const widths = { outline, library, truth: comparison, comments, inspector: inspectorShownWidth.value };
   const style = Object.fromEntries(Object.entries(widths).map(([name, width]) => [`--${name}`, `${width}px`]));
-  const shown = (name: SidePanel) => shownPanels.value.includes(name);
-  const over = useFileDrop(takeDropped);
+  const isPanelShown = (name: SidePanel) => shownPanels.value.includes(name);
+  const isDropTarget = useFileDrop(handleDrop);
   return (
-    <div class={`editor ${over ? "over" : ""}`} style={style}>
+    <div class={`editor ${isDropTarget ? "over" : ""}`} style={style}>
       <TopBar />
       <div class="middle">
-        {shown("outline") && <Outline />}
-        <PictureView />
-        {over && <DropHint />}
-        {shown("library") && mayEdit.value && <LibraryPanel />}
-        {shown("truth") && <TruthPanel />}
-        {shown("comments") && <CommentsPanel />}
-        {shown("inspector") && (
+        {isPanelShown("outline") && <ScenePanel />}
+        <Viewport />
+        {isDropTarget && <DropHint />}
+        {isPanelShown("library") && mayEdit.value && <LibraryPanel />}
+        {isPanelShown("truth") && <ComparisonPanel />}
+        {isPanelShown("comments") && <CommentsPanel />}
+        {isPanelShown("inspector") && (
           <aside class="side" aria-label="Inspector">
             <Splitter />
             <div class="inspected">

@@ -1,26 +1,26 @@
-/** Pictures to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
+/** Images to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
 import { useState } from "preact/hooks";
-import { exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turns, type Turns } from "../looks/export";
-import { exporting } from "../looks/rendering";
-import { stage } from "../picture/stage";
-import { lightLimitWords } from "../seen/limits";
-import { exrSpace, exrSpaceHere, spaces } from "../state/color";
-import { drawn } from "../state/display";
+import { exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turntableRotation, type TurntableRotation } from "../panels/looks/exportImage";
+import { exporting } from "../panels/looks/renderJob";
+import { stage } from "../render/renderStage";
+import { lightFilterText } from "../state/visibility/activeFilters";
+import { exrSpace, availableExrSpace, exrSpaces } from "../state/color";
+import { displayedFrames } from "../state/display";
 import { look } from "../state/look";
-import { moves, sideBySide, viewName } from "../state/views";
+import { hasFreeCamera, sideBySide, activeViewName } from "../state/views";
 
 /** What an export is of: with several views shown it must be said. */
-function whichView(): string {
-  return sideBySide.value ? `the view “${viewName.value}”` : "the picture";
+function exportTargetLabel(): string {
+  return sideBySide.value ? `the view “${activeViewName.value}”` : "the picture";
 }
 
-interface Choice {
+interface ExportOption {
   label: string;
   help: string;
   run(): Promise<void>;
 }
 
-const PICTURES: Choice[] = [
+const IMAGE_EXPORTS: ExportOption[] = [
   {
     label: "EXR with layers",
     help: "One for each light and each kind of light path, beside the picture",
@@ -34,7 +34,7 @@ const PICTURES: Choice[] = [
   { label: "EXR, the picture alone", help: "Quicker, and a smaller file", run: () => exportExr(false) },
 ];
 
-const TURNTABLES: Choice[] = [
+const TURNTABLE_EXPORTS: ExportOption[] = [
   {
     label: "Turntable, quick",
     help: `${TURNTABLE_FRAMES} frames once around, as the view looks while it moves; PNG in a ZIP`,
@@ -48,22 +48,22 @@ const TURNTABLES: Choice[] = [
   { label: "Turntable as a video", help: "The quick one as MP4", run: () => exportTurntable("mp4", false) },
 ];
 
-const TURNS: Record<Turns, string> = {
+const TURNTABLE_LABELS: Record<TurntableRotation, string> = {
   eye: "the eye goes around",
   object: "the object turns, under light that stays",
   environment: "the environment turns alone",
 };
 
 /** What the turntables turn. */
-function WhatTurns() {
+function TurntableSelect() {
   return (
     <li>
       <label>
         Turntable
-        <select value={turns.value} onChange={(event) => (turns.value = event.currentTarget.value as Turns)}>
-          {Object.entries(TURNS).map(([value, words]) => (
+        <select value={turntableRotation.value} onChange={(event) => (turntableRotation.value = event.currentTarget.value as TurntableRotation)}>
+          {Object.entries(TURNTABLE_LABELS).map(([value, label]) => (
             <option key={value} value={value}>
-              {words}
+              {label}
             </option>
           ))}
         </select>
@@ -72,15 +72,15 @@ function WhatTurns() {
   );
 }
 
-/** Which colour space EXR files are in, where the server has a config. */
-function Space() {
+/** Which color space EXR files are in, where the server has a config. */
+function ColorSpaceSelect() {
   return (
     <li>
       <label>
         EXR in
-        <select value={exrSpaceHere.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value)}>
+        <select value={availableExrSpace.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value)}>
           <option value="">linear Rec. 709</option>
-          {spaces.value.map((name) => (
+          {exrSpaces.value.map((name) => (
             <option key={name} value={name}>
               {name}
             </option>
@@ -93,26 +93,26 @@ function Space() {
 
 export function ExportMenu() {
   const [open, setOpen] = useState(false);
-  drawn.value;
-  const none = look.value === null || !stage.active.isThere;
-  const busy = none || exporting.value !== null;
-  const escape = (event: KeyboardEvent) => {
+  displayedFrames.value;
+  const isUnavailable = look.value === null || !stage.active.hasPixels;
+  const busy = isUnavailable || exporting.value !== null;
+  const onEscape = (event: KeyboardEvent) => {
     if (event.key !== "Escape" || !open) return;
     event.stopPropagation(); // a menu that the buttons are in stays
     setOpen(false);
   };
   return (
-    <div class="menu" onKeyDown={escape}>
+    <div class="menu" onKeyDown={onEscape}>
       <div class="group" role="group" aria-label="Export">
         <button
-          title={`Export ${whichView()} as displayed (Ctrl+Shift+S)${lightLimitWords()}`}
-          disabled={none}
+          title={`Export ${exportTargetLabel()} as displayed (Ctrl+Shift+S)${lightFilterText()}`}
+          disabled={isUnavailable}
           onClick={() => void exportPng()}
         >
           PNG
         </button>
         <button
-          title={`Export the linear radiance of ${whichView()}${exrSpaceHere.value === null ? "" : ` in ${exrSpaceHere.value}`}, with a layer for each light${lightLimitWords()}`}
+          title={`Export the linear radiance of ${exportTargetLabel()}${availableExrSpace.value === null ? "" : ` in ${availableExrSpace.value}`}, with a layer for each light${lightFilterText()}`}
           disabled={busy}
           onClick={() => void exportExr(true)}
         >
@@ -124,7 +124,7 @@ export function ExportMenu() {
       </div>
       {open && (
         <ul class="menu-body export-menu">
-          {(moves.value ? [...PICTURES, ...TURNTABLES] : PICTURES).map(({ label, help, run }) => (
+          {(hasFreeCamera.value ? [...IMAGE_EXPORTS, ...TURNTABLE_EXPORTS] : IMAGE_EXPORTS).map(({ label, help, run }) => (
             <li key={label}>
               <button
                 disabled={busy}
@@ -138,8 +138,8 @@ export function ExportMenu() {
               <span>{help}</span>
             </li>
           ))}
-          {moves.value && <WhatTurns />}
-          {spaces.value.length > 0 && <Space />}
+          {hasFreeCamera.value && <TurntableSelect />}
+          {exrSpaces.value.length > 0 && <ColorSpaceSelect />}
         </ul>
       )}
     </div>

@@ -1,10 +1,10 @@
-/** The keyboard map. Lies over a corner of the picture, never in its way for long: Escape or ? closes it. */
+/** The keyboard map. Lies over a corner of the image, never in its way for long: Escape or ? closes it. */
 import { useEffect, useRef } from "preact/hooks";
 import { helpOpen } from "../state/panels";
-import { IconButton } from "../ui/Button";
+import { IconButton } from "../ui/IconButton";
 import { keyName } from "../ui/chord";
-import { useReturnFocus } from "../ui/keepFocus";
-import { ACTIONS, FOCUS_KEYS } from "./actions";
+import { useReturnFocus } from "../ui/restoreFocus";
+import { SHORTCUTS, FOCUS_KEYS } from "./shortcuts";
 
 const GROUPS = ["Picture", "Look", "Compare", "Curve", "Panels"] as const;
 
@@ -22,7 +22,7 @@ export function Help() {
         {GROUPS.map((group) => (
           <dl key={group}>
             <h3>{group}</h3>
-            {ACTIONS.filter((action) => action.group === group).map((action) => (
+            {SHORTCUTS.filter((action) => action.group === group).map((action) => (
               <div key={action.label}>
                 <dt>{action.label}</dt>
                 <dd>

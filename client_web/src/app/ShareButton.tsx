@@ -1,7 +1,7 @@
 /** Makes a link that carries the look, and copies it; where the browser forbids that, the link is there to be copied. */
 import { useEffect, useRef } from "preact/hooks";
-import { linkToCopy, share } from "../looks/share";
-import { IconButton } from "../ui/Button";
+import { linkToCopy, copyShareLink } from "../panels/looks/shareLink";
+import { IconButton } from "../ui/IconButton";
 
 export function ShareButton() {
   const link = linkToCopy.value;
@@ -11,15 +11,15 @@ export function ShareButton() {
     linkToCopy.value = null;
     menu.current?.querySelector("button")?.focus();
   };
-  const escape = (event: KeyboardEvent) => {
+  const onEscape = (event: KeyboardEvent) => {
     if (event.key !== "Escape" || link === null) return;
     event.stopPropagation(); // a menu that the button is in stays
     close();
   };
   useEffect(() => field.current?.select(), [link]);
   return (
-    <div class="share-link" ref={menu} onKeyDown={escape}>
-      <IconButton icon="share" label="Share: copy a link to this picture" onClick={() => void share()} />
+    <div class="share-link" ref={menu} onKeyDown={onEscape}>
+      <IconButton icon="share" label="Share: copy a link to this picture" onClick={() => void copyShareLink()} />
       {link !== null && (
         <div class="menu-body" role="dialog" aria-label="Link to this picture">
           <label>

@@ -1,103 +1,103 @@
-/** What is going on, in words: connection, latency, exactness, freezing, bakes, memory. */
+/** The status bar: connection, latency, exactness, precomputing, bakes, cache. */
 import { useComputed } from "@preact/signals";
-import { reconnectNow } from "../live/connections";
-import { exporting, exportingWords } from "../looks/rendering";
-import { cancelBake } from "../net/api";
-import { bakingWords, hasProgress, useElapsed } from "../scene/baking";
-import { limits } from "../seen/limits";
-import { coming, method } from "../state/bakes";
-import { connection, freezing, retryInMs } from "../state/connection";
-import { settled } from "../state/fidelity";
+import { reconnectNow } from "../session/connections";
+import { exporting, exportText } from "../panels/looks/renderJob";
+import { cancelBake } from "../session/net/api";
+import { bakeProgressText, hasProgress, useElapsedSeconds } from "../session/scene/bakeStatus";
+import { activeFilters } from "../state/visibility/activeFilters";
+import { pendingBake, method } from "../state/bakes";
+import { connection, freezeStatus, retryInMs } from "../state/connection";
+import { isConverged } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
-import { bakedLight, look } from "../state/look";
-import { shownPanels } from "../state/room";
-import { companyWords } from "../state/together";
-import { moves } from "../state/views";
-import { playing } from "../timeline/play";
-import { toggleTruth } from "../truth/truth";
+import { usesBakedEnvironment, look } from "../state/look";
+import { shownPanels } from "../state/panelWidths";
+import { membersText } from "../state/collaboration";
+import { hasFreeCamera } from "../state/views";
+import { isPlaying } from "../panels/timeline/playback";
+import { toggleComparison } from "../panels/compare/comparison";
 import { formatBytes } from "../ui/scale";
-import { attempt } from "../ui/toasts";
-import { connectionWords } from "./connectionWords";
-import { useMemory } from "./memory";
+import { reportErrors } from "../ui/toasts";
+import { connectionMessage } from "./connectionMessages";
+import { useCacheGauge } from "./useCacheGauge";
 
-function pictureWords(): string {
-  if (freezing.value?.state === "shading") return `Shading ${freezing.value.what}`;
-  if (freezing.value !== null) return `Preparing ${freezing.value.what}`;
+function imageStatusText(): string {
+  if (freezeStatus.value?.state === "shading") return `Shading ${freezeStatus.value.label}`;
+  if (freezeStatus.value !== null) return `Preparing ${freezeStatus.value.label}`;
   if (look.value === null || connection.value !== "open") return "";
-  if (!settled.value && playing.value) return "playing";
-  if (!settled.value) return moves.value ? "approximate until the eye rests" : "refining…";
-  return bakedLight.value && method.value !== "direct" ? "exact ✓" : "exact for this bake ✓";
+  if (!isConverged.value && isPlaying.value) return "playing";
+  if (!isConverged.value) return hasFreeCamera.value ? "approximate until the eye rests" : "refining…";
+  return usesBakedEnvironment.value && method.value !== "direct" ? "exact ✓" : "exact for this bake ✓";
 }
 
-function bakeWords(elapsed: number): string {
-  const next = coming.value;
+function bakeStatusText(elapsed: number): string {
+  const next = pendingBake.value;
   if (next === null) return "";
   if (next.state === "ready") return "Bake ready, opening";
   if (next.state !== "running" && next.state !== "queued") return `Bake ${next.state}`;
-  return `Bake: ${bakingWords(next, elapsed)}`;
+  return `Bake: ${bakeProgressText(next, elapsed)}`;
 }
 
 export function StatusBar() {
-  const memory = useMemory();
-  const elapsed = useElapsed(coming.value);
+  const cacheBytes = useCacheGauge();
+  const elapsed = useElapsedSeconds(pendingBake.value);
   // announced: only what changes seldom, without the numbers that run
   const announced = useComputed(() =>
     [
-      connection.value === "open" ? "Connected" : connectionWords(),
-      freezing.value && pictureWords(),
-      companyWords.value,
-      ...limits.value.map((limit) => limit.words),
+      connection.value === "open" ? "Connected" : connectionMessage(),
+      freezeStatus.value && imageStatusText(),
+      membersText.value,
+      ...activeFilters.value.map((limit) => limit.label),
     ]
       .filter(Boolean)
       .join(". "),
   );
   const canTryNow = connection.value === "silent" || (connection.value === "reconnecting" && retryInMs.value > 0);
-  const running = coming.value !== null && (coming.value.state === "running" || coming.value.state === "queued");
+  const running = pendingBake.value !== null && (pendingBake.value.state === "running" || pendingBake.value.state === "queued");
   return (
     <footer class="status">
       <span class={`state ${connection.value}`}>
         <i class="lamp" aria-hidden="true" />
-        {connectionWords()}
+        {connectionMessage()}
         {canTryNow && <button onClick={reconnectNow}>Now</button>}
       </span>
       <span class="latency" title="From the hand to the drawn frame">
         edit → picture {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
-      <span class={`exactness ${settled.value ? "is-exact" : ""}`}>{pictureWords()}</span>
+      <span class={`exactness ${isConverged.value ? "is-exact" : ""}`}>{imageStatusText()}</span>
       <button 
         aria-pressed={shownPanels.value.includes("truth")}
         title="Compare this picture with brute force"
         disabled={look.value === null}
-        onClick={toggleTruth}
+        onClick={toggleComparison}
       >
         How true is this?
       </button>
-      {freezing.value !== null && <progress max={1} value={freezing.value.progress} aria-label={pictureWords()} />}
+      {freezeStatus.value !== null && <progress max={1} value={freezeStatus.value.progress} aria-label={imageStatusText()} />}
       <span class="spacer" />
       {exporting.value !== null && (
         <span class="bake">
-          {exportingWords(exporting.value)}
-          <progress max={1} value={exporting.value.progress} aria-label={exporting.value.what} />
+          {exportText(exporting.value)}
+          <progress max={1} value={exporting.value.progress} aria-label={exporting.value.exportName} />
           <button disabled={exporting.value.stop === null} onClick={() => exporting.value?.stop?.()}>
             Stop
           </button>
         </span>
       )}
-      {coming.value !== null && (
+      {pendingBake.value !== null && (
         <span class="bake">
-          {bakeWords(elapsed)}
+          {bakeStatusText(elapsed)}
           {running && (
             <>
-              <progress max={1} value={hasProgress(coming.value) ? coming.value.progress : undefined} aria-label="Bake" />
-              <button onClick={() => coming.value && void attempt(() => cancelBake(coming.value?.id ?? ""))}>
+              <progress max={1} value={hasProgress(pendingBake.value) ? pendingBake.value.progress : undefined} aria-label="Bake" />
+              <button onClick={() => pendingBake.value && void reportErrors(() => cancelBake(pendingBake.value?.id ?? ""))}>
                 Cancel
               </button>
             </>
           )}
         </span>
       )}
-      {memory !== null && memory > 0 && (
-        <span title="Frozen transport that the server holds in memory">frozen {formatBytes(memory)}</span>
+      {cacheBytes !== null && cacheBytes > 0 && (
+        <span title="Frozen transport that the server holds in memory">frozen {formatBytes(cacheBytes)}</span>
       )}
       <span class="announce" role="status" aria-live="polite">
         {announced.value}

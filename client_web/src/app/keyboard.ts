@@ -1,65 +1,65 @@
 /** Keys of the whole page; controls that have the focus take theirs first. */
 import { useEffect } from "preact/hooks";
-import { stopAdding } from "../lights/placing";
+import { stopPlacement } from "../panels/lights/placement";
 import { helpOpen } from "../state/panels";
-import { chord } from "../ui/chord";
-import { ACTIONS, onWipeKey, type Action } from "./actions";
+import { formatShortcut } from "../ui/chord";
+import { SHORTCUTS, handleWipeKey, type Shortcut } from "./shortcuts";
 
-function typing(target: EventTarget | null): boolean {
+function isTyping(target: EventTarget | null): boolean {
   return (
     target instanceof HTMLElement && target.matches("input:not([type=color]), textarea, select, [contenteditable]")
   );
 }
 
-function actionOf(event: KeyboardEvent): Action | undefined {
-  return ACTIONS.find((action) => action.keys.includes(chord(event)));
+function shortcutOf(event: KeyboardEvent): Shortcut | undefined {
+  return SHORTCUTS.find((action) => action.keys.includes(formatShortcut(event)));
 }
 
 /** Whether the pointer was used last. */
-let byPointer = false;
+let isPointerInput = false;
 
-function point(): void {
-  byPointer = true;
+function onPointerDown(): void {
+  isPointerInput = true;
 }
 
-function down(event: KeyboardEvent): void {
-  byPointer = false;
+function onKeyDown(event: KeyboardEvent): void {
+  isPointerInput = false;
   if (event.defaultPrevented || event.altKey) return;
   if (event.key === "Escape") {
     helpOpen.value = false;
-    stopAdding();
+    stopPlacement();
   }
-  const action = actionOf(event);
-  if (action === undefined || (typing(event.target) && !event.ctrlKey && !event.metaKey)) return;
+  const action = shortcutOf(event);
+  if (action === undefined || (isTyping(event.target) && !event.ctrlKey && !event.metaKey)) return;
   // in a field, undo is the field's own
-  if (typing(event.target) && /z|y/.test(event.key)) return;
+  if (isTyping(event.target) && /z|y/.test(event.key)) return;
   event.preventDefault();
-  if (event.key === "[" || event.key === "]") onWipeKey(event.key);
+  if (event.key === "[" || event.key === "]") handleWipeKey(event.key);
   else if (!(event.repeat && action.release !== undefined)) action.run();
 }
 
-function up(event: KeyboardEvent): void {
-  for (const action of ACTIONS) if (action.keys.includes(event.key.toLowerCase())) action.release?.();
+function onKeyUp(event: KeyboardEvent): void {
+  for (const action of SHORTCUTS) if (action.keys.includes(event.key.toLowerCase())) action.release?.();
 }
 
 /** A list that the pointer chose from gives the keys back: else the next letter would choose again. */
-function chosen({ target }: Event): void {
-  if (target instanceof HTMLSelectElement && byPointer) target.blur();
+function onSelectChange({ target }: Event): void {
+  if (target instanceof HTMLSelectElement && isPointerInput) target.blur();
 }
 
 export function useKeyboard(): void {
   useEffect(() => {
-    const release = () => ACTIONS.forEach((action) => action.release?.());
-    window.addEventListener("keydown", down);
-    window.addEventListener("keyup", up);
-    window.addEventListener("pointerdown", point, { capture: true });
-    window.addEventListener("change", chosen);
+    const release = () => SHORTCUTS.forEach((action) => action.release?.());
+    window.addEventListener("keydown", onKeyDown);
+    window.addEventListener("keyup", onKeyUp);
+    window.addEventListener("pointerdown", onPointerDown, { capture: true });
+    window.addEventListener("change", onSelectChange);
     window.addEventListener("blur", release);
     return () => {
-      window.removeEventListener("keydown", down);
-      window.removeEventListener("keyup", up);
-      window.removeEventListener("pointerdown", point, { capture: true });
-      window.removeEventListener("change", chosen);
+      window.removeEventListener("keydown", onKeyDown);
+      window.removeEventListener("keyup", onKeyUp);
+      window.removeEventListener("pointerdown", onPointerDown, { capture: true });
+      window.removeEventListener("change", onSelectChange);
       window.removeEventListener("blur", release);
     };
   }, []);

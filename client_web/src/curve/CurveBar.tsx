@@ -1,23 +1,23 @@
 /** The curve editor's switches: tools and channels above the plot, axes and resets below it. */
 import { inspectorWidth } from "../state/panels";
-import { IconButton } from "../ui/Button";
+import { IconButton } from "../ui/IconButton";
 import type { IconName } from "../ui/Icon";
-import { Switch } from "../ui/Switch";
-import { CHANNELS, type Active } from "./model/channels";
-import { copyOf, put } from "./model/model";
-import { active, isStretched, lights, logarithmic, stretched, tableOpen, tool, type Tool } from "./settings";
-import type { Hand } from "./tools";
+import { ToggleButton } from "../ui/ToggleButton";
+import { CHANNELS, type ActiveChannels } from "./model/channels";
+import { copyCurve, applyChannels } from "./model/model";
+import { activeChannels, isStretched, isIntervalLit, logarithmic, stretchedCurves, tableOpen, curveTool, type Tool } from "./curveView";
+import type { CurveContext } from "./curveTools";
 
 const TOOLS: { name: Tool; icon: IconName; label: string; keys: string }[] = [
   { name: "points", icon: "points", label: "Points", keys: "P" },
   { name: "draw", icon: "draw", label: "Draw", keys: "D" },
   { name: "stretch", icon: "stretch", label: "Scale and shift a stretch", keys: "T" },
 ];
-const ACTIVE: Active[] = ["rgb", ...CHANNELS];
-const WIDE = 560;
-const NARROW = 320;
+const ACTIVE: ActiveChannels[] = ["rgb", ...CHANNELS];
+const WIDE_TITLE = 560;
+const NARROW_TITLE = 320;
 
-export function CurveTools({ hand }: { hand: Hand }) {
+export function CurveTools({ context }: { context: CurveContext }) {
   return (
     <div class="bar">
       <div class="group" role="group" aria-label="Tool">
@@ -27,8 +27,8 @@ export function CurveTools({ hand }: { hand: Hand }) {
             icon={icon}
             label={label}
             keys={keys}
-            pressed={tool.value === name}
-            onClick={() => (tool.value = name)}
+            pressed={curveTool.value === name}
+            onClick={() => (curveTool.value = name)}
           />
         ))}
       </div>
@@ -37,16 +37,16 @@ export function CurveTools({ hand }: { hand: Hand }) {
           <button
             key={name}
             class={`channel-switch ${name}`}
-            aria-pressed={active.value === name}
-            onClick={() => (active.value = name)}
+            aria-pressed={activeChannels.value === name}
+            onClick={() => (activeChannels.value = name)}
           >
             {name.toUpperCase()}
           </button>
         ))}
       </div>
-      {!hand.model.together && active.value === "rgb" && (
+      {!context.model.areJoined && activeChannels.value === "rgb" && (
         <button
-          onClick={() => put(hand.model, "Join channels", () => copyOf(hand.model, 1, hand.axes), [0, 1, 2])}
+          onClick={() => applyChannels(context.model, "Join channels", () => copyCurve(context.model, 1, context.axes), [0, 1, 2])}
           title="Give all three channels the green curve"
         >
           Join
@@ -55,24 +55,24 @@ export function CurveTools({ hand }: { hand: Hand }) {
       <span class="spacer" />
       <IconButton
         icon="wide"
-        label={inspectorWidth.value >= WIDE ? "Narrow the inspector" : "Widen the inspector"}
-        pressed={inspectorWidth.value >= WIDE}
-        onClick={() => (inspectorWidth.value = inspectorWidth.value >= WIDE ? NARROW : WIDE)}
+        label={inspectorWidth.value >= WIDE_TITLE ? "Narrow the inspector" : "Widen the inspector"}
+        pressed={inspectorWidth.value >= WIDE_TITLE}
+        onClick={() => (inspectorWidth.value = inspectorWidth.value >= WIDE_TITLE ? NARROW_TITLE : WIDE_TITLE)}
       />
     </div>
   );
 }
 
-export function CurveBar({ hand }: { hand: Hand }) {
-  const { info, channels } = hand.model;
-  const near = isStretched(info.name, info.bands);
-  const drawn = hand.channels.some((c) => channels[c] !== null);
+export function CurveBar({ context }: { context: CurveContext }) {
+  const { info, channels } = context.model;
+  const isStretchedAxis = isStretched(info.name, info.bands);
+  const drawn = context.channels.some((c) => channels[c] !== null);
   return (
     <div class="bar">
       <button
-        aria-pressed={near}
+        aria-pressed={isStretchedAxis}
         title="Stretch the angles near 0°, where highlights live"
-        onClick={() => (stretched.value = { ...stretched.value, [info.name]: !near })}
+        onClick={() => (stretchedCurves.value = { ...stretchedCurves.value, [info.name]: !isStretchedAxis })}
       >
         0°↔
       </button>
@@ -83,14 +83,14 @@ export function CurveBar({ hand }: { hand: Hand }) {
       >
         log
       </button>
-      <Switch icon="eye" label="Pointing at the curve tints the pixels it lights" of={lights} />
+      <ToggleButton icon="eye" label="Pointing at the curve tints the pixels it lights" state={isIntervalLit} />
       <IconButton
         icon="table"
         label="Points as numbers"
         pressed={tableOpen.value}
         onClick={() => {
           tableOpen.value = !tableOpen.value;
-          if (tableOpen.value) tool.value = "points";
+          if (tableOpen.value) curveTool.value = "points";
         }}
       />
       <span class="spacer" />
@@ -98,7 +98,7 @@ export function CurveBar({ hand }: { hand: Hand }) {
         icon="reset"
         label="Back to the model's own curve"
         disabled={!drawn}
-        onClick={() => put(hand.model, "Reset curve", () => null, hand.channels)}
+        onClick={() => applyChannels(context.model, "Reset curve", () => null, context.channels)}
       >
         Reset
       </IconButton>

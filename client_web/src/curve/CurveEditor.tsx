@@ -1,25 +1,25 @@
-/** The curve editor: a term's one-dimensional factor, under the hand. */
+/** The curve editor for a term's one-dimensional factor. */
 import { useEffect, useMemo, useState } from "preact/hooks";
-import { holdCurve } from "../live/touch";
+import { beginCurveDrag } from "../session/prepare";
 import type { CurveEdits, CurveBody } from "../protocol";
-import { curveShape } from "../state/curveShape";
-import { probe } from "../state/probe";
+import { curvePreview } from "../state/curvePreview";
+import { pixelProbe } from "../state/pointerPixel";
 import { curvePath } from "../state/selection";
 import { CurveBar, CurveTools } from "./CurveBar";
-import { Handles } from "./Handles";
+import { PointHandles } from "./PointHandles";
 import { Plot } from "./Plot";
 import { PointTable } from "./PointTable";
-import { Readout, type Contributions } from "./Readout";
-import { StretchBar } from "./StretchBar";
-import { clearBrush } from "./brush";
+import { CurveReadout, type Contributions } from "./CurveReadout";
+import { IntervalBar } from "./IntervalBar";
+import { clearBrush } from "./curveBrush";
 import { curveModel, pointsOf } from "./model/model";
-import { shareOf } from "./model/stretch";
-import { active, tableOpen, tool } from "./settings";
-import { picked, selection } from "./tools";
-import { stretchKey, usePlot } from "./usePlot";
+import { outputShares } from "./model/interval";
+import { activeChannels, tableOpen, curveTool } from "./curveView";
+import { pickedPoint, selectedInterval } from "./curveTools";
+import { onIntervalKey, usePlot } from "./usePlot";
 
 /** Width of an element, followed. */
-function useWidth(): [(element: HTMLElement | null) => void, number] {
+function useElementWidth(): [(element: HTMLElement | null) => void, number] {
   const [element, setElement] = useState<HTMLElement | null>(null);
   const [width, setWidth] = useState(288);
   useEffect(() => {
@@ -34,77 +34,77 @@ function useWidth(): [(element: HTMLElement | null) => void, number] {
 }
 
 /** A pixel's contributions, where they are of this curve. */
-function contributionsTo(path: string): Contributions | null {
-  const answer = probe.value?.answer;
+function loadContributions(path: string): Contributions | null {
+  const answer = pixelProbe.value?.answer;
   if (answer?.curve !== path || answer.bands === null) return null;
-  return { bands: answer.bands, share: shareOf(answer.bands, answer.radiance) };
+  return { bands: answer.bands, fraction: outputShares(answer.bands, answer.radiance) };
 }
 
-/** `edits` is what the look says of this curve, undefined where the model's parameters make it. */
+/** `edits` are the look's edits of this curve, undefined if the model's parameters make it. */
 export function CurveEditor({ info, edits }: { info: CurveBody; edits: CurveEdits | undefined }) {
-  const [measure, width] = useWidth();
+  const [measure, width] = useElementWidth();
   const path = curvePath.value ?? "";
-  const shape = curveShape.value;
+  const shape = curvePreview.value;
   const model = useMemo(() => curveModel(path, info, edits, shape), [path, info, edits, shape]);
   const ready = model.curves.every((bands) => bands !== null);
-  const { frame, hand, spot, pointsBlocked, dragging, handlers } = usePlot(model, width, ready);
+  const { frame, context, spot, pointsBlocked, dragging, handlers } = usePlot(model, width, ready);
   useEffect(() => {
-    picked.value = null;
-    selection.value = null;
+    pickedPoint.value = null;
+    selectedInterval.value = null;
     return clearBrush;
-  }, [path, active.value]);
+  }, [path, activeChannels.value]);
   const { axes } = frame;
-  const first = hand.channels[0] ?? 0;
-  const handled = tool.value === "points" && ready && !pointsBlocked;
+  const first = context.channels[0] ?? 0;
+  const handledPoints = curveTool.value === "points" && ready && !pointsBlocked;
   const points = useMemo(
-    () => (handled ? pointsOf(model, first, axes) : null),
-    [handled, model, first, axes.stretched, axes.log, axes.top],
+    () => (handledPoints ? pointsOf(model, first, axes) : null),
+    [handledPoints, model, first, axes.stretched, axes.log, axes.top],
   );
   const drawn = useMemo(() => model.channels.map((channel) => channel !== null), [model]);
-  const contributions = contributionsTo(path);
+  const contributions = loadContributions(path);
   return (
-    <div class="curve" ref={measure} onKeyDown={(event) => stretchKey(event, hand)}>
-      <CurveTools hand={hand} />
+    <div class="curve" ref={measure} onKeyDown={(event) => onIntervalKey(event, context)}>
+      <CurveTools context={context} />
       <div
-        class={`plot ${tool.value}`}
+        class={`plot ${curveTool.value}`}
         style={{ width: `${frame.width}px`, height: `${frame.height}px` }}
-        onPointerEnter={holdCurve}
+        onPointerEnter={beginCurveDrag}
       >
         <Plot
           frame={frame}
           lines={model.lines}
-          ghosts={model.ghosts}
+          generatedLines={model.generatedLines}
           drawn={drawn}
-          together={model.together}
-          active={hand.channels}
-          contributions={contributions !== null && contributions.share > 0 ? contributions.bands : null}
-          stretch={tool.value === "stretch" ? selection.value : null}
+          areJoined={model.areJoined}
+          active={context.channels}
+          contributions={contributions !== null && contributions.fraction > 0 ? contributions.bands : null}
+          interval={curveTool.value === "stretch" ? selectedInterval.value : null}
           cursor={spot !== null && !dragging ? spot.degrees : null}
           points={points}
-          offered={!hand.channels.some((c) => drawn[c])}
+          offered={!context.channels.some((c) => drawn[c])}
         />
         <svg
           width={frame.width}
           height={frame.height}
-          tabindex={tool.value === "stretch" ? 0 : -1}
+          tabindex={curveTool.value === "stretch" ? 0 : -1}
           role="group"
           aria-label={`${info.label} curve`}
           {...handlers}
         >
-          {points !== null && <Handles frame={frame} hand={hand} points={points} />}
+          {points !== null && <PointHandles frame={frame} context={context} points={points} />}
         </svg>
       </div>
-      <Readout
+      <CurveReadout
         model={model}
-        axes={hand.axes}
+        axes={context.axes}
         spot={spot}
         ready={ready}
         blocked={pointsBlocked}
         contributions={contributions}
       />
-      {tool.value === "stretch" && <StretchBar hand={hand} />}
-      <CurveBar hand={hand} />
-      {tableOpen.value && points !== null && <PointTable hand={hand} points={points} />}
+      {curveTool.value === "stretch" && <IntervalBar context={context} />}
+      <CurveBar context={context} />
+      {tableOpen.value && points !== null && <PointTable context={context} points={points} />}
     </div>
   );
 }

@@ -1,10 +1,10 @@
-/** The plot without hands: one canvas, painted when what it shows has changed. */
+/** The plot without interaction: one canvas, painted when its content changes. */
 import { useLayoutEffect, useRef } from "preact/hooks";
-import { paintPlot, type PlotContent } from "./paint";
-import type { Frame } from "./plotScale";
+import { paintPlot, type PlotContent } from "./plotPainter";
+import type { PlotFrame } from "./plotScale";
 
 interface Props extends PlotContent {
-  frame: Frame;
+  frame: PlotFrame;
 }
 
 export function Plot({ frame, ...content }: Props) {

@@ -1,31 +1,31 @@
 /** The points as numbers. */
 import { MAX_CURVE_VALUE } from "../look.gen";
 import type { Point } from "../protocol";
-import { IconButton } from "../ui/Button";
+import { IconButton } from "../ui/IconButton";
 import { NumberField } from "../ui/NumberField";
-import { deletePoint, moveTo, resetPoint } from "./Handles";
-import { outlineOf } from "./model/fit";
-import { putPoints } from "./model/model";
+import { deletePoint, movePointTo, resetPoint } from "./PointHandles";
+import { outlinePoints } from "./model/fit";
+import { applyPoints } from "./model/model";
 import { addPoint } from "./model/points";
-import { bandOf, picked, type Hand } from "./tools";
+import { bandOf, pickedPoint, type CurveContext } from "./curveTools";
 
 /** Half-way along the widest gap, degrees. */
-function widestGap(points: Point[]): number {
-  let [best, at] = [-1, 45];
+function findWidestGap(points: Point[]): number {
+  let [best, midpoint] = [-1, 45];
   points.forEach(([x], i) => {
     const next = points[i + 1]?.[0] ?? x;
-    if (next - x > best) [best, at] = [next - x, (x + next) / 2];
+    if (next - x > best) [best, midpoint] = [next - x, (x + next) / 2];
   });
-  return at;
+  return midpoint;
 }
 
-export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
+export function PointTable({ context, points }: { context: CurveContext; points: Point[] }) {
   const add = () => {
-    const bands = hand.model.curves[hand.channels[0] ?? 0] ?? [];
-    const [[degrees, value]] = outlineOf([[widestGap(points), 0]], bands) as [Point];
-    const added = addPoint(points, degrees, value, bandOf(hand));
-    putPoints(hand.model, "Add point", points, added.points, hand.channels);
-    if (added.index >= 0) picked.value = { index: added.index, carried: false };
+    const bands = context.model.curves[context.channels[0] ?? 0] ?? [];
+    const [[degrees, value]] = outlinePoints([[findWidestGap(points), 0]], bands) as [Point];
+    const added = addPoint(points, degrees, value, bandOf(context));
+    applyPoints(context.model, "Add point", points, added.points, context.channels);
+    if (added.index >= 0) pickedPoint.value = { index: added.index, carried: false };
   };
   return (
     <div class="point-table">
@@ -45,7 +45,7 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
         </thead>
         <tbody>
           {points.map(([degrees, value], index) => (
-            <tr key={index} class={picked.value?.index === index ? "picked" : ""}>
+            <tr key={index} class={pickedPoint.value?.index === index ? "picked" : ""}>
               <td>
                 <NumberField
                   label={`Point ${index + 1}, angle`}
@@ -53,7 +53,7 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
                   minimum={0}
                   maximum={90}
                   step={0.5}
-                  onChange={(x) => moveTo(hand, points, index, x, value)}
+                  onChange={(x) => movePointTo(context, points, index, x, value)}
                 />
               </td>
               <td>
@@ -62,21 +62,21 @@ export function PointTable({ hand, points }: { hand: Hand; points: Point[] }) {
                   value={value}
                   minimum={0}
                   maximum={MAX_CURVE_VALUE}
-                  step={value > 0 ? value / 50 : hand.axes.top / 1000}
-                  onChange={(y) => moveTo(hand, points, index, degrees, y)}
+                  step={value > 0 ? value / 50 : context.axes.top / 1000}
+                  onChange={(y) => movePointTo(context, points, index, degrees, y)}
                 />
               </td>
               <td class="row-actions">
                 <IconButton
                   icon="reset"
                   label={`Point ${index + 1}: back to the model's curve`}
-                  onClick={() => resetPoint(hand, points, index)}
+                  onClick={() => resetPoint(context, points, index)}
                 />
                 <IconButton
                   icon="close"
                   label={`Delete point ${index + 1}`}
                   disabled={points.length <= 2}
-                  onClick={() => deletePoint(hand, points, index)}
+                  onClick={() => deletePoint(context, points, index)}
                 />
               </td>
             </tr>

@@ -1,16 +1,16 @@
-/** The plot's place on the screen: from angles and values to CSS pixels, and back. */
-import { degreesAt, xFraction, yFraction, type Axes } from "./model/axes";
+/** The plot's scale: from angles and values to CSS pixels, and back. */
+import { degreesAt, xFraction, yFraction, type CurveAxes } from "./model/axes";
 
-export interface Frame {
+export interface PlotFrame {
   width: number;
   height: number;
-  axes: Axes;
+  axes: CurveAxes;
 }
 
 const MARGIN = { left: 40, right: 10, top: 10, bottom: 20 };
 
 /** Edges of the area between the axes. */
-export function inner(frame: Frame): { left: number; right: number; top: number; base: number } {
+export function innerRect(frame: PlotFrame): { left: number; right: number; top: number; base: number } {
   return {
     left: MARGIN.left,
     right: frame.width - MARGIN.right,
@@ -19,18 +19,18 @@ export function inner(frame: Frame): { left: number; right: number; top: number;
   };
 }
 
-export function plotX(frame: Frame, degrees: number): number {
-  const { left, right } = inner(frame);
+export function plotX(frame: PlotFrame, degrees: number): number {
+  const { left, right } = innerRect(frame);
   return left + xFraction(frame.axes, degrees) * (right - left);
 }
 
-export function plotY(frame: Frame, value: number): number {
-  const { top, base } = inner(frame);
+export function plotY(frame: PlotFrame, value: number): number {
+  const { top, base } = innerRect(frame);
   return top + (1 - Math.min(1.02, yFraction(frame.axes, value))) * (base - top);
 }
 
 /** Angle, and fraction of the plot's height (may leave 0…1), at a place in the plot. */
-export function plotAt(frame: Frame, x: number, y: number): { degrees: number; height: number } {
-  const { left, right, top, base } = inner(frame);
+export function degreesAndValueAt(frame: PlotFrame, x: number, y: number): { degrees: number; height: number } {
+  const { left, right, top, base } = innerRect(frame);
   return { degrees: degreesAt(frame.axes, (x - left) / (right - left)), height: 1 - (y - top) / (base - top) };
 }

@@ -2,108 +2,108 @@
 import { useRef, useState } from "preact/hooks";
 import { history } from "../edit/history";
 import { useDrag } from "../ui/drag";
-import { brush, clearBrush } from "./brush";
-import { niceTop, type Axes } from "./model/axes";
+import { requestBrush, clearBrush } from "./curveBrush";
+import { niceTop, type CurveAxes } from "./model/axes";
 import { channelsOf } from "./model/channels";
 import { largestValue, pointsOf, type CurveModel } from "./model/model";
-import { plotAt, plotX, plotY, type Frame } from "./plotScale";
-import { active, isStretched, logarithmic, tool } from "./settings";
+import { degreesAndValueAt, plotX, plotY, type PlotFrame } from "./plotScale";
+import { activeChannels, isStretched, logarithmic, curveTool } from "./curveView";
 import {
   applyScale,
   applyShift,
   drawGesture,
-  picked,
+  pickedPoint,
   pointsGesture,
-  selection,
-  stretchGesture,
-  type Gesture,
-  type Hand,
-  type Spot,
-} from "./tools";
+  selectedInterval,
+  intervalGesture,
+  type PlotGesture,
+  type CurveContext,
+  type PlotSpot,
+} from "./curveTools";
 
 const HIT_PX = 11;
 const MIN_BRUSH_DEGREES = 0.75;
 
-function spotOf(frame: Frame, svg: SVGSVGElement, event: PointerEvent): Spot {
+function spotOf(frame: PlotFrame, svg: SVGSVGElement, event: PointerEvent): PlotSpot {
   const box = svg.getBoundingClientRect();
   const [x, y] = [event.clientX - box.left, event.clientY - box.top];
-  return { ...plotAt(frame, x, y), x, y };
+  return { ...degreesAndValueAt(frame, x, y), x, y };
 }
 
-function hitPoint(frame: Frame, hand: Hand, spot: Spot): number {
-  let [best, at] = [HIT_PX, -1];
-  pointsOf(hand.model, hand.channels[0] ?? 0, hand.axes).forEach(([x, y], i) => {
+function hitPoint(frame: PlotFrame, context: CurveContext, spot: PlotSpot): number {
+  let [best, hitIndex] = [HIT_PX, -1];
+  pointsOf(context.model, context.channels[0] ?? 0, context.axes).forEach(([x, y], i) => {
     const distance = Math.hypot(plotX(frame, x) - spot.x, plotY(frame, y) - spot.y);
-    if (distance < best) [best, at] = [distance, i];
+    if (distance < best) [best, hitIndex] = [distance, i];
   });
-  return at;
+  return hitIndex;
 }
 
-/** Keys on a selected stretch: arrows scale and shift it. */
-export function stretchKey(event: KeyboardEvent, hand: Hand): void {
-  const chosen = selection.value;
-  if (tool.value !== "stretch" || chosen === null) return;
+/** Keys on a selected interval: arrows scale and shift it. */
+export function onIntervalKey(event: KeyboardEvent, context: CurveContext): void {
+  const interval = selectedInterval.value;
+  if (curveTool.value !== "stretch" || interval === null) return;
   const fine = event.shiftKey ? 0.1 : 1;
-  if (event.key === "ArrowUp") applyScale(hand, chosen, 1 + 0.05 * fine);
-  else if (event.key === "ArrowDown") applyScale(hand, chosen, 1 / (1 + 0.05 * fine));
-  else if (event.key === "ArrowLeft") selection.value = applyShift(hand, chosen, -fine);
-  else if (event.key === "ArrowRight") selection.value = applyShift(hand, chosen, fine);
-  else if (event.key === "Escape") selection.value = null;
+  if (event.key === "ArrowUp") applyScale(context, interval, 1 + 0.05 * fine);
+  else if (event.key === "ArrowDown") applyScale(context, interval, 1 / (1 + 0.05 * fine));
+  else if (event.key === "ArrowLeft") selectedInterval.value = applyShift(context, interval, -fine);
+  else if (event.key === "ArrowRight") selectedInterval.value = applyShift(context, interval, fine);
+  else if (event.key === "Escape") selectedInterval.value = null;
   else return;
   event.preventDefault();
   event.stopPropagation();
 }
 
-function gestureAt(hand: Hand, frame: Frame, spot: Spot): Gesture {
-  if (tool.value === "draw") return drawGesture(hand, spot);
-  if (tool.value === "stretch") return stretchGesture(hand, spot);
-  return pointsGesture(hand, spot, hitPoint(frame, hand, spot));
+function gestureAt(context: CurveContext, frame: PlotFrame, spot: PlotSpot): PlotGesture {
+  if (curveTool.value === "draw") return drawGesture(context, spot);
+  if (curveTool.value === "stretch") return intervalGesture(context, spot);
+  return pointsGesture(context, spot, hitPoint(frame, context, spot));
 }
 
-/** The plot's frame, what the hand may change, and the pointer's handlers. */
+/** The plot's frame, the editing context, and the pointer's handlers. */
 export function usePlot(model: CurveModel, width: number, ready: boolean) {
-  const [held, setHeld] = useState<Axes | null>(null);
-  const gesture = useRef<Gesture | null>(null);
-  const [spot, setSpot] = useState<Spot | null>(null);
-  const axes: Axes = held ?? {
+  const [frozenAxes, setFrozenAxes] = useState<CurveAxes | null>(null);
+  const gesture = useRef<PlotGesture | null>(null);
+  const [spot, setSpot] = useState<PlotSpot | null>(null);
+  const axes: CurveAxes = frozenAxes ?? {
     stretched: isStretched(model.info.name, model.info.bands),
     log: logarithmic.value,
     top: niceTop(largestValue(model), logarithmic.value),
   };
-  const frame: Frame = { width, height: Math.round(Math.min(460, Math.max(190, width * 0.66))), axes };
-  const hand: Hand = { model, axes, channels: channelsOf(active.value) };
-  const pointsBlocked = tool.value === "points" && active.value === "rgb" && !model.together;
+  const frame: PlotFrame = { width, height: Math.round(Math.min(460, Math.max(190, width * 0.66))), axes };
+  const context: CurveContext = { model, axes, channels: channelsOf(activeChannels.value) };
+  const pointsBlocked = curveTool.value === "points" && activeChannels.value === "rgb" && !model.areJoined;
 
   const begin = (event: PointerEvent) => {
     if (event.button !== 0 || !ready || pointsBlocked) return false;
     const svg = event.currentTarget as SVGSVGElement;
     clearBrush();
-    history.seal();
-    setHeld(axes);
-    gesture.current = gestureAt(hand, frame, spotOf(frame, svg, event));
+    history.endGesture();
+    setFrozenAxes(axes);
+    gesture.current = gestureAt(context, frame, spotOf(frame, svg, event));
     event.preventDefault();
     return true;
   };
   const move = (event: PointerEvent) => {
     const svg = event.currentTarget as SVGSVGElement;
     setSpot(spotOf(frame, svg, event));
-    const events = tool.value === "draw" ? event.getCoalescedEvents?.() : undefined;
-    for (const each of events?.length ? events : [event]) gesture.current?.move(spotOf(frame, svg, each));
+    const events = curveTool.value === "draw" ? event.getCoalescedEvents?.() : undefined;
+    for (const sample of events?.length ? events : [event]) gesture.current?.move(spotOf(frame, svg, sample));
   };
   const hover = (event: PointerEvent) => {
-    const here = spotOf(frame, event.currentTarget as SVGSVGElement, event);
-    setSpot(here);
-    const half = Math.max(MIN_BRUSH_DEGREES, 90 / model.info.bands, here.degrees * 0.06);
-    const chosen = tool.value === "stretch" ? selection.value : null;
-    brush(...(chosen ?? [here.degrees - half, here.degrees + half]));
+    const hoverSpot = spotOf(frame, event.currentTarget as SVGSVGElement, event);
+    setSpot(hoverSpot);
+    const half = Math.max(MIN_BRUSH_DEGREES, 90 / model.info.bands, hoverSpot.degrees * 0.06);
+    const interval = curveTool.value === "stretch" ? selectedInterval.value : null;
+    requestBrush(...(interval ?? [hoverSpot.degrees - half, hoverSpot.degrees + half]));
   };
   const end = (event: PointerEvent, released: boolean) => {
     const svg = event.currentTarget as SVGSVGElement;
     if (released) gesture.current?.up(spotOf(frame, svg, event));
     gesture.current = null;
-    setHeld(null);
-    // the keys go on where the hand let go
-    const index = tool.value === "points" ? picked.value?.index : undefined;
+    setFrozenAxes(null);
+    // the keys go on where the drag ended
+    const index = curveTool.value === "points" ? pickedPoint.value?.index : undefined;
     if (index === undefined) svg.focus();
     else requestAnimationFrame(() => svg.querySelector<SVGGElement>(`[data-index="${index}"]`)?.focus());
   };
@@ -113,7 +113,7 @@ export function usePlot(model: CurveModel, width: number, ready: boolean) {
   };
   return {
     frame,
-    hand,
+    context,
     spot,
     pointsBlocked,
     dragging: gesture.current !== null,

@@ -1,20 +1,20 @@
 /** After an import, and on request: what a bake will cost. Not modal: the page stays usable. */
 import { useEffect, useRef } from "preact/hooks";
 import type { SceneBody } from "../protocol";
-import { viewsToBake, type BakeChoice } from "../scene/bakeChoice";
-import { DEFAULT_METHOD } from "../scene/methods";
-import { IconButton } from "../ui/Button";
-import { useReturnFocus } from "../ui/keepFocus";
-import { PresetList } from "./PresetList";
-import { Remarks } from "./Remarks";
+import { viewsToBake, type BakeSettings } from "../session/scene/bakeSettings";
+import { DEFAULT_BAKE_METHOD } from "../session/scene/bakeMethods";
+import { IconButton } from "../ui/IconButton";
+import { useReturnFocus } from "../ui/restoreFocus";
+import { Presets } from "./Presets";
+import { ImportWarnings } from "./ImportWarnings";
 
-interface Props {
+interface BakeDialogProps {
   scene: SceneBody;
   onClose(): void;
-  onOpen(choice: BakeChoice): void;
+  onOpen(choice: BakeSettings): void;
 }
 
-export function BakeDialog({ scene, onClose, onOpen }: Props) {
+export function BakeDialog({ scene, onClose, onOpen }: BakeDialogProps) {
   const panel = useRef<HTMLElement>(null);
   useReturnFocus(panel);
   useEffect(() => {
@@ -36,11 +36,11 @@ export function BakeDialog({ scene, onClose, onOpen }: Props) {
       <p>
         A preview opens the editor at once; the bake you choose takes its place when it is ready, and no edit is lost.
       </p>
-      {scene.remarks.length > 0 && <Remarks remarks={scene.remarks} />}
-      <PresetList
+      {scene.remarks.length > 0 && <ImportWarnings warnings={scene.remarks} />}
+      <Presets
         key={scene.id}
         scene={scene}
-        method={DEFAULT_METHOD}
+        method={DEFAULT_BAKE_METHOD}
         views={viewsToBake(scene)}
         action="Open and bake"
         onChoose={onOpen}

@@ -1,39 +1,39 @@
 /** Import: drop files and folders anywhere on the page, or choose them; then the uploads with their progress. */
 import { useEffect, useState } from "preact/hooks";
-import type { Dropped } from "../files/dropped";
+import type { DroppedFile } from "./files/dropTypes";
 import {
-  chosenFiles,
+  listSelectedFiles,
   COMPANION_SUFFIXES,
   ENVIRONMENT_SUFFIXES,
   isEnvironment,
-  isOfUse,
+  isImportable,
   SCENE_SUFFIXES,
   sortFiles,
-  together,
-  type Chosen,
-} from "../files/files";
-import { refusalOnStart } from "../files/refusals";
+  mergeFiles,
+  type ImportSelection,
+} from "./files/sceneFiles";
+import { startPageRejection } from "./files/rejections";
 import type { SceneBody } from "../protocol";
-import { mended, showError } from "../ui/toasts";
-import { ChosenScenes } from "./ChosenScenes";
+import { clearErrors, showError } from "../ui/toasts";
+import { ChosenFiles } from "./ChosenFiles";
 import { useFileDrop } from "./useFileDrop";
-import { useImport, type Sending } from "./useImport";
+import { useImport, type UploadState } from "./useImport";
 
-const NOTHING: Chosen = { scenes: [], environment: null };
+const EMPTY_SELECTION: ImportSelection = { scenes: [], environment: null };
 
-function useSorted(files: readonly Dropped[]): Chosen {
-  const [chosen, setChosen] = useState(NOTHING);
+function useSortedFiles(files: readonly DroppedFile[]): ImportSelection {
+  const [selection, setSelection] = useState(EMPTY_SELECTION);
   useEffect(() => {
     let stale = false;
-    void sortFiles(files).then((sorted) => !stale && setChosen(sorted));
+    void sortFiles(files).then((sorted) => !stale && setSelection(sorted));
     return () => {
       stale = true;
     };
   }, [files]);
-  return chosen;
+  return selection;
 }
 
-function FileInput({ label, folder, take }: { label: string; folder?: boolean; take(files: Dropped[]): void }) {
+function FileInput({ label, folder, onFiles }: { label: string; folder?: boolean; onFiles(files: DroppedFile[]): void }) {
   const accept = [...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES, ...COMPANION_SUFFIXES].join(",");
   return (
     <label class="file">
@@ -43,7 +43,7 @@ function FileInput({ label, folder, take }: { label: string; folder?: boolean; t
         multiple
         {...(folder ? { webkitdirectory: true } : { accept })}
         onChange={(event) => {
-          take(chosenFiles(event.currentTarget.files ?? []));
+          onFiles(listSelectedFiles(event.currentTarget.files ?? []));
           event.currentTarget.value = ""; // so that the same file can be chosen again
         }}
       />
@@ -51,53 +51,53 @@ function FileInput({ label, folder, take }: { label: string; folder?: boolean; t
   );
 }
 
-function SendingWords({ name, share, number, count }: Sending) {
+function UploadStatus({ name, fraction, number, count }: UploadState) {
   const which = count > 1 ? ` (${number} of ${count})` : "";
   return (
     <>
-      <progress max={1} value={share} aria-label="Upload" />
-      <span>{share < 1 ? `Sending “${name}”${which}, ${Math.round(100 * share)} %` : `The server reads “${name}”${which}…`}</span>
+      <progress max={1} value={fraction} aria-label="Upload" />
+      <span>{fraction < 1 ? `Sending “${name}”${which}, ${Math.round(100 * fraction)} %` : `The server reads “${name}”${which}…`}</span>
     </>
   );
 }
 
 export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void }) {
-  const [files, setFiles] = useState<readonly Dropped[]>([]);
-  const [ground, setGround] = useState(false);
-  const { sending, problems, forgetProblems, send } = useImport();
-  const chosen = useSorted(files);
-  const { scenes, environment } = chosen;
-  const take = (news: Dropped[]) => {
-    if (news.length === 0) return showError("The folder is empty. Nothing was chosen.", "files");
-    mended("files"); // what was wrong with those before
-    const words = refusalOnStart(news);
-    if (words !== null) showError(words, "files");
-    forgetProblems();
-    setFiles((before) => together(before, news.filter(isOfUse)));
+  const [files, setFiles] = useState<readonly DroppedFile[]>([]);
+  const [withGround, setWithGround] = useState(false);
+  const { upload, problems, clearProblems, send } = useImport();
+  const selection = useSortedFiles(files);
+  const { scenes, environment } = selection;
+  const addFiles = (files: DroppedFile[]) => {
+    if (files.length === 0) return showError("The folder is empty. Nothing was chosen.", "files");
+    clearErrors("files"); // what was wrong with those before
+    const message = startPageRejection(files);
+    if (message !== null) showError(message, "files");
+    clearProblems();
+    setFiles((current) => mergeFiles(current, files.filter(isImportable)));
   };
   const clear = () => {
-    mended("files");
-    forgetProblems();
+    clearErrors("files");
+    clearProblems();
     setFiles([]);
   };
-  const over = useFileDrop(take);
+  const isDropTarget = useFileDrop(addFiles);
   /** What was refused stays chosen, so that what it lacks can be added. */
   const sendAll = async () => {
-    const { imported, done } = await send(chosen, ground);
-    setFiles((before) => (done.size === scenes.length ? [] : before.filter(({ path }) => !done.has(path))));
+    const { imported, done } = await send(selection, withGround);
+    setFiles((current) => (done.size === scenes.length ? [] : current.filter(({ path }) => !done.has(path))));
     if (imported.length > 0) onImported(imported);
   };
   return (
-    <section class={`drop ${over ? "over" : ""}`} aria-label="Import a scene">
+    <section class={`drop ${isDropTarget ? "over" : ""}`} aria-label="Import a scene">
       <p>
-        <b>Drop a scene, its folder, or an environment anywhere</b>, or <FileInput label="choose files" take={take} />, or{" "}
-        <FileInput label="choose a folder" folder take={take} />.
+        <b>Drop a scene, its folder, or an environment anywhere</b>, or <FileInput label="choose files" onFiles={addFiles} />, or{" "}
+        <FileInput label="choose a folder" folder onFiles={addFiles} />.
       </p>
       <p class="quiet">
         Scene: .glb, .gltf, .obj, .ply with the files that belong to it, or a .zip of them. Environment: .hdr or .exr;
         without one the scene is lit by a studio.
       </p>
-      <ChosenScenes
+      <ChosenFiles
         scenes={scenes}
         numParts={files.filter(({ file }) => !isEnvironment(file)).length}
         problems={problems}
@@ -106,11 +106,11 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
       <div class="chosen">
         <span class={environment ? "" : "quiet"}>Environment: {environment?.name ?? "none"}</span>
         <label class="on-ground">
-          <input type="checkbox" checked={ground} onChange={(event) => setGround(event.currentTarget.checked)} />
+          <input type="checkbox" checked={withGround} onChange={(event) => setWithGround(event.currentTarget.checked)} />
           Put it on a ground
         </label>
-        {sending !== null ? (
-          <SendingWords {...sending} />
+        {upload !== null ? (
+          <UploadStatus {...upload} />
         ) : (
           <>
             <button class="primary" disabled={scenes.length === 0} onClick={() => void sendAll()}>

@@ -1,39 +1,39 @@
 import { useState } from "preact/hooks";
 import type { SceneBody } from "../protocol";
-import { mayEdit } from "../state/me";
-import { IconButton } from "../ui/Button";
+import { mayEdit } from "../state/sessionUser";
+import { IconButton } from "../ui/IconButton";
 import { formatCount } from "../ui/scale";
-import { CardProgress } from "./CardProgress";
-import { countsOf, Remarks } from "./Remarks";
+import { BakeProgress } from "./BakeProgress";
+import { warningCounts, ImportWarnings } from "./ImportWarnings";
 
-interface Props {
+interface SceneCardProps {
   scene: SceneBody;
   onOpen(): void;
   onBake(): void;
   onDelete(): void;
   /** Make the same scene on a ground. */
-  onGround(): void;
+  onAddGround(): void;
   /** Its first bake is ready. */
   onReady(): void;
 }
 
 /** The scene's thumbnail; the server paints it when it is first asked for, which takes seconds. */
-function Picture({ of }: { of: string }) {
-  const [words, setWords] = useState("painting its picture…");
+function CardImage({ url }: { url: string }) {
+  const [placeholder, setPlaceholder] = useState("painting its picture…");
   return (
     <>
-      <span class="no-picture">{words}</span>
-      <img src={of} alt="" loading="lazy" onLoad={() => setWords("")} onError={() => setWords("no picture")} />
+      <span class="no-picture">{placeholder}</span>
+      <img src={url} alt="" loading="lazy" onLoad={() => setPlaceholder("")} onError={() => setPlaceholder("no picture")} />
     </>
   );
 }
 
 /** One scene: a click anywhere on the card opens it, but for the card's own buttons. */
-export function SceneCard({ scene, onOpen, onBake, onDelete, onGround, onReady }: Props) {
+export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onReady }: SceneCardProps) {
   return (
     <li class="scene-card">
       <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
-        {scene.thumbnail === null ? <CardProgress scene={scene} onReady={onReady} /> : <Picture of={scene.thumbnail} />}
+        {scene.thumbnail === null ? <BakeProgress scene={scene} onReady={onReady} /> : <CardImage url={scene.thumbnail} />}
       </button>
       <div class="scene-text">
         <b title={scene.name}>{scene.name}</b>
@@ -44,8 +44,8 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onGround, onReady }
         </small>
         {scene.remarks.length > 0 && (
           <details>
-            <summary>Not as in the file: {countsOf(scene.remarks)}</summary>
-            <Remarks remarks={scene.remarks} />
+            <summary>Not as in the file: {warningCounts(scene.remarks)}</summary>
+            <ImportWarnings warnings={scene.remarks} />
           </details>
         )}
       </div>
@@ -53,7 +53,7 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onGround, onReady }
         <button onClick={onBake}>Bake…</button>
         {!scene.materials.some(({ catcher }) => catcher) && (
           <button
-            onClick={onGround}
+            onClick={onAddGround}
             aria-label={`Put ${scene.name} on a ground`}
             title="A new scene, the same on a ground that catches shadows"
           >

@@ -1,40 +1,40 @@
 /** Scenes as cards; drop a scene and an environment anywhere. */
 import { useEffect, useState } from "preact/hooks";
-import { addGround, deleteScene, listScenes } from "../net/api";
+import { addGround, deleteScene, listScenes } from "../session/net/api";
 import type { SceneBody } from "../protocol";
-import type { BakeChoice } from "../scene/bakeChoice";
-import { openScene } from "../scene/open";
-import { attempt, note } from "../ui/toasts";
-import { Account, ReadOnly } from "../account/Account";
-import { mayEdit } from "../state/me";
+import type { BakeSettings } from "../session/scene/bakeSettings";
+import { openScene } from "../session/scene/openScene";
+import { reportErrors, showNote } from "../ui/toasts";
+import { Account, ReadOnly } from "../app/account/Account";
+import { mayEdit } from "../state/sessionUser";
 import { BakeDialog } from "./BakeDialog";
-import { BuiltIns } from "./BuiltIns";
+import { ExampleScenes } from "./ExampleScenes";
 import { DropZone } from "./DropZone";
 import { SceneCard } from "./SceneCard";
 
-function open(scene: SceneBody, choice?: BakeChoice): void {
+function openInEditor(scene: SceneBody, choice?: BakeSettings): void {
   window.history.pushState(null, "", `?scene=${encodeURIComponent(scene.id)}`);
   void openScene(scene.id, undefined, choice);
 }
 
 export function StartPage() {
   const [scenes, setScenes] = useState<SceneBody[] | null>(null);
-  const [planned, setPlanned] = useState<SceneBody | null>(null);
-  const refresh = () => attempt(async () => setScenes(await listScenes()));
+  const [sceneToBake, setSceneToBake] = useState<SceneBody | null>(null);
+  const refresh = () => reportErrors(async () => setScenes(await listScenes()));
   useEffect(() => void refresh(), []);
-  const imported = (news: SceneBody[]) => {
-    if (news.length === 1) setPlanned(news[0] as SceneBody);
-    else note(`${news.length} scenes are imported.`);
+  const onImported = (importedScene: SceneBody[]) => {
+    if (importedScene.length === 1) setSceneToBake(importedScene[0] as SceneBody);
+    else showNote(`${importedScene.length} scenes are imported.`);
     void refresh();
   };
-  const remove = (scene: SceneBody) =>
-    note(`Delete “${scene.name}” with its bakes? This cannot be undone.`, {
+  const confirmDelete = (scene: SceneBody) =>
+    showNote(`Delete “${scene.name}” with its bakes? This cannot be undone.`, {
       label: "Delete",
-      run: () => void attempt(() => deleteScene(scene.id)).then(refresh),
+      run: () => void reportErrors(() => deleteScene(scene.id)).then(refresh),
     });
-  const putOnGround = async (scene: SceneBody) => {
-    const grounded = await attempt(() => addGround(scene.id));
-    if (grounded !== undefined) imported([grounded]);
+  const createOnGround = async (scene: SceneBody) => {
+    const grounded = await reportErrors(() => addGround(scene.id));
+    if (grounded !== undefined) onImported([grounded]);
   };
   return (
     <main class="start">
@@ -44,11 +44,11 @@ export function StartPage() {
         <Account />
       </header>
       <ReadOnly />
-      {mayEdit.value && <DropZone onImported={imported} />}
-      {planned !== null && (
-        <BakeDialog scene={planned} onClose={() => setPlanned(null)} onOpen={(choice) => open(planned, choice)} />
+      {mayEdit.value && <DropZone onImported={onImported} />}
+      {sceneToBake !== null && (
+        <BakeDialog scene={sceneToBake} onClose={() => setSceneToBake(null)} onOpen={(choice) => openInEditor(sceneToBake, choice)} />
       )}
-      {mayEdit.value && <BuiltIns onOpen={open} />}
+      {mayEdit.value && <ExampleScenes onOpen={openInEditor} />}
       <h2>Scenes</h2>
       {scenes === null && <p class="quiet">Looking for scenes…</p>}
       {scenes?.length === 0 && <p class="quiet">No scenes yet. Take a built-in one, or drop your own above.</p>}
@@ -57,10 +57,10 @@ export function StartPage() {
           <SceneCard
             key={scene.id}
             scene={scene}
-            onOpen={() => open(scene)}
-            onBake={() => setPlanned(scene)}
-            onDelete={() => remove(scene)}
-            onGround={() => void putOnGround(scene)}
+            onOpen={() => openInEditor(scene)}
+            onBake={() => setSceneToBake(scene)}
+            onDelete={() => confirmDelete(scene)}
+            onAddGround={() => void createOnGround(scene)}
             onReady={() => void refresh()}
           />
         ))}

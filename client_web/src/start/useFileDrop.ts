@@ -1,34 +1,34 @@
 /** Files and folders dropped anywhere on the page; whether some are held over it. */
 import { useLayoutEffect, useState } from "preact/hooks";
-import type { Dropped } from "../files/dropped";
-import { droppedFiles } from "../files/folders";
-import { attempt } from "../ui/toasts";
+import type { DroppedFile } from "./files/dropTypes";
+import { listDroppedFiles } from "./files/dropFolders";
+import { reportErrors } from "../ui/toasts";
 
-export function useFileDrop(take: (files: Dropped[]) => void): boolean {
-  const [over, setOver] = useState(false);
+export function useFileDrop(onFiles: (files: DroppedFile[]) => void): boolean {
+  const [isDropTarget, setDropTarget] = useState(false);
   // with the page itself: what is dropped as soon as it is seen is taken
   useLayoutEffect(() => {
-    const drag = (event: DragEvent) => {
+    const onDrag = (event: DragEvent) => {
       if (!event.dataTransfer?.types.includes("Files")) return;
       event.preventDefault(); // else the browser would open the file in place of the page
       // from one element to the next is no way out of the page
-      if (event.type === "dragover" || event.relatedTarget === null) setOver(event.type === "dragover");
+      if (event.type === "dragover" || event.relatedTarget === null) setDropTarget(event.type === "dragover");
     };
-    const drop = (event: DragEvent) => {
+    const onDrop = (event: DragEvent) => {
       const transfer = event.dataTransfer;
       if (!transfer?.types.includes("Files")) return;
       event.preventDefault();
-      setOver(false);
-      void attempt(async () => take(await droppedFiles(transfer)));
+      setDropTarget(false);
+      void reportErrors(async () => onFiles(await listDroppedFiles(transfer)));
     };
-    window.addEventListener("dragover", drag);
-    window.addEventListener("dragleave", drag);
-    window.addEventListener("drop", drop);
+    window.addEventListener("dragover", onDrag);
+    window.addEventListener("dragleave", onDrag);
+    window.addEventListener("drop", onDrop);
     return () => {
-      window.removeEventListener("dragover", drag);
-      window.removeEventListener("dragleave", drag);
-      window.removeEventListener("drop", drop);
+      window.removeEventListener("dragover", onDrag);
+      window.removeEventListener("dragleave", onDrag);
+      window.removeEventListener("drop", onDrop);
     };
   });
-  return over;
+  return isDropTarget;
 }

@@ -1,35 +1,35 @@
-/** Chosen scenes on their way to the server. */
+/** Import of the selected scenes. */
 import { useState } from "preact/hooks";
-import { stem, type Chosen } from "../files/files";
-import { uploadScene } from "../net/upload";
+import { fileBaseName, type ImportSelection } from "./files/sceneFiles";
+import { uploadScene } from "../session/net/upload";
 import type { SceneBody } from "../protocol";
-import { mended, showError } from "../ui/toasts";
+import { clearErrors, showError } from "../ui/toasts";
 
-export interface Sending {
+export interface UploadState {
   name: string;
   /** Of the bytes that are sent. */
-  share: number;
+  fraction: number;
   /** Which one it is, from 1, of how many. */
   number: number;
   count: number;
 }
 
-interface Outcome {
+interface ImportOutcome {
   imported: SceneBody[];
   /** Paths of the scenes that were imported. */
   done: ReadonlySet<string>;
 }
 
-interface Import {
-  sending: Sending | null;
+interface SceneImport {
+  upload: UploadState | null;
   /** What was wrong with the scenes that were refused, by their paths. */
   problems: ReadonlyMap<string, string>;
-  forgetProblems(): void;
-  /** One after another; what was refused is said. */
-  send(chosen: Chosen, ground: boolean): Promise<Outcome>;
+  clearProblems(): void;
+  /** Sequential; rejections are shown. */
+  send(selection: ImportSelection, ground: boolean): Promise<ImportOutcome>;
 }
 
-function sayRefused(problems: ReadonlyMap<string, string>, numSent: number): void {
+function showRejected(problems: ReadonlyMap<string, string>, numSent: number): void {
   if (problems.size === 0) return;
   showError(
     numSent === 1
@@ -39,30 +39,30 @@ function sayRefused(problems: ReadonlyMap<string, string>, numSent: number): voi
   );
 }
 
-export function useImport(): Import {
-  const [sending, setSending] = useState<Sending | null>(null);
+export function useImport(): SceneImport {
+  const [upload, setUpload] = useState<UploadState | null>(null);
   const [problems, setProblems] = useState<ReadonlyMap<string, string>>(new Map());
-  const send = async ({ scenes, environment }: Chosen, ground: boolean) => {
+  const send = async ({ scenes, environment }: ImportSelection, ground: boolean) => {
     const imported: SceneBody[] = [];
-    const done = new Set<string>();
-    const refused = new Map<string, string>();
-    mended("files");
+    const importedPaths = new Set<string>();
+    const rejected = new Map<string, string>();
+    clearErrors("files");
     for (const [k, scene] of scenes.entries()) {
-      const name = stem(scene.path);
+      const name = fileBaseName(scene.path);
       try {
         const order = { scene, companions: scene.companions, environment, name, ground };
-        const which = { name, number: k + 1, count: scenes.length };
-        setSending({ ...which, share: 0 });
-        imported.push(await uploadScene(order, (share) => setSending({ ...which, share })));
-        done.add(scene.path);
+        const uploadInfo = { name, number: k + 1, count: scenes.length };
+        setUpload({ ...uploadInfo, fraction: 0 });
+        imported.push(await uploadScene(order, (fraction) => setUpload({ ...uploadInfo, fraction })));
+        importedPaths.add(scene.path);
       } catch (error) {
-        refused.set(scene.path, (error as Error).message);
+        rejected.set(scene.path, (error as Error).message);
       }
     }
-    setSending(null);
-    setProblems(refused);
-    sayRefused(refused, scenes.length);
-    return { imported, done };
+    setUpload(null);
+    setProblems(rejected);
+    showRejected(rejected, scenes.length);
+    return { imported, done: importedPaths };
   };
-  return { sending, problems, forgetProblems: () => setProblems(new Map()), send };
+  return { upload, problems, clearProblems: () => setProblems(new Map()), send };
 }

@@ -1,12 +1,12 @@
-/** Which panels are open and how wide they are, and what is chosen in them, kept for the next visit. */
+/** Which panels are open and how wide they are, and what is chosen in them, stored for the next visit. */
 import { effect, signal, type Signal } from "@preact/signals";
 import { exrSpace } from "./color";
 
-export const outlineOpen = signal(true);
+export const scenePanelOpen = signal(true);
 export const inspectorOpen = signal(true);
 /** These are closed again at the next visit. */
 export const libraryOpen = signal(false);
-export const truthOpen = signal(false);
+export const comparisonOpen = signal(false);
 export const commentsOpen = signal(false);
 export const timelineOpen = signal(false);
 export const filmstripOpen = signal(true);
@@ -16,30 +16,30 @@ export const histogramOpen = signal(false);
 export const aimLocked = signal(false);
 export const helpOpen = signal(false);
 /** Titles of the panels' sections that are folded away. */
-export const folded = signal<readonly string[]>([]);
+export const foldedSections = signal<readonly string[]>([]);
 
 export function toggleFolded(title: string): void {
-  const others = folded.value.filter((name) => name !== title);
-  folded.value = others.length < folded.value.length ? others : [...others, title];
+  const remaining = foldedSections.value.filter((name) => name !== title);
+  foldedSections.value = remaining.length < foldedSections.value.length ? remaining : [...remaining, title];
 }
 
-const KEPT: Record<string, Signal<unknown>> = {
-  outlineOpen,
+const STORED_PANELS: Record<string, Signal<unknown>> = {
+  outlineOpen: scenePanelOpen,
   inspectorOpen,
   filmstripOpen,
   inspectorWidth,
   histogramOpen,
   aimLocked,
-  folded,
+  folded: foldedSections,
   exrSpace,
 };
-const KEY = "relume.panels";
+const PANELS_KEY = "relume.panels";
 
-function recall(): void {
+function loadPanels(): void {
   try {
-    const kept = JSON.parse(localStorage.getItem(KEY) ?? "{}") as Record<string, unknown>;
-    for (const [name, panel] of Object.entries(KEPT)) {
-      const value = kept[name];
+    const stored = JSON.parse(localStorage.getItem(PANELS_KEY) ?? "{}") as Record<string, unknown>;
+    for (const [name, panel] of Object.entries(STORED_PANELS)) {
+      const value = stored[name];
       if (typeof value === typeof panel.value && Array.isArray(value) === Array.isArray(panel.value)) panel.value = value;
     }
   } catch {
@@ -47,13 +47,13 @@ function recall(): void {
   }
 }
 
-/** Take up how the panels were left, and keep them in step. */
-export function followPanels(): void {
-  recall();
+/** Load the stored panels, and store their changes. */
+export function trackPanels(): void {
+  loadPanels();
   effect(() => {
-    const text = JSON.stringify(Object.fromEntries(Object.entries(KEPT).map(([name, panel]) => [name, panel.value])));
+    const text = JSON.stringify(Object.fromEntries(Object.entries(STORED_PANELS).map(([name, panel]) => [name, panel.value])));
     try {
-      localStorage.setItem(KEY, text);
+      localStorage.setItem(PANELS_KEY, text);
     } catch {
       // they are open again next time
     }

@@ -7,7 +7,7 @@ export const models = signal<ModelBody[]>([]);
 export const scene = signal<SceneBody | null>(null);
 export const materialNames = computed(() => scene.value?.materials.map((m) => m.name) ?? []);
 
-/** What the scene says of a material. */
+/** The scene's info on a material. */
 export function materialOf(name: string): SceneMaterial | undefined {
   return scene.value?.materials.find((material) => material.name === name);
 }

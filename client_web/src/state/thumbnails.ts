@@ -1,22 +1,22 @@
-/** Small pictures of the looks that were shown in this visit. */
+/** Small images of the looks that were shown in this visit. */
 import { signal } from "@preact/signals";
 import type { Look } from "../protocol";
 
-const images = new WeakMap<Look, string>();
+const lookThumbnails = new WeakMap<Look, string>();
 /** Counts up with every thumbnail. */
-export const thumbnailsMade = signal(0);
+export const thumbnailRevision = signal(0);
 
-/** A data URL, null where the look has no picture. */
-export function lookThumbnail(of: Look | undefined): string | null {
-  thumbnailsMade.value;
-  return of === undefined ? null : (images.get(of) ?? null);
+/** A data URL, null where the look has no image. */
+export function lookThumbnail(thumbnailLook: Look | undefined): string | null {
+  thumbnailRevision.value;
+  return thumbnailLook === undefined ? null : (lookThumbnails.get(thumbnailLook) ?? null);
 }
 
-export function hasThumbnail(of: Look): boolean {
-  return images.has(of);
+export function hasThumbnail(thumbnailLook: Look): boolean {
+  return lookThumbnails.has(thumbnailLook);
 }
 
-/** Keep a look's picture. */
-export function giveThumbnail(of: Look, image: string): void {
-  images.set(of, image);
+/** Keep a look's image. */
+export function storeThumbnail(thumbnailLook: Look, image: string): void {
+  lookThumbnails.set(thumbnailLook, image);
 }

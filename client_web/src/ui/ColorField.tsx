@@ -1,15 +1,15 @@
-/** A term's colour: a picker, and the three linear numbers. */
-import { fromHex, toHex } from "../color/color";
+/** A term's color: a picker, and the three linear numbers. */
+import { fromHex, toHex } from "../render/color/colorMath";
 import { RANGES } from "../look.gen";
 import type { Rgb } from "../protocol";
-import { IconButton } from "./Button";
+import { IconButton } from "./IconButton";
 import { NumberField } from "./NumberField";
 
 export interface ColorProps {
   label: string;
   value: Rgb;
   initial: Rgb | null;
-  /** The picker chooses the hue of a quantity, whose size it keeps; else a share of what there is. */
+  /** The picker chooses the hue of a quantity, whose size it keeps; else a fraction of what there is. */
   quantity?: boolean;
   onChange(value: Rgb): void;
 }
@@ -17,7 +17,7 @@ export interface ColorProps {
 const CHANNELS = ["red", "green", "blue"] as const;
 
 export function ColorField({ label, value, initial, quantity = false, onChange }: ColorProps) {
-  const least = quantity ? 0 : 1;
+  const minimum = quantity ? 0 : 1;
   const changed = initial !== null && value.some((v, i) => v !== initial[i]);
   return (
     <div class="color">
@@ -25,8 +25,8 @@ export function ColorField({ label, value, initial, quantity = false, onChange }
         type="color"
         aria-label={`${label}: pick`}
         title="Pick a colour"
-        value={toHex(value, least)}
-        onInput={(event) => onChange(fromHex(event.currentTarget.value, value, least))}
+        value={toHex(value, minimum)}
+        onInput={(event) => onChange(fromHex(event.currentTarget.value, value, minimum))}
       />
       {CHANNELS.map((name, channel) => (
         <label key={name} class={`channel ${name}`}>

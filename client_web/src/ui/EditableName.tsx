@@ -12,17 +12,17 @@ interface Props {
   onDone?(): void;
 }
 
-export function EditableName({ name, class: of, maximum, editing = false, onRename, onDone }: Props) {
+export function EditableName({ name, class: className, maximum, editing = false, onRename, onDone }: Props) {
   const [open, setOpen] = useState(editing);
   const button = useRef<HTMLButtonElement>(null);
-  const byKey = useRef(false);
+  const isKeyboard = useRef(false);
   useLayoutEffect(() => {
-    if (byKey.current) button.current?.focus(); // the field had it
-    byKey.current = false;
+    if (isKeyboard.current) button.current?.focus(); // the field had it
+    isKeyboard.current = false;
   }, [open]);
   if (!open) {
     return (
-      <button ref={button} type="button" class={of} title={`${name}: rename`} aria-label={`${name}: rename`} onClick={() => setOpen(true)}>
+      <button ref={button} type="button" class={className} title={`${name}: rename`} aria-label={`${name}: rename`} onClick={() => setOpen(true)}>
         {name}
       </button>
     );
@@ -31,26 +31,26 @@ export function EditableName({ name, class: of, maximum, editing = false, onRena
     setOpen(false);
     onDone?.();
   };
-  const take = (text: string) => {
+  const submit = (text: string) => {
     close();
     const next = text.trim().slice(0, maximum);
     if (next !== "" && next !== name) onRename(next);
   };
   return (
     <input
-      class={of}
+      class={className}
       aria-label={`New name of ${name}`}
       maxLength={maximum}
       defaultValue={name}
       ref={(input) => input?.focus()}
       onFocus={(event) => event.currentTarget.select()}
-      onBlur={(event) => take(event.currentTarget.value)}
+      onBlur={(event) => submit(event.currentTarget.value)}
       onKeyDown={(event) => {
         event.stopPropagation();
         if (event.key === "Escape") event.currentTarget.value = name;
         if (event.key !== "Enter" && event.key !== "Escape") return;
         event.preventDefault(); // else the button, which has the focus by then, is pressed
-        byKey.current = true;
+        isKeyboard.current = true;
         event.currentTarget.blur();
       }}
     />

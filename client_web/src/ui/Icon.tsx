@@ -1,4 +1,4 @@
-/** Line icons on a 16 px grid, drawn in the text's colour. */
+/** Line icons on a 16 px grid, drawn in the text's color. */
 const PATHS = {
   undo: "M3 6.5h6.5a3.5 3.5 0 0 1 0 7H6M3 6.5l3-3M3 6.5l3 3",
   redo: "M13 6.5H6.5a3.5 3.5 0 0 0 0 7H10M13 6.5l-3-3M13 6.5l-3 3",

@@ -2,7 +2,7 @@
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { history } from "../edit/history";
 import { formatNumber, parseNumber } from "./scale";
-import { note } from "./toasts";
+import { showNote } from "./toasts";
 
 interface Props {
   value: number;
@@ -10,56 +10,56 @@ interface Props {
   minimum: number;
   maximum: number;
   step: number;
-  /** Shown, and taken, without what follows the point. */
-  whole?: boolean;
+  /** An integer. */
+  isInteger?: boolean;
   autoFocus?: boolean;
   /** What has been typed already, before the field was there. */
-  begun?: string;
+  initialText?: string;
   onChange(value: number): void;
-  /** It is left; `byKey`: with Enter or Escape, so that the focus is free. */
+  /** The field is left; `isKeyboard`: with Enter or Escape, so that the focus is free. */
   onDone?(byKey: boolean): void;
 }
 
-export function NumberField({ value, label, minimum, maximum, step, whole = false, autoFocus, begun, onChange, onDone }: Props) {
+export function NumberField({ value, label, minimum, maximum, step, isInteger = false, autoFocus, initialText, onChange, onDone }: Props) {
   const input = useRef<HTMLInputElement>(null);
-  const [draft, setDraft] = useState<string | null>(begun ?? null);
-  const refused = useRef(false);
-  const byKey = useRef(false);
+  const [draft, setDraft] = useState<string | null>(initialText ?? null);
+  const isRejected = useRef(false);
+  const isKeyboard = useRef(false);
   const wrong = draft !== null && parseNumber(draft) === null;
   useLayoutEffect(() => {
     if (!autoFocus) return;
     input.current?.focus();
-    if (begun === undefined) input.current?.select();
+    if (initialText === undefined) input.current?.select();
   }, [autoFocus]);
 
-  const shown = whole ? String(Math.round(value)) : formatNumber(value);
-  const put = (next: number) => onChange(Math.min(maximum, Math.max(minimum, whole ? Math.round(next) : next)));
-  const take = () => {
-    const typed = draft !== null && draft !== shown && !refused.current;
+  const displayedText = isInteger ? String(Math.round(value)) : formatNumber(value);
+  const setText = (next: number) => onChange(Math.min(maximum, Math.max(minimum, isInteger ? Math.round(next) : next)));
+  const submit = () => {
+    const typed = draft !== null && draft !== displayedText && !isRejected.current;
     const next = typed ? parseNumber(draft) : null;
     if (next !== null) {
-      const taken = Math.min(maximum, Math.max(minimum, next));
-      if (taken !== next)
-        note(`${label}: ${formatNumber(next)} is beyond ${formatNumber(minimum)} to ${formatNumber(maximum)}; it became ${formatNumber(taken)}.`);
+      const clamped = Math.min(maximum, Math.max(minimum, next));
+      if (clamped !== next)
+        showNote(`${label}: ${formatNumber(next)} is beyond ${formatNumber(minimum)} to ${formatNumber(maximum)}; it became ${formatNumber(clamped)}.`);
       // a number that was typed is a step by itself
-      history.seal();
-      put(next);
-      history.seal();
+      history.endGesture();
+      setText(next);
+      history.endGesture();
     }
-    refused.current = false;
+    isRejected.current = false;
     setDraft(null);
   };
   const key = (event: KeyboardEvent) => {
     event.stopPropagation();
     // the field is left, so that the next key is the page's again
     if (event.key === "Enter" || event.key === "Escape") {
-      refused.current = event.key === "Escape";
-      byKey.current = true;
+      isRejected.current = event.key === "Escape";
+      isKeyboard.current = true;
       input.current?.blur();
     } else if (event.key === "ArrowUp" || event.key === "ArrowDown") {
       event.preventDefault();
       const size = step * (event.shiftKey ? 0.1 : 1);
-      put(Number((value + (event.key === "ArrowUp" ? size : -size)).toPrecision(10)));
+      setText(Number((value + (event.key === "ArrowUp" ? size : -size)).toPrecision(10)));
       setDraft(null);
     }
   };
@@ -73,13 +73,13 @@ export function NumberField({ value, label, minimum, maximum, step, whole = fals
       aria-label={label}
       aria-invalid={wrong}
       title={wrong ? `A number from ${minimum} to ${maximum}` : undefined}
-      value={draft ?? shown}
+      value={draft ?? displayedText}
       onFocus={(event) => draft === null && event.currentTarget.select()}
       onInput={(event) => setDraft(event.currentTarget.value)}
       onBlur={() => {
-        take();
-        onDone?.(byKey.current);
-        byKey.current = false;
+        submit();
+        onDone?.(isKeyboard.current);
+        isKeyboard.current = false;
       }}
       onKeyDown={key}
     />

@@ -1,7 +1,7 @@
 /** Buttons side by side of which one is chosen, by click or by arrow keys. */
 import { onRadioKey } from "./radio";
 
-export interface Choice<T> {
+export interface RadioOption<T> {
   value: T;
   label: string;
   title: string;
@@ -9,32 +9,32 @@ export interface Choice<T> {
 
 interface Props<T> {
   label: string;
-  choices: readonly Choice<T>[];
-  chosen: T;
-  onChoose(value: T): void;
+  choices: readonly RadioOption<T>[];
+  selected: T;
+  onSelect(value: T): void;
 }
 
-export function RadioRow<T extends string>({ label, choices, chosen, onChoose }: Props<T>) {
-  const at = choices.findIndex(({ value }) => value === chosen);
+export function RadioRow<T extends string>({ label, choices, selected, onSelect }: Props<T>) {
+  const selectedIndex = choices.findIndex(({ value }) => value === selected);
   const chooseAt = (index: number) => {
     const choice = choices[index];
-    if (choice !== undefined) onChoose(choice.value);
+    if (choice !== undefined) onSelect(choice.value);
   };
   return (
     <div
       class="group segmented"
       role="radiogroup"
       aria-label={label}
-      onKeyDown={(event) => onRadioKey(event, choices.length, at, chooseAt)}
+      onKeyDown={(event) => onRadioKey(event, choices.length, selectedIndex, chooseAt)}
     >
       {choices.map(({ value, label, title }, index) => (
         <button
           key={value}
           role="radio"
-          aria-checked={index === at}
-          tabIndex={index === at ? 0 : -1}
+          aria-checked={index === selectedIndex}
+          tabIndex={index === selectedIndex ? 0 : -1}
           title={title}
-          onClick={() => onChoose(value)}
+          onClick={() => onSelect(value)}
         >
           {label}
         </button>

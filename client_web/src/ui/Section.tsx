@@ -1,6 +1,6 @@
 /** A part of a panel below its heading, which folds it away. */
 import type { ComponentChildren } from "preact";
-import { folded, toggleFolded } from "../state/panels";
+import { foldedSections, toggleFolded } from "../state/panels";
 
 interface Props {
   title: string;
@@ -12,7 +12,7 @@ interface Props {
 }
 
 export function Section({ title, count, actions, children }: Props) {
-  const open = !folded.value.includes(title);
+  const open = !foldedSections.value.includes(title);
   return (
     <section aria-label={title}>
       <header class="panel-head">

@@ -1,18 +1,18 @@
 /** A slider: drag or click, arrows and Page keys, Shift for fine steps, double-click to type, modifier-click to reset.
- * Digits type a number at once. Fill and thumb move by transforms alone, so that nothing is painted anew while the hand drags. */
+ * Digits type a number at once. Fill and thumb move by transforms alone, so that nothing is painted anew during a drag. */
 import { useRef, useState } from "preact/hooks";
 import { NumberField } from "./NumberField";
 import { useDrag } from "./drag";
-import { formatNumber, fromFraction, keyStep, snap, toFraction, type Range } from "./scale";
+import { formatNumber, fromFraction, keyStep, snap, toFraction, type NumberRange } from "./scale";
 
-export interface SliderProps extends Range {
+export interface SliderProps extends NumberRange {
   label: string;
   value: number;
   unit?: string;
   initial?: number;
   tint?: string;
   onChange(value: number): void;
-  /** The hand has come to the slider, and has not moved it yet. */
+  /** The drag has begun, and has not moved the slider yet. */
   onHold?(): void;
 }
 
@@ -35,15 +35,15 @@ function isNumberKey(event: KeyboardEvent, minimum: number): boolean {
 export function Slider(props: SliderProps) {
   const { label, value, unit = "", initial, tint, onChange } = props;
   const drag = useRef({ x: 0, at: 0, width: 1 });
-  const [typing, setTyping] = useState<{ begun?: string } | null>(null);
+  const [typing, setTyping] = useState<{ initialText?: string } | null>(null);
   const track = useRef<HTMLDivElement>(null);
-  const at = toFraction(props, value);
+  const fraction = toFraction(props, value);
 
   const set = (fraction: number) => {
     drag.current.at = Math.min(1, Math.max(0, fraction));
     onChange(fromFraction(props, fraction));
   };
-  const hand = useDrag({
+  const dragHandlers = useDrag({
     begin(event) {
       if (event.button !== 0) return false;
       props.onHold?.();
@@ -53,8 +53,8 @@ export function Slider(props: SliderProps) {
       }
       const box = event.currentTarget.getBoundingClientRect();
       const clicked = (event.clientX - box.left) / box.width;
-      drag.current = { x: event.clientX, at, width: box.width };
-      if (Math.abs(clicked - at) * box.width > 7) set(clicked);
+      drag.current = { x: event.clientX, at: fraction, width: box.width };
+      if (Math.abs(clicked - fraction) * box.width > 7) set(clicked);
       return true;
     },
     move(event) {
@@ -64,10 +64,10 @@ export function Slider(props: SliderProps) {
     },
   });
   /** Several keys may come before the field is there. */
-  const begin = (typed: string) => setTyping((now) => ({ begun: `${now?.begun ?? ""}${typed}` }));
+  const begin = (typed: string) => setTyping((now) => ({ initialText: `${now?.initialText ?? ""}${typed}` }));
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
-    if (step !== undefined) set(at + step * keyStep(props) * (event.shiftKey && props.step === undefined ? FINE : 1));
+    if (step !== undefined) set(fraction + step * keyStep(props) * (event.shiftKey && props.step === undefined ? FINE : 1));
     else if (event.key === "Home") set(0);
     else if (event.key === "End") set(1);
     else if (event.key === "Enter") setTyping({});
@@ -77,7 +77,7 @@ export function Slider(props: SliderProps) {
     event.preventDefault();
     event.stopPropagation();
   };
-  const shown = `${props.step === 1 ? value : formatNumber(value)}${unit === "" ? "" : ` ${unit}`}`;
+  const valueText = `${props.step === 1 ? value : formatNumber(value)}${unit === "" ? "" : ` ${unit}`}`;
   return (
     <div class="slider">
       <div
@@ -89,15 +89,15 @@ export function Slider(props: SliderProps) {
         aria-valuemin={props.minimum}
         aria-valuemax={props.maximum}
         aria-valuenow={value}
-        aria-valuetext={shown}
+        aria-valuetext={valueText}
         style={tint === undefined ? undefined : { "--tint": tint }}
         onFocus={props.onHold}
-        {...hand}
+        {...dragHandlers}
         onKeyDown={key}
         onDblClick={() => setTyping({})}
       >
-        <span class="fill" style={{ transform: `scaleX(${at.toFixed(4)})` }} />
-        <span class="way" style={{ transform: `translateX(${(100 * at).toFixed(2)}%)` }}>
+        <span class="fill" style={{ transform: `scaleX(${fraction.toFixed(4)})` }} />
+        <span class="way" style={{ transform: `translateX(${(100 * fraction).toFixed(2)}%)` }}>
           <span class="thumb" />
         </span>
         {initial !== undefined && <span class="initial" style={{ left: `${toFraction(props, initial) * 100}%` }} />}
@@ -112,9 +112,9 @@ export function Slider(props: SliderProps) {
           autoFocus
           {...typing}
           onChange={(next) => onChange(snap(props, next))}
-          onDone={(byKey) => {
+          onDone={(isKeyboard) => {
             setTyping(null);
-            if (byKey) track.current?.focus();
+            if (isKeyboard) track.current?.focus();
           }}
         />
       ) : (
@@ -122,10 +122,10 @@ export function Slider(props: SliderProps) {
           type="button"
           class="value"
           title="Type a number"
-          aria-label={`${label}: ${shown}; type a number`}
+          aria-label={`${label}: ${valueText}; type a number`}
           onClick={() => setTyping({})}
         >
-          {shown}
+          {valueText}
         </button>
       )}
     </div>

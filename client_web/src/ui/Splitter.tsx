@@ -1,23 +1,23 @@
-/** The border between picture and inspector: drag it, or move it by keys. */
+/** The border between image and inspector: drag it, or move it by keys. */
 import { inspectorWidth } from "../state/panels";
-import { INSPECTOR, inspectorShownWidth, inspectorWidthIn } from "../state/room";
+import { INSPECTOR_RANGE, inspectorShownWidth, clampInspectorWidth } from "../state/panelWidths";
 import { useDrag } from "./drag";
 
 const STEP = 24;
 
-function resize(width: number): void {
-  inspectorWidth.value = inspectorWidthIn(window.innerWidth, width);
+function resizePanel(width: number): void {
+  inspectorWidth.value = clampInspectorWidth(window.innerWidth, width);
 }
 
 export function Splitter() {
-  const hand = useDrag({
+  const drag = useDrag({
     begin: (event) => event.button === 0,
-    move: (event) => resize(window.innerWidth - event.clientX),
+    move: (event) => resizePanel(window.innerWidth - event.clientX),
   });
   const key = (event: KeyboardEvent) => {
     const step = { ArrowLeft: STEP, ArrowRight: -STEP }[event.key];
     if (step === undefined) return;
-    resize(inspectorShownWidth.value + step);
+    resizePanel(inspectorShownWidth.value + step);
     event.preventDefault();
     event.stopPropagation();
   };
@@ -28,12 +28,12 @@ export function Splitter() {
       tabIndex={0}
       aria-orientation="vertical"
       aria-label="Width of the inspector"
-      aria-valuemin={INSPECTOR.narrowest}
-      aria-valuemax={INSPECTOR.widest}
+      aria-valuemin={INSPECTOR_RANGE.narrowest}
+      aria-valuemax={INSPECTOR_RANGE.widest}
       aria-valuenow={inspectorShownWidth.value}
-      {...hand}
+      {...drag}
       onKeyDown={key}
-      onDblClick={() => resize(320)}
+      onDblClick={() => resizePanel(320)}
     />
   );
 }

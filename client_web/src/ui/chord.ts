@@ -1,5 +1,5 @@
 /** "Ctrl+Shift+z" of an event; Shift is only named beside Ctrl, as it decides which character a key is. */
-export function chord(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey">): string {
+export function formatShortcut(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey">): string {
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   if (!event.ctrlKey && !event.metaKey) return key;
   return `Ctrl+${event.shiftKey ? "Shift+" : ""}${key}`;

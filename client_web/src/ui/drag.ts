@@ -1,65 +1,65 @@
-/** Dragging, the same everywhere: the pointer is captured, the browser's own dragging of text and pictures stays away,
+/** Dragging, the same everywhere: the pointer is captured, the browser's own dragging of text and images stays away,
  * and however the pointer is lost, the drag ends. */
 import { useEffect, useRef } from "preact/hooks";
 import { history } from "../edit/history";
 
-type Pulled = PointerEvent & { readonly currentTarget: Element };
+type DragTarget = PointerEvent & { readonly currentTarget: Element };
 
-interface Drag {
+interface DragHandlers {
   /** The pointer went down; false where it takes hold of nothing. */
-  begin(event: Pulled): boolean | void;
+  begin(event: DragTarget): boolean | void;
   /** It moved while it was held. */
-  move?(event: Pulled): void;
+  move?(event: DragTarget): void;
   /** It moved while it was not held. */
-  hover?(event: Pulled): void;
-  /** The drag is over; `released` where the hand let go, not where the pointer was lost. */
-  end?(event: Pulled, released: boolean): void;
+  hover?(event: DragTarget): void;
+  /** The drag is over; `released` if the pointer was released, not if it was lost. */
+  end?(event: DragTarget, released: boolean): void;
 }
 
-/** Selected text, or a picture that a moved border uncovers, would be dragged in the thumb's place: the browser then takes
+/** Selected text, or an image that a moved border uncovers, would be dragged in the thumb's place: the browser then takes
  * the pointer away. */
-function refuse(event: Event): void {
+function preventDefault(event: Event): void {
   event.preventDefault();
 }
 
-function hearDragStart(listen: boolean): void {
-  if (listen) window.addEventListener("dragstart", refuse, { capture: true });
-  else window.removeEventListener("dragstart", refuse, { capture: true });
+function listenForDragStart(listen: boolean): void {
+  if (listen) window.addEventListener("dragstart", preventDefault, { capture: true });
+  else window.removeEventListener("dragstart", preventDefault, { capture: true });
 }
 
 /** Properties of an element that is dragged. */
-export function useDrag({ begin, move, hover, end }: Drag) {
-  const held = useRef<{ pointer: number; buttons: number } | null>(null);
-  const over = (event: Pulled, released: boolean) => {
-    if (held.current?.pointer !== event.pointerId) return;
-    held.current = null;
-    hearDragStart(false);
+export function useDrag({ begin, move, hover, end }: DragHandlers) {
+  const activePointer = useRef<{ pointer: number; buttons: number } | null>(null);
+  const over = (event: DragTarget, released: boolean) => {
+    if (activePointer.current?.pointer !== event.pointerId) return;
+    activePointer.current = null;
+    listenForDragStart(false);
     end?.(event, released);
-    history.seal();
+    history.endGesture();
   };
   useEffect(
     () => () => {
-      if (held.current !== null) hearDragStart(false); // it has gone from under the hand
+      if (activePointer.current !== null) listenForDragStart(false); // it was removed during the drag
     },
     [],
   );
-  const lost = (event: Pulled) => over(event, false);
+  const lost = (event: DragTarget) => over(event, false);
   return {
     "data-drag": "",
-    onPointerDown(event: Pulled) {
+    onPointerDown(event: DragTarget) {
       lost(event);
-      if (held.current !== null || begin(event) === false) return;
-      held.current = { pointer: event.pointerId, buttons: event.buttons };
-      hearDragStart(true);
+      if (activePointer.current !== null || begin(event) === false) return;
+      activePointer.current = { pointer: event.pointerId, buttons: event.buttons };
+      listenForDragStart(true);
       event.currentTarget.setPointerCapture(event.pointerId);
     },
-    onPointerMove(event: Pulled) {
-      // released where nobody told us, such as outside the window
-      if (held.current !== null && (event.buttons & held.current.buttons) === 0) lost(event);
-      if (held.current === null) hover?.(event);
-      else if (held.current.pointer === event.pointerId) move?.(event);
+    onPointerMove(event: DragTarget) {
+      // released without an event, such as outside the window
+      if (activePointer.current !== null && (event.buttons & activePointer.current.buttons) === 0) lost(event);
+      if (activePointer.current === null) hover?.(event);
+      else if (activePointer.current.pointer === event.pointerId) move?.(event);
     },
-    onPointerUp: (event: Pulled) => over(event, true),
+    onPointerUp: (event: DragTarget) => over(event, true),
     onPointerCancel: lost,
     onLostPointerCapture: lost,
   };

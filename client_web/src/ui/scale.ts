@@ -1,6 +1,6 @@
 /** How a slider's way maps to its value, and how numbers are written. */
 
-export interface Range {
+export interface NumberRange {
   minimum: number;
   maximum: number;
   scale: "linear" | "log";
@@ -8,16 +8,16 @@ export interface Range {
   step?: number;
 }
 
-function isLog(range: Range): boolean {
+function isLog(range: NumberRange): boolean {
   return range.scale === "log" && range.minimum > 0;
 }
 
-export function clampTo(range: Range, value: number): number {
+export function clampTo(range: NumberRange, value: number): number {
   return Math.min(range.maximum, Math.max(range.minimum, value));
 }
 
 /** Position 0…1 of a value on its slider. */
-export function toFraction(range: Range, value: number): number {
+export function toFraction(range: NumberRange, value: number): number {
   const { minimum, maximum } = range;
   const v = clampTo(range, value);
   if (isLog(range)) return Math.log(v / minimum) / Math.log(maximum / minimum);
@@ -25,31 +25,31 @@ export function toFraction(range: Range, value: number): number {
 }
 
 /** Value at a position, rounded to three significant digits of the slider's own resolution. */
-export function fromFraction(range: Range, fraction: number): number {
+export function fromFraction(range: NumberRange, fraction: number): number {
   const t = Math.min(1, Math.max(0, fraction));
   const { minimum, maximum } = range;
   const value = isLog(range) ? minimum * (maximum / minimum) ** t : minimum + (maximum - minimum) * t;
-  return snap(range, tidy(value, isLog(range) ? value : maximum - minimum));
+  return snap(range, roundToStep(value, isLog(range) ? value : maximum - minimum));
 }
 
 /** The nearest value that the range has. */
-export function snap(range: Range, value: number): number {
+export function snap(range: NumberRange, value: number): number {
   return clampTo(range, range.step === undefined ? value : Math.round(value / range.step) * range.step);
 }
 
 /** How far a key press moves along the slider, of its whole way. */
-export function keyStep({ minimum, maximum, step = 0 }: Range): number {
+export function keyStep({ minimum, maximum, step = 0 }: NumberRange): number {
   return Math.max(0.01, step / (maximum - minimum));
 }
 
 /** Round to a thousandth of `span`, to a power of ten. */
-function tidy(value: number, span: number): number {
+function roundToStep(value: number, span: number): number {
   if (!(span > 0)) return value;
   const step = 10 ** (Math.floor(Math.log10(span)) - 3);
   return Number((Math.round(value / step) * step).toPrecision(12));
 }
 
-/** A number as people read it: four significant digits, no trailing noise. */
+/** A number for reading: four significant digits, no trailing noise. */
 export function formatNumber(value: number): string {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
@@ -81,7 +81,7 @@ export function formatBytes(bytes: number): string {
   return `${Math.max(1, Math.round(bytes / 1e3))} kB`;
 }
 
-/** Seconds in words: "under a second", "12 s", "3 min". */
+/** Seconds as text: "under a second", "12 s", "3 min". */
 export function formatSeconds(seconds: number): string {
   if (seconds < 1) return "under a second";
   if (seconds < 90) return `${Math.round(seconds)} s`;
@@ -90,7 +90,7 @@ export function formatSeconds(seconds: number): string {
 }
 
 /** The same of what is foreseen: "under a second", "about 12 s". */
-export function formatForeseen(seconds: number): string {
+export function formatEstimatedTime(seconds: number): string {
   return seconds < 1 ? formatSeconds(seconds) : `about ${formatSeconds(seconds)}`;
 }
 

@@ -1,17 +1,17 @@
-/** Short messages in words, announced to screen readers; errors stay until they are closed, or what they say is mended. */
+/** Short messages, announced to screen readers; errors stay until they are closed, or what they say is mended. */
 import { signal } from "@preact/signals";
 import { useRef } from "preact/hooks";
-import { UnansweredError } from "../net/api";
-import { useReturnFocus } from "./keepFocus";
+import { UnreachableError } from "../session/net/api";
+import { useReturnFocus } from "./restoreFocus";
 
 /** What an error is about: the next success there takes it away. */
-type Topic = "server" | "files" | "edit";
+type ToastTopic = "server" | "files" | "edit";
 
 interface Toast {
   id: number;
   kind: "note" | "error";
   text: string;
-  topic?: Topic;
+  topic?: ToastTopic;
   action?: { label: string; run(): void };
 }
 
@@ -19,44 +19,44 @@ const toasts = signal<Toast[]>([]);
 let nextId = 1;
 const NOTE_MS = 5000;
 /** Long messages are read more slowly. */
-const NOTE_MS_A_CHARACTER = 60;
+const NOTE_MS_PER_CHARACTER = 60;
 const MAX_SHOWN = 3;
 
-/** What is on the screen, in words. */
-export const shownWords = (): string[] => toasts.peek().map(({ text }) => text);
+/** The texts on the screen. */
+export const visibleTexts = (): string[] => toasts.peek().map(({ text }) => text);
 
-function dismiss(id: number): void {
+function dismissToast(id: number): void {
   toasts.value = toasts.value.filter((toast) => toast.id !== id);
 }
 
-function show(toast: Omit<Toast, "id">): void {
+function addToast(toast: Omit<Toast, "id">): void {
   const id = nextId++;
-  const others = toasts.value.filter((other) => other.text !== toast.text);
-  toasts.value = [...others, { ...toast, id }].slice(-MAX_SHOWN);
-  if (toast.kind === "note") window.setTimeout(() => dismiss(id), Math.max(NOTE_MS, NOTE_MS_A_CHARACTER * toast.text.length));
+  const remaining = toasts.value.filter((current) => current.text !== toast.text);
+  toasts.value = [...remaining, { ...toast, id }].slice(-MAX_SHOWN);
+  if (toast.kind === "note") window.setTimeout(() => dismissToast(id), Math.max(NOTE_MS, NOTE_MS_PER_CHARACTER * toast.text.length));
 }
 
-export function note(text: string, action?: Toast["action"]): void {
-  show({ kind: "note", text, ...(action ? { action } : {}) });
+export function showNote(text: string, action?: Toast["action"]): void {
+  addToast({ kind: "note", text, ...(action ? { action } : {}) });
 }
 
-export function showError(error: unknown, topic?: Topic): void {
-  const about = error instanceof UnansweredError ? "server" : topic;
+export function showError(error: unknown, topic?: ToastTopic): void {
+  const topicShown = error instanceof UnreachableError ? "server" : topic;
   const text = error instanceof Error ? error.message : String(error);
-  show({ kind: "error", text, ...(about ? { topic: about } : {}) });
+  addToast({ kind: "error", text, ...(topicShown ? { topic: topicShown } : {}) });
 }
 
 /** What errors of a topic said no longer holds. */
-export function mended(topic: Topic): void {
+export function clearErrors(topic: ToastTopic): void {
   if (toasts.peek().some((toast) => toast.topic === topic)) toasts.value = toasts.value.filter((toast) => toast.topic !== topic);
 }
 
 /** Run something that may fail, and say so where it does; where it succeeds, what was wrong with its topic is mended. */
-export async function attempt<T>(work: () => Promise<T>, topic?: Topic): Promise<T | undefined> {
+export async function reportErrors<T>(work: () => Promise<T>, topic?: ToastTopic): Promise<T | undefined> {
   try {
     const result = await work();
-    mended("server");
-    if (topic !== undefined) mended(topic);
+    clearErrors("server");
+    if (topic !== undefined) clearErrors(topic);
     return result;
   } catch (error) {
     showError(error, topic);
@@ -64,7 +64,7 @@ export async function attempt<T>(work: () => Promise<T>, topic?: Topic): Promise
   }
 }
 
-function Message({ toast: { id, kind, text, action } }: { toast: Toast }) {
+function ToastMessage({ toast: { id, kind, text, action } }: { toast: Toast }) {
   const element = useRef<HTMLDivElement>(null);
   useReturnFocus(element);
   return (
@@ -74,13 +74,13 @@ function Message({ toast: { id, kind, text, action } }: { toast: Toast }) {
         <button
           onClick={() => {
             action.run();
-            dismiss(id);
+            dismissToast(id);
           }}
         >
           {action.label}
         </button>
       )}
-      <button class="icon" aria-label="Close this message" onClick={() => dismiss(id)}>
+      <button class="icon" aria-label="Close this message" onClick={() => dismissToast(id)}>
         ×
       </button>
     </div>
@@ -91,7 +91,7 @@ export function Toasts() {
   return (
     <div class="toasts" role="status" aria-live="polite">
       {toasts.value.map((toast) => (
-        <Message key={toast.id} toast={toast} />
+        <ToastMessage key={toast.id} toast={toast} />
       ))}
     </div>
   );

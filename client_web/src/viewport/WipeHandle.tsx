@@ -1,40 +1,40 @@
-/** The line between A (left) and B, the live picture (right): drag it, or move it by keys. */
+/** The line between A (left) and B, the live image (right): drag it, or move it by keys. */
 import { useRef } from "preact/hooks";
-import type { Screen } from "../picture/screen";
-import { shownWidth, toScreen } from "../picture/transform";
-import { transformOf } from "../picture/viewTransforms";
-import { drawn, wipe } from "../state/display";
+import type { ImageCanvas } from "../render/canvas";
+import { displayedWidth, toScreenPoint } from "../render/zoomTransform";
+import { transformOf } from "../render/viewTransforms";
+import { displayedFrames, wipe } from "../state/display";
 import { useDrag } from "../ui/drag";
 
 const STEP = 0.02;
 
-function moveTo(at: number): void {
-  wipe.value = { on: true, at: Math.min(1, Math.max(0, at)) };
+function setWipe(position: number): void {
+  wipe.value = { isOn: true, position: Math.min(1, Math.max(0, position)) };
 }
 
-export function WipeHandle({ screen }: { screen: Screen }) {
-  drawn.value;
+export function WipeHandle({ screen }: { screen: ImageCanvas }) {
+  displayedFrames.value;
   const size = screen.size();
-  const { at } = wipe.value;
-  const transform = transformOf(screen.picture.view);
-  const [x] = toScreen(transform, size, at, 0);
-  const before = useRef(0);
-  const hand = useDrag({
+  const { position } = wipe.value;
+  const transform = transformOf(screen.image.view);
+  const [x] = toScreenPoint(transform, size, position, 0);
+  const startPosition = useRef(0);
+  const drag = useDrag({
     begin(event) {
-      before.current = event.clientX;
+      startPosition.current = event.clientX;
       return event.button === 0;
     },
     move(event) {
-      const dx = event.clientX - before.current;
-      before.current = event.clientX;
-      moveTo(wipe.peek().at + dx / shownWidth(transform, size));
+      const dx = event.clientX - startPosition.current;
+      startPosition.current = event.clientX;
+      setWipe(wipe.peek().position + dx / displayedWidth(transform, size));
     },
   });
   const key = (event: KeyboardEvent) => {
     const step = STEP * (event.shiftKey ? 0.1 : 1);
-    const next = { ArrowLeft: at - step, ArrowRight: at + step, Home: 0, End: 1 }[event.key];
+    const next = { ArrowLeft: position - step, ArrowRight: position + step, Home: 0, End: 1 }[event.key];
     if (next === undefined) return;
-    moveTo(next);
+    setWipe(next);
     event.preventDefault();
     event.stopPropagation();
   };
@@ -46,9 +46,9 @@ export function WipeHandle({ screen }: { screen: Screen }) {
       aria-label="Wipe between A and B, the live picture"
       aria-valuemin={0}
       aria-valuemax={100}
-      aria-valuenow={Math.round(at * 100)}
+      aria-valuenow={Math.round(position * 100)}
       style={{ left: `${x}px` }}
-      {...hand}
+      {...drag}
       onKeyDown={key}
     >
       <span class="side a">A</span>

@@ -1,112 +1,112 @@
-/** The pointer's and fingers' ways to move in a picture, or to move its eye. */
+/** The pointer's and fingers' ways to move in an image, or to move its camera. */
 import { useRef } from "preact/hooks";
-import { eyeOf } from "../cameras/eye";
-import { Fingers, type Pull } from "../cameras/fingers";
-import { approached, panned, turned } from "../cameras/orbit";
-import { TURN } from "../cameras/useHand";
-import { pinAt } from "../comments/comments";
-import { placeAt, placing } from "../lights/placing";
-import { askProbe } from "../live/probing";
-import { hitAt } from "../picture/hit";
-import type { Screen } from "../picture/screen";
-import { pan, zoomAt } from "../picture/transform";
-import { moveTo, transformOf } from "../picture/viewTransforms";
-import { pinning } from "../state/comments";
-import { hoveredMaterial, select } from "../state/selection";
-import { pointedView } from "../state/views";
+import { freeCameraOf } from "./cameras/freeCamera";
+import { TouchGestures, type PinchMove } from "./cameras/touchGestures";
+import { dollyOrbit, panOrbit, rotateOrbit } from "./cameras/orbit";
+import { RADIANS_PER_PIXEL } from "./cameras/useCameraControl";
+import { placePin } from "../panels/collaboration/commentActions";
+import { placeLightAt, placingKind } from "../panels/lights/placement";
+import { requestPixelProbe } from "../session/pixelProbe";
+import { pickMaterial } from "../render/materialPicking";
+import type { ImageCanvas } from "../render/canvas";
+import { panTransform, zoomAt } from "../render/zoomTransform";
+import { setTransform, transformOf } from "../render/viewTransforms";
+import { pendingPin } from "../state/comments";
+import { hoveredMaterial, selectMaterial } from "../state/selection";
+import { hoveredView } from "../state/views";
 import { useDrag } from "../ui/drag";
-import { leavePicture, probeAt } from "./probe";
+import { clearProbe, probeAt } from "./pixelReadout";
 
-type Pulled = PointerEvent & { readonly currentTarget: Element };
+type ViewPointerTarget = PointerEvent & { readonly currentTarget: Element };
 
 const CLICK_PX = 4;
 
-export function panBy(screen: Screen, dx: number, dy: number): void {
-  const { view } = screen.picture;
-  moveTo(view, pan(transformOf(view), screen.size(), dx, dy));
+export function panView(screen: ImageCanvas, dx: number, dy: number): void {
+  const { view } = screen.image;
+  setTransform(view, panTransform(transformOf(view), screen.size(), dx, dy));
 }
 
-/** Select what a pixel shows: where the eye moves, the server knows. */
+/** Select what a pixel shows: where the camera moves, the server knows. */
 async function selectAt(view: string, x: number, y: number): Promise<void> {
-  const { material } = await askProbe(view, x, y);
-  if (material !== null) select(material);
+  const { material } = await requestPixelProbe(view, x, y);
+  if (material !== null) selectMaterial(material);
 }
 
 /** Two fingers slide what they hold, and spread it. */
-function pinch(screen: Screen, view: string, { across, down, middle, spread }: Pull): void {
-  const eye = eyeOf(view);
-  if (eye === null) {
+function pinchCamera(screen: ImageCanvas, view: string, { across, down, center, spread }: PinchMove): void {
+  const freeCamera = freeCameraOf(view);
+  if (freeCamera === null) {
     const box = screen.canvas.getBoundingClientRect();
-    panBy(screen, across, down);
-    return moveTo(view, zoomAt(transformOf(view), screen.size(), spread, middle.x - box.left, middle.y - box.top));
+    panView(screen, across, down);
+    return setTransform(view, zoomAt(transformOf(view), screen.size(), spread, center.x - box.left, center.y - box.top));
   }
-  leavePicture();
+  clearProbe();
   const { height } = screen.size();
-  eye.change((orbit) => approached(panned(orbit, across / height, down / height), 1 / spread, eye.bounds));
+  freeCamera.change((orbit) => dollyOrbit(panOrbit(orbit, across / height, down / height), 1 / spread, freeCamera.bounds));
 }
 
-export function usePointer(screen: Screen | null, view: string) {
+export function useViewPointer(screen: ImageCanvas | null, view: string) {
   const drag = useRef({ x: 0, y: 0, moved: false });
   const begin = (event: PointerEvent) => {
     drag.current = { x: event.clientX, y: event.clientY, moved: false };
-    const eye = eyeOf(view);
-    void eye?.grasp();
-    return event.button <= (eye === null ? 1 : 2);
+    const freeCamera = freeCameraOf(view);
+    void freeCamera?.grab();
+    return event.button <= (freeCamera === null ? 1 : 2);
   };
   const move = (event: PointerEvent) => {
     if (screen === null) return;
-    pointedView.value = view;
+    hoveredView.value = view;
     const { x, y, moved } = drag.current;
     const [dx, dy] = [event.clientX - x, event.clientY - y];
     if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
     drag.current = { x: event.clientX, y: event.clientY, moved: true };
-    const eye = eyeOf(view);
-    if (eye === null) return panBy(screen, dx, dy);
-    leavePicture(); // what was probed has moved away from the pointer
+    const freeCamera = freeCameraOf(view);
+    if (freeCamera === null) return panView(screen, dx, dy);
+    clearProbe(); // what was probed has moved away from the pointer
     const { height } = screen.size();
-    if (event.shiftKey || (event.buttons & 6) !== 0) eye.change((orbit) => panned(orbit, dx / height, dy / height));
-    else eye.change((orbit) => turned(orbit, (-TURN * dx) / height, (TURN * dy) / height));
+    if (event.shiftKey || (event.buttons & 6) !== 0) freeCamera.change((orbit) => panOrbit(orbit, dx / height, dy / height));
+    else freeCamera.change((orbit) => rotateOrbit(orbit, (-RADIANS_PER_PIXEL * dx) / height, (RADIANS_PER_PIXEL * dy) / height));
   };
   const hover = (event: PointerEvent) => {
     if (screen === null) return;
-    pointedView.value = view; // not when it enters: the view under a resting pointer may become another
-    const { px, py, material } = hitAt(screen, event);
-    probeAt(screen.picture, px, py);
+    hoveredView.value = view; // not when it enters: the view under a resting pointer may become another
+    const { px, py, material } = pickMaterial(screen, event);
+    probeAt(screen.image, px, py);
     hoveredMaterial.value = material;
   };
   const end = (event: PointerEvent, released: boolean) => {
     if (screen === null || !released || drag.current.moved || event.button !== 0) return;
-    const { px, py, material } = hitAt(screen, event);
-    if (placing.peek() !== null) void placeAt(view, px, py);
-    else if (pinning.peek() !== null) pinAt(view, px, py);
-    else if (eyeOf(view) !== null) void selectAt(view, px, py);
-    else if (material !== null) select(material);
+    const { px, py, material } = pickMaterial(screen, event);
+    if (placingKind.peek() !== null) void placeLightAt(view, px, py);
+    else if (pendingPin.peek() !== null) placePin(view, px, py);
+    else if (freeCameraOf(view) !== null) void selectAt(view, px, py);
+    else if (material !== null) selectMaterial(material);
   };
-  const leave = () => {
-    pointedView.value = hoveredMaterial.value = null;
-    leavePicture();
+  const onLeave = () => {
+    hoveredView.value = hoveredMaterial.value = null;
+    clearProbe();
   };
-  const one = useDrag({ begin, move, hover, end });
-  const fingers = useRef(new Fingers());
+  const dragHandlers = useDrag({ begin, move, hover, end });
+  const fingers = useRef(new TouchGestures());
   const lift = (event: PointerEvent) => {
     const { current } = fingers;
     const left = current.lift(event) ? current.only : null;
     if (left !== null) drag.current = { ...left, moved: true }; // it goes on from where it is
   };
   return {
-    ...one,
-    onPointerLeave: leave,
-    onPointerDown(event: Pulled) {
+    ...dragHandlers,
+    onPointerLeave: onLeave,
+    onPointerDown(event: ViewPointerTarget) {
       if (event.pointerType === "touch") fingers.current.press(event);
-      one.onPointerDown(event);
+      dragHandlers.onPointerDown(event);
     },
-    onPointerMove(event: Pulled) {
+    onPointerMove(event: ViewPointerTarget) {
       const pull = fingers.current.move(event);
-      if (screen === null || pull === null || pull.count < 2) return one.onPointerMove(event);
+      if (screen === null || pull === null || pull.count < 2) return dragHandlers.onPointerMove(event);
       drag.current.moved = true; // no click
-      return pinch(screen, view, pull);
+      return pinchCamera(screen, view, pull);
     },
-    onPointerUp: (event: Pulled) => (lift(event), one.onPointerUp(event)),
-    onPointerCancel: (event: Pulled) => (lift(event), one.onPointerCancel(event)),
+    onPointerUp: (event: ViewPointerTarget) => (lift(event), dragHandlers.onPointerUp(event)),
+    onPointerCancel: (event: ViewPointerTarget) => (lift(event), dragHandlers.onPointerCancel(event)),
   };
 }

@@ -5,7 +5,7 @@ const LOG_DECADES = 5;
 /** Below this fraction of a log axis the value is zero, which a logarithm cannot show. */
 const LOG_ZERO = 0.004;
 
-export interface Axes {
+export interface CurveAxes {
   /** Stretched near zero, where highlights live: fraction = sqrt(angle / 90°). */
   stretched: boolean;
   log: boolean;
@@ -13,47 +13,47 @@ export interface Axes {
   top: number;
 }
 
-export function xFraction(axes: Axes, degrees: number): number {
+export function xFraction(axes: CurveAxes, degrees: number): number {
   const t = degrees / MAX_DEGREES;
   return axes.stretched ? Math.sqrt(Math.max(0, t)) : t;
 }
 
-export function degreesAt(axes: Axes, fraction: number): number {
+export function degreesAt(axes: CurveAxes, fraction: number): number {
   const t = Math.min(1, Math.max(0, fraction));
   return MAX_DEGREES * (axes.stretched ? t * t : t);
 }
 
-export function bottom(axes: Axes): number {
+export function bottomOf(axes: CurveAxes): number {
   return axes.log ? axes.top / 10 ** LOG_DECADES : 0;
 }
 
 /** 0 at the bottom, 1 at the top; may leave that range. */
-export function yFraction(axes: Axes, value: number): number {
+export function yFraction(axes: CurveAxes, value: number): number {
   if (!axes.log) return value / axes.top;
   if (value <= 0) return 0;
-  return Math.max(0, Math.log10(value / bottom(axes)) / LOG_DECADES);
+  return Math.max(0, Math.log10(value / bottomOf(axes)) / LOG_DECADES);
 }
 
-export function valueAt(axes: Axes, fraction: number): number {
+export function valueAt(axes: CurveAxes, fraction: number): number {
   if (!axes.log) return Math.max(0, fraction * axes.top);
-  return fraction < LOG_ZERO ? 0 : bottom(axes) * 10 ** (fraction * LOG_DECADES);
+  return fraction < LOG_ZERO ? 0 : bottomOf(axes) * 10 ** (fraction * LOG_DECADES);
 }
 
 /** The next of 1, 2, 5 × 10ⁿ above the largest value, with a little room; powers of ten on a log axis. */
 export function niceTop(largest: number, log: boolean): number {
   if (!(largest > 0)) return 1;
   if (log) return 10 ** Math.ceil(Math.log10(largest * 1.05));
-  const wanted = largest * 1.08;
-  const power = 10 ** Math.floor(Math.log10(wanted));
-  const factor = [1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((f) => f * power >= wanted) ?? 10;
+  const target = largest * 1.08;
+  const power = 10 ** Math.floor(Math.log10(target));
+  const factor = [1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((f) => f * power >= target) ?? 10;
   return factor * power;
 }
 
-export function xTicks(axes: Axes): number[] {
+export function xTicks(axes: CurveAxes): number[] {
   return axes.stretched ? [0, 1, 5, 10, 20, 40, 60, 90] : [0, 15, 30, 45, 60, 75, 90];
 }
 
-export function yTicks(axes: Axes): number[] {
+export function yTicks(axes: CurveAxes): number[] {
   if (axes.log) return Array.from({ length: LOG_DECADES }, (_, i) => axes.top / 10 ** i);
   return [0.25, 0.5, 0.75, 1].map((t) => t * axes.top);
 }

@@ -1,17 +1,17 @@
-/** A curve's edits in the look, seen per channel, and back in the shortest form. */
+/** A curve's edits in the look, per channel, and back in the shortest form. */
 import type { CurveEdits, DrawnCurve } from "../../protocol";
 
 export type ChannelName = "r" | "g" | "b";
 export const CHANNELS: readonly ChannelName[] = ["r", "g", "b"];
 /** What is drawn of one channel: `bands`, `factors` and `offsets` are its own J numbers. */
-export type Drawn = Omit<DrawnCurve, "channels">;
+export type DrawnChannels = Omit<DrawnCurve, "channels">;
 /** Null where the model's parameters make the curve. */
-export type Channels = readonly [Drawn | null, Drawn | null, Drawn | null];
-export type Active = "rgb" | ChannelName;
+export type Channels = readonly [DrawnChannels | null, DrawnChannels | null, DrawnChannels | null];
+export type ActiveChannels = "rgb" | ChannelName;
 
-const CHANNELS_OF: Record<Active, number[]> = { rgb: [0, 1, 2], r: [0], g: [1], b: [2] };
+const CHANNELS_OF: Record<ActiveChannels, number[]> = { rgb: [0, 1, 2], r: [0], g: [1], b: [2] };
 
-export function channelsOf(active: Active): number[] {
+export function channelsOf(active: ActiveChannels): number[] {
   return CHANNELS_OF[active];
 }
 
@@ -22,7 +22,7 @@ function rowOf(rows: number[] | number[][], channel: number, numBands: number): 
   return flat.length === 3 * numBands ? flat.slice(channel * numBands, (channel + 1) * numBands) : flat;
 }
 
-function drawnOf({ points, bands, factors, offsets, handles }: DrawnCurve, channel: number, num: number): Drawn {
+function drawnOf({ points, bands, factors, offsets, handles }: DrawnCurve, channel: number, num: number): DrawnChannels {
   return {
     ...(points && { points }),
     ...(bands && { bands: rowOf(bands, channel, num) }),
@@ -33,7 +33,7 @@ function drawnOf({ points, bands, factors, offsets, handles }: DrawnCurve, chann
 }
 
 export function readChannels(edits: CurveEdits | undefined, numBands: number): Channels {
-  const result: [Drawn | null, Drawn | null, Drawn | null] = [null, null, null];
+  const result: [DrawnChannels | null, DrawnChannels | null, DrawnChannels | null] = [null, null, null];
   const list = edits === undefined ? [] : Array.isArray(edits) ? edits : [edits];
   for (const override of list) {
     CHANNELS.forEach((name, channel) => {
@@ -43,7 +43,7 @@ export function readChannels(edits: CurveEdits | undefined, numBands: number): C
   return result;
 }
 
-/** Channels that are drawn alike share one object; undefined where nothing is drawn. */
+/** Channels with equal edits share one object; undefined if nothing is drawn. */
 export function writeChannels(channels: Channels): CurveEdits | undefined {
   const groups = new Map<string, DrawnCurve & { channels: string }>();
   channels.forEach((drawn, channel) => {
@@ -58,7 +58,7 @@ export function writeChannels(channels: Channels): CurveEdits | undefined {
 }
 
 /** Whether all three channels are drawn alike (or none). */
-export function joined(channels: Channels): boolean {
+export function joinChannels(channels: Channels): boolean {
   const [r, g, b] = channels.map((drawn) => JSON.stringify(drawn));
   return r === g && g === b;
 }

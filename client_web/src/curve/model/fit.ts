@@ -1,43 +1,43 @@
-/** From many samples to few points: the curve that people hold in their hand. */
+/** From many samples to few points: the curve as editable control points. */
 import { MAX_CURVE_VALUE } from "../../look.gen";
 import type { Point } from "../../protocol";
-import { xFraction, yFraction, type Axes } from "./axes";
-import { valueOn } from "./edited";
+import { xFraction, yFraction, type CurveAxes } from "./axes";
+import { sampleBands } from "./edits";
 import { pchip } from "./pchip";
 
 export const MAX_POINTS = 64;
 const TOLERANCE = 0.004;
 
-/** Six digits are more than a picture can show and keep the document readable. */
-export function tidyValue(value: number): number {
+/** Six digits are more than an image can show and keep the document readable. */
+export function roundValue(value: number): number {
   return Number(Math.min(MAX_CURVE_VALUE, Math.max(0, value)).toPrecision(6));
 }
 
-export function tidyPoint(degrees: number, value: number): Point {
-  return [Number(degrees.toFixed(3)), tidyValue(value)];
+export function roundPoint(degrees: number, value: number): Point {
+  return [Number(degrees.toFixed(3)), roundValue(value)];
 }
 
 /** Few points whose monotone cubic stays within `TOLERANCE` of the plot's height of all `samples` (angles increasing).
  * Greedy: the worst sample becomes the next point. */
-export function fitPoints(samples: readonly Point[], axes: Axes, maxPoints = 24): Point[] {
+export function fitPoints(samples: readonly Point[], axes: CurveAxes, maxPoints = 24): Point[] {
   const first = samples[0];
   const last = samples.at(-1);
   if (first === undefined || last === undefined) return [];
-  if (samples.length <= 2) return samples.map(([x, y]) => tidyPoint(x, y));
-  const chosen = new Set<number>([0, samples.length - 1]);
-  while (chosen.size < Math.min(maxPoints, samples.length)) {
-    const points = [...chosen].sort((a, b) => a - b).map((i) => samples[i] as Point);
+  if (samples.length <= 2) return samples.map(([x, y]) => roundPoint(x, y));
+  const selected = new Set<number>([0, samples.length - 1]);
+  while (selected.size < Math.min(maxPoints, samples.length)) {
+    const points = [...selected].sort((a, b) => a - b).map((i) => samples[i] as Point);
     const curve = pchip(points);
     let worst = TOLERANCE;
-    let at = -1;
+    let worstIndex = -1;
     samples.forEach(([x, y], i) => {
       const error = Math.abs(yFraction(axes, y) - yFraction(axes, curve(x)));
-      if (error > worst && !chosen.has(i)) [worst, at] = [error, i];
+      if (error > worst && !selected.has(i)) [worst, worstIndex] = [error, i];
     });
-    if (at < 0) break;
-    chosen.add(at);
+    if (worstIndex < 0) break;
+    selected.add(worstIndex);
   }
-  return [...chosen].sort((a, b) => a - b).map((i) => tidyPoint(...(samples[i] as Point)));
+  return [...selected].sort((a, b) => a - b).map((i) => roundPoint(...(samples[i] as Point)));
 }
 
 /** Band averages as samples at the bands' middles, the ends carried to 0° and 90°. */
@@ -55,21 +55,21 @@ export function knotSamples(bands: readonly number[], maxDegrees = 90): Point[] 
 }
 
 /** Points at the angles of others, on the curve to the last digit: where they stand once their angles are tidy. */
-export function outlineOf(points: readonly Point[], bands: readonly number[]): Point[] {
+export function outlinePoints(points: readonly Point[], bands: readonly number[]): Point[] {
   return points.map(([degrees]) => {
-    const [x] = tidyPoint(degrees, 0);
-    return tidyPoint(x, valueOn(bands, x));
+    const [x] = roundPoint(degrees, 0);
+    return roundPoint(x, sampleBands(bands, x));
   });
 }
 
 /** A freehand stroke: a height for each band it covers; the newest pass wins, smoothed in the plot. */
-export class Stroke {
+export class BrushStroke {
   private readonly values: Float64Array;
   private last: Point | null = null;
 
   constructor(
     private readonly numBands: number,
-    private readonly axes: Axes,
+    private readonly axes: CurveAxes,
   ) {
     // heights in the plot, so that smoothing means the same on linear and logarithmic axes
     this.values = new Float64Array(numBands).fill(Number.NaN);
@@ -96,7 +96,7 @@ export class Stroke {
     return a < 0 ? null : [a, b];
   }
 
-  /** Heights from the first band to the last, smoothed by `passes` of a binomial filter; the ends stay where the hand
+  /** Heights from the first band to the last, smoothed by `passes` of a binomial filter; the ends stay where the pointer
    * put them. */
   heights(passes = 6): number[] {
     const range = this.range();
@@ -104,15 +104,15 @@ export class Stroke {
     let heights = Array.from(this.values.subarray(range[0], range[1] + 1));
     for (let pass = 0; pass < passes; pass++) {
       heights = heights.map((v, i) => {
-        const [before, after] = [heights[i - 1], heights[i + 1]];
-        return before === undefined || after === undefined ? v : 0.25 * before + 0.5 * v + 0.25 * after;
+        const [previous, after] = [heights[i - 1], heights[i + 1]];
+        return previous === undefined || after === undefined ? v : 0.25 * previous + 0.5 * v + 0.25 * after;
       });
     }
     return heights;
   }
 
-  /** Share of the plot's width that it takes, for deciding how many points it deserves. */
-  share(): number {
+  /** Fraction of the plot's width that it takes, for deciding how many points it deserves. */
+  mergeAxes(): number {
     const [first, last] = this.range() ?? [0, 0];
     return (
       xFraction(this.axes, (90 * (last + 1)) / this.numBands) - xFraction(this.axes, (90 * first) / this.numBands)

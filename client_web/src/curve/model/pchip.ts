@@ -9,7 +9,7 @@ function endSlope(h0: number, h1: number, d0: number, d1: number): number {
   return slope;
 }
 
-function slopes(points: readonly Point[]): number[] {
+function pchipSlopes(points: readonly Point[]): number[] {
   const n = points.length;
   const h = points.slice(1).map((p, i) => p[0] - (points[i] as Point)[0]);
   const d = points.slice(1).map((p, i) => (p[1] - (points[i] as Point)[1]) / (h[i] as number));
@@ -30,7 +30,7 @@ export function pchip(points: readonly Point[]): (degrees: number) => number {
   const first = points[0];
   const last = points.at(-1);
   if (first === undefined || last === undefined) return () => 0;
-  const m = points.length > 1 ? slopes(points) : [0];
+  const m = points.length > 1 ? pchipSlopes(points) : [0];
   return (x) => {
     if (x <= first[0]) return first[1];
     if (x >= last[0]) return last[1];
@@ -63,8 +63,8 @@ const GAUSS: [number, number][] = [
 ];
 
 /** The curve through points as averages over equal bands of 0…90°. */
-export function bandsOfPoints(points: readonly Point[], numBands: number): number[] {
+export function averageBands(points: readonly Point[], numBands: number): number[] {
   const curve = pchip(points);
-  const at = (place: number) => curve((90 * place) / numBands);
-  return Array.from({ length: numBands }, (_, j) => GAUSS.reduce((sum, [x, w]) => sum + w * at(j + x), 0));
+  const valueAtBand = (band: number) => curve((90 * band) / numBands);
+  return Array.from({ length: numBands }, (_, j) => GAUSS.reduce((sum, [x, w]) => sum + w * valueAtBand(j + x), 0));
 }

@@ -1,14 +1,14 @@
-/** Operations on a curve's points. Points are sorted, those that a hand places about a `band` apart: nothing finer is
+/** Operations on a curve's points. Points are sorted, those placed by the user about a `band` apart: nothing finer is
  * resolved. Nothing is mutated; points that stay are the same objects. */
 import type { Point } from "../../protocol";
 import { MAX_DEGREES } from "./axes";
-import { MAX_POINTS, tidyPoint } from "./fit";
+import { MAX_POINTS, roundPoint } from "./fit";
 
-/** Degrees between neighbours, in bands. */
+/** Degrees between neighbors, in bands. */
 const GAP = 0.9;
 
 /** An angle where a point can stand: the outer halves of the first and the last band are their ends. */
-function standing(degrees: number, band: number): number {
+function pointAtBand(degrees: number, band: number): number {
   if (degrees < band / 2) return 0;
   return degrees > MAX_DEGREES - band / 2 ? MAX_DEGREES : degrees;
 }
@@ -20,18 +20,18 @@ export function addPoint(
   value: number,
   band: number,
 ): { points: Point[]; index: number } {
-  const point = tidyPoint(standing(degrees, band), value);
+  const point = roundPoint(pointAtBand(degrees, band), value);
   const distances = points.map(([x]) => Math.abs(x - point[0]));
-  const near = distances.indexOf(Math.min(...distances));
-  if (distances[near] !== undefined && distances[near] < GAP * band) {
-    return { points: points.map((p, i) => (i === near ? [p[0], point[1]] : p)), index: near };
+  const nearestIndex = distances.indexOf(Math.min(...distances));
+  if (distances[nearestIndex] !== undefined && distances[nearestIndex] < GAP * band) {
+    return { points: points.map((p, i) => (i === nearestIndex ? [p[0], point[1]] : p)), index: nearestIndex };
   }
   if (points.length >= MAX_POINTS) return { points: [...points], index: -1 };
   const next = [...points, point].sort((a, b) => a[0] - b[0]);
   return { points: next, index: next.indexOf(point) };
 }
 
-/** Move a point; its neighbours stop it. */
+/** Move a point; its neighbors stop it. */
 export function movePoint(
   points: readonly Point[],
   index: number,
@@ -39,11 +39,11 @@ export function movePoint(
   value: number,
   band: number,
 ): Point[] {
-  const at = points[index]?.[0] ?? 0;
-  const low = Math.min(at, (points[index - 1]?.[0] ?? -MAX_DEGREES) + GAP * band);
-  const high = Math.max(at, (points[index + 1]?.[0] ?? 2 * MAX_DEGREES) - GAP * band);
-  const x = degrees === at ? at : Math.min(high, Math.max(low, standing(degrees, band)));
-  return points.map((p, i) => (i === index ? tidyPoint(x, value) : p));
+  const current = points[index]?.[0] ?? 0;
+  const low = Math.min(current, (points[index - 1]?.[0] ?? -MAX_DEGREES) + GAP * band);
+  const high = Math.max(current, (points[index + 1]?.[0] ?? 2 * MAX_DEGREES) - GAP * band);
+  const x = degrees === current ? current : Math.min(high, Math.max(low, pointAtBand(degrees, band)));
+  return points.map((p, i) => (i === index ? roundPoint(x, value) : p));
 }
 
 /** Remove a point; two always stay. */

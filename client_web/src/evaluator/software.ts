@@ -1,6 +1,0 @@
-/** Whether graphics are computed by the processor. */
-export function isSoftware(gl: WebGL2RenderingContext): boolean {
-  const info = gl.getExtension("WEBGL_debug_renderer_info");
-  const name = String(gl.getParameter(info === null ? gl.RENDERER : info.UNMASKED_RENDERER_WEBGL));
-  return /swiftshader|llvmpipe|softpipe|software/i.test(name);
-}
