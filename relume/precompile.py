@@ -53,10 +53,11 @@ from relume.store.bake_protocol import Recipe
 SIZE, NUM_LIGHTS, NUM_POINTS = (64, 48), 256, 4000  # as many lights as are grouped
 CACHE_BYTES = 1 << 28
 ANALYTIC = tuple(model for model, term in TERMS.items() if not term.needs_data)
+# has no angle; has one that listens to a parameter with another: rays know no more cases
 RAY_MODELS = (
     "lambert",
     "ggx",
-)  # has no angle; has one that listens to a parameter with another: rays know no more cases
+)
 
 
 def precompile() -> None:

@@ -61,9 +61,8 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             "sigma": params["sigma"], "ior": params["ior"],
         }  # fmt: skip
     glossy, exponent = (lobes[0]["color"], lobes[0]["params"]["exponent"]) if lobes else ([0.0] * 3, 1.0)
-    diffuse_fraction = sum(diffuse) / max(
-        1e-9, sum(diffuse) + 4 * sum(glossy)
-    )  # a highlight reflects up to four times its colour
+    # a highlight reflects up to four times its colour
+    diffuse_fraction = sum(diffuse) / max(1e-9, sum(diffuse) + 4 * sum(glossy))
     return {
         "type": "lambert_blinn_phong", "albedo": diffuse, "gain": glossy, "exponent": exponent,
         "diffuse_share": diffuse_fraction,

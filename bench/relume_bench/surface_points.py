@@ -111,9 +111,8 @@ def measure_radiance_rmse(
         free_camera_bake, illumination_from_look(look, free_camera_bake.material_names, has_bounces=True)
     )
     tables = build_tables([material_documents(look, name) for name in free_camera_bake.material_names])
-    highlight_tables = tables._replace(
-        table_index=tables.table_index[..., [2, 3, 4, 5, 4, 5]]
-    )  # what the in-basis tells of all light
+    # what the in-basis tells of all light
+    highlight_tables = tables._replace(table_index=tables.table_index[..., [2, 3, 4, 5, 4, 5]])
     radiance = sum(
         shade_probes(
             free_camera_bake.stored_scene, incident.total, None, table, camera_position.astype(np.float32), is_needed

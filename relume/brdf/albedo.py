@@ -45,10 +45,8 @@ _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128  # of a highlight's numbers, from none to all
 _STEPS_PER_OCTAVE = 64  # steps of a sharp highlight's numbers
-_MIN_REFLECTANCE, _MIN_RESIDUAL_RATIO = (
-    0.15,
-    0.03,
-)  # F_00 of a highlight that counts; F_66 of F_00 where functions miss some of it
+# F_00 of a highlight that counts; F_66 of F_00 where functions miss some of it
+_MIN_REFLECTANCE, _MIN_RESIDUAL_RATIO = 0.15, 0.03
 _LAST_PAIR = PAIRS.index((OUTGOING_DEGREE // 2, OUTGOING_DEGREE // 2))  # both of the highest degree, of order 0
 
 

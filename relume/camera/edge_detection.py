@@ -129,9 +129,8 @@ def is_radiance_edge(
     edge = np.zeros((height, width), np.bool_)
     luminance_image = value.reshape(height, width)
     for first, second in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
-        is_different = (
-            np.abs(luminance_image[first] - luminance_image[second]) > threshold
-        )  # never where a neighbour sees something else
+        # never where a neighbour sees something else
+        is_different = np.abs(luminance_image[first] - luminance_image[second]) > threshold
         edge[first] |= is_different
         edge[second] |= is_different
     return edge.ravel()

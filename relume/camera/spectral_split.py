@@ -78,9 +78,8 @@ class TintedLight:
         self.num_groups = int(alpha_test.groups.max(initial=0))
         material_rule = alpha_test.alpha_masks.of_material
         self._is_glass = (material_rule >= 0) & (alpha_test.alpha_masks.rules[material_rule, 0] == GLASS_RULE)
-        is_tinted_glass = self._is_glass & (
-            alpha_test.groups[material_rule] > 0
-        )  # the share of others is in what rays see
+        # the share of others is in what rays see
+        is_tinted_glass = self._is_glass & (alpha_test.groups[material_rule] > 0)
         self._tint = np.where(is_tinted_glass[:, None], alpha_test.alpha_masks.rules[material_rule, 1:4], np.float32(1))
         self._f0 = np.where(is_tinted_glass, alpha_test.alpha_masks.rules[material_rule, 4], np.float32(0))
 

@@ -47,9 +47,8 @@ def reflect_rays(
     reflected = _reflect(surface.points.normal, directions)
     face_normal = geometry.face_normals[mirror_hits.face]
     face_normal = face_normal * -np.sign(np.einsum("nc,nc->n", face_normal, directions))[:, None]
-    is_below_face = (
-        np.einsum("nc,nc->n", reflected, face_normal) <= 0
-    )  # by bumps, or where smooth normals turn from the triangle
+    # by bumps, or where smooth normals turn from the triangle
+    is_below_face = np.einsum("nc,nc->n", reflected, face_normal) <= 0
     reflected[is_below_face] = _reflect(face_normal[is_below_face], directions[is_below_face])
     cosine = np.clip(-np.einsum("nc,nc->n", surface.points.normal, directions), 0, 1)
     last_segment = SpecularChain(

@@ -25,6 +25,7 @@ from relume.scene.model import Material
 F32 = NDArray[np.float32]
 
 
+# of a layer, a row a ray
 _ARRAYS = (
     "ray",
     "directions",
@@ -33,7 +34,7 @@ _ARRAYS = (
     "origins",
     "is_mirrored",
     "key",
-)  # of a layer, a row a ray
+)
 
 
 class TransparencyLayer(NamedTuple):

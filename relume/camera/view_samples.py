@@ -46,12 +46,13 @@ _SURFACE_COLUMNS = ("diffuse", "specular", "uv", "roughness", "normal_length", "
 _CHAIN_COLUMNS = ("mirror", "mirror_cosine", "mirror_tint")
 _SAMPLE_COLUMNS = ("pixel", "weight", "material", "level", "through", "eye", "is_mirrored", "chance")
 _COLUMNS = (*_SAMPLE_COLUMNS, *_POINT_COLUMNS, *_SURFACE_COLUMNS, *_CHAIN_COLUMNS)
+# to tell which samples light comes to through tinted glass
 _REQUIRED_COLUMNS = (
     "material",
     "level",
     "position",
     "normal",
-)  # to tell which samples light comes to through tinted glass
+)
 
 
 @dataclass(frozen=True)

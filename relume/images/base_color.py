@@ -34,10 +34,8 @@ ReadMaterial = Callable[[str, str], Material]
 DIELECTRIC = 0.04
 """Reflectance head-on of what is no metal, where a material does not say it."""
 _MAX_DIELECTRIC = 0.2  # of gems, about: what reflects more than that head-on is metal somewhere
-_ROOT_TOLERANCE, _NOISE = (
-    0.02,
-    1e-6,
-)  # bytes of display values say it no better; of what is as near, the less metal is likelier
+# bytes of display values say it no better; of what is as near, the less metal is likelier
+_ROOT_TOLERANCE, _NOISE = 0.02, 1e-6
 _ONES = np.ones(3)
 
 

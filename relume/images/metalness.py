@@ -62,9 +62,8 @@ def with_metalness(
     diffuse = store_texture("diffuse", "what scatters", lambda: _scale_texture(blend.diffuse(), base.scale))
     for index in diffuse_indices:
         new_terms[index]["texture"] = diffuse
-    new_terms[diffuse_indices[0]]["color"] = _triple(
-        base.factor * diffuse_fraction(base.dielectric)
-    )  # what was metal scattered less
+    # what was metal scattered less
+    new_terms[diffuse_indices[0]]["color"] = _triple(base.factor * diffuse_fraction(base.dielectric))
     specular = store_texture("specular", "highlights", lambda: blend.normalized_f0(mean, highest))
     for index in specular_indices:
         new_terms[index]["texture"] = specular

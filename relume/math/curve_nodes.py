@@ -72,9 +72,8 @@ def choose_nodes(
         nodes = CurveNodes(values[node_indices], curves[node_indices], band_weights, min_floor, np.inf)
         errors = np.array([_fit(nodes.curves, curve, nodes.floor(curve))[1] for curve in midpoint_curves])
         error = float(errors.max())
-        batch_size = (
-            len(node_indices) // 5 if error > _BATCH_ERROR_RATIO * tolerance else 1
-        )  # many at once, as long as they are all of use
+        # many at once, as long as they are all of use
+        batch_size = len(node_indices) // 5 if error > _BATCH_ERROR_RATIO * tolerance else 1
         num = 0 if error <= tolerance else min(max(1, batch_size), max_nodes - len(node_indices))
         new_indices = _worst_neighbors(errors, node_indices, num)
         if not new_indices:

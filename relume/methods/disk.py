@@ -111,9 +111,8 @@ def _trial_estimator(
         rates, num_pixels = Rates(*cached_rates.tolist()), recipe.size[0] * recipe.size[1]
         edge_factor = min(1.0, rates.pixels / num_pixels) ** (_EDGE_EXPONENT / 2)
         samples = (1 + max(0.0, rates.samples - 1) * edge_factor) * num_pixels * len(recipe.views)
-        index_bits_factor = max(
-            1.0, math.log2(num_patches or 1) / math.log2(_PATCHES)
-        )  # a number of more cells has more bits
+        # a number of more cells has more bits
+        index_bits_factor = max(1.0, math.log2(num_patches or 1) / math.log2(_PATCHES))
         total = samples * (
             rates.sample + rates.light * recipe.num_lights * edge_factor + rates.gather_hits * index_bits_factor
         )

@@ -79,9 +79,8 @@ class MirrorLights:
         """
         brightness = luminance(lights.irradiance).astype(np.float64)
         bright_indices = np.flatnonzero(brightness > _BRIGHT * brightness.sum() / (4 * np.pi) * tiles.solid_angles)
-        bright_indices = bright_indices[
-            np.argsort(tiles.traversal_key[bright_indices], kind="stable")
-        ]  # neighbours beside each other
+        # neighbours beside each other
+        bright_indices = bright_indices[np.argsort(tiles.traversal_key[bright_indices], kind="stable")]
         num_groups = min(len(bright_indices), MAX_GROUPS)
         group = np.arange(len(bright_indices)) * num_groups // max(1, len(bright_indices))
         summed_direction = np.zeros((num_groups, 3))

@@ -115,9 +115,8 @@ class SampledViews:
             + plan_estimates.num_tinted_rays(scene, samples)
         )
         sampling, tracing = plan_estimates.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)
-        concurrent_bytes = max(
-            tracing, plan_estimates.light_selection_bytes(scene)
-        )  # while a single view is sampled, others do this at most
+        # while a single view is sampled, others do this at most
+        concurrent_bytes = max(tracing, plan_estimates.light_selection_bytes(scene))
         return Plan(
             num_view_samples=samples,
             num_rays=num_rays,

@@ -170,9 +170,8 @@ class _RowMaker:
         self._patch_row = np.empty(len(expected), np.int32)
         max_coefficients = len(expected) + 1
         self._index = np.empty(max_coefficients, np.int32)
-        self._details = np.empty(
-            max_coefficients * 3 * BLOCK_SAMPLES, np.float32
-        )  # the system gives what is written to
+        # the system gives what is written to
+        self._details = np.empty(max_coefficients * 3 * BLOCK_SAMPLES, np.float32)
 
     def write(self, rows: IndirectOperator, block: int) -> None:
         """Make one block."""

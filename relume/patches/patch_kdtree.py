@@ -23,9 +23,8 @@ I32 = NDArray[np.int32]
 NO_PATCH = 65_535  # of 16-bit links
 MAX_PATCHES = 65_535
 NO_PATCH_NODE = np.int32(-1 - NO_PATCH)  # a leaf, like those of cells
-_MAX_NORMAL_EXTENT = np.float32(
-    0.5
-)  # extent of a normal's component over a cell, from which on the cell is divided by it
+# extent of a normal's component over a cell, from which on the cell is divided by it
+_MAX_NORMAL_EXTENT = np.float32(0.5)
 
 
 class PatchTree(NamedTuple):

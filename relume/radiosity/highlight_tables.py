@@ -67,9 +67,8 @@ class HighlightTables(NamedTuple):
         has_any = np.array([len(entry) > 0 for entry in documents])
         rows = np.flatnonzero(has_any[material])
         multipliers = np.concatenate([np.ones_like(textures[:1]), textures])[:, rows]
-        patch_factors = (
-            multipliers[slot_index[material[rows]].T, np.arange(len(rows))] * energy_scale[rows]
-        )  # (highlights, G, 3)
+        # (highlights, G, 3)
+        patch_factors = multipliers[slot_index[material[rows]].T, np.arange(len(rows))] * energy_scale[rows]
         factor = patch_factors.transpose(1, 0, 2)
         return cls(
             rows,

@@ -215,9 +215,8 @@ class PatchLight:
         point_values = ray_incident_coefficients(self.points, [GatherRays(gather_hits, self.pattern, outgoing)], 0)[
             ..., 0
         ]
-        patch_irradiance = _ROOT_PI * point_values.reshape(-1, self.points_per_patch, 3).mean(
-            axis=1
-        )  # of the first function, 1 / √π
+        # of the first function, 1 / √π
+        patch_irradiance = _ROOT_PI * point_values.reshape(-1, self.points_per_patch, 3).mean(axis=1)
         points = self.points_of(rows)
         row_hits = self.gather_hits[rows].reshape(points.num_points, self.pattern.num_rays)
         point_coefficients = ray_incident_coefficients(

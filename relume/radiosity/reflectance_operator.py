@@ -84,9 +84,8 @@ class ReflectanceOperator:
         Returns:
             The part that is the same everywhere, (C, 3), and L_j of `rows` beside it, (G, 3, J); float32
         """
-        coefficients = np.ascontiguousarray(
-            incident.coefficients.transpose(2, 0, 1)
-        )  # a function's numbers lie together
+        # a function's numbers lie together
+        coefficients = np.ascontiguousarray(incident.coefficients.transpose(2, 0, 1))
         recurrence_table, outgoing = recurrence(OUTGOING_DEGREE), np.zeros_like(coefficients)
         for pair, (j, k) in enumerate(PAIRS[1:], 1):
             for index in (recurrence_table.cosine, recurrence_table.sine)[: 2 if recurrence_table.order[j] else 1]:

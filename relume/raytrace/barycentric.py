@@ -13,9 +13,8 @@ from relume.raytrace.tangents import unit
 
 F32 = NDArray[np.float32]
 
-EDGE_OFFSET_FRACTION = (
-    1 / 8
-)  # of the distance that ray origins keep from their surface; many times what positions are rounded by
+# of the distance that ray origins keep from their surface; many times what positions are rounded by
+EDGE_OFFSET_FRACTION = 1 / 8
 
 
 class FacePoints(NamedTuple):

@@ -136,9 +136,8 @@ def two_texels(wrap, coordinate, size):  # type: ignore[no-untyped-def]
     wrap: of `WRAPS`. coordinate: along the image's side, 0 to 1. size: texels along it.
     """
     if wrap == _REPEAT:
-        coordinate -= math.floor(
-            coordinate
-        )  # so that what is outside is so by one texel at most, and nothing is divided
+        # so that what is outside is so by one texel at most, and nothing is divided
+        coordinate -= math.floor(coordinate)
     texel_coordinate = coordinate * np.float32(size) - np.float32(0.5)
     below = math.floor(texel_coordinate)
     first: Any = np.int64(below)

@@ -208,9 +208,8 @@ def _differing_blocks(frame_means: F64, batches: F64) -> Mask:
     null_ratios = []
     for batch_weights in _sign_flips(num):
         noise = np.tensordot(batch_weights, deviations, 1)
-        residual = np.maximum(
-            sum_squares - num * noise**2, 0.0
-        )  # what is left of the spread does not depend on this noise
+        # what is left of the spread does not depend on this noise
+        residual = np.maximum(sum_squares - num * noise**2, 0.0)
         null_ratios.append(_noise_ratio(noise, residual / (num * (num - 2)), mean))
     return noise_ratios >= _threshold(noise_ratios.ravel(), np.concatenate(null_ratios, axis=None))
 

@@ -36,10 +36,8 @@ _POINTS_PER_PACKET = 16  # neighbours that Embree traces together; where texels 
 _TEXELS_PER_BATCH = 8192
 _MAX_LIGHT_SAMPLES = 4096  # places of a local light, where every texel is asked for
 _SEED = 2006
-_COSINE_FRACTION, _LOBE_FRACTION = (
-    1 / 8,
-    1 / 4,
-)  # of the texels drawn: so many directions more by the cosine and by lobes
+# of the texels drawn: so many directions more by the cosine and by lobes
+_COSINE_FRACTION, _LOBE_FRACTION = 1 / 8, 1 / 4
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,8 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Terms = Sequence[Mapping[str, Any]]
 
-_MAX_CLASSES_PER_MATERIAL, _MAX_CLASSES = (
-    48,
-    96,
-)  # kinds of a material, and of a scene: far finer than pictures tell apart
+# kinds of a material, and of a scene: far finer than pictures tell apart
+_MAX_CLASSES_PER_MATERIAL, _MAX_CLASSES = 48, 96
 
 
 @dataclass(frozen=True)

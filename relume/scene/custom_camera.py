@@ -16,10 +16,8 @@ MAX_NAME = 80
 MIN_YFOV, MAX_YFOV = 1.0, 170.0  # degrees
 MAX_DISTANCE_M = 1e6  # metres from the origin; beyond, float32 cannot tell one pixel's ray from the next
 _FIELDS = ("name", "to_world", "yfov")
-_ANGLE_TOLERANCE, _RIGID_TOLERANCE = (
-    1e-3,
-    1e-8,
-)  # how far axes may be from right angles; below which nothing is done to them
+# how far axes may be from right angles; below which nothing is done to them
+_ANGLE_TOLERANCE, _RIGID_TOLERANCE = 1e-3, 1e-8
 
 
 @dataclass(frozen=True)

@@ -118,9 +118,8 @@ def ray_incident_coefficients(points: SurfacePoints, rays: Sequence[RayList], de
 
 def _add_rays(points: SurfacePoints, rays: Sequence[RayList], degree: int, out: F32) -> None:
     no_visibility = np.empty((points.num_points, 0), np.uint8)
-    receivers = ShadingPoints(
-        points, points.normal, no_visibility
-    )  # no ray of a point depends on where it is seen from
+    # no ray of a point depends on where it is seen from
+    receivers = ShadingPoints(points, points.normal, no_visibility)
     for some in rays:
         for_ranges(
             lambda start, stop, some=some: _list_and_add(some, receivers, degree, start, stop, out),  # type: ignore[misc]

@@ -254,9 +254,8 @@ def test_a_database_that_is_away_is_said_once_however_many_call(
         raise make_unavailable_error("connection refused")
 
     monkeypatch.setattr("relume_server.auth.tokens.TokenStore._fetch", away)
-    monkeypatch.setattr(
-        "relume_worker.database.failures.MissingDatabase.report_recovered", lambda _: None
-    )  # loops do reach it
+    # loops do reach it
+    monkeypatch.setattr("relume_worker.database.failures.MissingDatabase.report_recovered", lambda _: None)
     monkeypatch.setattr(
         "relume_server.auth.middleware.database_outage", MissingDatabase(logging.getLogger("away"), "the database")
     )

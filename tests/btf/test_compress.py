@@ -156,10 +156,8 @@ def test_a_black_btf_and_one_that_is_too_large_are_refused():
 
 def test_more_texels_than_memory_is_meant_for_are_refused_before_any_is_read():
     class Large:
-        grid, size = (
-            make_direction_grid([(0.0, 1), (40.0, 199), (70.0, 200)]),
-            (300, 300),
-        )  # 81 directions may have as many
+        # 81 directions may have as many
+        grid, size = make_direction_grid([(0.0, 1), (40.0, 199), (70.0, 200)]), (300, 300)
 
     assert max_texels(81) > 300 * 300
     with pytest.raises(MaterialError, match="in 400 directions at most 83,886 can be kept, scale it down"):

@@ -142,9 +142,8 @@ def test_it_follows_the_mirrors_look_until_its_lobe_takes_over(lit):
     _, rough = with_term(params={"roughness": 0.2, "f0": F0})
     inside = np.abs(x) < 0.15
     np.testing.assert_allclose(dim[inside], whole[inside] / 2, rtol=0.03)
-    np.testing.assert_allclose(
-        half[inside].mean(), whole[inside].mean(), rtol=0.15
-    )  # a narrow lobe throws it there, too
+    # a narrow lobe throws it there, too
+    np.testing.assert_allclose(half[inside].mean(), whole[inside].mean(), rtol=0.15)
     beside = (x > 0.65) & (x < 0.95)
     assert whole[beside].max() < 0.02 * whole[inside].mean() < half[beside].mean() < rough[beside].mean()
 

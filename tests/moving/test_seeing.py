@@ -92,9 +92,8 @@ def test_a_smooth_field_is_smooth_between_points():
     over_a_spacing = float(np.linalg.norm(slope)) * found.spacing
     assert len(shown) > 4 * 600
     assert np.abs(shown - 1 - found.lattice_nodes.normal @ slope).max() < 1.5 * over_a_spacing
-    assert (
-        np.ptp(shown[found.probe_grid.node.reshape(-1, 3)], axis=1).max() < over_a_spacing
-    )  # between corners of a face
+    # between corners of a face
+    assert np.ptp(shown[found.probe_grid.node.reshape(-1, 3)], axis=1).max() < over_a_spacing
 
 
 def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside():

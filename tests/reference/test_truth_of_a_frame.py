@@ -73,9 +73,8 @@ def test_of_what_is_called_different_few_are_so_by_chance() -> None:
     frame[:, 32:] *= 1.1  # blocks end there too
     differs = compare(frame, estimate(16, 0.1))[1]
     assert differs[:, 32:].mean() > 0.95
-    assert (
-        differs[:, :32].sum() < 4 * FALSE_DISCOVERY_RATE * differs.sum()
-    )  # of each size of blocks, and a block is many pixels
+    # of each size of blocks, and a block is many pixels
+    assert differs[:, :32].sum() < 4 * FALSE_DISCOVERY_RATE * differs.sum()
 
 
 def test_truth_without_noise_calls_rounding_no_difference() -> None:

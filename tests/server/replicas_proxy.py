@@ -55,9 +55,8 @@ def _running(folder: Path, port: int, servers: Sequence[str], command_prefix: Se
     (line,) = re.findall(r"server server:8420[^;]*;", text)
     lines = "".join(line.replace("server:8420", each) for each in servers)
     (folder / "nginx.conf").write_text(text.replace(line, lines))
-    directives = "daemon off;" + (
-        " user root;" if command_prefix else ""
-    )  # root there is who runs this, and can be nobody else
+    # root there is who runs this, and can be nobody else
+    directives = "daemon off;" + (" user root;" if command_prefix else "")
     command = [*command_prefix, _NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", directives]
     process = subprocess.Popen(command)
     try:

@@ -93,9 +93,8 @@ def no_database_on_the_loop() -> Iterator[None]:
 @pytest.fixture
 def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
     monkeypatch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is no slow link
-    monkeypatch.setattr(
-        "relume_server.session.frames.coefficient_budget.MIN_COEFFICIENTS", 512
-    )  # nor does it take more steps
+    # nor does it take more steps
+    monkeypatch.setattr("relume_server.session.frames.coefficient_budget.MIN_COEFFICIENTS", 512)
     app = create_app(
         settings, open_library=control.open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
     )

@@ -150,9 +150,8 @@ def test_rooms_are_told_of_what_another_server_took(
     def look() -> None:
         client.portal.call(news.refresh)  # type: ignore[union-attr]
 
-    monkeypatch.setattr(
-        "relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 1e9
-    )  # the server's own looks once at most
+    # the server's own looks once at most
+    monkeypatch.setattr("relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 1e9)
     told: list[str] = []
     monkeypatch.setattr(services.live.rooms, "notify_comment", told.append)
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:

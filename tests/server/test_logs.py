@@ -113,9 +113,8 @@ def test_requests_and_sessions_are_lines_without_their_tokens(
     with open_session(client, baked.bake, opening={"resume": "secret"}, headers={"X-Request-ID": "r8"}) as session:
         hello = session.text("hello")
         session.exact(0)
-    said = [
-        line for line in capsys.readouterr().err.splitlines() if '"relume_server.' in line
-    ]  # not the test client's own
+    # not the test client's own
+    said = [line for line in capsys.readouterr().err.splitlines() if '"relume_server.' in line]
     assert "secret" not in "".join(said)
     lines = {line["request"]: line for line in map(json.loads, said)}
     assert (lines["r7"]["method"], lines["r7"]["path"], lines["r7"]["status"]) == ("GET", "/livez", 200)

@@ -77,9 +77,8 @@ def look_at(client: TestClient, bake: str) -> bytes:
     with open_session(client, bake) as session:
         session.exact(0)
         session.send_message(type="touch", curve=CURVE)
-        session.wait_until_ready(
-            "Ball, half angle θh"
-        )  # shading adds in another order: the last bits of a picture would tell
+        # shading adds in another order: the last bits of a picture would tell
+        session.wait_until_ready("Ball, half angle θh")
         session.edit(1, SIGMA, 0.3, control=SIGMA)
         return session.exact(1).payload
 

@@ -101,9 +101,8 @@ def test_very_many_samples_are_asked_in_fours_where_neighbours_agree():
     )
     assert 0.5 < free.mean() < 0.9
     assert (bits != free).mean() < 2e-3
-    np.testing.assert_allclose(
-        bits.mean(axis=1), free.mean(axis=1), atol=6 / MIN_GROUPED_SAMPLES
-    )  # single cells along the edge
+    # single cells along the edge
+    np.testing.assert_allclose(bits.mean(axis=1), free.mean(axis=1), atol=6 / MIN_GROUPED_SAMPLES)
 
 
 def irradiance(geometry, light, position, normal, triangles=None, num_samples=64):

@@ -80,9 +80,8 @@ def test_light_groups_are_direct_and_reflected_light_of_each_light():
     assert names_of(groups) == both
     assert [layer.look.transport.paths for layer in groups[:2]] == [(True, 1, 0), (False, 1, 24)]
     assert names_of(light_group_layers(look, has_indirect=False)) == both[::2]
-    assert (
-        names_of(light_group_layers(look_with(), has_indirect=False)) == both[:1]
-    )  # a compositor finds what it asks for
+    # a compositor finds what it asks for
+    assert names_of(light_group_layers(look_with(), has_indirect=False)) == both[:1]
     shown = look_with(transport={"show": "first_bounce"})
     (first,) = light_group_layers(shown, has_indirect=True)
     assert (first.name, first.look.transport.paths) == (both[1], (False, 1, 1))

@@ -100,9 +100,8 @@ def packed(rgb):
 def test_kernel_packs_bit_for_bit_as_the_twin():
     rng = np.random.default_rng(2)
     random = np.exp(rng.uniform(-25, 14, (20_000, 1)) + rng.normal(size=(20_000, 3)))
-    halfway = np.ldexp(
-        rng.integers(0, 1024, (5000, 3)) + 0.5, rng.integers(-30, 8, (5000, 1))
-    )  # rounding to even or up
+    # rounding to even or up
+    halfway = np.ldexp(rng.integers(0, 1024, (5000, 3)) + 0.5, rng.integers(-30, 8, (5000, 1)))
     powers = np.ldexp(1.0, np.arange(-40, 20))[:, None] * [1.0, 0.5, 0.25]
     below = np.nextafter(powers.astype(np.float32), np.float32(0))
     for rgb in (random, halfway, powers, below, np.eye(3) * 0.9999, rng.integers(0, 70_000, (2000, 3))):

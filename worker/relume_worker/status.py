@@ -26,9 +26,8 @@ PHASE_LABELS: dict[Phase, str] = {
 }
 FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
 
-FREE_CAMERA_METHODS = frozenset(
-    {"surface"}
-)  # methods whose eyes move: their pictures are exact where these rest, not at once
+# methods whose eyes move: their pictures are exact where these rest, not at once
+FREE_CAMERA_METHODS = frozenset({"surface"})
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,8 @@ F64 = NDArray[np.float64]
 
 MAX_CLUSTERS, MAX_COMPONENTS = 64, 16
 MAX_TEXELS = 512 * 512
-_MAX_TEXEL_DIRECTIONS = (
-    1 << 25
-)  # texels times directions: values of one side take 400 MB, and are there up to four times
+# texels times directions: values of one side take 400 MB, and are there up to four times
+_MAX_TEXEL_DIRECTIONS = 1 << 25
 _CLUSTERS = (1, 2, 4, 8, 16, 32, 64)  # among which the number is chosen
 _SEED = 0  # of the first clusters
 _SPAN = 64  # R: numbers that a texel's row is brought to

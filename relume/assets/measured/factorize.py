@@ -114,9 +114,8 @@ def _diffuse_curves(table: F32) -> F64:
     curves = []
     for channel in range(3):
         u, v = factorize_rank_one(low[..., channel], weight)
-        curves.append(
-            _clamp_above_zero(np.sqrt(u * v))
-        )  # the matrix is symmetric: u and v differ by scale and rounding
+        # the matrix is symmetric: u and v differ by scale and rounding
+        curves.append(_clamp_above_zero(np.sqrt(u * v)))
     return np.array(curves)
 
 

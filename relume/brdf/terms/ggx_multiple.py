@@ -21,9 +21,8 @@ _NUM_RADII, _NUM_AROUND = 64, 24  # half vectors, to one side of the plane of wo
 _NUM_COSINES = 64  # of the mean
 _STEPS = 64  # of the roughness, between which E is linear
 _NUM_BANDS = 64
-_NUM_NODES = (
-    _NUM_BANDS + 1
-)  # of the angle, where bands end: within each the curve is one polynomial, whose mean is exact
+# of the angle, where bands end: within each the curve is one polynomial, whose mean is exact
+_NUM_NODES = _NUM_BANDS + 1
 _MIN_MISSING_ENERGY = 1e-7  # of a mean: what is as smooth as that sends nothing between its facets
 _MEAN_RISE = 1 / 21  # of (1 − cos θ)⁵, weighed by the cosine
 

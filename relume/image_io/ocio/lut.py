@@ -54,9 +54,8 @@ def sample_lut(table: U16, light: F32) -> F64:
     position = np.minimum(np.log1p(GAIN * roots) / (2 * np.log1p(GAIN)), 1) * (SIZE - 1)
     node = np.minimum(position.astype(int), SIZE - 2)
     fraction = position - node
-    order = np.argsort(
-        -fraction, axis=1, kind="stable"
-    )  # from the corner at 0 along the longest part first, to that at 1
+    # from the corner at 0 along the longest part first, to that at 1
+    order = np.argsort(-fraction, axis=1, kind="stable")
     steps = np.take_along_axis(fraction, order, axis=1)
     weights = -np.diff(steps, axis=1, prepend=1, append=0)  # of the four corners
     display = np.zeros(light.shape)

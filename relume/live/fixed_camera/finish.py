@@ -27,9 +27,8 @@ def render_exact(picture: Picture, look: Look, progress: ProgressCallback, is_ca
             return
 
         def report_overall(fraction: float, num_images: int = num_images) -> None:
-            progress(
-                min(num_images + fraction, num_terms) / max(1, num_terms)
-            )  # seldom is more made than an image a term
+            # seldom is more made than an image a term
+            progress(min(num_images + fraction, num_terms) / max(1, num_terms))
 
         picture.run_next_job(report_overall, is_canceled)
         num_images += 1

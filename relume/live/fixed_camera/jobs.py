@@ -176,9 +176,8 @@ class PrecomputeOperator:
         if not self.target.exists() or self.key != current_key:
             return
         ready, changed = live.ready, set(live.changed_curves())
-        has_coefficients = (
-            live.is_converged and ready.basis == self.basis
-        )  # its coefficients hold, also where only some were moved
+        # its coefficients hold, also where only some were moved
+        has_coefficients = live.is_converged and ready.basis == self.basis
         if not result.is_exact and can_resume_from(ready, changed, self.basis):
             if not has_coefficients:
                 live.set_ready(replace(ready, basis=self.basis, coefficients=self.basis.coefficients(ready.bands)))

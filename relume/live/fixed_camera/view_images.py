@@ -88,9 +88,8 @@ class ViewImages:
         changed, view = copy(self), with_overrides(self.transfer.views[self.view.name], maps, self.transfer.tracer)
         changed.view, changed.mirrors, changed.by_name = view, MirrorFactors(view), {}
         baked_to_view = np.empty(view.num_surface_samples, np.int64)
-        baked_to_view[self.view.unmodified()] = np.arange(
-            len(baked_to_view)
-        )  # of the samples as they were baked, in this view
+        # of the samples as they were baked, in this view
+        baked_to_view[self.view.unmodified()] = np.arange(len(baked_to_view))
         for index, (name, before) in enumerate(self.by_name.items()):
             image = before
             if view.sample_key(index) != self.view.sample_key(index):
@@ -225,9 +224,8 @@ class ViewImages:
         return None if curve.depends_on_view else CurveBasis.from_curve(curve)
 
     def _sample_key(self, material: MaterialImage) -> tuple[Hashable, ...]:
-        return self.transfer.key, *self.view.sample_key(
-            material.index
-        )  # the store comes first: a memory asks whose it is
+        # the store comes first: a memory asks whose it is
+        return self.transfer.key, *self.view.sample_key(material.index)
 
     def operator_key(
         self,

@@ -28,9 +28,8 @@ F32 = NDArray[np.float32]
 
 _MIN_SLANT = np.float32(0.05)  # cosine, below which footprints grow no more
 _CHUNKS_PER_THREAD = 4  # for each thread: a ray that sees a highlight costs five times as much as others
-_MAX_NEGATIVE_RATIO = np.float32(
-    0.5
-)  # by points, of what a pixel's lobe shows: more is an error of theirs, a black patch
+# by points, of what a pixel's lobe shows: more is an error of theirs, a black patch
+_MAX_NEGATIVE_RATIO = np.float32(0.5)
 _MAX_GRADIENT_RATIO = np.float32(0.125)  # of what a pixel shows, that turning its lobe may take or add
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
 _FULLY_ABOVE = np.float32(10)  # widths of a lobe, from which on all of it is above: a share of 4e-8 is missing

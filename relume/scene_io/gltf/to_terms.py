@@ -95,9 +95,8 @@ def _highlight(surface: PbrSurface, anisotropy: float) -> dict[str, Any]:
     f0 = surface.f0 / surface.f90 if surface.f90 > 0 else surface.f0
     if anisotropy == 0:
         params = _clamp_params(TERMS["ggx"], roughness=surface.roughness, f0=f0)
-        needs_roughness_map = (
-            surface.has_normal_map and surface.roughness >= SOFT
-        )  # mirrors are pictures, which nothing widens
+        # mirrors are pictures, which nothing widens
+        needs_roughness_map = surface.has_normal_map and surface.roughness >= SOFT
         roughness_map = {"roughness_map": True} if "roughness" in surface.textures or needs_roughness_map else {}
         return {"model": "ggx", "color": color, "params": params, **roughness_map}
     across = max(surface.roughness**2, 1e-3)

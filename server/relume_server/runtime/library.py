@@ -57,9 +57,8 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
             return Picture(transfer, view, memory, is_watched=True)
 
         def make_static_view(*camera_args: Any, **options: Any) -> Any:
-            return static_view_builder(transfer).make_static_view(
-                *camera_args, **options
-            )  # in the job's thread: reading a scene takes its time
+            # in the job's thread: reading a scene takes its time
+            return static_view_builder(transfer).make_static_view(*camera_args, **options)
 
         return ProgressivePicture(FreeCameraPicture(transfer, view, is_watched=True), make_static_view, memory)
 

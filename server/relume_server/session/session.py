@@ -153,9 +153,8 @@ def _state(
 def _audit_writer(audit: Audit, context: JoinContext, bake: str, session: str) -> AuditWriter | None:
     if not context.caller.may_edit:
         return None
-    room = (
-        "" if context.join_request is None else f", room {context.join_request.prefix}…"
-    )  # enough to know it by, not to open it
+    # enough to know it by, not to open it
+    room = "" if context.join_request is None else f", room {context.join_request.prefix}…"
     return AuditWriter(audit, context.caller, f"/api/bakes/{bake}/session, {session}{room}")
 
 

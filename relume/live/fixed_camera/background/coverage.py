@@ -36,9 +36,8 @@ class Coverage:
                 self._num_composed[material.index] = material.num_composed
                 self._update(material)
         if self._pixels is None:
-            coverage = np.clip(
-                1 - self._pixel_weights @ (1 - self._samples), 0, 1
-            )  # glass hides nothing, but dims what is behind
+            # glass hides nothing, but dims what is behind
+            coverage = np.clip(1 - self._pixel_weights @ (1 - self._samples), 0, 1)
             self._pixels = coverage.reshape(self._view.height, self._view.width)
         return self._pixels
 

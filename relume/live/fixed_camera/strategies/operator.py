@@ -94,9 +94,8 @@ def _add_change(
         weight = np.abs(change) * operator.importance
         change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
         exact = np.where(change == 0, current, exact)  # a sum would leave a rest to move again
-        undefined = {
-            name: np.full_like(new_bands[name], np.nan) for name in ready.basis.affected_curves
-        }  # shows no curve exactly
+        # shows no curve exactly
+        undefined = {name: np.full_like(new_bands[name], np.nan) for name in ready.basis.affected_curves}
         new_bands = {**new_bands, **undefined}
     norm = norm_of(ready.image)
     operator.add(change, ready.image)

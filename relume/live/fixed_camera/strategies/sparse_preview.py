@@ -202,9 +202,8 @@ class SparsePreview:
         for snapshot, image in zip(self.snapshots, result, strict=True):
             live = snapshot.target.live
             is_incremental = live.ready.fidelity == Fidelity.INCREMENTAL and live.ready.light == live.light
-            is_same = (
-                live.term.model == snapshot.term.model
-            )  # with other fixed parameters it is a glimpse of it as well
+            # with other fixed parameters it is a glimpse of it as well
+            is_same = live.term.model == snapshot.term.model
             if is_same and not (live.is_converged or is_incremental) and snapshot.target.exists():
                 live.set_ready(self._merge(snapshot, image))
 

@@ -281,10 +281,8 @@ def _lobe_quadrature(phi: float, num_azimuths: int) -> tuple[F64, F64, F64]:
 
 def _view_azimuths(document: Mapping[str, Any]) -> list[tuple[float, float]]:
     """φo of the eyes over which a term that is not isotropic is averaged, and the share of each."""
-    phi, multiplicity = (
-        np.arange(_NUM_VIEW_AZIMUTHS) * (2 * np.pi / _NUM_VIEW_AZIMUTHS),
-        np.ones(_NUM_VIEW_AZIMUTHS),
-    )  # how many eyes each stands for
+    # how many eyes each stands for
+    phi, multiplicity = np.arange(_NUM_VIEW_AZIMUTHS) * (2 * np.pi / _NUM_VIEW_AZIMUTHS), np.ones(_NUM_VIEW_AZIMUTHS)
     if has_reflection_symmetry(document):
         phi, multiplicity = (
             phi[: _NUM_VIEW_AZIMUTHS // 4 + 1],

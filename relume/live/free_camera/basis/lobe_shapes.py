@@ -145,9 +145,8 @@ def _build_shape(grid_density: F64, lobes: F64) -> tuple[F32, float, F64]:
     remainder = grid_density.astype(np.float32)
     if lobe_confidence.any():
         lobe_density, area = _lobe_density(lobes), _grid_solid_angles()
-        scale = (grid_density @ area) / np.maximum(
-            lobe_density @ area, 1e-30
-        )  # neither is told well where all is in a ring
+        # neither is told well where all is in a ring
+        scale = (grid_density @ area) / np.maximum(lobe_density @ area, 1e-30)
         remainder -= (lobe_confidence * scale)[:, None] * lobe_density
     blurred = (remainder @ _blur_kernels()).reshape(-1, len(WIDTHS), NUM_GRID_DIRECTIONS)
     flat = np.square(_half_vector_distances() + flatness).astype(np.float32)

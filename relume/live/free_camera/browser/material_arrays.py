@@ -27,9 +27,8 @@ F32 = NDArray[np.float32]
 Texels = NDArray[Any]
 
 _NUM_COARSE_FUNCTIONS = num_functions(FAST_DEGREE)  # that are not nothing in what is found quickly
-_FUNCTION_COUNTS = np.array(
-    [1, _NUM_COARSE_FUNCTIONS, NUM_FUNCTIONS]
-)  # how many are sent: a shader is written for each number
+# how many are sent: a shader is written for each number
+_FUNCTION_COUNTS = np.array([1, _NUM_COARSE_FUNCTIONS, NUM_FUNCTIONS])
 _MAX_RESIDUAL = 1e-3  # of a table's size, by the functions that a shader leaves out
 _MAX_SCALED = 2.0**14  # of light vectors: well inside half precision
 

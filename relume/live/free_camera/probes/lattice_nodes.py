@@ -230,9 +230,8 @@ def _merge_nodes(
     """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
     surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
     position_key, attribute_key = _keys(grid_nodes, merge_distance, normal_steps)
-    order = np.lexsort(
-        (~grid_nodes.is_candidate, attribute_key, position_key)
-    )  # stable: of equals a point, the one with the lowest number
+    # stable: of equals a point, the one with the lowest number
+    order = np.lexsort((~grid_nodes.is_candidate, attribute_key, position_key))
     is_new = np.concatenate(
         [
             [True],

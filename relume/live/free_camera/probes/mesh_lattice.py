@@ -111,15 +111,11 @@ def place_probes(
     surfaces = _PlacementInput(geometry, geometry.face_normals, mesh_components(geometry), is_open, density, finest)
     rows, normal_steps = rows_at(spacing), _NORMAL_STEPS
     probe_grid, grid_nodes = _make_grids(surfaces, rows, spacing)
-    power, previous_count, previous_spacing = (
-        -2.0,
-        0,
-        spacing,
-    )  # of the spacing, that points are as many as; how many there were
+    # of the spacing, that points are as many as; how many there were
+    power, previous_count, previous_spacing = -2.0, 0, spacing
     for trial in range(_MAX_TRIALS):
-        normal_steps = max(
-            _MIN_NORMAL_STEPS, _NORMAL_STEPS - max(0, trial - _NUM_TRIALS)
-        )  # where directions alone are too many
+        # where directions alone are too many
+        normal_steps = max(_MIN_NORMAL_STEPS, _NORMAL_STEPS - max(0, trial - _NUM_TRIALS))
         num_merged = num_representatives(grid_nodes, normal_steps)
         ratio = num_merged / num_probes
         if abs(ratio - 1) < _COUNT_TOLERANCE or (ratio < 1 and trial >= _NUM_TRIALS):

@@ -228,9 +228,8 @@ def _read_faces(store: StoreReader) -> tuple[F32, F32, NDArray[np.uint32], NDArr
 def _read_textures(store: StoreReader) -> Textures:
     try:
         channel_textures = np.array(store.attributes["textures"], np.int64).reshape(-1, len(TEXTURES))
-        emission_textures = store.attributes.get(
-            "emission_images", [-1] * len(channel_textures)
-        )  # older stores do not say
+        # older stores do not say
+        emission_textures = store.attributes.get("emission_images", [-1] * len(channel_textures))
         material_textures = np.column_stack(
             [channel_textures, np.array([store.attributes["normal_maps"], emission_textures], np.int64).T]
         )
