@@ -28,7 +28,7 @@ FIRST = (*TOGETHER, "worker")  # files of the last are long, and wait for proces
 
 
 class _Sharing(LoadScopeScheduling):
-    """Where tests are shared out to processes, those of a file, or of a folder in `ROOM_FIELDS`, go to the same one."""
+    """Where tests are shared out to processes, those of a file, or of a folder in `TOGETHER`, go to the same one."""
 
     def _split_scope(self, nodeid: str) -> str:
         path = Path(nodeid.partition("::")[0])

@@ -41,7 +41,7 @@ def quad(name, corners, material, tangent=(1, 0, 0)):
 
 
 def sphere(name, center, radius, material, num_rings=12, inside=False):
-    """A ball of 4 · rings² triangles less the poles', smooth normals; `relative_path`: seen from its inner side."""
+    """A ball of 4 · rings² triangles less the poles', smooth normals; `inside`: seen from its inner side."""
     theta, phi = np.linspace(0, np.pi, num_rings + 1), np.linspace(0, 2 * np.pi, 2 * num_rings + 1)
     theta, phi = (grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij"))
     normals = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=1)
@@ -81,7 +81,7 @@ def make_emissive_triangles(corners, is_two_sided):
 
 
 def make_camera(name, origin, target, yfov):
-    """A camera at `origin` that has `target_bands` in its middle, upright."""
+    """A camera at `origin` that has `target` in its middle, upright."""
     origin, target = np.asarray(origin, float), np.asarray(target, float)
     back = (origin - target) / np.linalg.norm(origin - target)
     right = np.cross([0, 1, 0], back)

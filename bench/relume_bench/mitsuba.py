@@ -92,7 +92,7 @@ def read_passes(folder: Path) -> F32:
 
 
 def averaged(fine: NDArray[Any], finer: int) -> NDArray[np.float64]:
-    """Average a picture that has `with_detail` times as many pixels both ways as the peer's. (h, w, 3) float64"""
+    """Average a picture that has `finer` times as many pixels both ways as the peer's. (h, w, 3) float64"""
     height, width, _ = fine.shape
     blocks = fine.reshape(height // finer, finer, width // finer, finer, 3)
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))

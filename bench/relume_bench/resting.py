@@ -3,7 +3,7 @@
 The eye of the still life, 640×480, steps aside twice, and is then given the time that it needs; the median of both.
 From the eye's last move to the encoded exact picture, without the quarter of a second that a session waits before it
 begins. `tracing_s` of that are view samples, shadow rays and gather rays; the rest is shading. `direct_s`: the same
-under a look without reflected light, for which no gather rays are traced. `free_camera_error` is how far the moving
+under a look without reflected light, for which no gather rays are traced. `moving_error` is how far the moving
 picture was from the exact one that replaces it, edges included, which only the exact one antialiases.
 
 `surface.rest_first_s` ends with the moving picture that a few exact samples have corrected; `first_error` is how

@@ -4,7 +4,7 @@
 
 The value is the smallest of three: Tweety, Indoor and Watch, with as many vertices as the Cornell box has points here.
 The exponent of the floor's highlight moves; what the floor sends to others follows some frames behind, `lag_ms`, made
-beside the frames on the same cores. `p95_ms` is of frames that show it in all pixels, `per_s` counts all; `max_spread`
+beside the frames on the same cores. `p95_ms` is of frames that show it in all pixels, `per_s` counts all; `widest`
 is the ratio of the walls. The eye stands, as in an editor; Sun's column lets view and BRDF change at once, on a machine
 of 2007, in scenes and at frame sizes of its own. `moved_eye` is the ratio where our eye moves in each frame, too.
 """

@@ -29,7 +29,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 Reflectances = tuple[bytes, ...]
-"""Of each material, from `reflectances_of`; as bytes, which are compared and hashed at every frame."""
+"""Of each material, from `pack_reflectance`; as bytes, which are compared and hashed at every frame."""
 
 
 def _pairs() -> tuple[tuple[int, int], ...]:
@@ -211,7 +211,7 @@ def _lobe_matrix(term_text: str) -> F64:
 
 @lru_cache(maxsize=256)
 def _project_incident(term_text: str) -> F64:
-    """What each function of ωi sends towards each ωo, weighed as `_Places`. (o, 3, rungs)"""
+    """What each function of ωi sends towards each ωo, weighed as `_QuadraturePoints`. (o, 3, rungs)"""
     document, points = json.loads(term_text), _mirror_quadrature()
     if is_isotropic(document):
         value = _quadrature().values(document)

@@ -44,7 +44,7 @@ def split_frequencies(lights: TriangleLights, basis: F64) -> FrequencySplit:
     Args:
         lights: M triangles. basis: what they bring in light that is a harmonic. (M, NUM_HARMONICS)
     Returns:
-        As few triangles as leave `_MISSED` of all light or less untold.
+        As few triangles as leave `_MAX_RESIDUAL_FRACTION` of all light or less untold.
     """
     light = lights.irradiance.astype(np.float64)
     total = float(np.abs(light).sum())

@@ -63,8 +63,8 @@ def visible_fraction(visible, group, fraction, start, stop, visible_fractions): 
 
     Args:
         visible: part m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
-        group, fraction: see `Parts`. visible_fractions: written, points last: they are done together. (C, ≥ stop -
-        start) float32
+        group, fraction: see `TriangleSubset`. visible_fractions: written, points last: they are done together. (C, ≥
+        stop - start) float32
     """
     num_points = stop - start
     bits = np.empty(num_points, np.uint8)

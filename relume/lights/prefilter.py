@@ -26,7 +26,7 @@ def prefiltered(radiance: F32, degrees: float) -> F32:
     """Blur an equirectangular map, into as few texels as hold the result; time and size are bounded by the map's.
 
     Args:
-        radiance: from `reduced`. degrees: σ.
+        radiance: from `downsampled`. degrees: σ.
     Returns:
         (rows, 2 · rows, 3) float32, as bright in all as the map
     """

@@ -120,7 +120,7 @@ def accumulate(table, num, columns, out):  # type: ignore[no-untyped-def]
     memory, and loops would be of one ray at a time.
 
     Args:
-        table: the `recurrence`. num: how many rays there are, at most `AT_ONCE`.
+        table: the `recurrence`. num: how many rays there are, at most `BATCH_RAYS`.
         columns: from `WI` on x and y of their local directions, from `LIGHT` on their light in each channel; the others
             are written. (NUM_COLUMNS · AT_ONCE,) float32
         out: added to. (3, K) float32

@@ -1,4 +1,4 @@
-"""An opened bake of the method `stored_scene`: what a moving eye sees, and what arrives there under any light."""
+"""An opened bake of the method `surface`: what a moving eye sees, and what arrives there under any light."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def check_gathering(recipe: Recipe, max_samples: int) -> None:
     """Refuse numbers of gather samples and rays that no store can have.
 
     Args:
-        recipe: whose `sample_points` and `gather_rays` are looked at. max_samples: that the method can keep; 0 where
+        recipe: whose `gather_samples` and `gather_rays` are looked at. max_samples: that the method can keep; 0 where
             it gathers no light.
     Raises:
         PlanError: they are out of bounds.

@@ -1,4 +1,4 @@
-"""Method `stored_scene`: pictures whose eye moves (Mahajan 2008, Sun 2007); light is kept at points of all surfaces.
+"""Method `surface`: pictures whose eye moves (Mahajan 2008, Sun 2007); light is kept at points of all surfaces.
 
 What is baked is what `gather` bakes for view samples, for points that no view owns: which light triangles each sees,
 and which cells its gather rays hit. Nothing of it knows a BRDF or an eye. Stages: "points" (the light triangles, the

@@ -87,7 +87,7 @@ def solve_indirect_fast(
     """The same for a moving hand: by squares in place of directions, and few rays where light is even.
 
     Args:
-        patches, reflectance_operator, incident, first, last, outgoing_highlights: as of `sent_between`.
+        patches, reflectance_operator, incident, first, last, outgoing_highlights: as of `solve_indirect`.
     """
     gather_hits, few_rays, rho = patches.gather_hits, patches.few_rays, reflectance_operator.reflectance
 
@@ -144,7 +144,7 @@ def solve_indirect_preview(
     """The same roughly, without directions, as others see it in the mean. (NO_CELL + 1, 3) float32
 
     Args:
-        patches, reflectance_operator, incident, first, last: as of `sent_between`.
+        patches, reflectance_operator, incident, first, last: as of `solve_indirect`.
     """
     isotropic = patches.mean_to_others(*reflectance_operator.apply(incident), reflectance_operator.rows)
     for _ in range(first - 1):

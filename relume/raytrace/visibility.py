@@ -99,7 +99,8 @@ def trace_visibility(
         origins: off the surface already. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
         directions: unit, towards the lights. (m, 3) float32
-        alpha_sample: of the rays of each point, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
+        alpha_sample: of the rays of each point, or of all, at surfaces that blend; see `SurfacePoints`. (n,) or (1,)
+            float32
         excluded_normals: other normals; lights above their horizon are not traced and count as hidden, too. (n, 3) or
             (1, 3)
     Cost: O(n · m · log triangles) time.

@@ -100,7 +100,8 @@ def trace_visibility_masks(
         origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
         normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
         targets: the lights, from `make_light_targets`.
-        alpha_sample: of the rays of each sample, or of all, at surfaces that blend; see `Points`. (n,) or (1,) float32
+        alpha_sample: of the rays of each sample, or of all, at surfaces that blend; see `SurfacePoints`. (n,) or (1,)
+            float32
     Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)

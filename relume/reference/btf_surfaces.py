@@ -82,7 +82,7 @@ def _footprint_offsets(side: F64, wo: F64, rng: np.random.Generator) -> F64:
     Args:
         side: of the square of its area, in repeats. (n,). wo: to the eye, in the texture's frame. (n, 3)
     Returns:
-        One in each of its strata. (n, `_PLACES`², 2)
+        One in each of its strata. (n, `_NUM_STRATA`², 2)
     """
     slanted = np.sqrt(np.maximum(wo[:, 2], _LEAST_COSINE))[:, None, None]
     horizontal_length = np.hypot(wo[:, 0], wo[:, 1])[:, None]

@@ -241,7 +241,7 @@ def _threshold(noise_ratios: F64, null_ratios: F64) -> float:
     """The least value from which on at most `FALSE_DISCOVERY_RATE` are expected by chance; infinite if there is none.
 
     Args:
-        null_ratios: of so many trials as `_turns` has.
+        null_ratios: of so many trials as `_sign_flips` has.
     """
     values = np.sort(noise_ratios[noise_ratios > 0])
     num_discoveries = len(values) - np.arange(len(values))

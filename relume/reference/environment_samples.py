@@ -50,7 +50,7 @@ class EnvironmentSamples:
         return replace(self, power=self.power * np.array(gain), gain=gain)
 
     def sample_directions(self, num_samples: int, rng: np.random.Generator) -> F64:
-        """Directions anywhere in texels drawn by luminance, one a stratum, with the density `pdf_table`. (num, 3)"""
+        """Directions anywhere in texels drawn by luminance, one a stratum, with the density of `radiance`. (num, 3)"""
         strata = (np.arange(num_samples) + rng.random(num_samples)) / num_samples
         texel_index = np.minimum(np.searchsorted(self.cdf, strata, side="right"), self.num_texels - 1)
         height, width, _ = self.map.shape
@@ -61,8 +61,8 @@ class EnvironmentSamples:
         return rotate_about_y(uv_to_direction(u, v), self.rotation)
 
     def radiance(self, direction: F64) -> tuple[F64, F64]:
-        """What comes from unit directions (..., 3), texels having one value each, and the density with which `drawn`
-        draws them, per steradian. (..., 3), (...)"""
+        """What comes from unit directions (..., 3), texels having one value each, and the density with which
+        `sample_directions` draws them, per steradian. (..., 3), (...)"""
         height, width, _ = self.map.shape
         u, v = direction_to_uv(rotate_about_y(direction.reshape(-1, 3), -self.rotation))
         column = np.minimum((u * width).astype(np.intp), width - 1)

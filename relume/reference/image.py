@@ -57,7 +57,7 @@ def reference_image(
 
     Args:
         scene, view, look, size, spp, progress, is_canceled, pass_index: as of `render_reference`.
-        reflects: whether the method has light between surfaces, as the look's `edit_transport` names it.
+        reflects: whether the method has light between surfaces, as the look's `transport` names it.
     Returns:
         Linear radiance, the background seen where there is no surface. (height, width, 3) float32
     """
@@ -257,7 +257,7 @@ def _add_indirect(
 def points_of_samples(samples: ViewSamples, textures: Mapping[str, F32], roughness: F32) -> ReferencePoints:
     """View samples as points; those of the background have no surface and are not meant.
 
-    samples: of a view. textures, roughness: there, see `Points`.
+    samples: of a view. textures, roughness: there, see `ReferencePoints`.
     """
     points = samples.surface.points
     to_camera = samples.eye.astype(np.float64) - points.position

@@ -12,7 +12,7 @@ def unlimited_paths(look: Look) -> LightPaths:
     """All light paths of the kind that a look shows, however many surfaces they have on their way.
 
     Args:
-        look: whose `edit_transport` names the kind.
+        look: whose `transport` names the kind.
     """
     return look.transport.model_copy(update={"bounces": MAX_BOUNCES}).paths
 
@@ -21,7 +21,7 @@ def omitted_paths(look: Look, *, reflects: bool) -> tuple[str, ...]:
     """What a method leaves out of the paths of a look, in sentences.
 
     Args:
-        look: whose `edit_transport` names them. reflects: whether the method has light between surfaces.
+        look: whose `transport` names them. reflects: whether the method has light between surfaces.
     """
     unlimited, supported = unlimited_paths(look), look.transport.supported_by(has_indirect=reflects)
     if not unlimited.has_indirect or supported.last >= unlimited.last:

@@ -100,7 +100,7 @@ def surface_roughness(scene: Scene, look: Look, surface: SurfaceInteraction, mat
     """How rough places on surfaces are, over what terms say.
 
     Args:
-        scene, look, surface, material: as in `textures_of`.
+        scene, look, surface, material: as in `surface_textures`.
     Returns:
         (n,) float32
     """

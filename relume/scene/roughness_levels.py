@@ -36,10 +36,10 @@ def levels_of_material(material: Material) -> tuple[float, ...]:
 
 
 def levels_of_texture(texture: Texture | None, base: float | None, min_length: float) -> tuple[float, ...]:
-    """The levels between the ends of a map, as `levels_of` has them.
+    """The levels between the ends of a map, as `levels_of_material` has them.
 
     Args:
-        texture: roughness over its mean, of bytes; None: one everywhere. base: that mean, see `widened`; None: bumps
+        texture: roughness over its mean, of bytes; None: one everywhere. base: that mean, see `rougher`; None: bumps
             widen nothing. min_length: from `min_mean_normal_length`.
     """
     return levels_in_range(*ratio_range(texture), base, min_length)
@@ -95,7 +95,7 @@ def rougher(ratio: F32, length: F32, base: float) -> F32:
 
 
 def smoother(ratio: F32, length: F32, base: float) -> F32:
-    """Roughness over `base` without the bumps that widened it: `widened` the other way.
+    """Roughness over `base` without the bumps that widened it: `rougher` the other way.
 
     ratio, length, own: as there. Returns (n,) float32
     """

@@ -25,7 +25,7 @@ def publish(staging: Path, target: Path, check: Callable[[], object] = lambda: N
     the same files, byte for byte, however often it was interrupted.
 
     Args:
-        staging: the finished store, same file system as `target_bands`.
+        staging: the finished store, same file system as `target`.
         target: where readers look for it; an older store there is replaced.
         check: called after what takes long; raises where the store is not to be published any more.
     Returns:

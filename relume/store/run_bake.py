@@ -94,7 +94,7 @@ def bake_in_process(
         target: folder of the finished store; an unfinished one beside it is removed before.
         progress: called with each task that is done and what it has written.
     Returns:
-        `target_bands`.
+        `target`.
     """
     staging, scene = target.with_name(f"{target.name}.staging"), recipe.add_cameras(scene)
     shutil.rmtree(staging, ignore_errors=True)

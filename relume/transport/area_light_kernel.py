@@ -1,6 +1,6 @@
 """The kernel that lists lamps of some extent as light triangles: those parts of them that a point sees.
 
-A part that is seen as a whole and no wider than `_NARROW_ASPECT` is two triangles; what is wider, or partly hidden, is
+A part that is seen as a whole and no wider than `_NARROW` is two triangles; what is wider, or partly hidden, is
 divided along its halvings (`relume.lights.light_sampling`), down to single samples.
 """
 
@@ -250,7 +250,7 @@ def list_area_light(  # type: ignore[no-untyped-def]
     """List what points [start, stop) see of a lamp.
 
     Args:
-        points: `Points`. wo: towards the viewer. (n, 3) float32
+        points: `SurfacePoints`. wo: towards the viewer. (n, 3) float32
         area_light: light, strata, parts and gain, as in `LocalRays`. visible: as there.
         kinds, support, first, light, wi, out: as of `relume.transport.light_culling.list_lights`.
         nodes: of triangles, written, corners and midpoints of edges. (M, 6, 3) float32

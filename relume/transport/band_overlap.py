@@ -55,7 +55,7 @@ def overlap(a, b, c):  # type: ignore[no-untyped-def]
     return low, middle, high, _ONE / (rising * width), _ONE / (falling * width)
 
 
-_OVERLAP = (types.float32,) * 5  # what `overlap_of` returns
+_OVERLAP = (types.float32,) * 5  # what `overlap` returns
 
 
 def _area_below(builder: Any, y: Any, low: Any, middle: Any, high: Any, rise: Any, fall: Any) -> Any:

@@ -71,7 +71,7 @@ def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-unty
     """Do as `neighbor_texels`.
 
     Args:
-        levels, texel, weight: as there. u, v: shares of a repeat. level: between two, see `level_of`.
+        levels, texel, weight: as there. u, v: shares of a repeat. level: between two, see `mip_level`.
     """
     coarsest = levels.shape[0] - 1
     clamped_level: Any = min(level, np.float32(coarsest))
@@ -107,7 +107,7 @@ def anisotropic_offsets(footprint, up, finest):  # type: ignore[no-untyped-def]
     both together are that of the footprint's length, a²/12.
 
     Args:
-        footprint: side of the square of its area, in repeats. up: cosine of the slant. finest: see `level_of`.
+        footprint: side of the square of its area, in repeats. up: cosine of the slant. finest: see `mip_level`.
     Returns:
         How many places; how far apart; the footprint's width, or what stands for it.
     """

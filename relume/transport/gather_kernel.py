@@ -73,7 +73,7 @@ def _glossy_rays(rays, shift, o, x, y, z, distance, twice_cosine):  # type: igno
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
-    """Weigh all rays of a point, as `weight_of` does."""
+    """Weigh all rays of a point, as `ray_weight` does."""
     ox, oy, oz = o
     num_cosine_rays, num_glossy_rays = np.float32(num_cosine), np.float32(x.shape[0] - num_cosine)
     if num_glossy_rays == _ZERO:
@@ -134,9 +134,9 @@ def list_gather_rays(  # type: ignore[no-untyped-def]
     """List the rays of points [start, stop) that hit a cell, in the points' local frames.
 
     Args:
-        points: `Points`. wo: towards the viewer. (n, 3) float32
+        points: `SurfacePoints`. wo: towards the viewer. (n, 3) float32
         gather_hits: cell that each ray hits. (n, rays) uint16. pattern: the rays' directions.
-        outgoing: by cells, a `Sent`.
+        outgoing: by cells, a `OutgoingLight`.
         start, stop: the points.
         first: written, where the rays of each point begin. (points + 1,) int64
         wi: written, local directions. (3, K) float32. out: written, local wo. (3, K) float32

@@ -113,7 +113,7 @@ class LightList:
         return shading, self._wo
 
     def _visible_clusters(self, subset: TriangleSubset, visible: Bits) -> Bits:
-        """Find which merged lights points see anything of, as bits; how much of each is in `_seen`."""
+        """Find which merged lights points see anything of, as bits; how much of each is in `_visible_fraction`."""
         visible_fraction(visible, subset.group, subset.fraction, 0, len(visible), self._visible_fraction)
         return np.packbits(self._visible_fraction[:, : len(visible)].T > 0, axis=1, bitorder="little")
 

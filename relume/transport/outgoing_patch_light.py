@@ -76,7 +76,7 @@ def radiance_from_patch(
     """Put together what cells send.
 
     Args:
-        isotropic_radiance: as in `Sent`. rows: the cells that send more one way than another. (G,)
+        isotropic_radiance: as in `OutgoingLight`. rows: the cells that send more one way than another. (G,)
         frame: their tangents and bitangents. (G, 2, 3) float32. coefficients: L_j of each. (G, 3, J) float32
         decay: how fast what narrow lobes see of each falls with the degree, see `decay_of`. (G,) float32; None where
             only cells look it up, which see widely: `smooth` is `table` then.
@@ -147,7 +147,7 @@ def incident_along(outgoing, gather_hits, bins, out):  # type: ignore[no-untyped
     """Look up what cells send along the rays of a point.
 
     Args:
-        outgoing: by all cells, a `Sent`. gather_hits: cells that the rays hit. (rays,) uint16
+        outgoing: by all cells, a `OutgoingLight`. gather_hits: cells that the rays hit. (rays,) uint16
         bins: in which light leaves them. (rays,) uint8
         out: radiance, written. (3, rays) float32
     """

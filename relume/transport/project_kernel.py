@@ -333,7 +333,7 @@ def project_points(  # type: ignore[no-untyped-def]
         kinds, axes, num_bands, bands, decrements, num_rows, settings, setting_index, support, active: see
         `Contraction`.
         fine: how far angles may bend over a leaf, times what is tolerated of exact operators; the last level of
-            division. `FINE` or `ROUGH`.
+            division. `FINE` or `COARSE`.
         scratch: from `make_scratch`.
         out: added to. (points, 3, J padded by 8) float32; with no free curve (points, 3, N) for N settings of the
             others.

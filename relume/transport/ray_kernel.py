@@ -27,7 +27,7 @@ def list_local_rays(  # type: ignore[no-untyped-def]
     """List the samples of a local light that points [start, stop) see.
 
     Args:
-        points: `Points`. wo: towards the viewer. (n, 3) float32
+        points: `SurfacePoints`. wo: towards the viewer. (n, 3) float32
         light, strata, gain, visible: as in `LocalRays`.
         start, stop: the points.
         first, wi, out, irradiance: written, as by `relume.transport.gather_kernel.list_gather_rays`; the irradiance of
@@ -216,7 +216,7 @@ def _project(  # type: ignore[no-untyped-def]
     first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active,
     scratch, out,
 ):  # fmt: skip
-    """Do what `project_rays` is for. scratch: `gamma`, `weight` and `band` of `_contract`, `multiply` of `_spread`."""
+    """Do what `project_rays` is for. scratch: gamma, weight, band of `_contract`, product of `_add_settings`."""
     gamma, weight, band, product = scratch
     for p in range(out.shape[0]):
         begin, end = first[p], first[p + 1]

@@ -92,7 +92,7 @@ class GatherRays:
         return replace(self, gather_hits=self.gather_hits[rows], sharing=None)
 
     def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `receiver_list`; see `Rays`."""
+        """List the rays of `receivers` [start, stop) into `receiver_list`; see `RayList`."""
         ray_arrays = self.gather_hits, self.pattern, self.outgoing
         return int(list_gather_rays(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
 
@@ -131,11 +131,11 @@ class LocalRays:
         return len(self.strata.uv)
 
     def unshared(self, rows: NDArray[np.integer]) -> LocalRays:
-        """Choose those of some points; see `Rays`."""
+        """Choose those of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
     def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `receiver_list`; see `Rays`."""
+        """List the rays of `receivers` [start, stop) into `receiver_list`; see `RayList`."""
         ray_arrays = self.light, self.strata, self.gain, self.visible
         return int(list_local_rays(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
 
@@ -160,11 +160,11 @@ class MirrorRays:
         return len(self.direction)
 
     def unshared(self, rows: NDArray[np.integer]) -> MirrorRays:
-        """Choose those of some points; see `Rays`."""
+        """Choose those of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
     def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `receiver_list`; see `Rays`."""
+        """List the rays of `receivers` [start, stop) into `receiver_list`; see `RayList`."""
         ray_arrays = self.direction, self.normal_irradiance, self.visible
         return int(list_mirror_lights(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
 

@@ -95,7 +95,7 @@ def read_surface_points(store: StoreReader, k: int, start: int, stop: int, seed:
 
 
 def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> F32:
-    """Read the chance of the rays of samples at surfaces that blend; see `Points`.
+    """Read the chance of the rays of samples at surfaces that blend; see `SurfacePoints`.
 
     Args:
         store: an open store. k: number of the view. start, stop: rows of its arrays.

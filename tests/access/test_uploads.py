@@ -263,7 +263,7 @@ class TestSlots:
         assert self.order_of(Slots(2, 1, {}), "aab") == "aba"
 
     def test_one_who_does_not_wait_any_more_leaves_the_slot(self) -> None:
-        async def is_canceled() -> None:
+        async def one_gives_up() -> None:
             slots = Slots(1, 1, {})
             async with slots.acquire("a"):
                 waiting = asyncio.create_task(slots.acquire("b").__aenter__())
@@ -273,4 +273,4 @@ class TestSlots:
             async with slots.acquire("c"):
                 pass
 
-        run_in_thread(is_canceled())
+        run_in_thread(one_gives_up())

@@ -12,7 +12,7 @@ RINGS = ubo_grid()
 
 
 class Facets:
-    """Texels of few kinds, each a Lambertian facet that leans; `angles` different ones."""
+    """Texels of few kinds, each a Lambertian facet that leans; `kinds` different ones."""
 
     grid = RINGS
 

@@ -215,7 +215,7 @@ def test_one_who_gives_up_lets_the_others_make_it_once():
     cache, made, outcome = Cache(100_000), [], []
     first_runs, go_on, second_runs = threading.Event(), threading.Event(), threading.Event()
 
-    def is_canceled():
+    def give_up_midway():
         first_runs.set()
         go_on.wait(60)
         raise CancelledError("cancelled")
@@ -228,7 +228,7 @@ def test_one_who_gives_up_lets_the_others_make_it_once():
 
     def give_up():
         with pytest.raises(CancelledError):
-            cache.get("k", LinearOperator, 480, is_canceled)
+            cache.get("k", LinearOperator, 480, give_up_midway)
 
     def want():
         outcome.append(cache.get("k", LinearOperator, 480, make))

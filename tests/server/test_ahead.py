@@ -37,7 +37,7 @@ AWAY = pg8000.InterfaceError("refused")
 
 
 class Steps:
-    """Does steps here and remembers them; `baked_normal` is called first."""
+    """Does steps here and remembers them; `before` is called first."""
 
     def __init__(self, data: Path) -> None:
         self._here = InThreadBatches(Settings(data=data), open_library(1 << 28, 0))

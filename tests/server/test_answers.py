@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,12 +19,6 @@ from relume.core.cache import Cache
 from relume_server.io import streamed_responses as answers_module
 from relume_server.io.streamed_responses import Answers
 from relume_server.runtime.single_flight import SingleFlight
-
-T = TypeVar("T")
-
-
-def run(work: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    return run_in_thread(work())
 
 
 async def sent(response: Any) -> bytes:
@@ -59,7 +52,7 @@ class TestAnswers:
             again = await answers.stream("points", make, "application/octet-stream", {})
             assert await sent(again) == content.tobytes()
 
-        run(scenario)
+        run_in_thread(scenario())
         assert len(made) == 2  # nobody was left to keep the first
         assert list(tmp_path.iterdir()) == []
 
@@ -79,7 +72,7 @@ class TestAnswers:
             may_end.set()
             return [await sent(response) for response in await asyncio.gather(*asking)]
 
-        assert run(scenario) == [b"it"] * 5
+        assert run_in_thread(scenario()) == [b"it"] * 5
         assert made == [1]
 
     def test_what_cannot_be_made_is_said_and_tried_again(self, answers: Answers) -> None:
@@ -88,7 +81,7 @@ class TestAnswers:
                 await answers.stream("it", lambda: bytes(1 // 0), "text/plain", {})
             return await sent(await answers.stream("it", lambda: b"", "text/plain", {}))
 
-        assert run(scenario) == b""
+        assert run_in_thread(scenario()) == b""
 
 
 class TestOnce:
@@ -111,7 +104,7 @@ class TestOnce:
             once.close()
             return found
 
-        assert (run(scenario), made) == (7, [1])
+        assert (run_in_thread(scenario()), made) == (7, [1])
 
     def test_a_failure_that_nobody_waits_for_is_no_warning(self, caplog: pytest.LogCaptureFixture) -> None:
         async def scenario() -> None:
@@ -124,7 +117,7 @@ class TestOnce:
             once.close()
             await asyncio.sleep(0)
 
-        run(scenario)
+        run_in_thread(scenario())
         assert caplog.records == []
 
 

@@ -17,7 +17,7 @@ interface Props {
   initialText?: string;
   onChange(value: number): void;
   /** The field is left; `isKeyboard`: with Enter or Escape, so that the focus is free. */
-  onDone?(byKey: boolean): void;
+  onDone?(isKeyboard: boolean): void;
 }
 
 export function NumberField({ value, label, minimum, maximum, step, isInteger = false, autoFocus, initialText, onChange, onDone }: Props) {
@@ -33,7 +33,7 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
   }, [autoFocus]);
 
   const displayedText = isInteger ? String(Math.round(value)) : formatNumber(value);
-  const setText = (next: number) => onChange(Math.min(maximum, Math.max(minimum, isInteger ? Math.round(next) : next)));
+  const setValue = (next: number) => onChange(Math.min(maximum, Math.max(minimum, isInteger ? Math.round(next) : next)));
   const submit = () => {
     const typed = draft !== null && draft !== displayedText && !isRejected.current;
     const next = typed ? parseNumber(draft) : null;
@@ -43,7 +43,7 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
         showNote(`${label}: ${formatNumber(next)} is beyond ${formatNumber(minimum)} to ${formatNumber(maximum)}; it became ${formatNumber(clamped)}.`);
       // a number that was typed is a step by itself
       history.endGesture();
-      setText(next);
+      setValue(next);
       history.endGesture();
     }
     isRejected.current = false;
@@ -59,7 +59,7 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
     } else if (event.key === "ArrowUp" || event.key === "ArrowDown") {
       event.preventDefault();
       const size = step * (event.shiftKey ? 0.1 : 1);
-      setText(Number((value + (event.key === "ArrowUp" ? size : -size)).toPrecision(10)));
+      setValue(Number((value + (event.key === "ArrowUp" ? size : -size)).toPrecision(10)));
       setDraft(null);
     }
   };

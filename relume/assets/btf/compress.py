@@ -225,7 +225,7 @@ def _allocate_bits(residual: F64, last: int) -> NDArray[np.uint8]:
 
 
 def _compress_view(read_rows: Callable[[], F32], size: tuple[int, int], choice: _PcaChoice, view: int) -> Arrays:
-    """Cluster the texels of one view, and round what tells them: a `_Part`."""
+    """Cluster the texels of one view, and round what tells them: a `_CompressedView`."""
     rows, rng = read_rows(), np.random.default_rng((_SEED, view))
     span = _span(rows)
     num, max_steps = choice.components, max_code(choice.bits)

@@ -94,7 +94,7 @@ def polar(theta: F64, phi: F64) -> F64:
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # type: ignore[no-untyped-def]
-    """Do as `taps` of angles.
+    """Do as `interpolation_weights` of angles.
 
     Args:
         grid, index, weight: as there. theta: radians, up to π/2. azimuth_fraction: φ, a share of a turn.
@@ -134,7 +134,7 @@ def interpolation_weights(grid, x, y, z, index, weight):  # type: ignore[no-unty
 
 
 def interpolation_weights_numpy(grid: DirectionGrid, w: F64) -> tuple[NDArray[np.int64], F64, F64]:
-    """Do as `taps` for directions (n, 3), in plain NumPy: its oracle.
+    """Do as `interpolation_weights` for directions (n, 3), in plain NumPy: its oracle.
 
     Returns:
         Directions (n, 4), weights (n, 4), what is left of the cosine (n,).

@@ -37,7 +37,7 @@ class Illumination(NamedTuple):
         reflectances: of all materials, for light that they reflect onto each other; none where no such light is shown.
         paths: by which light comes, those between surfaces only where they were baked.
         local: lights that give any. environment_gain: of each channel beside them; 1 where there are none, since then
-            it multiplies the finished picture (`gain_of`).
+            it multiplies the finished picture (`picture_gain`).
     """
 
     environment: EnvironmentKey

@@ -354,7 +354,7 @@ class Resum:
 
     Attributes:
         ready: the state that the steps led to. sum_into: writes the same image, summed once, over zeros.
-        rounding: that such a sum leaves, see `Shown`.
+        rounding: that such a sum leaves, see `DisplayedImage`.
     """
 
     target: TermTarget

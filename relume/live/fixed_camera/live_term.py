@@ -34,7 +34,7 @@ class LiveTerm:
     Attributes:
         document: of the term in the newest look. light: in which it is wanted.
         term: the declaration of its model, fixed parameters put in. model: what tells it from other models.
-        target_bands: bands of each curve in the newest look. (3, J) float64 each, or (L, 3, J), see `Wanted`
+        target_bands: bands of each curve in the newest look. (3, J) float64 each, or (L, 3, J), see `TargetTerm`
         target_rows_key: the same as bytes, in order of the curves' names: what keys are made of.
         view_factor: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
         ready: the newest image of it.

@@ -95,7 +95,7 @@ def add_environment(environment, rotation, direction, level, gain, out):  # type
 
     Args:
         environment: its levels. rotation: of the map, as a share of a whole turn, and a half.
-        direction: unit, a tuple. level: of the blur, from `level_of`. gain: that it is multiplied by.
+        direction: unit, a tuple. level: of the blur, from `blur_level`. gain: that it is multiplied by.
         out: added to. (3,)
     """
     level_coordinate: Any = min(level, np.float32(environment.levels.shape[0] - 1))

@@ -184,7 +184,7 @@ class FreeCameraPicture:
 
     @property
     def _target(self) -> tuple[Any, ...]:
-        """What has been asked for; equal to `_shown` where that is shown."""
+        """What has been asked for; equal to `_displayed` where that is shown."""
         return self._look, self._solo, self._camera_seq, self._probe_light.version
 
     def install(self, job: Any, result: Any) -> None:

@@ -87,7 +87,7 @@ def _add_divided(curves, scale, wo, no_group_range, num, tolerance, generations,
 
     Args:
         curves, scale, wo, scratch: as in `evaluate`. no_group_range: its `between` of what is no group.
-        tolerance: as in `set_aside`.
+        tolerance: as in `defer_triangles`.
         generations: local, weight, radius, which, value and error of each, written but for the first's first three.
         division_scratch: scratch for parents, and for how many of each generation there are, and are done, see
             `shade_points`.

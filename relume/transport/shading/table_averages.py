@@ -213,7 +213,7 @@ def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-
     """Look up the midpoints of edges of listed lights [begin, begin + num).
 
     Args:
-        nodes, light, begin, num: as in `look_up`. local: written. (3, 6, ≥ num)
+        nodes, light, begin, num: as in `load_nodes`. local: written. (3, 6, ≥ num)
     """
     ab_x, bc_x, ca_x = local[0, 3], local[0, 4], local[0, 5]
     ab_y, bc_y, ca_y = local[1, 3], local[1, 4], local[1, 5]

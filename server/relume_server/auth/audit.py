@@ -51,7 +51,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Entry(Change):
-    """A line; `seq` counts up, `at` is in seconds since 1970."""
+    """A line; `number` counts up, `at` is in seconds since 1970."""
 
     number: int
     at: float

@@ -91,7 +91,7 @@ class RoomMember:
         """The session's own edit was accepted: all others follow, if it is more than another way of looking.
 
         Args:
-            patch: that made the look of `target_bands`, as the client sent it.
+            patch: that made the look of `target`, as the client sent it.
         Returns:
             What is to be shown here, which says how often the room's look has changed.
         """

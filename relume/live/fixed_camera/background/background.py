@@ -66,7 +66,7 @@ class Background:
         """Bring the samples of the background and the factors of catchers to a look.
 
         Args:
-            light: that the picture shows. gain: from `gain_of`.
+            light: that the picture shows. gain: from `clamped_gain`.
             radiance: of every view sample, before the gain. (3, samples) float32, written
         Returns:
             Whether samples of the background are new.

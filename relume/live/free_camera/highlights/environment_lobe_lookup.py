@@ -25,7 +25,7 @@ class PrefilteredEnvironment(NamedTuple):
         environment: its levels, lamps left out of all that are blurred.
         bright_lights: what of it is small and strong: of each the direction, world space, ∫ L dω, and 1 − |Σ ω L / Σ
             L|, the variance of its own width; `MAX_BRIGHT_LIGHTS` at most. (lamps, 7) float32
-        rotation: of the levels, from `turn_of`. gain: of its light, in each channel. (3,) float32
+        rotation: of the levels, from `rotation_of`. gain: of its light, in each channel. (3,) float32
     """
 
     environment: EnvironmentLookup

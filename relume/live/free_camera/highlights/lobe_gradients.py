@@ -235,7 +235,7 @@ def gradients_along_lobe(
 def gradients_along_lobe_numpy(
     stored_scene: StoredScene, non_environment: F32, tables: Tables, lobes: Lobes, camera_position: F32, probe: int
 ) -> F64:
-    """Do as `turning` for one point, by how `shade_probes_numpy` differs a little aside of the eye: its oracle.
+    """Oracle of `gradients_along_lobe` for one point: differences of `shade_probes_numpy` beside the camera.
 
     Args:
         stored_scene, non_environment, tables, lobes, camera_position: as there. probe: number of the point, which has a

@@ -101,7 +101,7 @@ class ProbeLightState:
         """Go on from what is exact.
 
         Args:
-            light, has_hard_shadows: under which, see `Asked`. incident: at all points.
+            light, has_hard_shadows: under which, see `LightRequest`. incident: at all points.
         """
         self._exact = LightRequest(light, has_hard_shadows), incident
         self._updated = self._indirect = self._coarse = None

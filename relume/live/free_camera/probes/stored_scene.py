@@ -79,7 +79,7 @@ def corner_tangents(scene: Scene, geometry: SceneBuffers) -> F16:
 
 
 def _max_side(textures: Sequence[Texture]) -> int:
-    """How wide and high they may be for all to have at most `_MOST_TEXELS`."""
+    """How wide and high they may be for all to have at most `_MAX_TEXELS`."""
     side, pyramids = MAX_TEXTURE_SIDE, [MipMap.for_texture(texture) for texture in textures]
     while side > 1 and sum(p.levels[_level_index(p, side)].size // 3 for p in pyramids) > _MAX_TEXELS:
         side //= 2

@@ -123,7 +123,7 @@ def _subtract_center(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyped-def]
-    """Give rays that `_part` found what their pixels' middles show by now."""
+    """Give rays that `_subtract_center` found what their pixels' middles show by now."""
     for k in range(owner.shape[0]):
         if reuses_center[num_pixels + k]:
             for channel in range(3):

@@ -27,15 +27,16 @@ _MAX_REPEATS = np.float32(1 << 30)  # repeats: beyond, float32 knows no share of
 
 BATCH_SIZE = 64  # rays; all columns of them stay in the first cache
 X, Y, N, SIDE, U, V, LEVEL, THETA, AZIMUTH = (BATCH_SIZE * k for k in (0, 3, 6, 9, 10, 11, 12, 13, 14))
-"""Where columns begin that `lay` fills: the texture's axes x and y and the normal, three columns each; −1 where the
-texture is seen in a mirror, else 1; column and row in it, shares of a repeat; level of halvings, see `texels_at`; θ and
-share of a turn of the direction to the eye, see `taps_at`."""
+"""Where columns begin that `map_to_texture` fills: the texture's axes x and y and the normal, three columns each; −1
+where the texture is seen in a mirror, else 1; column and row in it, shares of a repeat; level of halvings, see
+`texels_at_level`; θ and share of a turn of the direction to the camera, see `interpolation_weights_at`."""
 _TO1, _TO2, _OUTWARD, _UV_SCALE, _D, _UV, _DISTANCE = (BATCH_SIZE * k for k in (15, 17, 19, 22, 23, 26, 28))
 NUM_COLUMNS = 29
-_FACE_COLUMNS = np.array([X, X + BATCH_SIZE, X + 2 * BATCH_SIZE, SIDE, U, V, _TO1, _TO1 + BATCH_SIZE, _TO2,
-_TO2 + BATCH_SIZE,
-                     _OUTWARD, _OUTWARD + BATCH_SIZE, _OUTWARD + 2 * BATCH_SIZE, _UV_SCALE])  # fmt: skip
-"""Where the numbers of `face_places` go."""
+_FACE_COLUMNS = np.array([
+    X, X + BATCH_SIZE, X + 2 * BATCH_SIZE, SIDE, U, V, _TO1, _TO1 + BATCH_SIZE, _TO2, _TO2 + BATCH_SIZE,
+    _OUTWARD, _OUTWARD + BATCH_SIZE, _OUTWARD + 2 * BATCH_SIZE, _UV_SCALE,
+])  # fmt: skip
+"""Where the numbers of `face_placements` go."""
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
@@ -97,7 +98,7 @@ def _projected_axes(face_normal):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def gather_hits(placements, normals, face, uv, distance, directions, lattice_node, weight, rows, start, num, columns):  # type: ignore[no-untyped-def]
-    """Gather what rays rows[start:start + num] see, at most `AT_ONCE`.
+    """Gather what rays rows[start:start + num] see, at most `BATCH_SIZE`.
 
     Args:
         placements: from `face_placements`. normals: of vertices. face, uv, distance: that rays meet. directions: of

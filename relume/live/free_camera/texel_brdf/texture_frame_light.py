@@ -55,7 +55,7 @@ def rotation_from_vector(x, y):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _rotation_powers(x, y):  # type: ignore[no-untyped-def]
-    """Find cos mδ and sin mδ for m of 1 to 4, of δ as `turned_by` has it."""
+    """Find cos mδ and sin mδ for m of 1 to 4, of δ as `rotation_from_vector` has it."""
     c1, s1 = rotation_from_vector(x, y)
     c2, s2 = c1 * c1 - s1 * s1, np.float32(2) * c1 * s1
     return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2

@@ -48,7 +48,7 @@ def cameras() -> tuple[Camera, ...]:
 
 
 def look_at(name: str, position: tuple[float, float, float], target: tuple[float, float, float], yfov: float) -> Camera:
-    """A level camera at `position` that has `target_bands` in the middle of its picture.
+    """A level camera at `position` that has `target` in the middle of its picture.
 
     Args:
         name: of the view.
