@@ -227,12 +227,22 @@ def test_the_exact_picture_takes_over_where_the_eye_rests_twice(
             assert changed(before, editor.pixels()) > 0.05
 
 
+@pytest.fixture
+def ball_on_a_floor(server: Server) -> Iterator[str]:
+    """Its scene; it is gone afterwards."""
+    identity = server.ball_on_a_floor()
+    yield identity
+    server.delete(f"/api/scenes/{identity}")
+
+
 @pytest.mark.slow
-def test_reflections_turn_between_points_as_the_server_has_them(server: Server, browser: Browser) -> None:
+def test_reflections_turn_between_points_as_the_server_has_them(
+    server: Server, browser: Browser, ball_on_a_floor: str
+) -> None:
     """Of a floor in a metal ball: a tenth of all pixels would be other ones without gradients (ADR 112)."""
     with opened_page(browser) as page:
         never_at_rest(page, [])
-        page.goto(f"{server.url}/?scene={server.ball_on_a_floor()}")
+        page.goto(f"{server.url}/?scene={ball_on_a_floor}")
         wait_until_drawn(page)
         editor = Editor(page)
         editor.canvas.focus()
