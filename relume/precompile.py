@@ -50,7 +50,7 @@ from relume.scene.scene_folder import load_scene, save_scene
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
-SIZE, NUM_LIGHTS, NUM_POINTS = (64, 48), 256, 4000  # as many lights as are grouped
+SIZE, NUM_LIGHTS, NUM_PROBES = (64, 48), 256, 4000  # as many lights as are grouped
 CACHE_BYTES = 1 << 28
 ANALYTIC = tuple(model for model, term in TERMS.items() if not term.needs_data)
 # has no angle; has one that listens to a parameter with another: rays know no more cases
@@ -82,7 +82,7 @@ def _compile_pictures() -> None:
 def _compile_rays() -> None:
     """Compile what gather rays need more; `gather` last, by when what it shares with `direct` is there."""
     with _temporary_scene() as (scene, folder):
-        for method in (METHODS["surface"], METHODS["gather"]):
+        for method in (METHODS["probes"], METHODS["gather"]):
             _exercise(method, scene, folder, RAY_MODELS)
 
 
@@ -96,7 +96,7 @@ def _temporary_scene() -> Iterator[tuple[Scene, Path]]:
 
 def _exercise(method: TransferMethod, scene: Scene, folder: Path, models: Iterable[str]) -> None:
     """Bake, open, edit terms of some models, and move what can be moved."""
-    recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS, num_points=NUM_POINTS)
+    recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS, num_probes=NUM_PROBES)
     transfer: Any = open_bake(
         bake_in_process(method, scene, recipe, folder / f"{method.name}.zarr"), Cache(CACHE_BYTES)
     )

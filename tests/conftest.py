@@ -16,7 +16,7 @@ from xdist.scheduler import LoadScopeScheduling
 __all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
 os.environ.setdefault("RELUME_BATCH_NICE", "0")  # tests beside which others run would wait for ever for renders
-os.environ.setdefault("RELUME_AHEAD", "false")  # nor should each bake be followed by a process
+os.environ.setdefault("RELUME_PREWARM", "false")  # nor should each bake be followed by a process
 
 # examples are drawn alike each time, and take as long as they take: machines differ, and others work on them
 settings.register_profile("relume", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])

@@ -4,8 +4,8 @@ All surfaces glow alike, with half of the mean radiance of the environment, and 
 arrives at a sample is the glow along those of its gather rays that hit anything. Stages: "samples", as those of
 `relume.methods.view_stages`, then "hits".
 
-    views/<k>/links     0 where a gather ray of a sample hits anything, else NO_CELL
-    views/<k>/number    of a view sample: seeds its rays
+    views/<k>/gather_hits  0 where a gather ray of a sample hits anything, else NO_CELL
+    views/<k>/seed         of a view sample: seeds its rays
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class FurnaceMethod:
         return [
             ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
             for k, rows in enumerate(self._views.view_stage(store).num_surface_samples)
-            for name, width, dtype in (("links", (RAYS,), "uint16"), ("number", (), "uint32"))
+            for name, width, dtype in (("gather_hits", (RAYS,), "uint16"), ("seed", (), "uint32"))
         ]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
@@ -137,7 +137,7 @@ class FurnaceMethod:
         )
         hits = np.where(gather_hits.patch == NO_PATCH, NO_PATCH, 0).astype(np.uint16)
         return TaskOutput(
-            {f"views/{k}/links": hits, f"views/{k}/number": surface_points.seed},
+            {f"views/{k}/gather_hits": hits, f"views/{k}/seed": surface_points.seed},
             gather_hits.num_rays,
             gather_hits.trace_s,
         )

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from relume.assets.btf.local_pca_btf import LocalPcaBtf
 from relume.assets.btf.value_cache import ValueFile
 from relume.synthetic_btf.synthesize import GEOMETRIES
-from relume_bench.btf_made import SyntheticBtf, open_values_folder
+from relume_bench.btf_synthetic import SyntheticBtf, open_values_folder
 from relume_bench.figure import Figure
 
 _BOUNDS = (0.05, 0.1, 0.2)

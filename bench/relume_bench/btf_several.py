@@ -41,12 +41,12 @@ _EDITED = "Bowl"
 def measure(tiny: bool) -> list[Figure]:
     """Edit one material beside five that are covered with none, two, and five BTFs."""
     size, num_probes, side, edits = ((40, 30), 2000, 8, 3) if tiny else ((320, 240), 15_000, 128, 40)
-    recipe = Recipe("surface", ("front",), size, 300, num_points=num_probes)
+    recipe = Recipe("probes", ("front",), size, 300, num_probes=num_probes)
     with tempfile.TemporaryDirectory() as name, STORE.with_search_folder(Path(name) / "btfs"):
         folder, cache = Path(name), Cache(4 << 30)
         use_for_assets(cache)
         records = _records(folder, side)
-        store = bake_in_process(METHODS["surface"], built_in("still_life"), recipe, folder / "s.zarr")
+        store = bake_in_process(METHODS["probes"], built_in("still_life"), recipe, folder / "s.zarr")
         transfer: Any = open_bake(store, cache)
         sessions = [_Session(transfer, records[:num]) for num in (0, 2, _NUM)]
         for number in range(edits):

@@ -17,8 +17,8 @@ from urllib.parse import urlencode
 
 from relume.scene.examples.still_life import demo_scene
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import BakedFolder, baked_folder, serving
 from relume_bench.figure import Figure, skipped
-from relume_bench.house import House, baked_house, serving
 from relume_bench.timing import percentiles
 from relume_server.settings import Settings
 
@@ -41,8 +41,8 @@ def measure(tiny: bool) -> list[Figure]:
         return skipped(_NAMES, "ms", "the editor is not built; run make setup")
     size, num_lights, num_moves = ((64, 48), 60, 5) if tiny else ((640, 480), 2000, 120)
     recipe = Recipe("direct", ("front",), size, num_lights)
-    with baked_house(demo_scene(), recipe) as house, serving(house) as server:
-        latencies = _drag(browser, f"http://127.0.0.1:{server.port}/?{_make_editor_query(house)}", num_moves)
+    with baked_folder(demo_scene(), recipe) as data_folder, serving(data_folder) as server:
+        latencies = _drag(browser, f"http://127.0.0.1:{server.port}/?{_make_editor_query(data_folder)}", num_moves)
         at_socket = server.edit_ms()[-num_moves:]
     p50, p95 = percentiles(latencies)
     context = {
@@ -55,8 +55,10 @@ def measure(tiny: bool) -> list[Figure]:
     return [Figure(_NAMES[0], p50, "ms", context), Figure(_NAMES[1], p95, "ms", context)]
 
 
-def _make_editor_query(house: House) -> str:
-    return urlencode({"scene": house.scene, "bake": house.bake, "view": "front", "material": "Teapot", "term": 1})
+def _make_editor_query(data_folder: BakedFolder) -> str:
+    return urlencode(
+        {"scene": data_folder.scene, "bake": data_folder.bake, "view": "front", "material": "Teapot", "term": 1}
+    )
 
 
 def _drag(browser: str, url: str, num_moves: int) -> list[float]:

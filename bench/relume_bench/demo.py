@@ -13,8 +13,8 @@ from dataclasses import replace
 
 from relume.scene.examples.still_life import demo_scene
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import BakedFolder, baked_folder, serving, session
 from relume_bench.figure import Figure
-from relume_bench.house import House, baked_house, serving, session
 from relume_cli.demo import demo_recipes
 
 
@@ -22,14 +22,14 @@ def measure(tiny: bool) -> list[Figure]:
     """Bake both, open the second twice."""
     scene = demo_scene()
     preview, recipe = (replace(each, size=(64, 48), num_lights=60) if tiny else each for each in demo_recipes(scene))
-    with baked_house(scene, preview) as house:
-        preview_s = house.bake_s
-    with baked_house(scene, recipe) as house:
-        first_s, second_s = _first_picture_s(house), _first_picture_s(house)
+    with baked_folder(scene, preview) as data_folder:
+        preview_s = data_folder.bake_s
+    with baked_folder(scene, recipe) as data_folder:
+        first_s, second_s = _first_picture_s(data_folder), _first_picture_s(data_folder)
     context, preview_context = _context(recipe), _context(preview)
     return [
         Figure("demo.preview_s", preview_s, "s", preview_context),
-        Figure("demo.bake_s", house.bake_s, "s", context),
+        Figure("demo.bake_s", data_folder.bake_s, "s", context),
         Figure("demo.first_picture_s", first_s, "s", {**context, "second_opening_s": second_s}),
     ]
 
@@ -43,7 +43,7 @@ def _context(recipe: Recipe) -> dict[str, object]:
     }
 
 
-def _first_picture_s(house: House) -> float:
-    with serving(house) as server, session(server, house.bake) as client:
+def _first_picture_s(data_folder: BakedFolder) -> float:
+    with serving(data_folder) as server, session(server, data_folder.bake) as client:
         client.frame()
         return time.perf_counter() - server.started_s

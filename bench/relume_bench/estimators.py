@@ -54,13 +54,13 @@ def measure(tiny: bool) -> list[Figure]:
         )
         assert isinstance(transfer, BakedIndirectViews)
         radiance = transfer.indirect.exact(light).isotropic
-        num_rays = store.shape("views/0/links")[1]
-        sample_rows = np.linspace(0, store.shape("views/0/links")[0] - 1, num_samples).astype(np.int64)
+        num_rays = store.shape("views/0/gather_hits")[1]
+        sample_rows = np.linspace(0, store.shape("views/0/gather_hits")[0] - 1, num_samples).astype(np.int64)
         position, normal = (store.read(f"views/0/{name}")[sample_rows] for name in ("position", "normal"))
         surface_points = SurfacePoints(
             position, normal, any_tangent(normal), 64 * np.arange(num_samples, dtype=np.uint32)
         )
-        patch_position, patch_normal = (store.read(f"cells/{name}")[:, 0] for name in ("position", "normal"))
+        patch_position, patch_normal = (store.read(f"patches/{name}")[:, 0] for name in ("position", "normal"))
 
     def gathered(count: int) -> F64:
         gather_hits = trace_gather_rays(

@@ -22,9 +22,9 @@ from websockets.sync.client import connect
 from relume.assets.environments.studio import studio
 from relume.core.errors import PlanError
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import SPEAKS, BakedFolder, Server, SessionClient, baked_folder, serving, session
 from relume_bench.figure import Figure
 from relume_bench.flooding import FLOOD_TYPES, flood
-from relume_bench.house import SPEAKS, House, Server, SessionClient, baked_house, serving, session
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume_server.collaboration.join import derive_watch_key
 
@@ -40,10 +40,12 @@ def measure(tiny: bool) -> list[Figure]:
     room = secrets.token_hex(16)
     latencies: dict[tuple[str, int], list[float]] = {}
     with (
-        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
-        serving(house, {"RELUME_MAX_PEOPLE": "64"}) as server,  # those that were killed keep their place for a while
-        session(server, house.bake) as client,
-        _flood_room(server, house, room),
+        baked_folder(scene, Recipe("direct", ("front",), size, num_lights)) as data_folder,
+        serving(
+            data_folder, {"RELUME_MAX_PEOPLE": "64"}
+        ) as server,  # those that were killed keep their place for a while
+        session(server, data_folder.bake) as client,
+        _flood_room(server, data_folder, room),
     ):
         client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
@@ -52,7 +54,7 @@ def measure(tiny: bool) -> list[Figure]:
         for _ in range(rounds):
             for kind in FLOOD_TYPES:
                 for number in (0, 1, 4):
-                    with _flooding(server, house, derive_watch_key(room), kind, number):
+                    with _flooding(server, data_folder, derive_watch_key(room), kind, number):
                         latencies.setdefault((kind, number), []).extend(slider_client.edit(seconds))
     quiet_ms = float(np.median([ms for (_, number), each in latencies.items() if number == 0 for ms in each]))
     medians = {
@@ -86,9 +88,9 @@ class _SliderClient:
 
 
 @contextmanager
-def _flood_room(server: Server, house: House, room: str) -> Iterator[None]:
+def _flood_room(server: Server, data_folder: BakedFolder, room: str) -> Iterator[None]:
     """An editor who does nothing is in the room, so that others can watch."""
-    address = f"{server.session(house.bake)}?room_prefix={room[:8]}"
+    address = f"{server.session(data_folder.bake)}?room_prefix={room[:8]}"
     with connect(address, subprotocols=[SPEAKS], max_size=None, max_queue=None, compression=None) as editor:
         editor.send(json.dumps({"type": "open", "room": room}))
         SessionClient(editor).exact(0)
@@ -96,8 +98,8 @@ def _flood_room(server: Server, house: House, room: str) -> Iterator[None]:
 
 
 @contextmanager
-def _flooding(server: Server, house: House, watch: str, kind: str, number: int) -> Iterator[None]:
-    address = f"{server.session(house.bake)}?room_prefix={watch[:8]}"
+def _flooding(server: Server, data_folder: BakedFolder, watch: str, kind: str, number: int) -> Iterator[None]:
+    address = f"{server.session(data_folder.bake)}?room_prefix={watch[:8]}"
     spawning = get_context("spawn")
     start_events = [spawning.Event() for _ in range(number)]
     viewers = [spawning.Process(target=flood, args=(address, watch, kind, each), daemon=True) for each in start_events]

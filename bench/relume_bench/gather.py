@@ -62,7 +62,7 @@ def measure(tiny: bool) -> list[Figure]:
     size = {"size": list(make_recipe(tiny).size), "cells": baked.context["cells"]}
     return [
         Figure(_NAMES[0], baked.wall_s, "s", {**baked.context, "threads": num_threads()}),
-        Figure(_NAMES[1], size_mb, "MB", {**size, "rays_a_sample": transfer.store.shape("views/0/links")[1]}),
+        Figure(_NAMES[1], size_mb, "MB", {**size, "rays_a_sample": transfer.store.shape("views/0/gather_hits")[1]}),
         Figure(_NAMES[2], max_freeze_s, "s", {**size, "floor_samples": _floor_samples(transfer), **freeze_times}),
         Figure(_NAMES[3], 1 / p50, _SPEED, {**size, "ms_p50": 1e3 * p50, "ms_p95": 1e3 * p95}),
     ]
@@ -97,7 +97,7 @@ def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
         last = current_time
 
     wall_s = seconds(lambda: bake_in_process(method, scene, recipe, target, note))
-    num_patches = open_transfer(target, Cache(4 << 30)).store.shape("cells/material")[0]
+    num_patches = open_transfer(target, Cache(4 << 30)).store.shape("patches/material")[0]
     return Baked(
         target, wall_s, {"cells": num_patches, "size": list(recipe.size), "lights": recipe.num_lights, **stages}
     )

@@ -1,4 +1,4 @@
-"""gather.light_move_fps, gather.panel_move_fps and gather.light_scale_fps: lamps in the room of bench/gather.py.
+"""gather.light_move_fps, gather.area_light_move_fps, gather.light_intensity_fps: lights in the room of bench/gather.py.
 
 A point light and a rectangle of 0.5 × 0.5 m under the ceiling are moved, and the rectangle is dimmed, held by the hand;
 from the look to the encoded bytes, medians. What holding it makes is made before. A frame of a moved lamp may be
@@ -34,7 +34,7 @@ from relume_bench.gather import bake, make_recipe, run_until_exact
 from relume_bench.rays import embreex_scene
 from relume_bench.timing import seconds, time_interleaved
 
-_NAMES = ("gather.light_move_fps", "gather.panel_move_fps", "gather.light_scale_fps")
+_NAMES = ("gather.light_move_fps", "gather.area_light_move_fps", "gather.light_intensity_fps")
 _SPEED = "frames/s"
 _POINT_LIGHT: dict[str, Any] = {"kind": "point", "emission": [1.0, 1.0, 1.0]}
 _PANEL: dict[str, Any] = {"kind": "rectangle", "direction": [0.0, -1.0, 0.0], "emission": [4.0, 4.0, 4.0]}

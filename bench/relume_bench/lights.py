@@ -1,4 +1,4 @@
-"""lights.rmse_…: direct light of each kind against Mitsuba 3; lights.gain_fps: frames a second while one is dimmed.
+"""lights.rmse_…: direct light of each kind against Mitsuba 3; lights.intensity_fps: frames a second of a dimmed light.
 
 The Cornell box, 128×128 pixels, diffuse; the environment is dark. Pictures are compared by means over squares of 4×4
 pixels, Mitsuba's noise taken off: a pixel has one view sample inside surfaces and Mitsuba's many, which differ along
@@ -51,7 +51,7 @@ _LIGHTS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 _BLOCK = 4
 _NAMES = tuple(f"lights.rmse_{kind}" for kind in _LIGHTS)
-_FPS = "lights.gain_fps"
+_FPS = "lights.intensity_fps"
 
 
 def measure(tiny: bool) -> list[Figure]:

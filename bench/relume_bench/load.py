@@ -1,4 +1,4 @@
-"""load.drag_beside_renders_ratio: frames a second of a dragged slider beside full queues ÷ alone.
+"""load.drag_with_renders_ratio: frames a second of a dragged slider beside full queues ÷ alone.
 
 A real server in its own process, the picture of `relume_bench.session`. A client drags σ and sends each edit when the
 frame of the one before is there, so that it has all the frames that the server can give. In turn,
@@ -17,11 +17,11 @@ import numpy as np
 
 from relume.assets.environments.studio import studio
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import BakedFolder, Server, SessionClient, baked_folder, serving, session
 from relume_bench.figure import Figure
-from relume_bench.house import House, Server, SessionClient, baked_house, serving, session
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 
-_NAME = "load.drag_beside_renders_ratio"
+_NAME = "load.drag_with_renders_ratio"
 _SIGMA = "/materials/Teapot/terms/1/params/sigma"
 _NUM_BATCHES = 8
 _WAIT_S = 120.0
@@ -32,9 +32,9 @@ def measure(tiny: bool) -> list[Figure]:
     size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.5) if tiny else ((512, 512), 1000, 5, 3.0)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     with (
-        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
-        serving(house) as server,
-        session(server, house.bake) as client,
+        baked_folder(scene, Recipe("direct", ("front",), size, num_lights)) as data_folder,
+        serving(data_folder) as server,
+        session(server, data_folder.bake) as client,
     ):
         client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
@@ -45,7 +45,7 @@ def measure(tiny: bool) -> list[Figure]:
         painted = 0
         for _ in range(rounds):
             unloaded_ms.append(slider_client.drag(seconds))
-            queued = _fill(server, house)
+            queued = _fill(server, data_folder)
             loaded_ms.append(slider_client.drag(seconds))
             responses = [_call(server, "GET", address) for address in queued]
             painted += sum(int(body["done"] if "done" in body else body["passes"]) for body in responses)
@@ -85,9 +85,9 @@ class _SliderClient:
         return frames / durations
 
 
-def _fill(server: Server, house: House) -> list[str]:
+def _fill(server: Server, data_folder: BakedFolder) -> list[str]:
     """Queue batches and a comparison, and wait until both run; returns their addresses."""
-    common = {"bake": house.bake, "view": "front"}
+    common = {"bake": data_folder.bake, "view": "front"}
     looks = [{"materials": {"Teapot": {"terms": [LAMBERT, cook_torrance(0.15 + 0.002 * k)]}}} for k in range(200)]
     job_addresses = [
         str(_call(server, "POST", "/api/renders", {**common, "looks": looks, "format": "png"})["id"])

@@ -20,8 +20,8 @@ from relume.core.errors import PlanError
 from relume.scene.examples.catalog import BUILT_IN
 from relume.scene.model import Scene
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import BakedFolder, Server, baked_folder, serving, session
 from relume_bench.figure import Figure
-from relume_bench.house import House, Server, baked_house, serving, session
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume_worker.database import open_database
 from relume_worker.ledger import Ledger
@@ -44,9 +44,9 @@ def measure(tiny: bool) -> list[Figure]:
     size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
     num_scenes, num_more = (2, 1) if tiny else (_NUM_SCENES, _NUM_MORE)
     scenes = list(_make_scenes(num_scenes + num_more))
-    with baked_house(scenes[0], Recipe("direct", (scenes[0].cameras[0].name,), (64, 48), 60)) as house:
-        _register(house, scenes[1:])
-        with serving(house) as server:
+    with baked_folder(scenes[0], Recipe("direct", (scenes[0].cameras[0].name,), (64, 48), 60)) as data_folder:
+        _register(data_folder, scenes[1:])
+        with serving(data_folder) as server:
             before = _resident(server.pid)
             _use_all(server, scenes[:num_scenes], size, num_lights)
             after = _resident(server.pid)
@@ -91,10 +91,10 @@ def _rested(server: Server, tiny: bool) -> Resident:
     return _resident(server.pid)
 
 
-def _register(house: House, scenes: list[Scene]) -> None:
-    ledger = Ledger(open_database(f"sqlite:///{house.data / 'relume.db'}"))
+def _register(data_folder: BakedFolder, scenes: list[Scene]) -> None:
+    ledger = Ledger(open_database(f"sqlite:///{data_folder.data / 'relume.db'}"))
     for scene in scenes:
-        register_scene(house.data, ledger, scene)
+        register_scene(data_folder.data, ledger, scene)
     ledger.close()
 
 

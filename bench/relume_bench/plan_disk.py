@@ -35,7 +35,7 @@ def measure(tiny: bool) -> list[Figure]:
     ratios: dict[str, float] = {}
     for scene in _list_scenes(tiny):
         for name, method in sorted(METHODS.items()):
-            recipe = Recipe(name, (scene.cameras[0].name,), size, lights, num_points=num_probes)
+            recipe = Recipe(name, (scene.cameras[0].name,), size, lights, num_probes=num_probes)
             planned = estimate_disk(method, scene, recipe, method.plan(scene, recipe)).store
             with tempfile.TemporaryDirectory() as folder:
                 measured_bytes = folder_bytes(bake_in_process(method, scene, recipe, Path(folder) / "s.zarr"))

@@ -37,7 +37,7 @@ def main(folder: str, recipe: str) -> None:
         peak_bytes = _peak_bytes()
         reader = open_store(store)
         view_arrays = [f"views/{k}/pixel" for k in range(len(planned_recipe.views))]
-        sample_arrays = ["points/material"] if planned_recipe.method in FREE_CAMERA_METHODS else view_arrays
+        sample_arrays = ["probes/material"] if planned_recipe.method in FREE_CAMERA_METHODS else view_arrays
         samples = sum(reader.shape(path)[0] for path in sample_arrays)
         store_bytes = sum(reader.read(path).nbytes for path in array_paths(store))
     print(json.dumps({"peak_bytes": peak_bytes, "view_samples": samples, "rays": rays, "store_bytes": store_bytes}))

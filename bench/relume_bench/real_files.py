@@ -43,7 +43,7 @@ _DEPTH = 24
 _CANDELA = 1 / 683  # as importers have it: W/sr
 FILES = {
     "cat": "scenes/egyptian-cat/cat.glb",
-    "house": "scenes/house/house.glb",
+    "data_folder": "scenes/data_folder/data_folder.glb",
     "truck": "scenes/khronos_CesiumMilkTruck.glb",
     "sofa": "scenes/khronos_GlamVelvetSofa.glb",
     "chair": "scenes/khronos_SheenChair.glb",
@@ -114,7 +114,7 @@ def _light() -> Any:
 
 
 def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
-    """The picture, and which pixels show any surface."""
+    """The picture, and which pixels show any probes."""
     width, height = size
     recipe = Recipe("gather", (scene.cameras[0].name,), (_FINER * width, _FINER * height), lights)
     transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))

@@ -16,8 +16,8 @@ from relume.assets.environments.studio import studio
 from relume.core.cache import Cache
 from relume.methods.registry import open_transfer
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import SessionClient, baked_folder, serving, session
 from relume_bench.figure import Figure
-from relume_bench.house import SessionClient, baked_house, serving, session
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume_bench.timing import percentiles
 from relume_worker.paths import bake_path
@@ -31,9 +31,9 @@ def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, drag."""
     size, num_lights, num_edits = ((64, 64), 60, 10) if tiny else ((512, 512), 1000, 600)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
-    with baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house:
-        ids = open_transfer(bake_path(house.data, house.bake), Cache(4 << 30)).views["front"].material_ids()
-        with serving(house) as server, session(server, house.bake) as client:
+    with baked_folder(scene, Recipe("direct", ("front",), size, num_lights)) as data_folder:
+        ids = open_transfer(bake_path(data_folder.data, data_folder.bake), Cache(4 << 30)).views["front"].material_ids()
+        with serving(data_folder) as server, session(server, data_folder.bake) as client:
             client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
             client.exact(0)
             client.send_message(type="edit", revision=1, patch=[{"op": "replace", "path": _SIGMA, "value": 0.19}])

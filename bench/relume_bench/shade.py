@@ -1,9 +1,9 @@
-"""shade.pairs_per_s_vs_limit and shade.vs_leaves: how fast a term's picture is made without an operator.
+"""shade.pairs_per_s_vs_limit and shade.vs_operator_sums: how fast a term's picture is made without an operator.
 
 17,700 view samples of the teapot × 4,000 light triangles; pairs are those of a sample and a light that it sees. The
 limit: as many pairs whose angles at three nodes, one for each curve, are computed from arrays in a row by the same
-threads: arithmetic alone, nothing listed, looked up or weighed. `shade.vs_leaves`: the time of the sums that operators
-are made by (`Projector` with no curve free), over that of `shade`. The smallest of three terms counts.
+threads: arithmetic alone, nothing listed, looked up or weighed. `shade.vs_operator_sums`: the time of the sums that
+operators are made by (`Projector` with no curve free), over that of `shade`. The smallest of three terms counts.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def measure(tiny: bool) -> list[Figure]:
         }
     return [
         Figure("shade.pairs_per_s_vs_limit", min(limit_by_model.values()), "×", {**limit_by_model, **context}),
-        Figure("shade.vs_leaves", min(subdivision_by_model.values()), "×", {**subdivision_by_model, **context}),
+        Figure("shade.vs_operator_sums", min(subdivision_by_model.values()), "×", {**subdivision_by_model, **context}),
     ]
 
 

@@ -17,8 +17,8 @@ from contextlib import ExitStack
 from relume.core.memory_usage import resident_bytes
 from relume.scene.examples.catalog import built_in
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import BakedFolder, Server, baked_folder, serving
 from relume_bench.figure import Figure
-from relume_bench.house import House, Server, baked_house, serving
 
 _NAME = "slow_readers.mb"
 _NUM_STABLE_READINGS = 5
@@ -29,9 +29,9 @@ def measure(tiny: bool) -> list[Figure]:
     """Bake, serve, ask."""
     readers, num_probes = (3, 2_000) if tiny else (60, 200_000)
     scene = built_in("cornell_box")
-    recipe = Recipe("surface", (scene.cameras[0].name,), (64, 64), 60, num_points=num_probes)
-    with baked_house(scene, recipe) as house, serving(house, {"RELUME_AHEAD": "false"}) as server:
-        array, answer_bytes = _largest(server, house)
+    recipe = Recipe("probes", (scene.cameras[0].name,), (64, 64), 60, num_probes=num_probes)
+    with baked_folder(scene, recipe) as data_folder, serving(data_folder, {"RELUME_PREWARM": "false"}) as server:
+        array, answer_bytes = _largest(server, data_folder)
         with ThreadPoolExecutor(readers) as threads:
             list(threads.map(lambda _: _read(server, array), range(readers)))
         before = _measure_settled_bytes(server)
@@ -43,9 +43,9 @@ def measure(tiny: bool) -> list[Figure]:
     return [Figure(_NAME, (idle_bytes - before) / 1e6, "MB", context)]
 
 
-def _largest(server: Server, house: House) -> tuple[str, int]:
+def _largest(server: Server, data_folder: BakedFolder) -> tuple[str, int]:
     """Path and size of the largest array, each read whole once."""
-    root = f"/api/bakes/{house.bake}/surface"
+    root = f"/api/bakes/{data_folder.bake}/surface"
     sizes = {}
     with urllib.request.urlopen(f"http://127.0.0.1:{server.port}{root}") as answer:
         names = json.load(answer)["arrays"]

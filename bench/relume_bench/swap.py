@@ -9,7 +9,7 @@ from relume.core.jackknife import JackknifeEstimate
 from relume.lights.sphere_tiles import MIN_LIGHTS
 from relume_bench.figure import Figure
 from relume_bench.points import sample_lit_surface
-from relume_bench.relit import bake, compare, documents, figures
+from relume_bench.relighting import bake, compare, documents, figures
 from relume_bench.scenes import LAMBERT, environments, teapot_on_table
 
 

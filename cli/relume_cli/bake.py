@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from relume_worker.service import BakeService
     from relume_worker.status import BakeStatus
 
-Method = Literal["direct", "gather", "surface"]
+Method = Literal["direct", "gather", "probes"]
 Preset = Literal["preview", "good", "final"]
 
 
@@ -41,18 +41,20 @@ def bake(
         typer.Option(metavar="FILE.json", help='View from here: {"name", "to_world": 16 numbers, "yfov": degrees}.'),
     ] = None,
     size: Size = None,
-    lights: Annotated[int | None, typer.Option(metavar="N", help="Triangles of light. [default: by --preset]")] = None,
-    points: Annotated[
-        int | None, typer.Option(metavar="N", help="Points of a moving view, method surface. [default: 50000]")
+    lights: Annotated[
+        int | None, typer.Option(metavar="N", help="Environment triangles. [default: by --preset]")
     ] = None,
-    gather_samples: Annotated[
-        int | None, typer.Option(metavar="N", help="Pieces of surfaces that light each other. [default: as fits]")
+    probes: Annotated[
+        int | None, typer.Option(metavar="N", help="Probes on surfaces (free camera), method probes. [default: 50000]")
+    ] = None,
+    patches: Annotated[
+        int | None, typer.Option(metavar="N", help="Surface patches for indirect light. [default: as fits]")
     ] = None,
     gather_rays: Annotated[
-        int | None, typer.Option(metavar="N", help="Rays of a sample that look for them. [default: 610; surface: 377]")
+        int | None, typer.Option(metavar="N", help="Gather rays of a view sample or probe. [default: 610; probes: 377]")
     ] = None,
     relightable: Annotated[
-        bool, typer.Option("--relightable", help="Divide the light so that the environment can be turned or exchanged.")
+        bool, typer.Option("--relightable", help="Prepare for rotating or replacing the environment.")
     ] = False,
     watch: Annotated[
         bool, typer.Option(help="Bake here and show it; --no-watch leaves it to a running server and returns.")
@@ -80,8 +82,8 @@ def bake(
         record = find_scene(service.ledger, scene)
         view_names = [match_name(name, _view_names(service, record)) for name in view or ()]
         views = resolve_views(service.ledger, record, [*view_names, *(read_camera(path) for path in camera or ())])
-        recipe = _recipe(method, preset, views, size, lights, points, relightable)
-        recipe = replace(recipe, gather_samples=gather_samples, gather_rays=gather_rays)
+        recipe = _recipe(method, preset, views, size, lights, probes, relightable)
+        recipe = replace(recipe, num_patches=patches, gather_rays=gather_rays)
         if dry_run:
             _print_plan(service, record, recipe, as_json=as_json)
             return 0
@@ -118,21 +120,21 @@ def _recipe(
     views: Views,
     size: str | None,
     lights: int | None,
-    requested_points: int | None,
+    requested_probes: int | None,
     relightable: bool,
 ) -> Recipe:
     from relume.core.errors import ParameterError
     from relume.store.bake_protocol import Recipe
-    from relume_worker.presets import PRESETS, resolve_num_points
+    from relume_worker.presets import PRESETS, resolve_num_probes
 
     if lights is not None and lights < 1:
         raise ParameterError("--lights", lights, "a number of at least 1")
-    if requested_points is not None and requested_points < 1:
-        raise ParameterError("--points", requested_points, "a number of at least 1")
+    if requested_probes is not None and requested_probes < 1:
+        raise ParameterError("--probes", requested_probes, "a number of at least 1")
     fineness, (names, cameras) = PRESETS[preset], views
     pixels = parse_size(size) if size else fineness.size
-    num_lights, num_points = lights or fineness.num_lights, resolve_num_points(method, requested_points)
-    return Recipe(method, names, pixels, num_lights, relightable, cameras, num_points)
+    num_lights, num_probes = lights or fineness.num_lights, resolve_num_probes(method, requested_probes)
+    return Recipe(method, names, pixels, num_lights, relightable, cameras, num_probes)
 
 
 def _watch(service: BakeService, settings: Settings, identity: str, label: str, *, as_json: bool) -> int:
@@ -164,7 +166,7 @@ def _report(status: BakeStatus, settings: Settings, seconds: float) -> None:
     note(f"{size_text(status.bytes)} in {seconds:.1f} s")
     if status.recipe.method == "direct":
         _report_rays(fetch_if_missing(bake_path(settings.data, status.id)))
-    if status.recipe.method == "surface":
+    if status.recipe.method == "probes":
         _report_free_camera_error(fetch_if_missing(bake_path(settings.data, status.id)))
 
 
@@ -186,7 +188,7 @@ def _report_free_camera_error(store: Path) -> None:
     free_camera_error = read_free_camera_error(open_store(store))
     if free_camera_error is not None:
         error_percent, deviation = 100 * free_camera_error.value, 100 * free_camera_error.standard_error
-        note(f"while the eye moves: {error_percent:.1f} ± {deviation:.1f} % off (RMS of surfaces); at rest exact")
+        note(f"free camera: {error_percent:.1f} ± {deviation:.1f} % RMS error on surfaces; exact when the camera stops")
 
 
 def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:

@@ -136,7 +136,7 @@ def _check_bake_and_view(bake: BakeStatus, view: str | None, is_free_camera: boo
     if view is not None and view not in bake.recipe.views:
         raise NotFoundError(f"bake {bake.id} has no view {view[:80]!r}; its views are {', '.join(bake.recipe.views)}")
     if is_free_camera and bake.recipe.method not in FREE_CAMERA_METHODS:
-        raise NotFoundError(f"bake {bake.id} is of fixed views; run: relume bake {bake.scene} --method surface")
+        raise NotFoundError(f"bake {bake.id} is of fixed views; run: relume bake {bake.scene} --method probes")
 
 
 def find_bake(
@@ -158,7 +158,7 @@ def find_bake(
         raise NotFoundError(f"the scene has no view {view[:80]!r}; its views are {', '.join(view_names)[:400]}")
     candidates = [bake for bake in ready if view is None or view in bake.recipe.views]
     if not candidates:
-        option = " --method surface" if is_free_camera else ""
+        option = " --method probes" if is_free_camera else ""
         raise NotFoundError(f"there is no finished bake of {scene.name!r} yet; run: relume bake {scene.id}{option}")
     finest = max(candidates, key=lambda bake: bake.rank)
     return finest, view or finest.recipe.views[0]

@@ -34,24 +34,26 @@ def render(
     view: View = None,
     layers: Annotated[bool, typer.Option("--layers", help="EXR: add a layer for each light and light path.")] = False,
     light_groups: Annotated[
-        bool, typer.Option("--light-groups", help="EXR: layers of direct and of reflected light of each light instead.")
+        bool, typer.Option("--light-groups", help="EXR: layers of direct and of indirect light of each light instead.")
     ] = False,
     full_float: Annotated[bool, typer.Option("--float", help="EXR: full floats instead of half ones.")] = False,
     color_space: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="EXR: a linear colour space of the config RELUME_OCIO. [default: Rec. 709]"),
+        typer.Option(metavar="NAME", help="EXR: a linear color space of the config RELUME_OCIO. [default: Rec. 709]"),
     ] = None,
     turntable: Annotated[
         int | None,
         typer.Option(metavar="N", help="N frames once around: PNG files in a folder, or a video."),
     ] = None,
-    turns: Annotated[
+    rotate: Annotated[
         TurntableSubject | None,
-        typer.Option(help="Turntable: what turns; the eye, or before it the object, or the light. [default: eye]"),
+        typer.Option(help="Turntable: what rotates: the camera, the object, or the environment. [default: camera]"),
     ] = None,
     fps: Annotated[int | None, typer.Option(min=1, max=120, help="Video: frames a second. [default: 25]")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Leave out what is written already.")] = False,
-    quick: Annotated[bool, typer.Option("--quick", help="Moving bakes: as it looks while the eye moves.")] = False,
+    approximate: Annotated[
+        bool, typer.Option("--approximate", help="Free camera: the approximate image, as while moving.")
+    ] = False,
     dry_run: DryRun = False,
     as_json: Json = False,
     data: Data = None,
@@ -66,7 +68,7 @@ def render(
     from relume_cli.pictures.plans import check_target, make_turntable_plan, plan_files
     from relume_server.persistence.look_store import LookStore
 
-    turntable_plan = make_turntable_plan(turntable, turns, fps)
+    turntable_plan = make_turntable_plan(turntable, rotate, fps)
     check_target(output, turntable_plan, resumes=resume)
     exr = exr_options(output, layers=layers, light_groups=light_groups, full_float=full_float, color_space=color_space)
     service = open_bakes(open_settings(data))
@@ -77,7 +79,7 @@ def render(
             bake,
             view,
             is_free_camera=turntable_plan is not None and turntable_plan.subject != "environment",
-            quick=quick,
+            approximate=approximate,
         )
         documents = _check(source, planned_files, turntable_plan)
         if not dry_run:
@@ -135,7 +137,9 @@ def _write(
                 )
 
 
-def _open(service: BakeService, bake: str, view: str | None, *, is_free_camera: bool, quick: bool) -> RenderSource:
+def _open(
+    service: BakeService, bake: str, view: str | None, *, is_free_camera: bool, approximate: bool
+) -> RenderSource:
     """Open what was asked for, and say what its pictures are not."""
     from relume.core.cache import Cache
     from relume.methods.free_camera_transfer import BakedFreeCamera
@@ -151,8 +155,8 @@ def _open(service: BakeService, bake: str, view: str | None, *, is_free_camera: 
     if not bake_status.is_current:
         note(f"note: another version of relume made this bake; anew: relume bake {scene.id}")
     static_views = None
-    if isinstance(transfer, BakedFreeCamera) and quick:
-        note("note: the picture is approximate, as while the eye moves; exact: without --quick")
+    if isinstance(transfer, BakedFreeCamera) and approximate:
+        note("note: the image is approximate, as while the camera moves; exact without --approximate")
     elif isinstance(transfer, BakedFreeCamera):
         static_views = StaticViewBuilder(transfer.light_transport, load_registered_scene(service.data_dir, scene.id))
     return RenderSource(scene, bake_status, view_name, transfer, static_views)

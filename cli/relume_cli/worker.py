@@ -38,7 +38,7 @@ def worker(
         signal.signal(name, lambda *_: stop_requested.set())
     with (
         private_files(),
-        BakeService(settings.data, settings.database_url, num_workers=processes, client_weights=settings.turns),
+        BakeService(settings.data, settings.database_url, num_workers=processes, client_weights=settings.fair_shares),
     ):
         typer.echo("waiting for bakes", err=True)
         stop_requested.wait()

@@ -76,7 +76,7 @@ class TintedLight:
         alpha_test = geometry.embree.alpha_test
         assert alpha_test is not None
         self.num_groups = int(alpha_test.groups.max(initial=0))
-        material_rule = alpha_test.alpha_masks.of_material
+        material_rule = alpha_test.alpha_masks.material_rule
         self._is_glass = (material_rule >= 0) & (alpha_test.alpha_masks.rules[material_rule, 0] == GLASS_RULE)
         # the share of others is in what rays see
         is_tinted_glass = self._is_glass & (alpha_test.groups[material_rule] > 0)

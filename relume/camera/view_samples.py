@@ -44,7 +44,7 @@ _NUM_LEVELS = 256
 _POINT_COLUMNS = ("position", "normal", "tangent")
 _SURFACE_COLUMNS = ("diffuse", "specular", "uv", "roughness", "normal_length", "emission", "surface_normal")
 _CHAIN_COLUMNS = ("mirror", "mirror_cosine", "mirror_tint")
-_SAMPLE_COLUMNS = ("pixel", "weight", "material", "level", "through", "eye", "is_mirrored", "chance")
+_SAMPLE_COLUMNS = ("pixel", "weight", "material", "level", "transmittance", "camera", "is_mirrored", "alpha_sample")
 _COLUMNS = (*_SAMPLE_COLUMNS, *_POINT_COLUMNS, *_SURFACE_COLUMNS, *_CHAIN_COLUMNS)
 # to tell which samples light comes to through tinted glass
 _REQUIRED_COLUMNS = (
@@ -68,14 +68,15 @@ class ViewSamples:
             environment's radiance in it.
         num_rays: how many were traced to find them.
         level: of roughness, see `relume.scene.roughness_levels`; 0 where the material has but one. (n,) uint8
-        through: what glass before a sample lets through. Samples on glass and those behind it, on mirrors and those
-            seen in them, have the same shares of a pixel. Where light comes to a sample through tinted glass, several
-            stand in its place, which share its `weight`, and this says how (`relume.camera.spectral_split`). (n, 3)
-            float32
-        eye: where each is seen from: the camera, or the last surface that turned the way to it. (n, 3) float32
+        transmittance: what glass before a sample lets through. Samples on glass and those behind it, on mirrors and
+            those seen in them, have the same shares of a pixel. Where light comes to a sample through tinted glass,
+            several stand in its place, which share its `weight`, and this says how (`relume.camera.spectral_split`).
+            (n, 3) float32
+        camera: where each is seen from: the camera, or the last surface that bent the path to it. (n, 3) float32
         chain: the mirrors that it is seen in, `NO_MIRROR` where it is seen in fewer.
         is_mirrored: whether its surface is a mirror, and other samples have what is seen in it. (n,)
-        chance: of its rays at surfaces that blend, see `relume.raytrace.surface_points.SurfacePoints`. (n,) float32
+        alpha_sample: of its rays at surfaces that blend, see `relume.raytrace.surface_points.SurfacePoints`. (n,)
+            float32
     """
 
     pixel: NDArray[np.uint32]
@@ -84,11 +85,11 @@ class ViewSamples:
     surface: SurfaceInteraction
     num_rays: int
     level: NDArray[np.uint8]
-    through: F32
-    eye: F32
+    transmittance: F32
+    camera: F32
     chain: SpecularChain
     is_mirrored: NDArray[np.bool_]
-    chance: F32
+    alpha_sample: F32
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, Any], num_rays: int) -> ViewSamples:
@@ -106,7 +107,7 @@ class ViewSamples:
     @property
     def throughput(self) -> F32:
         """What the radiance of each sample is multiplied by for its pixel, mirrors apart. (n, 3) float32"""
-        return self.weight[:, None] * self.through
+        return self.weight[:, None] * self.transmittance
 
 
 def dither_thresholds(pixel: NDArray[np.int64], width: int) -> F32:
@@ -269,8 +270,8 @@ def _sorted_samples(camera_setup: CameraSetup, rays: MergedRays) -> dict[str, ND
     assert layer.chain is not None
     return {
         "pixel": rays.pixel[order].astype(np.uint32), "weight": rays.weight[order], "material": material[order],
-        "level": level, "through": layer.transmittance, "eye": layer.origins, "is_mirrored": layer.is_mirrored,
-        "chance": np.zeros(len(order), np.float32),
+        "level": level, "transmittance": layer.transmittance, "camera": layer.origins, "is_mirrored": layer.is_mirrored,
+        "alpha_sample": np.zeros(len(order), np.float32),
         **{name: getattr(surface.points, name) for name in _POINT_COLUMNS},
         **{name: getattr(surface, name) for name in _SURFACE_COLUMNS},
         **dict(zip(_CHAIN_COLUMNS, layer.chain, strict=True)),

@@ -130,7 +130,7 @@ def _trial_recipe(recipe: Recipe) -> Recipe:
     step = -(-len(recipe.views) // _VIEWS)
     views, size = recipe.views[::step], (max(16, round(width * scale)), max(16, round(height * scale)))
     num_patches = _PATCHES if recipe.method == "gather" else None
-    return replace(recipe, views=views, size=size, num_lights=_LIGHTS, gather_samples=num_patches)
+    return replace(recipe, views=views, size=size, num_lights=_LIGHTS, num_patches=num_patches)
 
 
 def _measure_rates(method: BakeMethod, scene: Scene, small: Recipe) -> NDArray[np.float64]:
@@ -156,8 +156,8 @@ def _rate_field(array: str) -> str:
     """Which of `Rates` the bytes of an array count for."""
     group, _, name = array.partition("/")
     if group == "views":
-        return {"visibility": "light", "links": "gather_hits"}.get(name.rpartition("/")[2], "sample")
-    if group == "cells":
+        return {"visibility": "light", "gather_hits": "gather_hits"}.get(name.rpartition("/")[2], "sample")
+    if group == "patches":
         return "patch_light" if name == "visibility" else "patch"
     return "per_light" if group == "lights" and name != "environment" else "constant"
 
@@ -189,5 +189,5 @@ def _texture_bytes(scene: Scene) -> float:
 _METHODS = {
     "direct": _trial_estimator(DirectMethod, lambda recipe: 0),
     "gather": _trial_estimator(GatherMethod, num_patches),
-    "surface": _probe_disk,
+    "probes": _probe_disk,
 }

@@ -21,7 +21,7 @@ from relume.live.free_camera.hard_shadows.lights import HardShadowLight, hard_sh
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
 from relume.live.free_camera.occluded_probes import find_occluded_probes
-from relume.live.free_camera.probes.stored_scene import StoredScene, ray_pattern, read_surface
+from relume.live.free_camera.probes.stored_scene import StoredScene, ray_pattern, read_stored_scene
 from relume.live.free_camera.probes.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.look import EnvironmentKey, LightGeometry
@@ -84,7 +84,7 @@ class BakedFreeCamera:
         )
         width, height = store.attributes["size"]
         cameras = (read_camera(store, k) for k in range(len(store.attributes["views"])))
-        stored_scene = read_surface(store)
+        stored_scene = read_stored_scene(store)
         probe_positions = stored_scene.probes.position
         bounds = probe_positions.min(axis=0).astype(np.float64), probe_positions.max(axis=0).astype(np.float64)
         return cls(
@@ -167,11 +167,11 @@ class BakedFreeCamera:
     @cached_property
     def visible(self) -> NDArray[np.uint8]:
         """Which light triangles points see: triangle l in bit l & 7 of byte l >> 3. (points, bytes) uint8"""
-        return np.asarray(self.light_transport.store.read("points/visibility"), np.uint8)
+        return np.asarray(self.light_transport.store.read("probes/visibility"), np.uint8)
 
     @cached_property
     def _gather_hits(self) -> NDArray[np.uint16]:
-        return np.asarray(self.light_transport.store.read("points/links"), np.uint16)
+        return np.asarray(self.light_transport.store.read("probes/gather_hits"), np.uint16)
 
     def vectors(self, element: Illumination, without_sun_disks: bool = False) -> F32:
         """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32
@@ -187,7 +187,7 @@ class BakedFreeCamera:
         return self.cache.contains(self._vectors_key(element, without_sun_disks))
 
     def _vectors_key(self, element: Illumination, without_sun_disks: bool) -> tuple[Hashable, ...]:
-        return self.key, "light vectors", element, without_sun_disks and self.sun_disks.are_in(element)
+        return self.key, "incident coefficients", element, without_sun_disks and self.sun_disks.are_in(element)
 
     def _vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
         probes = self.stored_scene.probes
@@ -244,7 +244,7 @@ class BakedFreeCamera:
                 self.stored_scene.probes, self._gather_hits, self._pattern, self.light_transport.patches.frames
             )
 
-        return self.cache.get_value((self.key, "squares of links"), compute)
+        return self.cache.get_value((self.key, "direction bins of gather rays"), compute)
 
     @cached_property
     def sun_disks(self) -> SunExtractor:
@@ -299,7 +299,7 @@ class BakedFreeCamera:
             (points, 3) float32
         """
         rows, cache = np.flatnonzero(self.stored_scene.material == material), self.cache.transient
-        key = self.key, "unhidden light", material
+        key = self.key, "unoccluded light", material
 
         def compute_environment() -> F32:
             return self._unoccluded_environment(light, self.stored_scene.probes.rows(rows), is_preview=is_preview)

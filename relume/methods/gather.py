@@ -1,17 +1,17 @@
 """Method `gather`: environment light with any number of bounces, fixed views (after Nguyen 2010).
 
-What `relume.methods.view_stages` bakes, and beside it gather cells on the surfaces, the lights that these see, and
-gather rays from cells and view samples, of which only the cell that each hits is kept: their directions are made again
-from a seed. Stages after those of the views: "gather cells", then "gather rays" (rows of cells, rows of each view).
+Beside what `relume.methods.view_stages` bakes: surface patches, the lights that they see, and gather rays from patches
+and view samples, of which only the patch that each hits is kept: their directions are made again from a seed. Stages
+after those of the views: "patches", then "gather rays" (rows of patches, rows of each view).
 
-    cells/axis, value, children, roots          relume.patches.patch_kdtree.PatchTree
-    cells/position, normal, material, …         relume.patches.patches.Patches
-    cells/visibility                            lights that the points of a cell see, one point after another
-    cells/links                                 cells that the rays of its points hit
-    views/<k>/links                             cells that the rays of a view sample hit
-    views/<k>/number                            of a view sample: seeds its rays
-    thrown/…                                    relume.methods.planar_mirror_light.MirrorLights: bright lights, planes
-    of flat mirrors views/<k>/thrown                            which of those lights a view sample sees in flat mirrors
+    patches/axis, value, children, roots        relume.patches.patch_kdtree.PatchTree
+    patches/position, normal, material, …       relume.patches.patches.Patches
+    patches/visibility                          lights visible from the points of a patch, one point after another
+    patches/gather_hits                         patches that the rays of its points hit
+    views/<k>/gather_hits                       patches that the rays of a view sample hit
+    views/<k>/seed                              seeds the rays of a view sample
+    mirror_lights/…                             relume.methods.planar_mirror_light.MirrorLights: bright lights, planes
+    views/<k>/mirror_lights                     which of those lights a view sample sees in flat mirrors
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class GatherMethod:
     """
 
     name = "gather"
-    stages = (*SampledViews.stages, "gather cells", "gather rays")
+    stages = (*SampledViews.stages, "patches", "gather rays")
 
     def __init__(
         self,
@@ -114,7 +114,7 @@ class GatherMethod:
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         """What opening the store needs besides its arrays; `gather_rays`: cosine and glossy, of each material, and
-        `gather_tents`: how often they are shared."""
+        `gather_filter_passes`: how often they are shared."""
         rays, num_glossy = self._ray_counts(recipe)
         diffuse, glossy = [rays, 0], [rays - num_glossy, num_glossy]
         direct = self._views.attributes(scene, recipe)
@@ -124,7 +124,7 @@ class GatherMethod:
             "gather_rays": [
                 diffuse if all(map(scatters_diffusely, material_terms)) else glossy for material_terms in terms
             ],
-            "gather_tents": self._num_tent_passes,
+            "gather_filter_passes": self._num_tent_passes,
             "gather_seed": int(scene.id[:7], 16),
         }
 
@@ -134,7 +134,7 @@ class GatherMethod:
             return self._views.tasks(stage, scene, recipe, store)
         if stage == _PATCH_STAGE:
             return [Task(stage, 0, "", 0, 0)]
-        num_patches = store.shape("cells/material")[0]
+        num_patches = store.shape("patches/material")[0]
         ranges = [
             ("", start, min(start + PATCHES_PER_SHARD, num_patches))
             for start in range(0, num_patches, PATCHES_PER_SHARD)
@@ -146,16 +146,19 @@ class GatherMethod:
         """As the views; what cells see, and all links. See `BakeMethod`."""
         if stage < _RAY_STAGE:
             return self._views.arrays(stage, scene, recipe, store) if stage < _PATCH_STAGE else []
-        num_patches, mirror_lights = store.shape("cells/material")[0], read_mirror_lights(store)
-        bits = POINTS_PER_PATCH * ((store.shape("lights/power")[0] + 7) // 8)
-        widths = [("cells/visibility", bits, "uint8"), ("cells/links", POINTS_PER_PATCH * RAYS_PER_POINT, "uint16")]
+        num_patches, mirror_lights = store.shape("patches/material")[0], read_mirror_lights(store)
+        bits = POINTS_PER_PATCH * ((store.shape("lights/irradiance")[0] + 7) // 8)
+        widths = [
+            ("patches/visibility", bits, "uint8"),
+            ("patches/gather_hits", POINTS_PER_PATCH * RAYS_PER_POINT, "uint16"),
+        ]
         patch_specs = [
             ArraySpec(path, (num_patches, width), dtype, (CHUNK_ROWS, width), (PATCHES_PER_SHARD, width))
             for path, width, dtype in widths
         ]
-        sample_columns = [("links", (self._ray_counts(recipe)[0],), "uint16"), ("number", (), "uint32")]
+        sample_columns = [("gather_hits", (self._ray_counts(recipe)[0],), "uint16"), ("seed", (), "uint32")]
         if mirror_lights is not None:
-            sample_columns.append(("thrown", (-(-mirror_lights.num_mirrored_lights // 8),), "uint8"))
+            sample_columns.append(("mirror_lights", (-(-mirror_lights.num_mirrored_lights // 8),), "uint8"))
         view_specs = [
             ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
             for k, rows in enumerate(self._views.view_stage(store).num_surface_samples)
@@ -186,7 +189,7 @@ class GatherMethod:
         fields: dict[str, NDArray[Any]] = {**vars(patches), **patches.tree._asdict()}
         del fields["tree"]
         mirror_light_arrays = make_mirror_lights(scene, geometry, store, patches.position)
-        return TaskOutput({f"cells/{name}": array for name, array in fields.items()} | mirror_light_arrays, 0, 0.0)
+        return TaskOutput({f"patches/{name}": array for name, array in fields.items()} | mirror_light_arrays, 0, 0.0)
 
     def _bake_patch_rows(self, scene: Scene, task: Task, store: StoreReader) -> TaskOutput:
         points, geometry = read_patch_points(store, task.start, task.stop), self._views.geometry_of(scene)
@@ -197,8 +200,8 @@ class GatherMethod:
         gather_hits = trace_gather_rays(geometry, self._patch_tree(store), points, points.normal, pattern)
         num_patches = task.stop - task.start
         arrays: dict[str, NDArray[Any]] = {
-            "cells/visibility": visibility.visible.reshape(num_patches, -1),
-            "cells/links": gather_hits.patch.reshape(num_patches, -1),
+            "patches/visibility": visibility.visible.reshape(num_patches, -1),
+            "patches/gather_hits": gather_hits.patch.reshape(num_patches, -1),
         }
         return TaskOutput(
             arrays, visibility.rays.num_traced + gather_hits.num_rays, visibility.trace_s + gather_hits.trace_s
@@ -217,19 +220,22 @@ class GatherMethod:
             material_hits.append(
                 trace_gather_rays(geometry, tree, points.rows(slice(first, stop)), wo[first:stop], pattern)
             )
-        arrays = {f"views/{k}/links": np.concatenate([hits.patch for hits in material_hits]), f"views/{k}/number": seed}
+        arrays = {
+            f"views/{k}/gather_hits": np.concatenate([hits.patch for hits in material_hits]),
+            f"views/{k}/seed": seed,
+        }
         num_rays = sum(hits.num_rays for hits in material_hits)
         if (mirror_lights := read_mirror_lights(store)) is not None:
             reflected_light = lights_visible_in_mirrors(
                 geometry, mirror_lights.mirrors, points, mirror_lights.direction
             )
-            arrays[f"views/{k}/thrown"], num_rays = reflected_light.visible, num_rays + reflected_light.num_rays
+            arrays[f"views/{k}/mirror_lights"], num_rays = reflected_light.visible, num_rays + reflected_light.num_rays
         return TaskOutput(arrays, num_rays, sum(hits.trace_s for hits in material_hits))
 
 
 def num_patches(recipe: Recipe) -> int:
     """As many as the pictures' pixels can tell apart, where the recipe does not say."""
-    if recipe.gather_samples is not None:
-        return recipe.gather_samples
+    if recipe.num_patches is not None:
+        return recipe.num_patches
     width, height = recipe.size
     return min(MAX_PATCHES, max(_MIN_PATCHES, len(recipe.views) * width * height // _PIXELS_PER_PATCH))

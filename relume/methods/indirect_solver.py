@@ -49,7 +49,7 @@ class IndirectSolver:
     def exact(self, light: Illumination) -> OutgoingLight:
         """What exact pictures show."""
         indirect = _without_direct(light)
-        return self._cache.get_value((self._key, "reflected light", indirect), lambda: self._outgoing_light(indirect))
+        return self._cache.get_value((self._key, "indirect light", indirect), lambda: self._outgoing_light(indirect))
 
     def excluding(self, light: Illumination, excluded: Callable[[Illumination], OutgoingRadiance]) -> OutgoingLight:
         """The same without what `excluded` finds of it: what is shown of that is found otherwise."""
@@ -62,13 +62,13 @@ class IndirectSolver:
                 .outgoing_light(self._direct_light_for(indirect).patches)
             )
 
-        return self._cache.get_value((self._key, "reflected light beside what is thrown", indirect), compute)
+        return self._cache.get_value((self._key, "indirect light without mirror lights", indirect), compute)
 
     def preview(self, light: Illumination) -> F32:
         """What pictures follow while a hand moves, the same in every direction; waits for nobody who wants something
         exact. (NO_CELL + 1, 3) float32"""
         indirect = _without_direct(light)
-        key = self._key, "reflected light for a preview", indirect
+        key = self._key, "indirect light, preview", indirect
         return self._cache.transient.get_value(key, lambda: self._preview(indirect))
 
     def fast(self, light: Illumination) -> OutgoingLight:
@@ -112,7 +112,7 @@ class IndirectSolver:
                 self._patches, reflectance_operator, incident, light.paths.first, light.paths.last, outgoing_highlights
             )
 
-        key = self._key, "reflected light, quickly", light, is_preview, is_sharp
+        key = self._key, "indirect light, fast", light, is_preview, is_sharp
         return self._cache.transient.get_value(key, compute)
 
     def _outgoing_light(self, light: Illumination) -> OutgoingLight:

@@ -47,7 +47,7 @@ class LocalPatchLight:
 
     def irradiance(self, geometry: LightGeometry) -> F32:
         """What comes to every cell, the mean over its points. (C,) float32"""
-        key = self._key, "light on cells", geometry, *self._normal_overrides
+        key = self._key, "light on patches", geometry, *self._normal_overrides
         return self._cache.get_value(key, lambda: self._irradiance(geometry))
 
     def _irradiance(self, geometry: LightGeometry) -> F32:
@@ -64,7 +64,7 @@ class LocalPatchLight:
             )
 
         return self._cache.get_value(
-            (self._key, "shadows on cells", emitter_geometry(geometry), *self._normal_overrides), trace
+            (self._key, "shadows on patches", emitter_geometry(geometry), *self._normal_overrides), trace
         )
 
     def rays(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
@@ -87,7 +87,7 @@ class LocalPatchLight:
 
     def _preview(self, geometry: LightGeometry) -> MovingLight:
         key, patch_rows = (
-            (self._key, "preview light on cells", geometry, *self._normal_overrides),
+            (self._key, "preview light on patches", geometry, *self._normal_overrides),
             np.arange(self._patches.num_patches),
         )
         return self._cache.transient.get_value(
@@ -165,10 +165,10 @@ class DirectPatchLight:
         )
 
     def _irradiance(self, environment: EnvironmentKey, is_preview: bool) -> F32:
-        key = self._key, "environment on cells", environment, *self._normal_overrides
+        key = self._key, "environment on patches", environment, *self._normal_overrides
         if not is_preview or self._cache.contains(key):
             return self._cache.get_value(key, lambda: self.patches.irradiance(self._find_lights(environment)))
-        preview_key = *key, "for a preview"
+        preview_key = *key, "preview"
         return self._cache.transient.get_value(preview_key, lambda: self._preview_irradiance(environment))
 
     def _preview_irradiance(self, environment: EnvironmentKey) -> F32:
@@ -191,7 +191,7 @@ class DirectPatchLight:
             *self._normal_overrides,
         )
         if is_preview:
-            preview_key = *key, "for a preview"
+            preview_key = *key, "preview"
             return self._cache.transient.get_value(preview_key, lambda: self._preview_coefficients(environment, rows))
         return self._cache.get_value(
             key, lambda: patches.incident_coefficients(rows, self._find_lights(environment), OUTGOING_DEGREE)

@@ -22,7 +22,7 @@ from relume.scene.emission import has_emission_images
 from relume.scene.model import Mesh, Scene, Texture
 from relume.store.bake_protocol import Recipe
 
-MIN_GATHER_SAMPLES, MIN_GATHER_RAYS = 64, 16
+MIN_REQUESTED_PATCHES, MIN_GATHER_RAYS = 64, 16
 PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
 
 _TREE_BYTES_PER_TRIANGLE = 160  # Embree's, while it is built
@@ -158,16 +158,16 @@ def _arrays(mesh: Mesh) -> list[NDArray[Any]]:
 
 
 def check_gathering(recipe: Recipe, max_samples: int) -> None:
-    """Refuse numbers of gather samples and rays that no store can have.
+    """Refuse numbers of patches and gather rays that no store can have.
 
     Args:
-        recipe: whose `gather_samples` and `gather_rays` are looked at. max_samples: that the method can keep; 0 where
+        recipe: whose `num_patches` and `gather_rays` are checked. max_samples: that the method can keep; 0 where
             it gathers no light.
     Raises:
         PlanError: they are out of bounds.
     """
     for count, minimum, maximum, label in (
-        (recipe.gather_samples, MIN_GATHER_SAMPLES, max_samples, "gather samples"),
+        (recipe.num_patches, MIN_REQUESTED_PATCHES, max_samples, "patches"),
         (recipe.gather_rays, MIN_GATHER_RAYS, MAX_RAYS, "gather rays"),
     ):
         if count is None:

@@ -94,7 +94,7 @@ class MirrorLights:
         """As a store keeps them."""
         fields = {**vars(self), **self.mirrors._asdict()}
         del fields["mirrors"]
-        return {f"thrown/{name}": array for name, array in fields.items()}
+        return {f"mirror_lights/{name}": array for name, array in fields.items()}
 
 
 def max_mirror_lights(scene: Scene, recipe: Recipe) -> int:
@@ -123,23 +123,23 @@ def make_mirror_lights(
 def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
     """What a store knows of flat mirrors; None where there is none, or no bright light."""
     try:
-        store.shape("thrown/offset")
+        store.shape("mirror_lights/offset")
     except StoreError:
         return None
 
     def read(name: str) -> NDArray[Any]:
-        return store.read(f"thrown/{name}")
+        return store.read(f"mirror_lights/{name}")
 
     mirrors = FlatMirrors(*map(read, FlatMirrors._fields))
     mirror_lights = MirrorLights(read("lights"), read("group"), read("direction"), mirrors, read("plane"))
     limits: list[tuple[NDArray[Any], int]] = [
-        (mirror_lights.lights, store.shape("lights/power")[0]),
+        (mirror_lights.lights, store.shape("lights/irradiance")[0]),
         (mirror_lights.group, len(mirror_lights.direction)),
         (mirrors.material, len(store.attributes["materials"])),
     ]
     are_valid = all(len(indices) == 0 or 0 <= indices.min() <= indices.max() < limit for indices, limit in limits)
-    if not are_valid or mirror_lights.plane.shape != store.shape("cells/material"):
-        raise ChunkDamagedError("thrown", "it does not fit the lights, materials and cells of the bake")
+    if not are_valid or mirror_lights.plane.shape != store.shape("patches/material"):
+        raise ChunkDamagedError("mirror_lights", "its arrays do not fit the lights, materials and patches of the bake")
     return mirror_lights
 
 
@@ -282,7 +282,7 @@ class MirrorLightTransfer:
                 patches.incident_coefficients(rows, bright_lights, OUTGOING_DEGREE, light_indices),
             )
 
-        return self._cache.get_value((self._key, "thrown light on cells", environment, rows.tobytes()), compute)
+        return self._cache.get_value((self._key, "mirror light on patches", environment, rows.tobytes()), compute)
 
 
 def _mirror_reflectances(reflectances: Reflectances) -> Reflectances:

@@ -1,20 +1,20 @@
-"""Method `surface`: pictures whose eye moves (Mahajan 2008, Sun 2007); light is kept at points of all surfaces.
+"""Method `probes`: free-camera views (Mahajan 2008, Sun 2007); incident light is kept at surface probes.
 
-What is baked is what `gather` bakes for view samples, for points that no view owns: which light triangles each sees,
-and which cells its gather rays hit. Nothing of it knows a BRDF or an eye. Stages: "points" (the light triangles, the
-points, the cells), then "visibility and gather rays" (rows of cells and of points), then "harmonics of light", then
-"error of moving pictures", which looks at the bake.
+The bake keeps for each probe what `gather` keeps for each view sample: the light triangles that it sees, and the
+patches that its gather rays hit. Neither depends on a BRDF or a camera. Stages: "probes" (light triangles, probes,
+patches), "visibility and gather rays" (rows of patches and of probes), "spherical harmonics", then "free-camera error", which
+reads the finished bake.
 
-    scene/positions, faces, face_material, uvs, textures, …  what the eye sees:
-    relume.live.free_camera.probes.stored_scene lights/…                                                 as in
-    relume.methods.view_stages cells/…                                                  as in relume.methods.gather
-    lattice/num_rows, first, node                            relume.live.free_camera.probes.triangle_grids.ProbeGrid
-    vertices/normal, point, weight                           relume.live.free_camera.probes.lattice_nodes.LatticeNodes
-    points/position, normal, tangent, material               relume.live.free_camera.probes.mesh_lattice.PlacedProbes
-    points/visibility, points/links                          lights that a point sees, cells that its rays hit
-    harmonics/…                                              relume.methods.spherical_harmonic_transfer
-    thrown/…                                                 as in relume.methods.gather, for stills
-    error/moving                                             relume.methods.free_camera_error
+    scene/positions, faces, face_material, uvs, textures, …  relume.live.free_camera.probes.stored_scene
+    lights/…                                                 as in relume.methods.view_stages
+    patches/…                                                as in relume.methods.gather
+    nodes/num_rows, first, node_index                        relume.live.free_camera.probes.triangle_grids.ProbeGrid
+    nodes/normal, probe, weight                              relume.live.free_camera.probes.lattice_nodes.LatticeNodes
+    probes/position, normal, tangent, material               relume.live.free_camera.probes.mesh_lattice.PlacedProbes
+    probes/visibility, probes/gather_hits                    lights visible from a probe; patches that its rays hit
+    sh/…                                                     relume.methods.spherical_harmonic_transfer
+    mirror_lights/…                                          as in relume.methods.gather, for static views
+    error/free_camera                                        relume.methods.free_camera_error
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 
 ROWS_PER_SHARD = 4096
-RAYS_PER_PROBE = 377  # a point alone then errs by less than 1 % of its radiance (`surface.points_rmse`)
+RAYS_PER_PROBE = 377  # a point alone then errs by less than 1 % of its radiance (`probes.probe_rmse`)
 RAYS_PER_PATCH_POINT = 55
 _MIN_PATCHES, _MAX_PATCHES, _PROBES_PER_PATCH = 512, 8192, 6
 _MAX_REQUESTED_PATCHES = 4 * _MAX_PATCHES
@@ -70,8 +70,8 @@ _RAY_NS, _TRIANGLE_US = 2000.0, 40.0  # of one core, on scenes of 200 to a milli
 class ProbesMethod:
     """Implements `relume.methods.base.TransferMethod`."""
 
-    name = "surface"
-    stages = ("points", "visibility and gather rays", "harmonics of light", "error of moving pictures")
+    name = "probes"
+    stages = ("probes", "visibility and gather rays", "spherical harmonics", "free-camera error")
 
     def __init__(self) -> None:
         self._views = SampledViews()
@@ -89,12 +89,12 @@ class ProbesMethod:
         """Upper bounds from the recipe alone."""
         plan_estimates.check_gathering(recipe, _MAX_REQUESTED_PATCHES)
         views_plan = self._views.plan(scene, recipe)
-        if not MIN_PROBES <= recipe.num_points <= MAX_PROBES:
-            raise PlanError(f"{recipe.num_points} points were asked for; give {MIN_PROBES} to {MAX_PROBES:,}")
+        if not MIN_PROBES <= recipe.num_probes <= MAX_PROBES:
+            raise PlanError(f"{recipe.num_probes} probes were asked for; give {MIN_PROBES} to {MAX_PROBES:,}")
         num_probes = _max_probes(scene, recipe)
         num_patches, rays = _num_patches(recipe), _num_rays(recipe)
         num_patch_points = POINTS_PER_PATCH * num_patches
-        num_nodes = max_grid_nodes(plan_estimates.num_triangles(scene), recipe.num_points)
+        num_nodes = max_grid_nodes(plan_estimates.num_triangles(scene), recipe.num_probes)
         textures = plan_estimates.texture_bytes(scene)
         peak_task_bytes = max(
             num_nodes * _NODE_BUILD_BYTES, free_camera_error.BYTES + num_probes * free_camera_error.PROBE_BYTES
@@ -110,7 +110,7 @@ class ProbesMethod:
             peak_bytes=views_plan.peak_bytes
             + peak_task_bytes
             + num_patches * _PATCH_BUILD_BYTES
-            + ROWS_PER_SHARD * 3 * 2 * rays  # links: traced, joined, written
+            + ROWS_PER_SHARD * 3 * 2 * rays  # gather hits: traced, joined, written
             + textures,
             lone_bytes=peak_task_bytes,
         )
@@ -120,20 +120,20 @@ class ProbesMethod:
         return {
             **self._views.attributes(scene, recipe),
             "gather_seed": int(scene.id[:7], 16),
-            "has_harmonics": True,
-            "has_moving_error": True,
+            "has_sh": True,
+            "has_free_camera_error": True,
             **collect_textures(scene).attributes,
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
         """The lights, the points, the cells; then whole shards of cells and of points. See `BakeMethod`."""
         if stage == 0:
-            return [Task(0, index, group, 0, 0) for index, group in enumerate(("lights", "points", "cells"))]
+            return [Task(0, index, group, 0, 0) for index, group in enumerate(("lights", "probes", "patches"))]
         if stage == 2:
-            return [Task(2, 0, "harmonics", 0, 0)]
+            return [Task(2, 0, "spherical harmonics", 0, 0)]
         if stage == 3:
-            return [Task(3, 0, "moving error", 0, 0)]
-        rows = {group: store.shape(f"{group}/material")[0] for group in ("cells", "points")}
+            return [Task(3, 0, "free-camera error", 0, 0)]
+        rows = {group: store.shape(f"{group}/material")[0] for group in ("patches", "probes")}
         ranges = [
             (group, start, min(start + ROWS_PER_SHARD, num))
             for group, num in rows.items()
@@ -145,10 +145,10 @@ class ProbesMethod:
         """What cells and points see, and their links; the first stage makes its own. See `BakeMethod`."""
         if stage != 1:
             return []
-        bits = (store.shape("lights/power")[0] + 7) // 8
+        bits = (store.shape("lights/irradiance")[0] + 7) // 8
         widths = {
-            "cells": (POINTS_PER_PATCH * bits, POINTS_PER_PATCH * RAYS_PER_PATCH_POINT),
-            "points": (bits, _num_rays(recipe)),
+            "patches": (POINTS_PER_PATCH * bits, POINTS_PER_PATCH * RAYS_PER_PATCH_POINT),
+            "probes": (bits, _num_rays(recipe)),
         }
         return [
             ArraySpec(
@@ -159,22 +159,22 @@ class ProbesMethod:
                 (ROWS_PER_SHARD, width),
             )
             for group, group_widths in widths.items()
-            for name, width, dtype in zip(("visibility", "links"), group_widths, ("uint8", "uint16"), strict=True)
+            for name, width, dtype in zip(("visibility", "gather_hits"), group_widths, ("uint8", "uint16"), strict=True)
         ]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
         """One task; seeds are the scene's and the numbers of rows: the same bits anywhere. See `BakeMethod`."""
         if task.stage == 0:
-            bake_functions = {"lights": self._bake_lights, "points": self._bake_probes, "cells": self._bake_patches}
+            bake_functions = {"lights": self._bake_lights, "probes": self._bake_probes, "patches": self._bake_patches}
             return TaskOutput(bake_functions[task.group](scene, recipe), 0, 0.0)
-        if task.group == "harmonics":
+        if task.group == "spherical harmonics":
             mirror_light_arrays = make_mirror_lights(
-                scene, self._views.geometry_of(scene), store, store.read("cells/position")
+                scene, self._views.geometry_of(scene), store, store.read("patches/position")
             )
             return TaskOutput(make_harmonic_light(store, int(scene.id[:7], 16)) | mirror_light_arrays, 0, 0.0)
-        if task.group == "moving error":
+        if task.group == "free-camera error":
             return TaskOutput({FREE_CAMERA_ERROR: free_camera_error.measure_error(store, scene, recipe.size)}, 0, 0.0)
-        if task.group not in ("cells", "points"):
+        if task.group not in ("patches", "probes"):
             raise ValueError(f"{task.group!r} is not in the stage")
         return self._bake_rows(scene, recipe, task, store)
 
@@ -199,38 +199,40 @@ class ProbesMethod:
         lights = tessellate_environment(scene.environment.radiance, recipe.num_lights)
         density = density_from_distance(geometry, camera_positions, make_corner_grid(is_open))
         density = density_from_shadows(
-            geometry, place_probes(geometry, is_open, density, recipe.num_points), camera_positions, lights
+            geometry, place_probes(geometry, is_open, density, recipe.num_probes), camera_positions, lights
         )
-        placed_probes = place_probes(geometry, is_open, density, recipe.num_points)
+        placed_probes = place_probes(geometry, is_open, density, recipe.num_probes)
         fields = {name: getattr(placed_probes.probes, name) for name in ("position", "normal", "tangent")}
         return {
-            **{f"lattice/{name}": array for name, array in placed_probes.probe_grid._asdict().items()},
-            **{f"vertices/{name}": array for name, array in placed_probes.lattice_nodes._asdict().items()},
-            **{f"points/{name}": array for name, array in fields.items()},
-            "points/material": placed_probes.material,
+            **{f"nodes/{name}": array for name, array in placed_probes.probe_grid._asdict().items()},
+            **{f"nodes/{name}": array for name, array in placed_probes.lattice_nodes._asdict().items()},
+            **{f"probes/{name}": array for name, array in fields.items()},
+            "probes/material": placed_probes.material,
         }
 
     def _bake_patches(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
         patches = choose_patches(scene, self._views.geometry_of(scene), recipe.views, recipe.size, _num_patches(recipe))
         fields: dict[str, NDArray[Any]] = {**vars(patches), **patches.tree._asdict()}
         del fields["tree"]
-        return {f"cells/{name}": array for name, array in fields.items()}
+        return {f"patches/{name}": array for name, array in fields.items()}
 
     def _bake_rows(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
         """What some cells or points see, and what their rays hit."""
         geometry, seed = self._views.geometry_of(scene), int(store.attributes["gather_seed"])
-        if task.group == "cells":
+        if task.group == "patches":
             points = read_patch_points(store, task.start, task.stop)
             pattern = make_pattern(RAYS_PER_PATCH_POINT, 0, seed)
         else:
             points = read_probes(store, task.start, task.stop)
             pattern = ray_pattern(store, _num_rays(recipe))
-        visibility = _trace_visibility(geometry, points, self._shadow_targets(store), is_uniform=task.group == "cells")
+        visibility = _trace_visibility(
+            geometry, points, self._shadow_targets(store), is_uniform=task.group == "patches"
+        )
         gather_hits = trace_gather_rays(geometry, self._patch_tree(store), points, points.normal, pattern)
         num_rows = task.stop - task.start
         arrays: dict[str, NDArray[Any]] = {
             f"{task.group}/visibility": visibility.visible.reshape(num_rows, -1),
-            f"{task.group}/links": gather_hits.patch.reshape(num_rows, -1),
+            f"{task.group}/gather_hits": gather_hits.patch.reshape(num_rows, -1),
         }
         return TaskOutput(arrays, visibility.num_rays + gather_hits.num_rays, visibility.trace_s + gather_hits.trace_s)
 
@@ -266,7 +268,7 @@ def bound_store_bytes(scene: Scene, recipe: Recipe) -> StoreBytes:
         gather_hits=num_probes * 2 * _num_rays(recipe),
         probes=num_probes * (_PROBE_BYTES + bits),
         patches=POINTS_PER_PATCH * num_patches * bits + num_patches * _PATCH_BYTES,
-        nodes=(4 + _NODE_BYTES) * max_grid_nodes(triangles, recipe.num_points),
+        nodes=(4 + _NODE_BYTES) * max_grid_nodes(triangles, recipe.num_probes),
         harmonics=harmonic_bytes(num_probes, num_patches),
         triangles=triangles * 10 + plan_estimates.triangles_bytes(scene) + plan_estimates.corner_bytes(scene),
         lights=plan_estimates.lights_bytes(scene, recipe),
@@ -275,14 +277,14 @@ def bound_store_bytes(scene: Scene, recipe: Recipe) -> StoreBytes:
 
 def _max_probes(scene: Scene, recipe: Recipe) -> int:
     unshared_probes = _MAX_UNSHARED_PROBES * len(scene.materials)  # that cannot be shared, however few are asked for
-    return int(_PROBE_MARGIN * recipe.num_points) + unshared_probes
+    return int(_PROBE_MARGIN * recipe.num_probes) + unshared_probes
 
 
 def _num_patches(recipe: Recipe) -> int:
     """Fewer than points, where the recipe does not say: what they send is gathered over hemispheres, which blurs it."""
-    if recipe.gather_samples is not None:
-        return recipe.gather_samples
-    return min(_MAX_PATCHES, max(_MIN_PATCHES, recipe.num_points // _PROBES_PER_PATCH))
+    if recipe.num_patches is not None:
+        return recipe.num_patches
+    return min(_MAX_PATCHES, max(_MIN_PATCHES, recipe.num_probes // _PROBES_PER_PATCH))
 
 
 def _num_rays(recipe: Recipe) -> int:

@@ -1,7 +1,7 @@
 """Transfer of harmonics in a store: what smooth light brings to points and cells (`relume.transport.sh_transfer`).
 
-    harmonics/basis, cluster, weight     of points: ClusteredTransfer
-    harmonics/irradiance, vectors        of cells: (C, NUM_HARMONICS), and of their first points (C, K, NUM_HARMONICS)
+    sh/basis, cluster, weight            of probes: ClusteredTransfer
+    sh/irradiance, coefficients          of patches: (C, NUM_HARMONICS), and of their first points (C, K, NUM_HARMONICS)
 
 Found once in a bake, it serves while a hand turns or exchanges an environment.
 """
@@ -58,7 +58,7 @@ class HarmonicLight:
 def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]]:
     """Find the arrays of a store in which points and cells know their lights. seed: of the clusters."""
     light_samples = read_shadow_ray_directions(store), read_tiles(store).solid_angles
-    probes, visible, patches = read_probes(store), store.read("points/visibility"), read_patches(store)
+    probes, visible, patches = read_probes(store), store.read("probes/visibility"), read_patches(store)
 
     def matrices(rows: NDArray[np.intp]) -> F32:
         return transfer_matrices(probes.rows(rows), visible[rows], *light_samples, FAST_DEGREE)
@@ -76,9 +76,9 @@ def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]
         patches.first_points(patch_rows), first_visible, *light_samples, PATCH_DEGREE
     )
     return {
-        **{f"harmonics/{name}": array for name, array in clustered._asdict().items()},
-        "harmonics/irradiance": irradiance.astype(np.float16),
-        "harmonics/vectors": patch_coefficients.astype(np.float16),
+        **{f"sh/{name}": array for name, array in clustered._asdict().items()},
+        "sh/irradiance": irradiance.astype(np.float16),
+        "sh/coefficients": patch_coefficients.astype(np.float16),
     }
 
 
@@ -95,19 +95,19 @@ def read_harmonic_light(store: StoreReader, patches: PatchLight) -> HarmonicLigh
     Raises:
         ChunkDamagedError: arrays of the store do not fit each other.
     """
-    if not store.attributes.get("has_harmonics"):
+    if not store.attributes.get("has_sh"):
         return None
-    probe_transfer = ClusteredTransfer(*(store.read(f"harmonics/{name}") for name in ClusteredTransfer._fields))
+    probe_transfer = ClusteredTransfer(*(store.read(f"sh/{name}") for name in ClusteredTransfer._fields))
     irradiance, patch_coefficients = (
-        store.read(f"harmonics/{name}").astype(np.float32) for name in ("irradiance", "vectors")
+        store.read(f"sh/{name}").astype(np.float32) for name in ("irradiance", "coefficients")
     )
     shape = num_functions(FAST_DEGREE), NUM_HARMONICS
-    fits = len(probe_transfer.cluster) == len(probe_transfer.weight) == store.shape("points/material")[0]
+    fits = len(probe_transfer.cluster) == len(probe_transfer.weight) == store.shape("probes/material")[0]
     fits = fits and probe_transfer.basis.shape[1:] == (1 + probe_transfer.weight.shape[1], *shape)
     fits = fits and int(probe_transfer.cluster.max(initial=0)) < len(probe_transfer.basis)
     patch_shape = patches.num_patches, num_functions(PATCH_DEGREE), NUM_HARMONICS
     if not (fits and irradiance.shape == patch_shape[::2] and patch_coefficients.shape == patch_shape):
-        raise ChunkDamagedError("harmonics", "they do not fit the points and cells")
+        raise ChunkDamagedError("sh", "its arrays do not fit the probes and patches")
     light_coefficients = (
         harmonics(read_shadow_ray_directions(store).astype(np.float64)) * read_tiles(store).solid_angles[:, None]
     )

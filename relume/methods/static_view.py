@@ -131,7 +131,7 @@ class StaticTracing:
             view_specs = (s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
             store.arrays.update({spec.path: np.empty(spec.shape, spec.dtype) for spec in view_specs})
         # seeds of local lights' shadows, too, which need no gather rays
-        seeds = store.arrays["views/0/number"]
+        seeds = store.arrays["views/0/seed"]
         seeds[:] = np.arange(len(seeds))
         shadow_tasks, hit_tasks = (
             list(_split_tasks(method.tasks(k, scene, recipe, store))) for k in (_SHADOW_STAGE, _HIT_STAGE)
@@ -204,7 +204,7 @@ class StaticViewBuilder:
             MemoryBudgetError: what is traced is larger than the memory may be.
         """
         cache, name = self._light_transport.cache.transient, _view_name(camera, size, smooths_edges)
-        key = self._light_transport.key, "still", name
+        key = self._light_transport.key, "static view", name
         tracing = cache.get_cached(key, StaticTracing)
         if tracing is None:
             new_tracing = self._start_tracing(

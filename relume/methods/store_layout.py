@@ -23,12 +23,14 @@ from relume.store.bake_protocol import StoreReader
 F32 = NDArray[np.float32]
 
 SHARD_ROWS = 16_384
-FREE_CAMERA_ERROR = "error/moving"
+FREE_CAMERA_ERROR = "error/free_camera"
 
 
 def read_lights(store: StoreReader) -> TriangleLights:
     """The light triangles of a store."""
-    nodes, direction, power, codes = (store.read(f"lights/{name}") for name in ("nodes", "direction", "power", "tiles"))
+    nodes, direction, power, codes = (
+        store.read(f"lights/{name}") for name in ("nodes", "direction", "irradiance", "tiles")
+    )
     return TriangleLights(nodes, direction, power, codes=codes)
 
 
@@ -49,29 +51,29 @@ def read_shadow_ray_directions(store: StoreReader) -> F32:
 
 def read_tree(store: StoreReader) -> PatchTree:
     """The tree over a store's gather cells."""
-    return PatchTree(*(store.read(f"cells/{name}") for name in PatchTree._fields))
+    return PatchTree(*(store.read(f"patches/{name}") for name in PatchTree._fields))
 
 
 def read_patch_points(store: StoreReader, start: int = 0, stop: int | None = None) -> SurfacePoints:
     """The points that stand for gather cells [start, stop) of a store, those of a cell one after another."""
-    position, normal = (store.read(f"cells/{name}", start, stop) for name in ("position", "normal"))
+    position, normal = (store.read(f"patches/{name}", start, stop) for name in ("position", "normal"))
     return patch_sample_points(position, normal, start)
 
 
 def read_patches(store: StoreReader) -> PatchLight:
     """The gather cells of a store."""
-    points, visible = read_patch_points(store), store.read("cells/visibility")
-    gather_hits, material = store.read("cells/links"), store.read("cells/material")
-    points_per_patch = store.shape("cells/normal")[1]
+    points, visible = read_patch_points(store), store.read("patches/visibility")
+    gather_hits, material = store.read("patches/gather_hits"), store.read("patches/material")
+    points_per_patch = store.shape("patches/normal")[1]
     return PatchLight(
         points,
         visible.reshape(len(material), points_per_patch, visible.shape[1] // points_per_patch),
         gather_hits,
         make_pattern(gather_hits.shape[1] // points_per_patch, 0, int(store.attributes["gather_seed"])),
         material,
-        np.stack([store.read(f"cells/{texture}") for texture in TEXTURES]),
-        _read_optional(store, "cells/uv"),
-        _read_optional(store, "cells/surface_normal"),
+        np.stack([store.read(f"patches/{texture}") for texture in TEXTURES]),
+        _read_optional(store, "patches/uv"),
+        _read_optional(store, "patches/surface_normal"),
     )
 
 
@@ -86,7 +88,7 @@ def _read_optional(store: StoreReader, path: str) -> F32 | None:
 
 def has_alpha_tested_surfaces(store: StoreReader) -> bool:
     """Tell whether rays may pass some triangles of a store."""
-    return bool(store.attributes.get("has_holes"))
+    return bool(store.attributes.get("has_alpha_test"))
 
 
 def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) -> AlphaTest | None:
@@ -101,7 +103,9 @@ def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32
     if not has_alpha_tested_surfaces(store):
         return None
     names = store.attributes["materials"]
-    alpha_masks = check_alpha_masks({name: store.read(f"cutouts/{name}") for name in AlphaMasks._fields}, len(names))
+    alpha_masks = check_alpha_masks(
+        {name: store.read(f"alpha_masks/{name}") for name in AlphaMasks._fields}, len(names)
+    )
     uvs, material = store.read("scene/uvs"), store.read("scene/face_material")
     corner, last = int(faces.max(initial=0)), int(material.max(initial=0))
     if (
@@ -115,7 +119,7 @@ def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32
 
 def read_free_camera_error(store: StoreReader) -> JackknifeEstimate | None:
     """How far moving pictures of a bake are off, relative RMS; None where that is not known, as of bakes of before."""
-    if not store.attributes.get("has_moving_error"):
+    if not store.attributes.get("has_free_camera_error"):
         return None
     error, standard_error = store.read(FREE_CAMERA_ERROR).tolist()
     return JackknifeEstimate(error, standard_error) if np.isfinite([error, standard_error]).all() else None

@@ -40,7 +40,7 @@ class SunExtractor:
         """The triangles by which light comes straight, without that of suns."""
         if not self.are_in(light):
             return self.light_transport.lights_for(light)
-        key = self.light_transport.key, "lights beside suns", light.environment
+        key = self.light_transport.key, "lights without sun disks", light.environment
         return displayed_of(
             self.light_transport.cache.get_value(key, lambda: self._integrate_residual(light.environment)), light
         )
@@ -50,7 +50,8 @@ class SunExtractor:
         if not self.are_in(light):
             return self.light_transport.preview_lights_for(light)
         return displayed_of(
-            self.light_transport.coarse_weights("lights beside suns", light.environment, self._residual_radiance), light
+            self.light_transport.coarse_weights("lights without sun disks", light.environment, self._residual_radiance),
+            light,
         )
 
     def _integrate_residual(self, environment: EnvironmentKey) -> TriangleLights:

@@ -1,25 +1,25 @@
-"""Fixed views: their samples, and which light triangles each of those sees; methods share these two stages.
+"""Fixed views: their samples, and which light triangles each sample sees; methods share these two stages.
 
-The bake keeps rays, not answers: per view sample one visibility bit a light triangle. Stages: "samples" (the light
+The bake keeps rays, not answers: one visibility bit per view sample and light triangle. Stages: "samples" (the light
 triangles, and each view's samples), then "visibility" (rows of each view).
 
-    scene/positions, faces, face_material, face_mesh         triangles, for rays of what looks add
-    scene/uvs, cutouts/…                                     where some have holes:
-    relume.raytrace.alpha_test.AlphaMasks lights/environment                                       radiance, to weigh it
-    again lights/tiles                                             relume.lights.sphere_tiles.Tiles
-    lights/nodes, direction, power                           relume.lights.spherical_triangles.TriangleLights
-    views/<k>/pixel, weight, material                        every sample of the k-th view; background samples last
+    scene/positions, faces, face_material, face_mesh     triangles, for rays that looks add
+    scene/uvs, alpha_masks/…                             of alpha-tested scenes: relume.raytrace.alpha_test.AlphaMasks
+    lights/environment                                   radiance, to weight it again
+    lights/tiles                                         relume.lights.sphere_tiles.Tiles
+    lights/nodes, direction, irradiance                  relume.lights.spherical_triangles.TriangleLights
+    views/<k>/pixel, weight, material                    every sample of the k-th view; background samples last
     views/<k>/position, normal, tangent, diffuse, specular, uv
-    scene/face_emission, views/<k>/emission                  where surfaces shine as images say: relume.scene.emission
-    views/<k>/level                                          of roughness: relume.scene.roughness_levels
-    views/<k>/normal_length, surface_normal                  of scenes with bumps:
-    relume.raytrace.surface_interaction.SurfaceInteraction views/<k>/through, eye, is_mirrored, mirror, mirror_cosine,
-    mirror_tint
-                                                             of scenes with glass or mirrors: relume.camera.view_samples
-    views/<k>/chance                                         of scenes with tinted glass:
-    relume.raytrace.surface_points.SurfacePoints views/<k>/visibility                                     samples on
-    surfaces only views/<k>/rays/<shard>                                   relume.raytrace.visibility_masks.RayCounts of
-    a shard's rows
+    scene/face_emission, views/<k>/emission              of scenes with emission images: relume.scene.emission
+    views/<k>/level                                      of roughness: relume.scene.roughness_levels
+    views/<k>/normal_length, surface_normal              of scenes with normal maps:
+                                                         relume.raytrace.surface_interaction.SurfaceInteraction
+    views/<k>/transmittance, camera, is_mirrored, mirror, mirror_cosine, mirror_tint
+                                                         of scenes with glass or mirrors: relume.camera.view_samples
+    views/<k>/alpha_sample                               of scenes with tinted glass:
+                                                         relume.raytrace.surface_points.SurfacePoints
+    views/<k>/visibility                                 samples on surfaces only
+    views/<k>/rays/<shard>                               relume.raytrace.visibility_masks.RayCounts of a shard's rows
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class SampledViews:
             "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
-            "has_holes": any(material.is_alpha_tested for material in scene.materials),
+            "has_alpha_test": any(material.is_alpha_tested for material in scene.materials),
             "has_layers": has_layers(scene.materials),
             "has_tints": num_tints(scene.materials) > 0,
             "has_emission_images": has_emission_images(scene),
@@ -169,7 +169,7 @@ class SampledViews:
         """The visibility of each view; the arrays of the first stage are made by its tasks. See `BakeMethod`."""
         if stage == 0:
             return []
-        bits = (store.shape("lights/power")[0] + 7) // 8
+        bits = (store.shape("lights/irradiance")[0] + 7) // 8
         num_surface_samples = self.view_stage(store).num_surface_samples
         return [
             ArraySpec(
@@ -224,9 +224,9 @@ def _columns(scene: Scene) -> list[str]:
     """What is kept of view samples."""
     names = ["pixel", "weight", "material", "level", "position", "normal", "tangent", "diffuse", "specular", "uv"]
     if has_layers(scene.materials):
-        names += ["through", "eye", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
+        names += ["transmittance", "camera", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
     if num_tints(scene.materials):
-        names.append("chance")
+        names.append("alpha_sample")
     if has_emission_images(scene):
         names.append("emission")
     return names + ["normal_length", "surface_normal"] * _has_normal_maps(scene)
@@ -254,7 +254,7 @@ def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
     return {
         "lights/nodes": lights.nodes,
         "lights/direction": lights.direction,
-        "lights/power": lights.irradiance,
+        "lights/irradiance": lights.irradiance,
         "lights/tiles": tiles.codes,
         "lights/environment": radiance,
     }
@@ -269,7 +269,7 @@ def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[A
     if alpha_test is not None:
         arrays |= {
             "scene/uvs": alpha_test.uvs,
-            **{f"cutouts/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()},
+            **{f"alpha_masks/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()},
         }
     return arrays
 

@@ -81,7 +81,7 @@ class AlphaTest(NamedTuple):
             positions: (num_vertices, 3) float32. uvs: (num_vertices, 2) float32
             face_material: (num_faces,) int32 into `alpha_masks.material_textures`. alpha_masks: the images.
         """
-        image = np.ascontiguousarray(alpha_masks.of_material[face_material], np.int32)
+        image = np.ascontiguousarray(alpha_masks.material_rule[face_material], np.int32)
         faces, uvs = np.ascontiguousarray(faces, np.uint32), np.ascontiguousarray(uvs, np.float32)
         sheet, groups = _number_sheets(positions, faces, image, alpha_masks), tint_groups(alpha_masks)
         kernel_arrays = (image, faces, uvs, alpha_masks.texels, alpha_masks.images, alpha_masks.rules, sheet, groups)

@@ -34,13 +34,13 @@ class AlphaMasks(NamedTuple):
         rules: opacity from which a surface is there, or `BLEND_RULE`, or `GLASS_RULE`; then for glass the share of red,
             green and blue that passes it but for what it reflects, the latter head-on, and how many sides it has.
             (num, 6) float32
-        of_material: row of the two above, −1 where nothing passes a material. (materials,) int32
+        material_rule: row of the two above, −1 where nothing passes a material. (materials,) int32
     """
 
     texels: NDArray[np.uint8]
     images: NDArray[np.int64]
     rules: F32
-    of_material: NDArray[np.int32]
+    material_rule: NDArray[np.int32]
 
 
 def collect_alpha_masks(materials: Sequence[Material]) -> AlphaMasks | None:
@@ -105,7 +105,7 @@ def check_alpha_masks(arrays: Mapping[str, NDArray[Any]], num_materials: int) ->
         ChunkDamagedError: they do not fit each other; rays would read beyond their ends.
     """
     alpha_masks = AlphaMasks(*(np.ascontiguousarray(arrays[name]) for name in AlphaMasks._fields))
-    shapes = (alpha_masks.images.shape, alpha_masks.rules.shape, alpha_masks.of_material.shape)
+    shapes = (alpha_masks.images.shape, alpha_masks.rules.shape, alpha_masks.material_rule.shape)
     types = [array.dtype.name for array in alpha_masks]
     num = len(alpha_masks.rules)
     fits = shapes == ((num, 5), (num, 6), (num_materials,)) and types == ["uint8", "int64", "float32", "int32"]
@@ -116,7 +116,10 @@ def check_alpha_masks(arrays: Mapping[str, NDArray[Any]], num_materials: int) ->
         fits &= bool((first + height * width <= alpha_masks.texels.size).all())
     if (
         not fits
-        or not -1 <= int(alpha_masks.of_material.min(initial=-1)) <= int(alpha_masks.of_material.max(initial=-1)) < num
+        or not -1
+        <= int(alpha_masks.material_rule.min(initial=-1))
+        <= int(alpha_masks.material_rule.max(initial=-1))
+        < num
     ):
-        raise ChunkDamagedError("scene/cutouts", "its images do not fit its texels or materials")
+        raise ChunkDamagedError("alpha_masks", "its images do not fit its texels or materials")
     return alpha_masks

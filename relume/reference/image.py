@@ -217,7 +217,7 @@ def _add_direct(radiance: F64, setup: _ViewSetup, draw: _Draw, progress: Callabl
     for index, material in enumerate(setup.scene.materials):
         rows = setup.samples_of(index)
         if (emission := emitted_radiance(setup.local_lights, material.name)).any():
-            front = setup.geometry.is_front(setup.samples.eye[rows], setup.points.position[rows])
+            front = setup.geometry.is_front(setup.samples.camera[rows], setup.points.position[rows])
             is_emissive_side = (front | material.double_sided)[:, None]
             radiance[rows] += emission * is_emissive_side * setup.samples.surface.emission[rows]
 
@@ -260,9 +260,9 @@ def points_of_samples(samples: ViewSamples, textures: Mapping[str, F32], roughne
     samples: of a view. textures, roughness: there, see `ReferencePoints`.
     """
     points = samples.surface.points
-    to_camera = samples.eye.astype(np.float64) - points.position
+    to_camera = samples.camera.astype(np.float64) - points.position
     wo = (to_camera / np.linalg.norm(to_camera, axis=1, keepdims=True)).astype(np.float32)
-    alpha_sample = samples.chance if samples.chance.any() else FIXED_ALPHA_SAMPLE
+    alpha_sample = samples.alpha_sample if samples.alpha_sample.any() else FIXED_ALPHA_SAMPLE
     return ReferencePoints(
         points.position, points.normal, points.tangent, wo, textures, roughness, samples.surface.uv, alpha_sample
     )

@@ -49,9 +49,9 @@ class Recipe:
         num_lights: triangles that the environment is divided into.
         relightable: choose them for an environment that will be turned or exchanged, not for the one that is there.
         cameras: those of `views` that somebody placed; the others came with the scene.
-        num_points: that light is kept at for an eye that moves; methods of fixed views have none.
-        gather_samples: pieces of surfaces that reflected light is kept for (cells). gather_rays: of each view sample,
-            or point, that look for them. None: as many as the method finds fit; `direct` has none.
+        num_probes: surface probes of a free camera; methods of fixed views have none.
+        num_patches: surface patches for indirect light. gather_rays: of each view sample, or probe. None: as many as
+            the method finds fit; `direct` has none.
     """
 
     method: str
@@ -60,8 +60,8 @@ class Recipe:
     num_lights: int
     relightable: bool = False
     cameras: tuple[CustomCamera, ...] = ()
-    num_points: int = 50_000
-    gather_samples: int | None = None
+    num_probes: int = 50_000
+    num_patches: int | None = None
     gather_rays: int | None = None
 
     def add_cameras(self, scene: Scene) -> Scene:

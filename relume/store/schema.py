@@ -18,7 +18,7 @@ from typing import Any
 from relume.core.errors import SchemaVersionError, StoreError
 from relume.store.bake_protocol import ArraySpec
 
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 MANIFEST_NAME = "manifest.json"
 DTYPES = frozenset(
     {"bool", "uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64", "float16", "float32", "float64"}

@@ -31,7 +31,7 @@ F32 = NDArray[np.float32]
 RowIndices = NDArray[np.int64]
 
 _PERTURBED_COLUMNS = ("normal", "tangent", "uv", "normal_length")
-_TRACED_COLUMNS = ("visibility", "links", "thrown")
+_TRACED_COLUMNS = ("visibility", "gather_hits", "mirror_lights")
 _SAMPLES_PER_STEP = 1024  # samples; a tenth of a second's rays
 
 
@@ -185,7 +185,7 @@ class MapOverrideStore:
         """Bring what was read of some samples of a material to their normals. first: row of the material's first."""
         if name in _PERTURBED_COLUMNS:
             values[:] = getattr(self._perturbed[first], name)[rows]
-        elif name == "links":
+        elif name == "gather_hits":
             values[:] = self._gather_hits(first)[rows]
         elif name in _TRACED_COLUMNS:
             self._trace(name, first, self._all_rows(first)[rows], values)
@@ -204,7 +204,7 @@ class MapOverrideStore:
     def _gather_hits(self, first: int, is_canceled: Callable[[], bool] = lambda: False) -> NDArray[np.uint16]:
         """The cells that they hit, for each of the material's terms. (samples, rays)"""
         pattern, num = self._pattern(first), len(self._perturbed[first].normal)
-        key = *self._key, "links", first
+        key = *self._key, "gather hits", first
         partial_hits = self._cache.transient.get_value(key, lambda: PartialHits.empty(num, pattern.num_rays))
         if not partial_hits.steps.done.all():
             all_rows = self._all_rows(first)
@@ -219,7 +219,7 @@ class MapOverrideStore:
 
     def _trace(self, name: str, first: int, rows: RowIndices, values: NDArray[Any]) -> None:
         """Trace rays of some samples of a material. found: what was baked; written."""
-        if name == "links":
+        if name == "gather_hits":
             values[:] = self._tracer.gather_hits(
                 self._surface_points(first, rows), self._wo(first, rows), self._pattern(first)
             )

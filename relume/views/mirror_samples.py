@@ -64,7 +64,7 @@ def read_mirror_samples(
     order_index = np.empty(len(order), np.int64)
     order_index[order] = np.arange(len(order))
     chain = SpecularChain(material, store.read(f"{prefix}/mirror_cosine"), store.read(f"{prefix}/mirror_tint"))
-    origin, direction = (store.read(f"{prefix}/{name}")[sample] for name in ("eye", "position"))
+    origin, direction = (store.read(f"{prefix}/{name}")[sample] for name in ("camera", "position"))
     distance, surface_rows = (
         np.full(len(sample), np.inf, np.float32),
         slice(0, int(np.searchsorted(sample, num_surface))),

@@ -65,7 +65,7 @@ def read_gather_rays(
         store: an open store. k: number of the view. material: index of the material.
         start, stop: rows of the view's arrays. outgoing: by cells.
     """
-    gather_hits = store.read(f"views/{k}/links", start, stop)
+    gather_hits = store.read(f"views/{k}/gather_hits", start, stop)
     return GatherRays(gather_hits, make_material_pattern(store, k, material), outgoing)
 
 
@@ -78,7 +78,7 @@ def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> NDArray[np.
         (stop - start,) uint32
     """
     if "gather_rays" in store.attributes:
-        return np.asarray(store.read(f"views/{k}/number", start, stop), np.uint32)
+        return np.asarray(store.read(f"views/{k}/seed", start, stop), np.uint32)
     return np.arange(start, stop, dtype=np.uint32)
 
 
@@ -102,7 +102,7 @@ def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> F32
     """
     if not store.attributes.get("has_tints"):
         return FIXED_ALPHA_SAMPLE
-    alpha_samples = store.read(f"views/{k}/chance", start, stop)
+    alpha_samples = store.read(f"views/{k}/alpha_sample", start, stop)
     return alpha_samples if alpha_samples.any() else FIXED_ALPHA_SAMPLE
 
 
@@ -115,7 +115,7 @@ def read_ray_origins(store: StoreReader, k: int, start: int, stop: int) -> F32:
         (stop - start, 3) float32, or (1, 3) where it is the same for all
     """
     if store.attributes.get("has_layers"):
-        return np.asarray(store.read(f"views/{k}/eye", start, stop), np.float32)
+        return np.asarray(store.read(f"views/{k}/camera", start, stop), np.float32)
     return read_camera(store, k).to_world[None, :3, 3].astype(np.float32)
 
 

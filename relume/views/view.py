@@ -226,7 +226,7 @@ class View:
 
     def subset_rays(self, material: int, sample_indices: NDArray[np.integer], outgoing: OutgoingLight) -> GatherRays:
         """Read the rays of some of a material's samples, which do not share them. See `read_rows`, `gather_rays`."""
-        gather_hits = np.asarray(self.read_rows("links", material, sample_indices), np.uint16)
+        gather_hits = np.asarray(self.read_rows("gather_hits", material, sample_indices), np.uint16)
         return GatherRays(gather_hits, make_material_pattern(self.store, self.index, material), outgoing)
 
     def gather_rays(self, material: int, outgoing: OutgoingLight) -> GatherRays:
@@ -248,12 +248,12 @@ class View:
 
     def _neighbor_filter(self, material: int) -> NeighborFilter:
         def build_filter() -> NeighborFilter:
-            num_passes = int(self.store.attributes.get("gather_tents", 1))
+            num_passes = int(self.store.attributes.get("gather_filter_passes", 1))
             return make_neighbor_filter(
                 self.pixel[self.rows(material)], self.width, self.surface_points(material), num_passes
             )
 
-        return self.cache.get_value((self.key, "sharing", *self.sample_key(material)), build_filter)
+        return self.cache.get_value((self.key, "neighbor filter", *self.sample_key(material)), build_filter)
 
     def background(self) -> F32:
         """Read the radiance of the samples after the surfaces. (n, 3) float32"""
@@ -332,8 +332,8 @@ def open_view(
     material = store.read(f"{prefix}/material")
     throughput = store.read(f"{prefix}/weight")[:, None]
     has_layers = store.attributes.get("has_layers")
-    if has_layers or store.attributes.get("has_glass"):  # so stores said it that knew of no mirrors
-        throughput = throughput * store.read(f"{prefix}/through")
+    if has_layers:
+        throughput = throughput * store.read(f"{prefix}/transmittance")
     num_materials = len(store.attributes["materials"])
     num_surface = int(np.searchsorted(material, BACKGROUND))
     if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(material[1:] < material[:-1]):

@@ -128,7 +128,7 @@ def create_app(
         UploadMiddleware,
         access=lambda: app.state.services.access,
         max_per_user=UPLOADS_EACH if settings.login else UPLOADS_AT_ONCE,
-        weights=settings.turns,
+        weights=settings.fair_shares,
     )
     app.add_middleware(AuthMiddleware, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(Conditional)

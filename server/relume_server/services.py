@@ -98,7 +98,7 @@ OpenBatches = Callable[[Settings, Library], Batches]
 
 def open_bakes(settings: Settings) -> BakeService:
     """relume's own bake service."""
-    return BakeService(settings.data, settings.database_url, settings.scheduler, client_weights=settings.turns)
+    return BakeService(settings.data, settings.database_url, settings.scheduler, client_weights=settings.fair_shares)
 
 
 def open_batches(settings: Settings, library: Library) -> Batches:
@@ -154,13 +154,16 @@ async def open_services(
             queue.start()
         prewarmer = Prewarmer(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
         at_end(prewarmer.close)
-        if settings.ahead:
+        if settings.prewarm:
             prewarmer.start()
         importers = Importers()
         at_end(importers.close)
-        if settings.importer_at_start:
+        if settings.preload_importer:
             importers.start()
-        rooms, comments = Rooms(settings.max_rooms, settings.max_people, settings.away_seconds), CommentStore(sessions)
+        rooms, comments = (
+            Rooms(settings.max_rooms, settings.max_people, settings.reconnect_seconds),
+            CommentStore(sessions),
+        )
         room_lease = RoomLease(rooms, RoomLeases(sessions), drain, threads.queries)
         ends.push_async_callback(room_lease.close)
         ends.callback(rooms.close)
@@ -199,7 +202,7 @@ class _Queues(NamedTuple):
 def _queues(settings: Settings, service: BakeService, batch: Batches, access: AuthServices) -> _Queues:
     sessions, quota = (
         service.ledger.sessions,
-        Quota(settings.max_queued, settings.max_queued_per_client, settings.turns),
+        Quota(settings.max_queued, settings.max_queued_per_client, settings.fair_shares),
     )
 
     def scene_name(bake: str) -> str:
@@ -243,7 +246,7 @@ def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, batc
     """Have it shown what works and waits, and whether there is room for more."""
     metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
     metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions))
-    metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.least_free_bytes)
+    metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.min_free_bytes)
 
 
 def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -> None:
@@ -251,7 +254,7 @@ def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -
     metrics.watch_cache(library.cache_used_bytes, library.bytes_by_owner)
     metrics.watch_owners(
         {
-            "frozen_cache": library.cache_used_bytes,
+            "cache": library.cache_used_bytes,
             "open_bakes": lambda: live_bytes(transfers.open_bakes),
             "bake_tasks": cached_bytes,
             "environments": lambda: live_bytes(load_built_in),

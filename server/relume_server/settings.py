@@ -75,36 +75,42 @@ class Settings(BaseSettings):
         default=Path(__file__).resolve().parents[2] / "client_web" / "dist", description="the built editor"
     )
     cache_bytes: int = Field(
-        default_factory=_default_cache_bytes, gt=0, description="budget of what is made from bakes"
+        default_factory=_default_cache_bytes, gt=0, description="budget of the cache of everything computed from bakes"
     )
-    cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="of them, kept of bakes that nobody uses")
+    cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="of that, kept for bakes that nobody uses")
     batch_processes: int = Field(default=1, ge=1, le=64, description="processes for renders and comparisons")
     batch_bytes: int = Field(
-        default_factory=lambda: _default_cache_bytes() // 2, gt=0, description="that each keeps of what it makes"
+        default_factory=lambda: _default_cache_bytes() // 2, gt=0, description="cache of each batch process"
     )
-    batch_nice: int = Field(default=10, ge=0, le=19, description="how much they yield to all else, as nice(1) says")
-    ahead: bool = Field(default=True, description="whether what a bake shows first is made before anybody opens it")
-    max_queued: int = Field(default=100, ge=1, description="renders, and comparisons, that wait or run")
-    max_queued_each: int | None = Field(
-        default=None, ge=1, description="of them, of one client; unset: a quarter where clients are known by name"
+    batch_nice: int = Field(default=10, ge=0, le=19, description="nice(1) of batch processes")
+    prewarm: bool = Field(
+        default=True, description="whether the first image of a new bake is computed before anybody opens it"
     )
-    idle_seconds: float = Field(default=DEFAULT_IDLE_S, ge=1, description="how long things that nobody uses are kept")
+    max_queued: int = Field(default=100, ge=1, description="queued and running renders, and as many comparisons")
+    max_queued_per_user: int | None = Field(
+        default=None, ge=1, description="of these, of one user; unset: a quarter if users log in"
+    )
+    idle_seconds: float = Field(
+        default=DEFAULT_IDLE_S, ge=1, description="how long unused bakes, scenes and processes are kept"
+    )
     max_upload_bytes: int = Field(default=2 * GIB, gt=0, description="largest upload of a file but a measured material")
     max_body_bytes: int = Field(default=16 * 1024**2, gt=0, description="largest body of a call for renders")
-    least_free_bytes: int = Field(
-        default=256 * 1024**2, ge=0, description="room on the disk below which nothing is begun"
+    min_free_bytes: int = Field(
+        default=256 * 1024**2, ge=0, description="free disk space below which new work is refused"
     )
     max_sessions: int = Field(default=32, ge=1, description="live sessions at once")
-    max_rooms: int = Field(default=32, ge=1, description="looks that several people share at once")
-    max_people: int = Field(default=8, ge=1, le=64, description="people who share one")
-    away_seconds: float = Field(
-        default=60.0, gt=0, description="how long the place of somebody whose connection is lost is kept"
+    max_rooms: int = Field(default=32, ge=1, description="rooms at once")
+    max_people: int = Field(default=8, ge=1, le=64, description="people in one room")
+    reconnect_seconds: float = Field(
+        default=60.0, gt=0, description="how long a room keeps a member whose connection is lost"
     )
     import_seconds: int = Field(default=300, ge=1, description="time a scene import may take")
     import_bytes: int = Field(
         default_factory=_default_import_bytes, gt=0, description="address space a scene import may use"
     )
-    importer_at_start: bool = Field(default=True, description="whether what imports need is loaded before the first")
+    preload_importer: bool = Field(
+        default=True, description="whether the importer is loaded at start, not with the first import"
+    )
     ack_seconds: float = Field(default=30.0, gt=0, description="how long a client may leave frames unacknowledged")
     resume_seconds: float = Field(default=600.0, gt=0, description="how long a lost session can be resumed")
     login: bool = Field(default=False, description="whether people log in; without it, whoever reaches the port is in")
@@ -117,24 +123,24 @@ class Settings(BaseSettings):
     user_header: str = Field(default="", description="header in which they say who calls; empty: they say it of nobody")
     proxy_role: RoleName = Field(default="view", description="role of those whom a proxy names")
     proxy_roles: dict[str, RoleName] = Field(default={}, description="roles of some of them by name, as JSON object")
-    viewers_comment: bool = Field(default=False, description="whether the role view, too, may write comments")
-    turns: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field(
-        default={}, description="turns of some users in the queues, to one of each other user, as JSON object"
+    allow_viewer_comments: bool = Field(default=False, description="whether the role view, too, may write comments")
+    fair_shares: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field(
+        default={}, description="weights of users in fair scheduling, by name, as JSON object; 1 for all others"
     )
-    max_sessions_each: int | None = Field(default=None, ge=1, description="live sessions of one user")
-    max_bakes_each: int | None = Field(default=None, ge=1, description="bakes of one user that wait or run")
-    max_bytes_each: int | None = Field(default=None, ge=0, description="uploads and bakes of one user")
+    max_sessions_per_user: int | None = Field(default=None, ge=1, description="live sessions of one user")
+    max_bakes_per_user: int | None = Field(default=None, ge=1, description="queued and running bakes of one user")
+    max_bytes_per_user: int | None = Field(default=None, ge=0, description="uploads and bakes of one user")
     requests_per_second: float | None = Field(
         default=None, gt=0, description="calls of one user on the mean; of who is not known, of one address"
     )
-    requests_at_once: int = Field(default=200, ge=1, description="calls of one user after a rest")
+    requests_at_once: int = Field(default=200, ge=1, description="burst of calls of one user")
     audit_lines: int = Field(default=100_000, ge=1, description="changes that the audit keeps")
     log_format: Literal["plain", "json"] = Field(default="plain", description="lines of the log: text, or JSON")
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="warning", description="least level that is logged; info has a line for each request"
     )
     traces: bool = Field(default=False, description="whether spans of edits go to a collector, as OTEL_… variables say")
-    drain_seconds: float = Field(default=10.0, ge=0, description="how long sessions may take to leave after SIGTERM")
+    drain_seconds: float = Field(default=10.0, ge=0, description="how long sessions may take to move after SIGTERM")
     stop_seconds: float = Field(default=30.0, gt=0, description="how long all else may take to stop after that")
     allowed_origins: list[str] = Field(default=[], description="origins besides the server's own, as JSON list")
     allowed_hosts: list[str] = Field(
@@ -148,7 +154,7 @@ class Settings(BaseSettings):
 
         Where nobody logs in, all are one client, who may have all.
         """
-        return self.max_queued_each or (max(1, self.max_queued // 4) if self.login else self.max_queued)
+        return self.max_queued_per_user or (max(1, self.max_queued // 4) if self.login else self.max_queued)
 
     @property
     def database_url(self) -> str:

@@ -16,7 +16,7 @@ from relume_server.settings import Settings
 
 @pytest.fixture
 def settings(settings: Settings) -> Settings:
-    settings.viewers_comment = True
+    settings.allow_viewer_comments = True
     return settings
 
 

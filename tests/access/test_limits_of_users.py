@@ -80,7 +80,7 @@ class TestRates:
 class TestBytes:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
-        settings.max_bytes_each = 100_000
+        settings.max_bytes_per_user = 100_000
         return settings
 
     def test_uploads_and_bakes_count_until_they_are_deleted(
@@ -95,11 +95,11 @@ class TestBytes:
         assert used == on_disk > 0
         client.post("/api/scenes", files=SCENE, headers=bob)  # the same scene, which is Ann's
         assert access.quotas.used_bytes("Bob") == 0
-        settings.max_bytes_each = used
+        settings.max_bytes_per_user = used
         refused = client.post("/api/scenes", files=SCENE, headers=ann)
         assert refused.status_code == 429
         assert refused.json()["type"] == "urn:relume:problem:quota"
-        assert "RELUME_MAX_BYTES_EACH" in refused.json()["detail"]
+        assert "RELUME_MAX_BYTES_PER_USER" in refused.json()["detail"]
         bake = {"scene": scene, "size": list(SIZE), "lights": 10}
         assert client.post("/api/bakes", json=bake, headers=ann).status_code == 429
         assert client.post("/api/bakes", json={**bake, "dry_run": True}, headers=ann).status_code == 200
@@ -119,7 +119,7 @@ class TestBytes:
     def test_renders_count_by_what_they_may_take_until_they_are_there(
         self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, baked: Baked
     ) -> None:
-        settings.max_bytes_each = 1_000_000
+        settings.max_bytes_per_user = 1_000_000
         ann = bearer("edit", "Ann")
         request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "exr", "size": [16, 16]}
         large = client.post("/api/renders", json={**request, "frames": 3600}, headers=ann)
@@ -136,7 +136,7 @@ class TestBytes:
     def test_a_btf_that_was_made_here_counts_by_what_is_kept(
         self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, tmp_path: Path
     ) -> None:
-        settings.max_bytes_each = 1_000_000
+        settings.max_bytes_per_user = 1_000_000
         ann, works = bearer("edit", "Ann"), "/api/materials/btf-works"
         with zipped(tmp_path / "a.zip").open("rb") as images:
             url = client.post(works, files={"images": ("a.zip", images)}, headers=ann).headers["location"]
@@ -150,7 +150,7 @@ class TestBytes:
         assert kept > 0
         while access.quotas.used_bytes("Ann") != kept:  # what has failed lets go when its row has said so
             time.sleep(0.02)
-        settings.max_bytes_each = kept
+        settings.max_bytes_per_user = kept
         refused = client.post(f"{works}/synthetic", json={"geometry": "weave", "size": 8}, headers=ann)
         assert refused.status_code == 429
         assert client.delete(f"{url}?forget=true", headers=ann).status_code == 204
@@ -167,7 +167,7 @@ class TestBytes:
         tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        settings.max_bytes_each = 1_000_000
+        settings.max_bytes_per_user = 1_000_000
         owned: list[int] = []
 
         def refuse(*args: object, **kwargs: object) -> str:
@@ -188,7 +188,7 @@ class TestBytes:
 class TestTurns:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
-        settings.turns = {"Cem": 2.0}
+        settings.fair_shares = {"Cem": 2.0}
         return settings
 
     def test_bakes_of_one_do_not_wait_for_all_of_another(
@@ -214,7 +214,7 @@ class TestTurns:
 class TestBakes:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
-        settings.max_bakes_each = 1
+        settings.max_bakes_per_user = 1
         return settings
 
     @pytest.fixture
@@ -234,7 +234,7 @@ class TestBakes:
         assert client.post("/api/bakes", json=recipes[0], headers=ann).status_code == 202  # the same
         refused = client.post("/api/bakes", json=recipes[1], headers=ann)
         assert refused.status_code == 429
-        assert "RELUME_MAX_BAKES_EACH" in refused.json()["detail"]
+        assert "RELUME_MAX_BAKES_PER_USER" in refused.json()["detail"]
         assert client.post("/api/bakes", json=recipes[1], headers=bob).status_code == 202
         gate.set()
         bakes: BakeService = client.app.state.services.bakes
@@ -264,7 +264,7 @@ class TestQueues:
 def test_without_names_all_are_one_client_who_may_fill_a_queue() -> None:
     assert Settings(max_queued=8).max_queued_per_client == 8
     assert Settings(max_queued=8, login=True).max_queued_per_client == 2
-    assert Settings(max_queued=8, max_queued_each=3).max_queued_per_client == 3
+    assert Settings(max_queued=8, max_queued_per_user=3).max_queued_per_client == 3
 
 
 def test_each_change_is_a_line_and_each_refusal(client: TestClient, bearer: Bearer, baked: Baked) -> None:

@@ -48,7 +48,7 @@ def test_the_line_that_the_proxy_adds_counts_not_the_clients_own(
 class TestNames:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
-        settings.user_header, settings.max_sessions_each = "X-Forwarded-User", 1
+        settings.user_header, settings.max_sessions_per_user = "X-Forwarded-User", 1
         settings.requests_per_second, settings.requests_at_once = 0.001, 3
         return settings
 

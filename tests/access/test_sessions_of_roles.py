@@ -189,7 +189,7 @@ def test_revoking_a_token_ends_its_sessions_and_no_others(
 class TestQuota:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
-        settings.max_sessions_each = 1
+        settings.max_sessions_per_user = 1
         return settings
 
     def test_each_has_so_many_sessions(self, client: TestClient, baked: Baked, bearer: Bearer) -> None:
@@ -199,7 +199,7 @@ class TestQuota:
             with open_session(client, baked.bake, headers=ann) as second, pytest.raises(ConnectionError) as ended:
                 second.receive()
             assert ended.value.args[0] == 1013
-            assert "RELUME_MAX_SESSIONS_EACH" in ended.value.args[1]
+            assert "RELUME_MAX_SESSIONS_PER_USER" in ended.value.args[1]
             with open_session(client, baked.bake, headers=bob) as other:
                 other.text("hello")
         with open_session(client, baked.bake, headers=ann) as again:

@@ -90,7 +90,7 @@ def a_door(access: AuthServices, app: Callable[..., Any] = taken, each: int = 8)
 class TestBodies:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
-        settings.max_bytes_each = 100_000
+        settings.max_bytes_per_user = 100_000
         return settings
 
     def test_one_that_says_that_it_is_too_large_is_not_read(self, access: AuthServices) -> None:
@@ -168,12 +168,12 @@ class TestUnpacking:
 
         assert send(0) == 201
         one = access.quotas.used_bytes("Ann")
-        settings.max_bytes_each = int(3.5 * one) + 1_000
+        settings.max_bytes_per_user = int(3.5 * one) + 1_000
         with ThreadPoolExecutor(10) as threads:
             answers = [*threads.map(send, range(1, 11))]
         assert sorted({*answers}) == [201, 429]
         kept = folder_bytes(settings.data / "scenes")
-        assert one < kept <= settings.max_bytes_each
+        assert one < kept <= settings.max_bytes_per_user
         assert access.quotas.used_bytes("Ann") == kept
         assert not list(settings.data.glob("upload-*"))
 
@@ -191,7 +191,7 @@ class TestUnpacking:
             asked.append(request.max_file_bytes)
             raise ImportTooLargeError("too large")
 
-        settings.max_bytes_each = 5_000
+        settings.max_bytes_per_user = 5_000
         access.quotas.assign_owner("Ann", "scene", "another", 3_000)
         monkeypatch.setattr(client.app.state.services.intake.importers, "run", unpack)
         refused = client.post("/api/scenes", files=SCENE, headers=bearer("edit", "Ann"))
@@ -203,7 +203,7 @@ class TestUnpacking:
 class TestDisk:
     @pytest.fixture(autouse=True)
     def _disk(self, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
-        settings.least_free_bytes = 1_000
+        settings.min_free_bytes = 1_000
         for name in ("quotas", "reservations"):
             monkeypatch.setattr(f"relume_server.auth.{name}.free_bytes", lambda _: 10_000)
 
@@ -232,7 +232,7 @@ class TestDisk:
         assert access.quotas.used_bytes("Ann") == 0
 
     def test_what_was_held_is_held_where_more_is_refused(self, access: AuthServices, settings: Settings) -> None:
-        settings.max_bytes_each = 2_000
+        settings.max_bytes_per_user = 2_000
         reservation = Reservation(access.quotas, "Ann")
         reservation.reserve(1_500)
         with pytest.raises(QuotaError, match=r"you have 0 bytes of at most 2 kB, and this takes 2.5 kB"):

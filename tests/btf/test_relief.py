@@ -31,7 +31,7 @@ CONSTANT = int(np.flatnonzero(FUNCTIONS == 0)[0])
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    return opened(floor(), tmp_path_factory.mktemp("moving"), "surface")
+    return opened(floor(), tmp_path_factory.mktemp("moving"), "probes")
 
 
 def sight(moving, pixel_angle=0.0):

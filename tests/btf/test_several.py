@@ -53,12 +53,12 @@ def strips():
     return make_tiny_scene(*floor, camera=CAMERA, environment=studio(32, 20.0), materials=materials)
 
 
-@pytest.fixture(params=["direct", "surface"])
+@pytest.fixture(params=["direct", "probes"])
 def opened(request, strips, tmp_path, monkeypatch):
     """A bake, in a memory that has nothing yet."""
     memory = Cache(1 << 30)
     monkeypatch.setattr(memories._AssetCache, "cache", memory)
-    recipe = Recipe(request.param, ("front",), SIZE, 100, num_points=800)
+    recipe = Recipe(request.param, ("front",), SIZE, 100, num_probes=800)
     return open_bake(bake_in_process(METHODS[request.param], strips, recipe, tmp_path / "s.zarr"), memory)
 
 
@@ -110,7 +110,7 @@ def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypa
     )
 
 
-@pytest.mark.parametrize("opened", ["surface"], indirect=True)
+@pytest.mark.parametrize("opened", ["probes"], indirect=True)
 def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkeypatch):
     picture = FreeCameraPicture(opened, "front", is_watched=True)
     picture.set_look(look_of(opened, records))
@@ -131,7 +131,7 @@ def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkey
     assert np.linalg.norm(found - wanted) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - wanted)
 
 
-@pytest.mark.parametrize("opened", ["surface"], indirect=True)
+@pytest.mark.parametrize("opened", ["probes"], indirect=True)
 def test_an_edit_beside_btfs_changes_what_it_changes_and_nothing_else(opened, records):
     picture = FreeCameraPicture(opened, "front", is_watched=True)
     picture.set_look(look_of(opened, records, 0.2))

@@ -36,7 +36,7 @@ def floor():
 
 
 def opened(scene, folder, method="direct"):
-    recipe = Recipe(method, ("front",), SIZE, 300, num_points=800)
+    recipe = Recipe(method, ("front",), SIZE, 300, num_probes=800)
     return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
@@ -179,13 +179,13 @@ def test_surfaces_without_places_in_textures_take_a_projection(small_btf, tmp_pa
     assert np.isfinite(render_image(bake, "front", covered(bake, small_btf.record, scale=3.0))).all()
 
 
-@pytest.mark.parametrize("method", ["gather", "surface"])
+@pytest.mark.parametrize("method", ["gather", "probes"])
 def test_other_methods_show_it_too_and_follow_a_hand(small_btf, tmp_path, method):
     bake = opened(floor(), tmp_path, method)
     picture = render_image(bake, "front", covered(bake, small_btf.record, scale=3.0))
     assert np.isfinite(picture).all()
     assert picture[..., :3].mean() > 0.01
-    if method == "surface":
+    if method == "probes":
         return
     live = Picture(bake, "front", bake.cache)
     live.set_look(covered(bake, small_btf.record, scale=3.0))

@@ -119,8 +119,8 @@ def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.Cap
         (["bake", "quad", "--lights=many"], "--lights is 'many'; give a valid integer"),
         (["bake", "quad", "--gather-rays", "100"], "direct"),
         (["bake", "quad", "--method", "gather", "--gather-rays", "9"], "16 to 4,096"),
-        (["bake", "quad", "--method", "surface", "--gather-samples", "9"], "64 to"),
-        (["bake", "quad", "--method", "magic"], "--method is 'magic'; give one of 'direct', 'gather', 'surface'"),
+        (["bake", "quad", "--method", "probes", "--patches", "9"], "64 to"),
+        (["bake", "quad", "--method", "magic"], "--method is 'magic'; give one of 'direct', 'gather', 'probes'"),
         (["bake", "quad", "--preset", "best"], "--preset is 'best'; give one of 'preview', 'good', 'final'"),
         (["bake", "quad", "--view", "top"], "--view is 'top'; give some of front"),
         (["import", "/no/such-file.glb"], "FILE is '/no/such-file.glb'; give a file that exists"),
@@ -151,7 +151,7 @@ def test_failure_is_one_line_on_stderr(
 
 
 def test_a_summary_is_never_cut_short(capsys: pytest.CaptureFixture[str]) -> None:
-    for group in ([], ["token"], ["material"], ["environment"], ["ledger"]):
+    for group in ([], ["token"], ["material"], ["environment"], ["db"]):
         assert main([*group, "--help"]) == 0
         lines = capsys.readouterr().out.splitlines()
         assert [line for line in lines if line.endswith("...") and "Usage" not in line] == []
@@ -228,7 +228,7 @@ def test_render_takes_a_bake_by_its_id(data: Path, tmp_path: Path, capsys: pytes
         assert np.asarray(Image.open(tmp_path / "x.png")).shape[1] == width
     for more, output, words in (
         ([coarse, "--view", "top"], "y.png", "its views are front"),
-        ([coarse, "--turntable", "2"], "round", "--method surface"),
+        ([coarse, "--turntable", "2"], "round", "--method probes"),
         (["0123456789ab"], "y.png", "no scene"),
     ):
         assert main(["render", *more, "--output", str(tmp_path / output)]) == 1
@@ -269,10 +269,10 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     look.write_text(json.dumps({"materials": {"White": {"terms": [{"model": "lambert", "color": [0.5, 0.25, 1.0]}]}}}))
     turntable = ["render", "quad", "--turntable", "3", "--look", str(look), "--output", str(folder)]
     assert main(turntable) == 1
-    assert "--method surface" in capsys.readouterr().err
-    assert main(["bake", "quad", "--view", "front", "--points", "200", *TINY]) == 1
+    assert "--method probes" in capsys.readouterr().err
+    assert main(["bake", "quad", "--view", "front", "--probes", "200", *TINY]) == 1
     assert "method direct has none" in capsys.readouterr().err
-    assert main(["bake", "quad", "--view", "front", "--method", "surface", "--points", "200", *TINY]) == 0
+    assert main(["bake", "quad", "--view", "front", "--method", "probes", "--probes", "200", *TINY]) == 0
     assert main(turntable) == 0
     frames = [np.asarray(Image.open(folder / f"{k:04d}.png")) for k in range(3)]
     assert frames[0].shape == (24, 32, 3)
@@ -284,10 +284,10 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     assert main([*turntable, "--resume"]) == 0
     np.testing.assert_array_equal(np.asarray(Image.open(folder / "0001.png")), frames[1])
     assert (folder / "0002.png").read_bytes() == b"kept"
-    assert main(["render", "quad", "--quick", "--output", str(tmp_path / "x.png")]) == 0
+    assert main(["render", "quad", "--approximate", "--output", str(tmp_path / "x.png")]) == 0
     assert "approximate" in capsys.readouterr().err
     turned = tmp_path / "turned"
-    assert main(["render", "quad", "--turntable", "2", "--turns", "environment", "--output", str(turned)]) == 0
+    assert main(["render", "quad", "--turntable", "2", "--rotate", "environment", "--output", str(turned)]) == 0
     assert len(list(turned.glob("*.png"))) == 2
     assert main(["render", "quad", "--turntable", "0", "--output", str(tmp_path / "none")]) == 1
 
@@ -304,8 +304,8 @@ def test_a_server_with_a_damaged_database_says_one_sentence(data: Path, capsys: 
 @pytest.mark.parametrize(
     ("variable", "value", "said"),
     [
-        ("RELUME_TURNS", "{bad", "RELUME_TURNS is '{bad'; give JSON"),
-        ("RELUME_TURNS", '{"Ann": -1}', "RELUME_TURNS.Ann is -1; give greater than 0"),
+        ("RELUME_FAIR_SHARES", "{bad", "RELUME_FAIR_SHARES is '{bad'; give JSON"),
+        ("RELUME_FAIR_SHARES", '{"Ann": -1}', "RELUME_FAIR_SHARES.Ann is -1; give greater than 0"),
         ("RELUME_TRUSTED_PROXIES", '["10.0.0.300"]', "RELUME_TRUSTED_PROXIES.0 is '10.0.0.300'; give an address"),
         ("RELUME_LOG_LEVEL", "loud", "RELUME_LOG_LEVEL is 'loud'; give 'debug', 'info', "),
         ("RELUME_STORAGE", "s3://", "RELUME_STORAGE is 's3://'; give one that can be used (Generic URL error: "),

@@ -15,7 +15,7 @@ from relume_worker.status import bake_id
 
 
 def test_the_demo_bakes_what_the_editor_asks_for_first(tmp_path: Path) -> None:
-    app = create_app(Settings(data=tmp_path, importer_at_start=False, ahead=False))
+    app = create_app(Settings(data=tmp_path, preload_importer=False, prewarm=False))
     with TestClient(app, "http://127.0.0.1") as client:
         scene = client.post("/api/built-ins/still_life").json()
         request = {"scene": scene["id"], "method": "gather", "views": [view["name"] for view in scene["views"]]}

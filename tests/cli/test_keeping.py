@@ -38,10 +38,10 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["ledger", "upgrade"]) == 0
+    assert main(["db", "upgrade"]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "0001: The tables as they were before there were revisions"
-    assert main(["ledger", "upgrade"]) == 0
+    assert main(["db", "upgrade"]) == 0
     assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the ledger is at revision {latest_revision()}"]
 
 
@@ -99,7 +99,7 @@ def test_backups_are_told_as_json(data: Path, tmp_path: Path, capsys: pytest.Cap
         return document
 
     backups = str(tmp_path / "backups")
-    assert told("ledger", "upgrade")["revision"] == latest_revision()
+    assert told("db", "upgrade")["revision"] == latest_revision()
     made = told("backup", backups)
     assert (made["files"], len(made["left_out"])) == (0, 2)
     assert told("backup", backups, "--verify") == {"name": made["name"], "files": 1, "damaged": []}

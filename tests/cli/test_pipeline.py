@@ -230,7 +230,7 @@ def test_a_dry_run_of_a_render_checks_all_and_writes_nothing(run: Any, tmp_path:
         (["--look", "Green", "--output", "x.png"], "no saved look; saved are: 'Blue', 'Red night'"),
         (["--look", "/no/look.json", "--output", "x.png"], "--look is '/no/look.json'; give a file that exists"),
         (["--output", "x.mp4"], "a video needs --turntable"),
-        (["--turns", "object", "--output", "x.png"], "--turns is 'object'; give --turntable N with it"),
+        (["--rotate", "object", "--output", "x.png"], "--rotate is 'object'; give --turntable N with it"),
         (["--fps", "10", "--output", "x.png"], "--fps is 10; give --turntable N with it"),
         (["--turntable", "2", "--output", "x.png"], "a folder for the numbered frames, or a name ending in .mp4"),
         (["--turntable", "2", "--output", "x.mov"], "a folder for the numbered frames, or a name ending in .mp4"),
@@ -249,7 +249,7 @@ def test_what_cannot_be_rendered_is_one_sentence(
 
 
 def test_a_turntable_becomes_a_video_and_what_was_written_is_printed(run: Any, tmp_path: Path) -> None:
-    words = ["--turntable", "3", "--turns", "environment", "--fps", "3"]
+    words = ["--turntable", "3", "--rotate", "environment", "--fps", "3"]
     code, text, _ = run("render", "quad one", *words, "--output", str(tmp_path / "x.mp4"))
     assert (code, text) == (0, f"{tmp_path / 'x.mp4'}\n")
     assert (tmp_path / "x.mp4").read_bytes()[4:8] == b"ftyp"

@@ -79,7 +79,7 @@ def method(request: pytest.FixtureRequest) -> Iterator[TransferMethod]:
 
 @pytest.fixture(scope="session")
 def recipe(method: TransferMethod, scene: Scene) -> Recipe:
-    return Recipe(method.name, tuple(camera.name for camera in scene.cameras), SIZE, NUM_LIGHTS, num_points=NUM_POINTS)
+    return Recipe(method.name, tuple(camera.name for camera in scene.cameras), SIZE, NUM_LIGHTS, num_probes=NUM_POINTS)
 
 
 @pytest.fixture(scope="session")

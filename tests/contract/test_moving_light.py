@@ -75,7 +75,7 @@ def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
 
         def read(self, path, start=0, stop=None):
             found = store.read(path, start, stop)
-            return found[:-1] if path == "harmonics/weight" else found
+            return found[:-1] if path == "sh/weight" else found
 
     with pytest.raises(ChunkDamagedError, match="harmonics"):
         read_harmonic_light(Damaged(), read_patches(store))

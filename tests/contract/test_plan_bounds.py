@@ -60,16 +60,16 @@ def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "direct")) for name in sorted(METHODS)]
 )
 def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
-    took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40, num_points=1000))
+    took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40, num_probes=1000))
     if name not in FREE_CAMERA_METHODS:  # nearly every pixel is an edge, and all flights are short beside one
         assert took["view_samples"] > 3 * 16 * 16
 
 
 @linux
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["gather", "surface"])
+@pytest.mark.parametrize("name", ["gather", "probes"])
 def test_many_gather_samples_and_rays_stay_below_their_plan(name: str, blades: Scene) -> None:
-    asked = Recipe(name, ("front",), (16, 16), 40, num_points=1000, gather_samples=4000, gather_rays=1024)
+    asked = Recipe(name, ("front",), (16, 16), 40, num_probes=1000, num_patches=4000, gather_rays=1024)
     check(METHODS[name], blades, asked)
 
 

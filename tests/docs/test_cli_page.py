@@ -13,7 +13,7 @@ from relume_cli.pictures.looks import MAX_LOOKS
 from relume_worker.presets import PRESETS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cli.md").read_text(encoding="utf-8")
-GROUPS = ("environment", "material", "token", "ledger")
+GROUPS = ("environment", "material", "token", "db")
 
 
 def shown() -> list[list[str]]:

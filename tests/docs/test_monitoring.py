@@ -28,7 +28,7 @@ LABELS = {"format", "instance", "kind", "outcome", "reason", "state", "status"}
 @pytest.fixture(scope="module")
 def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CollectorRegistry]:
     """The metrics of a server that runs."""
-    settings = Settings(data=tmp_path_factory.mktemp("metrics"), allowed_hosts=["testserver"], importer_at_start=False)
+    settings = Settings(data=tmp_path_factory.mktemp("metrics"), allowed_hosts=["testserver"], preload_importer=False)
     library = Control().open_library
     app = create_app(settings, open_library=library, open_batches=InThreadBatches, open_bakes=open_fake_bakes)
     with TestClient(app):
@@ -74,7 +74,7 @@ def test_labels_that_rules_match_are_there(registry: CollectorRegistry) -> None:
 
 
 def test_of_the_ledger_that_servers_share_none_is_counted_twice() -> None:
-    asked = [text for text in expressions().values() if "relume_work{" in text]
+    asked = [text for text in expressions().values() if "relume_jobs{" in text]
     assert len(asked) > 1
     assert all("instance" in text.partition("(")[2].partition(")")[0] or text.startswith("max by") for text in asked)
 

@@ -63,7 +63,7 @@ class Server:
     def create_free_camera_scene(self) -> str:
         """A scene of its own with one bake, whose view moves; it is to be deleted."""
         identity = str(self.call("/api/built-ins/cornell_box", {})["id"])
-        self.bake({"scene": identity, "method": "surface", "size": (120, 120), "lights": 100, "points": 4000})
+        self.bake({"scene": identity, "method": "probes", "size": (120, 120), "lights": 100, "points": 4000})
         return identity
 
     def ball_on_a_floor(self) -> str:
@@ -81,7 +81,7 @@ class Server:
         ledger = Ledger(open_database(f"sqlite:///{self.data / 'relume.db'}"))
         register_scene(self.data, ledger, scene)
         ledger.close()
-        self.bake({"scene": scene.id, "method": "surface", "size": (120, 120), "lights": 100, "points": 400})
+        self.bake({"scene": scene.id, "method": "probes", "size": (120, 120), "lights": 100, "points": 400})
         return scene.id
 
     def bake(self, recipe: dict[str, Any]) -> None:

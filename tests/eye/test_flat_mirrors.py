@@ -83,7 +83,7 @@ def test_bent_bumpy_and_rough_mirrors_are_not_flat():
 
 @pytest.fixture(scope="module")
 def lit(tmp_path_factory):
-    recipe = Recipe("gather", ("front",), (64, 32), 400, gather_samples=1024, gather_rays=64)
+    recipe = Recipe("gather", ("front",), (64, 32), 400, num_patches=1024, gather_rays=64)
     target = tmp_path_factory.mktemp("thrown") / "gather.zarr"
     return open_transfer(bake_in_process(METHODS["gather"], hall(), recipe, target), Cache(1 << 30))
 
@@ -113,9 +113,9 @@ def in_the_patch():
 @pytest.fixture(scope="module")
 def resting(tmp_path_factory):
     """The same where a moving eye rests."""
-    recipe = Recipe("surface", ("front",), (64, 32), 400, num_points=300, gather_samples=1024, gather_rays=64)
-    target = tmp_path_factory.mktemp("resting") / "surface.zarr"
-    moving = open_bake(bake_in_process(METHODS["surface"], hall(), recipe, target), Cache(1 << 30))
+    recipe = Recipe("probes", ("front",), (64, 32), 400, num_probes=300, num_patches=1024, gather_rays=64)
+    target = tmp_path_factory.mktemp("resting") / "probes.zarr"
+    moving = open_bake(bake_in_process(METHODS["probes"], hall(), recipe, target), Cache(1 << 30))
     stills, camera = StaticViewBuilder(moving.light_transport, hall()), moving.views["front"].camera
     return stills.make_static_view(camera, (64, 32), True, lambda share: None, lambda: False)
 

@@ -140,7 +140,7 @@ def test_glass_that_neither_bends_nor_reflects_is_not_there():
     ball = sphere("ball", [0, 0, 0], 0.8, 1, num_rings=16)
     scene = scene_with(ball, material=glass(thickness=1.6, ior=1.0))
     samples = sample_view(scene, build_scene_buffers(scene), "front", SIZE)
-    assert samples.through is not None
+    assert samples.transmittance is not None
     on_wall = samples.material == 0
     seen = np.bincount(samples.pixel[on_wall], samples.throughput[on_wall].mean(axis=1), minlength=SIZE[0] * SIZE[1])
     assert np.median(np.abs(seen - 1)) < 1e-4
@@ -201,7 +201,7 @@ def tinted():
 
 
 def opened(scene, method, folder, size=SIZE, num_lights=600):
-    recipe = Recipe(method, ("front",), size, num_lights, num_points=2000)
+    recipe = Recipe(method, ("front",), size, num_lights, num_probes=2000)
     return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
@@ -244,7 +244,7 @@ def test_a_moving_eye_sees_panes_as_one_at_rest(tinted, tmp_path):
     back, _, pane = tinted.meshes
     (camera,), materials = tinted.cameras, list(tinted.materials)
     pane_alone = make_tiny_scene(back, pane, camera=camera, environment=studio(), materials=materials)
-    found = opened(pane_alone, "surface", tmp_path)
+    found = opened(pane_alone, "probes", tmp_path)
     look = make_look(found)
     moving = render_image(found, "front", look)
     still = reference_image(pane_alone, "front", look, SIZE, 0)

@@ -119,7 +119,7 @@ def test_shares_of_split_samples_are_those_of_one_and_no_other_sample_changes():
     np.testing.assert_allclose(whole, 1, atol=1e-6)
     of_pixel = [np.bincount(samples.pixel, samples.throughput[:, c], SIZE[0] * SIZE[1]) for c in range(3)]
     np.testing.assert_allclose(of_pixel, 1, atol=1e-5)  # light that no glass is before is whole
-    assert set(np.unique(samples.chance)) == set(PASS_TINT_GROUPS[:3])
+    assert set(np.unique(samples.alpha_sample)) == set(PASS_TINT_GROUPS[:3])
 
 
 def test_a_sample_is_split_by_the_tints_that_reach_it():

@@ -13,13 +13,13 @@ from relume.store.bake_protocol import Recipe
 def open_small_bake(scene, method, folder):
     """A bake of 24×18 pixels under 60 lights."""
     folder.mkdir(exist_ok=True)
-    recipe = Recipe(method, ("front",), (24, 18), 60, num_points=300 if method == "surface" else None)
+    recipe = Recipe(method, ("front",), (24, 18), 60, num_probes=300 if method == "probes" else None)
     return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / "store.zarr"), Cache(1 << 30))
 
 
 def render_exact(transfer, look, method):
     """Radiance, once it is exact. (height, width, 3)"""
-    if method == "surface":
+    if method == "probes":
         picture = FreeCameraPicture(transfer, "front")
         picture.set_look(look)
         picture.advance(None)

@@ -35,7 +35,7 @@ def with_own(scene, texture):
     return replace(scene, materials=(replace(floor, textures={"diffuse": texture}), *others))
 
 
-@pytest.fixture(scope="module", params=["gather", "surface"])
+@pytest.fixture(scope="module", params=["gather", "probes"])
 def bakes(request, corner, named, tmp_path_factory):
     """The corner, and the corner whose floor has the image: each with the method it was baked by."""
     folder = tmp_path_factory.mktemp("images")
@@ -55,7 +55,7 @@ def test_pictures_are_those_of_a_scene_that_has_the_image(bakes, named):
         render_exact(baked, painted(own, "diffuse"), method),
     )
     assert relative_rmse(render_exact(bare, painted(plain, None), method), expected) > 0.1
-    assert relative_rmse(found, expected) < (1e-3 if method == "surface" else 1e-6)
+    assert relative_rmse(found, expected) < (1e-3 if method == "probes" else 1e-6)
 
 
 def test_a_look_without_it_shows_again_what_it_did(bakes, named):
@@ -75,7 +75,7 @@ def test_what_other_surfaces_get_from_it_follows(bakes, named):
 
     found = render_exact(bare, reflected(plain, named), method)
     expected = render_exact(baked, reflected(own, "diffuse"), method)
-    assert relative_rmse(found, expected) < (1e-3 if method == "surface" else 1e-6)
+    assert relative_rmse(found, expected) < (1e-3 if method == "probes" else 1e-6)
     assert relative_rmse(render_exact(bare, reflected(plain, None), method), expected) > 0.1
 
 
@@ -111,7 +111,7 @@ def test_where_there_is_no_place_in_textures_moving_views_project_as_fixed_ones_
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
     box = mesh("box", corners, faces, 0, normals=corners / np.sqrt(3))
     scene = make_tiny_scene(box, camera=corner.cameras[0], materials=corner.materials[:1])
-    moving = open_small_bake(scene, "surface", tmp_path)
+    moving = open_small_bake(scene, "probes", tmp_path)
     found = overridden_textures(moving.stored_scene, moving.positions, (ProbeMapOverrides((named, None)),))
     eyes = np.random.default_rng(2).normal(size=(60, 3)).astype(np.float32)
     directions = -eyes / np.linalg.norm(eyes, axis=1, keepdims=True)
@@ -128,7 +128,7 @@ def test_where_there_is_no_place_in_textures_moving_views_project_as_fixed_ones_
 def test_a_shader_is_sent_the_image_once_it_is_named(bakes, named):
     """The floor's row names a texture whose finest level is the image, after the bake's own."""
     method, (plain, _), (bare, _) = bakes
-    if method != "surface":
+    if method != "probes":
         pytest.skip("fixed views have no shader")
     picture = FreeCameraPicture(bare, "front")
     picture.set_look(painted(plain, None))

@@ -165,7 +165,7 @@ def test_what_it_was_made_of_is_kept_and_checked(shelf, sent):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["direct", "gather", "surface"])
+@pytest.mark.parametrize("method", ["direct", "gather", "probes"])
 def test_pictures_are_those_of_a_scene_that_has_the_map(method, shelf, sent, tmp_path):
     """By every method, with light between surfaces where that has it."""
     files = imported(BASE, metallic=0), imported(BASE, METAL)
@@ -183,5 +183,5 @@ def test_pictures_are_those_of_a_scene_that_has_the_map(method, shelf, sent, tmp
             (own, default_look(own.materials), "own"),
         )
     )
-    assert relative_rmse(found, expected) < (1e-3 if method == "surface" else 1e-5)
+    assert relative_rmse(found, expected) < (1e-3 if method == "probes" else 1e-5)
     assert relative_rmse(without, expected) > 0.1

@@ -230,23 +230,23 @@ def test_truths_show_it(plain, named):
 def test_moving_views_show_it(plain, named, tmp_path):
     """In straight light, and in all."""
     bare, baked = (
-        open_small_bake(s, "surface", tmp_path / str(k)) for k, s in enumerate((plain, with_own(plain, named)))
+        open_small_bake(s, "probes", tmp_path / str(k)) for k, s in enumerate((plain, with_own(plain, named)))
     )
     for show, most in (("direct", 2e-3), ("all", 0.015)):
         light = {"transport": {"show": show}}
         found, expected = (
-            render_exact(transfer, bumpy(plain, name, **light), "surface")
+            render_exact(transfer, bumpy(plain, name, **light), "probes")
             for transfer, name in ((bare, named), (baked, None))
         )
         assert relative_rmse(found, expected) < most
-        assert relative_rmse(render_exact(bare, bumpy(plain, None, **light), "surface"), expected) > 0.3
+        assert relative_rmse(render_exact(bare, bumpy(plain, None, **light), "probes"), expected) > 0.3
 
 
 @pytest.mark.slow
 def test_meshes_without_tangents_get_those_of_imports(named, tmp_path):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     none = replace(scene, meshes=tuple(replace(m, tangents=0 * m.tangents) for m in scene.meshes))
-    moving = open_small_bake(none, "surface", tmp_path)
+    moving = open_small_bake(none, "probes", tmp_path)
     assert len(moving.stored_scene.tangents) == 0
     found = overridden_textures(
         moving.stored_scene, moving.positions, (ProbeMapOverrides(normals=NormalMap(named)), NO_OVERRIDES)

@@ -22,7 +22,7 @@ from relume_worker.status import recipe_from_json, recipe_json
 __all__ = ["unmeasured"]  # a fixture
 
 SIZE = (24, 18)
-GATHERING = ["gather", "surface"]
+GATHERING = ["gather", "probes"]
 
 
 @pytest.fixture(scope="module")
@@ -35,17 +35,17 @@ def corner():
 
 
 def recipe_of(method: str, **asked: int) -> Recipe:
-    return Recipe(method, ("front",), SIZE, 60, num_points=300, **asked)
+    return Recipe(method, ("front",), SIZE, 60, num_probes=300, **asked)
 
 
 @pytest.mark.parametrize("method", GATHERING)
 def test_a_store_has_as_many_as_its_recipe_asks_for(corner, tmp_path: Path, method: str) -> None:
-    recipe = recipe_of(method, gather_samples=200, gather_rays=100)
+    recipe = recipe_of(method, num_patches=200, gather_rays=100)
     path = bake_in_process(METHODS[method], corner, recipe, tmp_path / "s.zarr")
     store = open_store(path)
-    links = "views/0/links" if method == "gather" else "points/links"
+    links = "views/0/gather_hits" if method == "gather" else "probes/gather_hits"
     assert store.shape(links)[1] == 100
-    assert 150 <= store.shape("cells/material")[0] <= 200
+    assert 150 <= store.shape("patches/material")[0] <= 200
     if method == "gather":
         usual = bake_in_process(METHODS[method], corner, recipe_of(method), tmp_path / "t.zarr")
         few, plenty = (open_transfer(of, Cache(1 << 30)) for of in (path, usual))
@@ -55,13 +55,13 @@ def test_a_store_has_as_many_as_its_recipe_asks_for(corner, tmp_path: Path, meth
 
 @pytest.mark.parametrize("method", GATHERING)
 def test_the_plan_counts_what_is_asked_for(corner, method: str) -> None:
-    plan, recipe = METHODS[method].plan, recipe_of(method, gather_samples=1000, gather_rays=100)
+    plan, recipe = METHODS[method].plan, recipe_of(method, num_patches=1000, gather_rays=100)
     usual = plan(corner, recipe)
     more_rays = plan(corner, replace(recipe, gather_rays=1100))
     assert more_rays.num_rays == usual.num_rays + 1000 * usual.num_view_samples
     assert more_rays.store_bytes == usual.store_bytes + 2 * 1000 * usual.num_view_samples
     assert more_rays.peak_bytes > usual.peak_bytes
-    more_samples = plan(corner, replace(recipe, gather_samples=3000))
+    more_samples = plan(corner, replace(recipe, num_patches=3000))
     assert more_samples.num_rays == usual.num_rays + 2000 * 4 * (55 + recipe.num_lights)
     assert more_samples.store_bytes > usual.store_bytes + 2000 * 4 * 2 * 55
     assert more_samples.peak_bytes > usual.peak_bytes
@@ -70,11 +70,11 @@ def test_the_plan_counts_what_is_asked_for(corner, method: str) -> None:
 @pytest.mark.parametrize(
     ("method", "asked", "said"),
     [
-        *((method, {"gather_samples": 63}, "give 64 to") for method in GATHERING),
+        *((method, {"num_patches": 63}, "give 64 to") for method in GATHERING),
         *((method, {"gather_rays": bad}, "give 16 to 4,096") for method in GATHERING for bad in (0, 15, 4097, -1)),
-        ("gather", {"gather_samples": 65_536}, "65,535"),
-        ("surface", {"gather_samples": 32_769}, "32,768"),
-        ("direct", {"gather_samples": 1000}, "leave them out"),
+        ("gather", {"num_patches": 65_536}, "65,535"),
+        ("probes", {"num_patches": 32_769}, "32,768"),
+        ("direct", {"num_patches": 1000}, "leave them out"),
         ("direct", {"gather_rays": 100}, "leave them out"),
     ],
 )
@@ -84,8 +84,8 @@ def test_what_no_store_can_have_is_refused(corner, method: str, asked: dict[str,
 
 
 def test_recipes_are_read_as_they_were_written_and_older_ones_too() -> None:
-    recipe = recipe_of("gather", gather_samples=200, gather_rays=100)
+    recipe = recipe_of("gather", num_patches=200, gather_rays=100)
     assert recipe_from_json(recipe_json(recipe)) == recipe
-    text = recipe_json(recipe_of("gather")).replace('"gather_rays":null,"gather_samples":null,', "")
+    text = recipe_json(recipe_of("gather")).replace('"gather_rays":null,', "").replace('"num_patches":null,', "")
     assert "gather_rays" not in text
     assert recipe_from_json(text) == recipe_of("gather")

@@ -80,10 +80,10 @@ def test_fixed_views_take_a_third_of_their_plan_at_least_and_never_more(make, re
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [glasses, lambda: cornell_box("sky")], ids=["glass", "box"])
 def test_so_do_points_of_the_free_camera(make, tmp_path, unmeasured):
-    scene, recipe = make(), Recipe("surface", ("front",), (64, 48), 300, num_points=30_000)
+    scene, recipe = make(), Recipe("probes", ("front",), (64, 48), 300, num_probes=30_000)
     plan, taken = (
         planned(scene, recipe),
-        folder_bytes(bake_in_process(METHODS["surface"], scene, recipe, tmp_path / "s")),
+        folder_bytes(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "s")),
     )
     assert taken <= plan.planned_bytes <= 3 * taken
 

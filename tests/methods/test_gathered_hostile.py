@@ -40,7 +40,7 @@ def test_a_closed_room_is_black(tmp_path):
 @pytest.mark.parametrize("size", [(16, 16), (16, 40)])
 def test_a_single_triangle_reflects_nothing_onto_itself(tmp_path, size):
     transfer = transfer_of(make_tiny_scene(TRIANGLE, camera=FRONT), tmp_path, size)
-    assert transfer.store.shape("cells/material") == (0,)
+    assert transfer.store.shape("patches/material") == (0,)
     alone = render_image(transfer, "front", validate({"transport": {"show": "direct"}}, transfer.default_look))
     np.testing.assert_array_equal(picture_of(transfer), alone)
 

@@ -45,7 +45,7 @@ def scene():
 
 
 def opened(scene, method, folder):
-    recipe = Recipe(method, ("front",), (48, 36), 500, num_points=2000)
+    recipe = Recipe(method, ("front",), (48, 36), 500, num_probes=2000)
     return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
@@ -80,7 +80,7 @@ def test_pictures_agree_with_brute_force(scene, method, tmp_path):
 
 
 def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
-    found = opened(scene, "surface", tmp_path)
+    found = opened(scene, "probes", tmp_path)
     holes = found.embree.alpha_test
     assert holes is not None
     np.testing.assert_array_equal(holes.image >= 0, found.stored_scene.face_material == 1)
@@ -93,7 +93,7 @@ def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
 def test_bakes_of_whole_surfaces_hold_nothing_of_holes(scene, tmp_path):
     whole = [Material(material.name, material.terms) for material in scene.materials]
     without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
-    found = opened(without, "surface", tmp_path)
+    found = opened(without, "probes", tmp_path)
     assert found.embree.alpha_test is None
     assert not constants(found)["has_holes"]
-    assert not (tmp_path / "surface.zarr" / "cutouts").exists()
+    assert not (tmp_path / "probes.zarr" / "alpha_masks").exists()

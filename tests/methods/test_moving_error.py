@@ -17,8 +17,8 @@ SIZE = (80, 60)
 
 
 def baked(scene, folder, num_points):
-    recipe = Recipe("surface", ("front",), SIZE, 100, num_points=num_points)
-    return open_bake(bake_in_process(METHODS["surface"], scene, recipe, folder / f"{num_points}.zarr"), Cache(1 << 30))
+    recipe = Recipe("probes", ("front",), SIZE, 100, num_probes=num_points)
+    return open_bake(bake_in_process(METHODS["probes"], scene, recipe, folder / f"{num_points}.zarr"), Cache(1 << 30))
 
 
 def off_in_a_whole_picture(transfer, scene):

@@ -55,7 +55,7 @@ def scene(environment, terms=(LAMBERT,)):
 
 
 def opened(of, method, folder, num_points=2000):
-    recipe = Recipe(method, ("front",), SIZE, 200, num_points=num_points)
+    recipe = Recipe(method, ("front",), SIZE, 200, num_probes=num_points)
     return open_bake(bake_in_process(METHODS[method], of, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
@@ -81,7 +81,7 @@ def error(found, expected):
 
 @pytest.fixture(scope="module")
 def sunlit(tmp_path_factory):
-    return opened(scene(hard_sky()), "surface", tmp_path_factory.mktemp("beams"))
+    return opened(scene(hard_sky()), "probes", tmp_path_factory.mktemp("beams"))
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,7 @@ def test_shares_are_those_of_all_shadow_rays(sunlit):
 @pytest.mark.parametrize("terms", [(LAMBERT,), (LAMBERT, GLOSSY)], ids=["diffuse", "glossy"])
 def test_a_hard_sun_casts_the_shadows_of_a_fixed_view(terms, tmp_path):
     of = scene(hard_sky(), terms)
-    fixed, bake = (opened(of, method, tmp_path) for method in ("direct", "surface"))
+    fixed, bake = (opened(of, method, tmp_path) for method in ("direct", "probes"))
     expected = render_image(fixed, "front", look_of(fixed))
     by_pixels = error(picture_of(bake, look_of(bake)).image(), expected)
     by_points = error(picture_of(bake, look_of(bake), draws=False).image(), expected)

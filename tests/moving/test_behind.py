@@ -37,9 +37,9 @@ def fixed(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    recipe = Recipe("surface", ("front",), SIZE, 400, num_points=20000)
+    recipe = Recipe("probes", ("front",), SIZE, 400, num_probes=20000)
     store = bake_in_process(
-        METHODS["surface"], ball_scene(studio()), recipe, tmp_path_factory.mktemp("moving") / "s.zarr"
+        METHODS["probes"], ball_scene(studio()), recipe, tmp_path_factory.mktemp("moving") / "s.zarr"
     )
     return open_bake(store, Cache(1 << 30))
 

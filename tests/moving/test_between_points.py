@@ -54,7 +54,7 @@ def ball(terms):
 
 
 def opened(scene, method, folder, num_points=400):
-    recipe = Recipe(method, ("front",), (64, 48), 2000, num_points=num_points)
+    recipe = Recipe(method, ("front",), (64, 48), 2000, num_probes=num_points)
     return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
@@ -66,7 +66,7 @@ def picture_of(bake):
 def shiny_ball(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ball")
     scene = ball((GLOSSY,))
-    return opened(scene, "surface", folder), picture_of(opened(scene, "direct", folder))
+    return opened(scene, "probes", folder), picture_of(opened(scene, "direct", folder))
 
 
 def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball, monkeypatch):
@@ -295,10 +295,10 @@ def test_a_surface_takes_from_its_own_points_and_not_from_what_lies_beside_it():
     is_open = visible_sides(geometry, scene.cameras, 1)
     found = place_probes(geometry, is_open, density_from_distance(geometry, eyes, make_corner_grid(is_open)), 1500)
     vertices, points = found.lattice_nodes, found.probes
-    of_ball = found.material[vertices.point[:, 0]] == 0
-    place = np.einsum("vk,vkc->vc", vertices.weight, points.position[vertices.point])
+    of_ball = found.material[vertices.probe[:, 0]] == 0
+    place = np.einsum("vk,vkc->vc", vertices.weight, points.position[vertices.probe])
     for vertex in np.flatnonzero(of_ball):
-        taken = points.position[vertices.point[vertex][vertices.weight[vertex] > 0], 0]
+        taken = points.position[vertices.probe[vertex][vertices.weight[vertex] > 0], 0]
         assert len(np.unique(taken > 0.051)) == 1, place[vertex]
 
 

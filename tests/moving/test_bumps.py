@@ -35,7 +35,7 @@ def floor(terms, normal_map):
 
 
 def picture_of(scene, method, folder):
-    recipe = Recipe(method, ("front",), SIZE, 1000, num_points=2000)
+    recipe = Recipe(method, ("front",), SIZE, 1000, num_probes=2000)
     opened = open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
     return render_image(opened, "front", validate(complete({}, opened.default_look), opened.default_look))
 
@@ -53,8 +53,8 @@ def test_slopes_are_lit_as_in_fixed_views(terms, at_most, tmp_path):
     """And not as flat ones are: what the map does to the picture is several times what is left."""
     bumpy, flat = floor(terms, waves()), floor(terms, None)
     expected = picture_of(bumpy, "direct", tmp_path)
-    found = error(picture_of(bumpy, "surface", tmp_path), expected)
-    ignored = error(picture_of(flat, "surface", tmp_path / "flat"), expected)
+    found = error(picture_of(bumpy, "probes", tmp_path), expected)
+    ignored = error(picture_of(flat, "probes", tmp_path / "flat"), expected)
     assert found < at_most
     assert ignored > 4 * found
 
@@ -70,9 +70,9 @@ def test_light_of_a_few_directions_comes_from_their_mean(tmp_path):
 
 def test_points_are_told_where_light_comes_from_as_in_numpy(tmp_path):
     scene = floor(LAMBERT, waves())
-    recipe = Recipe("surface", ("front",), (16, 12), 60, num_points=500)
+    recipe = Recipe("probes", ("front",), (16, 12), 60, num_probes=500)
     surface = open_bake(
-        bake_in_process(METHODS["surface"], scene, recipe, tmp_path / "s.zarr"), Cache(1 << 30)
+        bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "s.zarr"), Cache(1 << 30)
     ).stored_scene
     num = surface.probes.num_points
     vectors = np.random.default_rng(1).normal(size=(num, 3, NUM_FUNCTIONS)).astype(np.float32)
@@ -83,6 +83,6 @@ def test_points_are_told_where_light_comes_from_as_in_numpy(tmp_path):
 
 
 def test_scenes_without_normal_maps_keep_no_tangents(tmp_path):
-    recipe = Recipe("surface", ("front",), (16, 12), 60, num_points=500)
-    store = bake_in_process(METHODS["surface"], floor(LAMBERT, None), recipe, tmp_path / "s.zarr")
+    recipe = Recipe("probes", ("front",), (16, 12), 60, num_probes=500)
+    store = bake_in_process(METHODS["probes"], floor(LAMBERT, None), recipe, tmp_path / "s.zarr")
     assert open_bake(store, Cache(1 << 30)).stored_scene.tangents.shape == (0, 4)

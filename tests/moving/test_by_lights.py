@@ -28,8 +28,8 @@ def surface(tmp_path_factory):
     material = Material("Ball", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
     ball = sphere("ball", [0, 0, 0], 1, 0, 24)
     scene = make_tiny_scene(ball, camera=CAMERA, environment=studio(64, 20.0), materials=[material])
-    store = tmp_path_factory.mktemp("ball") / "surface.zarr"
-    bake_in_process(METHODS["surface"], scene, Recipe("surface", ("front",), (32, 24), 500, num_points=300), store)
+    store = tmp_path_factory.mktemp("ball") / "probes.zarr"
+    bake_in_process(METHODS["probes"], scene, Recipe("probes", ("front",), (32, 24), 500, num_probes=300), store)
     return open_bake(store, Cache(1 << 30)).stored_scene
 
 

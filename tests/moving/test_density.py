@@ -48,7 +48,7 @@ def test_far_from_the_eye_points_are_farther_apart(scene):
     geometry, _, placed = first_placed(scene)
     eye, steps = np.array([0.0, 0.5, 2.0]), enumerate_nodes(placed.probe_grid.num_rows)
     power = density_from_distance(geometry, eye[None], placed.probe_grid).power
-    where = placed.probes.position[placed.lattice_nodes.point[placed.probe_grid.node, 0]]
+    where = placed.probes.position[placed.lattice_nodes.probe[placed.probe_grid.node_index, 0]]
     distance = np.linalg.norm(where - eye, axis=1)
     is_floor = geometry.face_material[steps.grid // 2] == 0
     assert power[is_floor][distance[is_floor].argmax()] == 3 + power[is_floor][distance[is_floor].argmin()]
@@ -92,7 +92,7 @@ def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
     a, b, c = geometry.positions[geometry.faces[steps.grid // 2]].transpose(1, 0, 2)
     u, v = (steps.i / steps.rows)[:, None], (steps.j / steps.rows)[:, None]
     where = ((1 - u - v) * a + u * b + v * c)[is_floor]
-    of_nodes = vertices.point[lattice.node], vertices.weight[lattice.node]
+    of_nodes = vertices.probe[lattice.node_index], vertices.weight[lattice.node_index]
     found = np.einsum("npc,np->nc", placed.probes.position[of_nodes[0]], of_nodes[1])[is_floor]
     off = np.linalg.norm((found - where)[:, [0, 2]], axis=1) / placed.spacing
     assert len(where) > 2 * len(placed.probes.position)
@@ -103,15 +103,15 @@ def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
 
 def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
     def shown(method, name):
-        recipe = Recipe(method, ("front",), (64, 48), 300, num_points=1500)
+        recipe = Recipe(method, ("front",), (64, 48), 300, num_probes=1500)
         bake = open_bake(bake_in_process(METHODS[method], scene, recipe, tmp_path / f"{name}.zarr"), Cache(1 << 30))
-        look = validate({"transport": {"bounces": 0}} if method == "surface" else {}, bake.default_look)
+        look = validate({"transport": {"bounces": 0}} if method == "probes" else {}, bake.default_look)
         return render_image(bake, "front", look)[..., :3]
 
-    truth, now = shown("direct", "truth"), shown("surface", "now")
+    truth, now = shown("direct", "truth"), shown("probes", "now")
     alike = lambda geometry, placed, eyes, lights: density_from_distance(geometry, eyes, placed.probe_grid)  # noqa: E731
     monkeypatch.setattr("relume.methods.probes.density_from_shadows", alike)
-    assert relative_rmse(now, truth) < 0.7 * relative_rmse(shown("surface", "before"), truth)
+    assert relative_rmse(now, truth) < 0.7 * relative_rmse(shown("probes", "before"), truth)
 
 
 def test_where_nothing_is_in_the_way_distance_counts_alone():

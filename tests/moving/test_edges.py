@@ -29,9 +29,9 @@ def opened(tmp_path_factory):
     scene = make_tiny_scene(
         sphere("ball", (0, 0.5, 0), 0.5, 0, num_rings=24), wall, camera=CAMERA, materials=[black, white]
     )
-    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=1500)
+    recipe = Recipe("probes", ("front",), SIZE, 60, num_probes=1500)
     folder = tmp_path_factory.mktemp("edges")
-    return open_bake(bake_in_process(METHODS["surface"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
+    return open_bake(bake_in_process(METHODS["probes"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
 
 
 def picture(opened, scale):

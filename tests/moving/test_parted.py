@@ -34,9 +34,9 @@ def scene():
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    recipe = Recipe("surface", ("front",), SIZE, 100, num_points=500)
+    recipe = Recipe("probes", ("front",), SIZE, 100, num_probes=500)
     return open_bake(
-        bake_in_process(METHODS["surface"], scene(), recipe, tmp_path_factory.mktemp("parted") / "s.zarr"),
+        bake_in_process(METHODS["probes"], scene(), recipe, tmp_path_factory.mktemp("parted") / "s.zarr"),
         Cache(1 << 30),
     )
 
@@ -52,7 +52,7 @@ def test_pixels_beside_a_box_do_without_what_lies_under_it(moving):
     before = seen.weight.copy()
     reweight(seen, moving.has_occluded_neighbor, moving.occlusion_mesh)
     surface = moving.stored_scene
-    place = surface.probes.position[surface.lattice_nodes.point[:, 0]]
+    place = surface.probes.position[surface.lattice_nodes.probe[:, 0]]
     on_floor = (seen.hits.face >= 0) & (surface.face_material[seen.hits.face] == 0)
     under = np.stack([is_inside(place[seen.lattice_node[:, k]]) for k in range(3)], axis=1)
     is_mixed = on_floor & under.any(axis=1) & ~under.all(axis=1)
@@ -87,6 +87,6 @@ def test_faces_that_meet_do_not_part_each_other(tmp_path):
     walls = mesh("walls", corners, [[0, 1, 2], [0, 2, 3], [4, 0, 3], [4, 3, 5]], 0)
     floor = quad("floor", [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]], 0)
     of = make_tiny_scene(walls, floor, camera=make_camera("front", [3, 2, 4], [0, 0.5, 0], 0.6))
-    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=800)
-    found = open_bake(bake_in_process(METHODS["surface"], of, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
+    recipe = Recipe("probes", ("front",), SIZE, 60, num_probes=800)
+    found = open_bake(bake_in_process(METHODS["probes"], of, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
     assert not found.has_occluded_neighbor.any()

@@ -55,9 +55,9 @@ def shiny(tmp_path_factory):
     sky[12, ::8] = 60
     ball = sphere("ball", (0, 0.5, 0), 0.5, 0, num_rings=24)
     scene = make_tiny_scene(ball, camera=CAMERA, environment=sky, materials=[Material("B", (term,))])
-    recipe = Recipe("surface", ("front",), SIZE, 60, num_points=1500)
+    recipe = Recipe("probes", ("front",), SIZE, 60, num_probes=1500)
     folder = tmp_path_factory.mktemp("rims")
-    return open_bake(bake_in_process(METHODS["surface"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
+    return open_bake(bake_in_process(METHODS["probes"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
 
 
 def shown(opened, scale):

@@ -33,8 +33,8 @@ TOLD = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells 
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    recipe = Recipe("surface", ("front",), (48, 36), 60, num_points=1000)
-    store = bake_in_process(METHODS["surface"], still_life(), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
+    recipe = Recipe("probes", ("front",), (48, 36), 60, num_probes=1000)
+    store = bake_in_process(METHODS["probes"], still_life(), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
     return open_bake(store, Cache(1 << 30))
 
 
@@ -72,8 +72,8 @@ def test_what_vertices_take_is_from_about_them():
         a, b, c = geometry.positions[geometry.faces[face]]
         for i, j in ((0, 0), (rows, 0), (0, rows), (rows // 2, rows // 3 if rows > 2 else 0)):
             place = a + (b - a) * (i / rows) + (c - a) * (j / rows)
-            vertex = lattice.node[first + node_index(rows, i, j)]
-            taken = vertices.weight[vertex] @ points.position[vertices.point[vertex]]
+            vertex = lattice.node_index[first + node_index(rows, i, j)]
+            taken = vertices.weight[vertex] @ points.position[vertices.probe[vertex]]
             assert np.linalg.norm(taken - place) < 2 * found.spacing
             outward = np.cross(b - a, c - a) * (1 if side == 0 else -1)
             assert vertices.normal[vertex] @ outward > 0
@@ -88,12 +88,12 @@ def test_a_smooth_field_is_smooth_between_points():
     _, found = placed(scene, 600)
     slope = np.array([0.3, 0.5, -0.2], np.float32)
     field = 1 + found.probes.position @ slope
-    shown = np.einsum("vk,vk->v", found.lattice_nodes.weight, field[found.lattice_nodes.point])
+    shown = np.einsum("vk,vk->v", found.lattice_nodes.weight, field[found.lattice_nodes.probe])
     over_a_spacing = float(np.linalg.norm(slope)) * found.spacing
     assert len(shown) > 4 * 600
     assert np.abs(shown - 1 - found.lattice_nodes.normal @ slope).max() < 1.5 * over_a_spacing
     # between corners of a face
-    assert np.ptp(shown[found.probe_grid.node.reshape(-1, 3)], axis=1).max() < over_a_spacing
+    assert np.ptp(shown[found.probe_grid.node_index.reshape(-1, 3)], axis=1).max() < over_a_spacing
 
 
 def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside():
@@ -127,7 +127,7 @@ def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
     assert np.median(apart) < 0.03
     vertices = moving.stored_scene.lattice_nodes
     assert set(np.flatnonzero(seen.is_visible)) == set(seen.lattice_node[hit].ravel())
-    taken = vertices.point[seen.is_visible > 0][vertices.weight[seen.is_visible > 0] > 0]
+    taken = vertices.probe[seen.is_visible > 0][vertices.weight[seen.is_visible > 0] > 0]
     assert set(np.flatnonzero(seen.is_needed)) == set(taken)
 
 

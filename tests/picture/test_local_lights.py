@@ -173,7 +173,7 @@ def test_cells_reflect_local_light(tmp_path):
     on_cells = LocalPatchLight(transfer.local, cells, transfer.cache, transfer.key, ())
     arriving = on_cells.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
     on_floor = cells.material == 0
-    position = transfer.store.read("cells/position").mean(axis=1)[on_floor]
+    position = transfer.store.read("patches/position").mean(axis=1)[on_floor]
     away = np.linalg.norm(position - [0, 0.9, 0], axis=1)
     cosine = 0.9 / away
     falloff = np.clip((cosine - np.cos(np.radians(40))) / (np.cos(np.radians(10)) - np.cos(np.radians(40))), 0, 1)

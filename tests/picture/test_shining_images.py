@@ -93,8 +93,8 @@ def test_picture_is_what_the_twin_gives(transfer, pictures) -> None:
 
 
 def test_a_moving_eye_sees_the_image(scene, tmp_path, pictures) -> None:
-    recipe = Recipe("surface", ("front",), SIZE, 400, num_points=2000)
-    moving = open_bake(bake_in_process(METHODS["surface"], scene, recipe, tmp_path / "surface.zarr"), Cache(1 << 30))
+    recipe = Recipe("probes", ("front",), SIZE, 400, num_probes=2000)
+    moving = open_bake(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "probes.zarr"), Cache(1 << 30))
     found, (_, truth, ids) = render_image(moving, "front", make_look(moving)), pictures
     inner = (ids == 1) & np.roll(ids == 1, 1, 0) & np.roll(ids == 1, -1, 0) & np.roll(ids == 1, 1, 1)
     inner &= np.roll(ids == 1, -1, 1)

@@ -52,6 +52,6 @@ def test_nothing_is_kept_of_it_beside_the_store(baked):
 def test_arrays_of_other_views_and_of_no_view_stay(transfer):
     store = DownsampledStore(transfer.store, 1, 4)
     np.testing.assert_array_equal(store.read("views/0/pixel", 5, 9), transfer.store.read("views/0/pixel", 5, 9))
-    assert store.shape("lights/power") == transfer.store.shape("lights/power")
+    assert store.shape("lights/irradiance") == transfer.store.shape("lights/irradiance")
     assert store.shape("views/1/visibility")[0] == len(store.read("views/1/visibility"))
     assert store.read("views/1/pixel").max() < 16 * 12

@@ -56,14 +56,14 @@ def settings(tmp_path: Path, ack_seconds: float, empty_ledger: Path) -> Settings
         max_body_bytes=2 * 1024**2,
         max_upload_bytes=4 * 1024**2,
         max_sessions=3,
-        importer_at_start=False,
+        preload_importer=False,
         ack_seconds=ack_seconds,
     )
 
 
 def open_fake_bakes(settings: Settings) -> BakeService:
     return BakeService(
-        settings.data, settings.database_url, methods={"direct": FakeMethod()}, client_weights=settings.turns
+        settings.data, settings.database_url, methods={"direct": FakeMethod()}, client_weights=settings.fair_shares
     )
 
 

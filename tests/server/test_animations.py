@@ -154,7 +154,7 @@ def test_a_fixed_view_follows_looks_but_no_path(
         json={"bake": fixed["id"], "view": name, "looks": [{}], "format": "png", "path": {"turntable": 3}},
     )
     assert refused.status_code == 422
-    assert "surface" in refused.json()["detail"]
+    assert "probes" in refused.json()["detail"]
     looks = [of(material, [0.8, 0.4, 0.0]), of(material, [0.0, 0.4, 0.8])]
     found = frames_of(client, {"bake": fixed["id"], "view": name, "looks": looks, "frames": 3}, tmp_path)
     np.testing.assert_allclose(found[1], (found[0] + found[2]) / 2, rtol=2e-3, atol=2e-3)

@@ -233,7 +233,7 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
             return queue.submit(RenderRequest.model_validate(asked), client)
 
         last = [submit("a", "ann"), submit("A", "ann")][-1]
-        with pytest.raises(QuotaError, match=r"of yours .*RELUME_MAX_QUEUED_EACH"):
+        with pytest.raises(QuotaError, match=r"of yours .*RELUME_MAX_QUEUED_PER_USER"):
             submit("x", "ann")
         submit("b", "bob")
         with pytest.raises(BusyError, match=r"renders wait or run as may, 3; .*RELUME_MAX_QUEUED\)"):

@@ -201,7 +201,7 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        FakeTransfer, "__init__", _baked_by("surface", FakeTransfer.__init__, camera_mode=CameraMode.FREE)
+        FakeTransfer, "__init__", _baked_by("probes", FakeTransfer.__init__, camera_mode=CameraMode.FREE)
     )
     control.trace_gate.set()
     to_world = np.array([[0, 0, 1, 4], [0, 1, 0, 2], [-1, 0, 0, 3], [0, 0, 0, 1]], float)

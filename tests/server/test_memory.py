@@ -84,15 +84,15 @@ def look_at(client: TestClient, bake: str) -> bytes:
 
 
 def gauges(client: TestClient) -> dict[str, float]:
-    """Every sample of /metrics by its name, and by its holder where it has one."""
+    """Every sample of /metrics by its name, and by its component where it has one."""
     families = text_string_to_metric_families(client.get("/metrics").text)
-    return {s.labels.get("holder", s.name): s.value for family in families for s in family.samples}
+    return {s.labels.get("component", s.name): s.value for family in families for s in family.samples}
 
 
 def held(client: TestClient) -> dict[tuple[str, str], float]:
     """What is in the memory, by kind and bake."""
     families = text_string_to_metric_families(client.get("/metrics").text)
-    samples = [sample for family in families for sample in family.samples if sample.name == "relume_memory_bytes"]
+    samples = [sample for family in families for sample in family.samples if sample.name == "relume_cache_bytes"]
     return {(s.labels["kind"], s.labels["bake"]): s.value for s in samples}
 
 
@@ -103,7 +103,7 @@ def test_metrics_tell_who_holds_what(real: TestClient) -> None:
     found = held(real)
     assert {(kind, bake) for kind in ("linear operator", "shaded term") for bake in bakes} <= set(found)
     assert all(num_bytes > 0 for num_bytes in found.values())
-    assert sum(found.values()) == gauges(real)["frozen_cache"]
+    assert sum(found.values()) == gauges(real)["cache"]
 
 
 def test_a_thumbnail_of_other_code_is_painted_again(
@@ -128,7 +128,7 @@ def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -
     before = gauges(real)
     assert kept
     assert before["open_bakes"] > 0
-    assert before["frozen_cache"] == before["relume_frozen_cache_bytes"] > FLOOR_BYTES
+    assert before["cache"] == before["relume_frozen_cache_bytes"] > FLOOR_BYTES
     assert before["process_resident_memory_bytes"] > before["open_bakes"]
 
     clock.now += IDLE_S + 1
@@ -137,7 +137,7 @@ def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -
     assert [ref() for ref in kept] == [None] * len(kept)
     after = gauges(real)
     assert after["open_bakes"] == 0
-    assert 0 < after["frozen_cache"] <= FLOOR_BYTES
+    assert 0 < after["cache"] <= FLOOR_BYTES
 
     assert [look_at(real, bake) for bake in bakes] == pictures
 
@@ -153,7 +153,7 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
         clock.now += 100 * IDLE_S
         go_round(real)
         assert real.app.state.services.transfers.open_bakes == [transfer]
-        assert gauges(real)["frozen_cache"] > FLOOR_BYTES
+        assert gauges(real)["cache"] > FLOOR_BYTES
         session.edit(2, "/materials/Ball/terms/1/params/sigma", 0.25)
         session.exact(2)
     clock.now += IDLE_S - 1

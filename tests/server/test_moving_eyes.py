@@ -38,17 +38,17 @@ def scene(client: TestClient) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def bake(client: TestClient, scene: dict[str, Any]) -> str:
-    request = {"scene": scene["id"], "method": "surface", "size": SIZE, "lights": 100, "points": 2000}
+    request = {"scene": scene["id"], "method": "probes", "size": SIZE, "lights": 100, "points": 2000}
     done = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     assert done["state"] == "ready", done["problem"]
     assert done["recipe"]["points"] == 2000
     return str(done["id"])
 
 
-@pytest.mark.parametrize("method", ["gather", "surface"])
+@pytest.mark.parametrize("method", ["gather", "probes"])
 def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dict[str, Any], method: str) -> None:
     request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "dry_run": True}
-    request |= {"points": 500} if method == "surface" else {}
+    request |= {"points": 500} if method == "probes" else {}
     usual, asked = (
         client.post("/api/bakes", json=request | more).json()
         for more in ({}, {"gather_samples": 4000, "gather_rays": 1000})
@@ -75,7 +75,7 @@ def test_points_are_refused_where_no_eye_moves(client: TestClient, scene: dict[s
     assert client.post("/api/bakes", json=request | {"points": recipe["points"]}).json()["recipe"] == recipe
     refused = client.post("/api/bakes", json=request | {"points": 777})
     assert (refused.status_code, refused.json()["type"]) == (422, "urn:relume:problem:plan")
-    assert f"777 points were asked for; method {method} has none" in refused.json()["detail"]
+    assert f"777 probes were asked for; method {method} has none" in refused.json()["detail"]
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def of_eye(session: Session, number: int) -> Frame:
 def test_hello_says_that_the_eye_is_free_and_where_there_is_something(session: Session) -> None:
     found = hello(session)
     (view,) = found["views"]
-    assert (view["eye"], found["method"], "eye" in found["axes"]) == ("free", "surface", True)
+    assert (view["eye"], found["method"], "eye" in found["axes"]) == ("free", "probes", True)
     lowest, highest = np.array(view["bounds"])
     np.testing.assert_allclose([lowest, highest], [[-1] * 3, [1] * 3], atol=0.05)
     assert 0 < found["moving_error"]["standard_error"] < found["moving_error"]["value"] < 0.5
@@ -253,7 +253,7 @@ def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
         (view,) = hello(session)["views"]
         assert (view["eye"], view["bounds"]) == ("baked", None)
         session.send_message(**eye(view, 1, 0.2))
-        assert "surface" in session.text("problem")["problem"]["detail"]
+        assert "probes" in session.text("problem")["problem"]["detail"]
     answer = client.get(f"/api/bakes/{bake}/views/{view['name']}/materials.png")
     assert answer.status_code == 404
     assert "probe" in answer.json()["detail"]
@@ -262,7 +262,7 @@ def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
 def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClient) -> None:
     file = trimesh.Scene(trimesh.creation.icosphere(subdivisions=2)).export(file_type="glb")
     scene = client.post("/api/scenes", files={"scene": ("gone.glb", file)}).json()["id"]
-    request = {"scene": scene, "method": "surface", "size": SIZE, "lights": 50, "points": 500}
+    request = {"scene": scene, "method": "probes", "size": SIZE, "lights": 50, "points": 500}
     made = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     with open_session(client, made["id"]) as session:
         (view,) = hello(session)["views"]

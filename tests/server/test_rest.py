@@ -161,7 +161,7 @@ def test_a_finished_bake_cannot_be_cancelled_and_is_forgotten_where_that_is_said
 def test_a_disk_that_is_nearly_full_takes_nothing_new_and_lets_go(
     client: TestClient, settings: Settings, baked: Baked
 ) -> None:
-    settings.least_free_bytes = 1 << 60
+    settings.min_free_bytes = 1 << 60
     bake = {"scene": baked.scene, "size": [24, 16], "lights": 11}
     image = {"files": {"image": ("a.png", b"")}}
     for refused in (

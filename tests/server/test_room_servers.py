@@ -32,7 +32,7 @@ def _no_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def settings(settings: Settings) -> Settings:
-    settings.away_seconds, settings.drain_seconds = 0.05, 0.2
+    settings.reconnect_seconds, settings.drain_seconds = 0.05, 0.2
     return settings
 
 

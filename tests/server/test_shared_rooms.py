@@ -23,7 +23,7 @@ EXTINCTION = "/materials/Paper/terms/1/params/extinction"
 
 @pytest.fixture
 def settings(settings: Settings) -> Settings:
-    settings.max_sessions, settings.max_people, settings.max_rooms, settings.away_seconds = 8, 3, 2, 0.05
+    settings.max_sessions, settings.max_people, settings.max_rooms, settings.reconnect_seconds = 8, 3, 2, 0.05
     return settings
 
 
@@ -188,7 +188,7 @@ def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) ->
 class TestComingBack:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
-        settings.away_seconds, settings.max_people = 60.0, 2
+        settings.reconnect_seconds, settings.max_people = 60.0, 2
         return settings
 
     def test_a_place_is_kept_and_the_room_with_it(self, client: TestClient, baked: Baked) -> None:

@@ -82,16 +82,16 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
     told = about(root)
     assert told["relume.session"] == hello["session"]
     assert (told["relume.request"], told["relume.bake"]) == ("r-1", baked.bake)
-    assert (told["relume.revision"], told["relume.view"], told["relume.hand"]) == (1, "front", SIGMA)
+    assert (told["relume.revision"], told["relume.view"], told["relume.active_control"]) == (1, "front", SIGMA)
     assert told["relume.frame"] <= frame.header["frame"]
     parts = [span for span in spans if span.parent_span_id == root.span_id]
-    assert [part.name for part in parts] == [f"edit.{name}" for name in ("take", "wait", "update", "encode", "send")]
+    assert [part.name for part in parts] == [f"edit.{name}" for name in ("apply", "wait", "update", "encode", "send")]
     times = [time for part in parts for time in (part.start_time_unix_nano, part.end_time_unix_nano)]
     assert all(early <= late for early, late in pairwise(times))
     assert (times[0], times[-1]) == (root.start_time_unix_nano, root.end_time_unix_nano)
     (refused,) = (span for span in spans if span.name == "edit" and span.status.code)
     assert "old revision" in refused.status.message
-    assert {about(span)["relume.what"] for span in spans if span.name == "freeze"} == {status["what"]}
+    assert {about(span)["relume.label"] for span in spans if span.name == "freeze"} == {status["what"]}
 
 
 def test_a_collector_that_is_away_is_said_once_and_that_it_is_back(

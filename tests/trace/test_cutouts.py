@@ -147,9 +147,9 @@ def test_scenes_without_holes_pay_nothing():
         {"images": np.zeros((0, 5), np.int64)},
         {"rules": np.zeros((2, 6), np.float32)},
         {"rules": np.zeros((1, 6), np.float64)},
-        {"of_material": np.array([-1, 1], np.int32)},
-        {"of_material": np.array([-2, 0], np.int32)},
-        {"of_material": np.array([0], np.int32)},
+        {"material_rule": np.array([-1, 1], np.int32)},
+        {"material_rule": np.array([-2, 0], np.int32)},
+        {"material_rule": np.array([0], np.int32)},
         {"texels": np.zeros(34, np.uint8)},
     ],
 )

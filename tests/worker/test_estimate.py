@@ -68,7 +68,7 @@ def test_crowding_is_at_least_one_thread_a_core(monkeypatch):
 
 
 def test_triangles_take_their_time():
-    few, many = (METHODS["surface"].plan(ball(n), Recipe("surface", ("front",), (64, 48), 60)) for n in (4, 64))
+    few, many = (METHODS["probes"].plan(ball(n), Recipe("probes", ("front",), (64, 48), 60)) for n in (4, 64))
     assert few.num_rays == many.num_rays
     assert estimate_seconds(many, [CompletedBake(few, 60.0)], 1) > 60.0
 
@@ -82,7 +82,7 @@ def ball(fineness):
 
 def test_bakes_of_other_methods_judge_by_what_a_ray_takes_in_each():
     recipe = Recipe("direct", ("front",), (640, 480), 500)
-    direct, surface = (METHODS[name].plan(ball(4), replace(recipe, method=name)) for name in ("direct", "surface"))
+    direct, surface = (METHODS[name].plan(ball(4), replace(recipe, method=name)) for name in ("direct", "probes"))
     found = estimate_seconds(surface, [CompletedBake(direct, 5.0)], 1)
     assert found == pytest.approx(5.0 * surface.work_s / direct.work_s)
     assert found > 5 * 5.0 * surface.num_rays / direct.num_rays

@@ -174,7 +174,7 @@ def test_what_adds_is_made_at_start_and_what_does_not_waits_for_a_word(
     another.write('op.add_column("looks", sa.Column("note", sa.Text()))', True)
     open_database(ledger_url).dispose()
     another.write('op.drop_column("looks", "note")', False)
-    with pytest.raises(LedgerVersionError, match="run: relume backup FOLDER, then: relume ledger upgrade"):
+    with pytest.raises(LedgerVersionError, match="run: relume backup FOLDER, then: relume db upgrade"):
         open_database(ledger_url)
     engine = connect(ledger_url)
     assert "note" in {column["name"] for column in inspect(engine).get_columns("looks")}

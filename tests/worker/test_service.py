@@ -420,7 +420,7 @@ def test_a_bake_that_is_deleted_in_the_middle_of_a_task_is_no_defect(
     def run_deleted(job: Job, task: Task) -> TaskCost:
         delete_bakes(service.data_dir, service.ledger, [job.bake_id])
         met.set()
-        raise KeyError("lights/power")  # as zarr says of an array whose folder is gone
+        raise KeyError("lights/irradiance")  # as zarr says of an array whose folder is gone
 
     monkeypatch.setattr("relume_worker.runner.run_task", run_deleted)
     with open_service(tmp_path) as service:

@@ -75,7 +75,7 @@ def test_a_bake_of_other_code_stays_usable_and_says_so(tmp_path: Path, running: 
             (NEW, True),
         ]
         assert service.get(new).rank > service.get(old).rank
-        moving = replace(service.get(new), recipe=replace(RECIPE, method="surface", size=(4096, 4096)))
+        moving = replace(service.get(new), recipe=replace(RECIPE, method="probes", size=(4096, 4096)))
         assert moving.rank < service.get(old).rank  # however fine, it never becomes exact
         assert service.get(old).state == "ready"
         assert open_store(service.store_path(old)).attributes["code"] == OLD

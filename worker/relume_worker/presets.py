@@ -34,12 +34,12 @@ PRESETS: dict[PresetName, Preset] = {
 }
 
 
-def resolve_num_points(method: str, requested: int | None) -> int:
-    """The `num_points` of a recipe; as many as usual where no number is asked for.
+def resolve_num_probes(method: str, requested: int | None) -> int:
+    """The `num_probes` of a recipe; as many as usual where no number is asked for.
 
     Raises:
-        PlanError: a number is asked for, and the method's eyes do not move.
+        PlanError: a number is asked for, and the method has no free camera.
     """
     if requested is not None and method not in FREE_CAMERA_METHODS:
-        raise PlanError(f"{requested} points were asked for; method {method} has none, leave them out")
-    return requested or Recipe.num_points
+        raise PlanError(f"{requested} probes were asked for; method {method} has none, leave them out")
+    return requested or Recipe.num_probes

@@ -26,8 +26,8 @@ PHASE_LABELS: dict[Phase, str] = {
 }
 FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
 
-# methods whose eyes move: their pictures are exact where these rest, not at once
-FREE_CAMERA_METHODS = frozenset({"surface"})
+# methods with a free camera: their images are exact once it stops, not at once
+FREE_CAMERA_METHODS = frozenset({"probes"})
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ def recipe_from_json(text: str) -> Recipe:
         int(document["num_lights"]),
         bool(document["relightable"]),
         tuple(read_custom_camera(camera) for camera in document.get("cameras", ())),  # recipes of before there were any
-        int(document.get("num_points", Recipe.num_points)),
-        document.get("gather_samples"),
+        int(document.get("num_probes", Recipe.num_probes)),
+        document.get("num_patches"),
         document.get("gather_rays"),
     )
 

@@ -1,1 +1,1 @@
-"""Commands on the ledger."""
+"""Commands on the database."""

@@ -1,4 +1,4 @@
-"""`relume ledger draft`: begins a revision, for who changes relume's tables."""
+"""`relume db draft`: begins a revision, for developers who change relume's tables."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 
-def ledger_draft(
+def db_draft(
     message: Annotated[str, typer.Argument(metavar="MESSAGE", help="What the revision does, in a few words.")],
 ) -> None:
     """For developers: write the next revision of the tables.

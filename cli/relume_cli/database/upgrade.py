@@ -1,4 +1,4 @@
-"""`relume ledger upgrade`: brings the ledger to the schema of this relume."""
+"""`relume db upgrade`: brings the database to the schema of this relume."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from relume_cli.options import Data
 from relume_cli.terminal.printing import Json, print_result
 
 
-def ledger_upgrade(as_json: Json = False, data: Data = None) -> None:
-    """Upgrade the ledger for this relume; make a backup before.
+def db_upgrade(as_json: Json = False, data: Data = None) -> None:
+    """Upgrade the database for this relume; make a backup before.
 
-    No older relume may use it any more. Servers do by themselves what only adds to a ledger; this does the rest.
+    Older versions of relume can no longer use it. Servers apply additive revisions by themselves; this applies the
+    others.
     """
     from relume_cli.data_folder import open_settings
     from relume_worker.database.connect import connect
@@ -23,6 +24,6 @@ def ledger_upgrade(as_json: Json = False, data: Data = None) -> None:
     document = {"revision": latest_revision(), "made": [revision for revision, _ in revisions]}
     lines = [
         *(f"{revision}: {description}" for revision, description in revisions),
-        f"the ledger is at revision {latest_revision()}",
+        f"the database is at revision {latest_revision()}",
     ]
     print_result(document, "\n".join(lines), as_json=as_json)

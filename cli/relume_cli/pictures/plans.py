@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 LOOK = "{look}"
 VIDEO = ".mp4"
 NO_FOLDERS = (*FORMATS, ".mov", ".avi", ".webm", ".mkv", ".gif", ".jpg", ".jpeg", ".tif", ".tiff")
-TurntableSubject = Literal["eye", "object", "environment"]
+TurntableSubject = Literal["camera", "object", "environment"]
 
 
 class TurntablePlan(NamedTuple):
-    """A turntable: frames once around, what turns, and frames a second of a video."""
+    """A turntable: frames once around, what rotates, and frames a second of a video."""
 
     frames: int
-    subject: TurntableSubject = "eye"
+    subject: TurntableSubject = "camera"
     fps: int = 25
 
 
@@ -44,13 +44,13 @@ def make_turntable_plan(frames: int | None, subject: TurntableSubject | None, fp
     from relume_server.schemas.renders import MAX_FRAMES
 
     if frames is None:
-        for option, value in (("--turns", subject), ("--fps", fps)):
+        for option, value in (("--rotate", subject), ("--fps", fps)):
             if value is not None:
-                raise ParameterError(option, value, "--turntable N with it: nothing turns without")
+                raise ParameterError(option, value, "--turntable N with it")
         return None
     if not 1 <= frames <= MAX_FRAMES:
         raise ParameterError("--turntable", frames, f"1 to {MAX_FRAMES:,} frames")
-    return TurntablePlan(frames, subject or "eye", fps or 25)
+    return TurntablePlan(frames, subject or "camera", fps or 25)
 
 
 def check_target(output: Path, turntable_plan: TurntablePlan | None, *, resumes: bool) -> None:

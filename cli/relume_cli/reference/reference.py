@@ -1,4 +1,4 @@
-"""`relume reference`: brute-force truth, for error figures."""
+"""`relume reference`: brute-force reference images, and comparisons with them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def reference(
         typer.Option(help="All light paths, or those of the method that the scene is baked with."),
     ] = "all",
     method: Annotated[
-        Literal["direct", "gather", "surface"] | None, typer.Option(help="Light paths of this method, baked or not.")
+        Literal["direct", "gather", "probes"] | None, typer.Option(help="Light paths of this method, baked or not.")
     ] = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="Say how far the scene's finest bake is from it, by both kinds of paths.")

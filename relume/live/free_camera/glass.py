@@ -51,7 +51,7 @@ def find_glass_layers(embree: EmbreeScene, stored_scene: StoredScene, glass_hits
     assert embree.alpha_test is not None
     cutouts = embree.alpha_test.alpha_masks
     rule_index = np.where(
-        glass_hits.face >= 0, cutouts.of_material[stored_scene.face_material[np.maximum(glass_hits.face, 0)]], -1
+        glass_hits.face >= 0, cutouts.material_rule[stored_scene.face_material[np.maximum(glass_hits.face, 0)]], -1
     )
     ray = np.flatnonzero((rule_index >= 0) & (cutouts.rules[rule_index, 0] == GLASS_RULE))
     rules, normal = cutouts.rules[rule_index[ray]].astype(np.float64), stored_scene.face_normal[glass_hits.face[ray]]

@@ -51,8 +51,8 @@ class DirtyPixels(NamedTuple):
 def _mark_nodes(lattice_nodes, is_visible, probe_mask, out):  # type: ignore[no-untyped-def]
     for v in range(is_visible.shape[0]):
         if is_visible[v]:
-            for k in range(lattice_nodes.point.shape[1]):
-                if lattice_nodes.weight[v, k] > 0 and probe_mask[lattice_nodes.point[v, k]]:
+            for k in range(lattice_nodes.probe.shape[1]):
+                if lattice_nodes.weight[v, k] > 0 and probe_mask[lattice_nodes.probe[v, k]]:
                     out[v] = 1
 
 

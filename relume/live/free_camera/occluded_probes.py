@@ -96,8 +96,8 @@ def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occlud
                         _point_on_face(geometry, f, side, i0 / num_rows, j0 / num_rows, origin)
                         _point_on_face(geometry, f, side, i1 / num_rows, j1 / num_rows, target)
                         _aim_between(packet, num_pending, origin, target)
-                        ends[num_pending, 0] = geometry.probe_grid.node[first + node_index(num_rows, i0, j0)]
-                        ends[num_pending, 1] = geometry.probe_grid.node[first + node_index(num_rows, i1, j1)]
+                        ends[num_pending, 0] = geometry.probe_grid.node_index[first + node_index(num_rows, i0, j0)]
+                        ends[num_pending, 1] = geometry.probe_grid.node_index[first + node_index(num_rows, i1, j1)]
                         num_pending += 1
                         if num_pending == LANES:
                             _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)

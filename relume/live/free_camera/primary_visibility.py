@@ -100,9 +100,9 @@ def _find_nodes(probe_grid, face_normal, face, uv, directions, start, stop, latt
             continue
         n0, n1, n2, w0, w1, w2 = surrounding_nodes(probe_grid, f, side, uv[p, 0], uv[p, 1])
         lattice_node[p, 0], lattice_node[p, 1], lattice_node[p, 2] = (
-            probe_grid.node[n0],
-            probe_grid.node[n1],
-            probe_grid.node[n2],
+            probe_grid.node_index[n0],
+            probe_grid.node_index[n1],
+            probe_grid.node_index[n2],
         )
         weight[p, 0], weight[p, 1], weight[p, 2] = w0, w1, w2
         for k in range(3):
@@ -206,9 +206,9 @@ def mark_needed_probes(lattice_nodes, is_visible, is_needed):  # type: ignore[no
     """
     for v in range(is_visible.shape[0]):
         if is_visible[v]:
-            for k in range(lattice_nodes.point.shape[1]):
+            for k in range(lattice_nodes.probe.shape[1]):
                 if lattice_nodes.weight[v, k] > 0:
-                    is_needed[lattice_nodes.point[v, k]] = 1
+                    is_needed[lattice_nodes.probe[v, k]] = 1
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
@@ -216,8 +216,8 @@ def _interpolate_to_nodes(lattice_nodes, rows, values, start, stop, out):  # typ
     """Find what the vertices that are [start, stop) of rows take from points."""
     for v in rows[start:stop]:
         out[v] = 0
-        for k in range(lattice_nodes.point.shape[1]):
-            w, probe = lattice_nodes.weight[v, k], lattice_nodes.point[v, k]
+        for k in range(lattice_nodes.probe.shape[1]):
+            w, probe = lattice_nodes.weight[v, k], lattice_nodes.probe[v, k]
             if w > 0:
                 for c in range(values.shape[1]):
                     out[v, c] += w * values[probe, c]

@@ -56,7 +56,7 @@ class BakedIndirectViews(BakedFixedViews):
         )
 
     def _normal_mapped_patches(self, normals: Normals, is_canceled: Callable[[], bool] = lambda: False) -> PatchLight:
-        key = self.key, "cells that lean", normals
+        key = self.key, "patches with mapped normals", normals
         return self.cache.get_value(key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled))
 
     def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
@@ -111,9 +111,9 @@ class BakedIndirectViews(BakedFixedViews):
         rows = view.rows(material)
 
         def read() -> NDArray[np.uint8]:
-            return view.store.read(f"views/{view.index}/thrown", rows.start, rows.stop)
+            return view.store.read(f"views/{view.index}/mirror_lights", rows.start, rows.stop)
 
-        return self.cache.transient.get_value((self.key, "thrown", *view.sample_key(material)), read)
+        return self.cache.transient.get_value((self.key, "mirror lights", *view.sample_key(material)), read)
 
     def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
         """How much more flat mirrors throw after than before. See `FixedViewTransfer`."""

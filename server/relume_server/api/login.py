@@ -25,7 +25,11 @@ async def me(caller: CallerDep, services: ServicesDep, response: Response) -> Me
     response.headers["Cache-Control"] = "no-store"
     settings, role = services.settings, caller.role.label
     return MeBody(
-        login=settings.login, name=caller.person, role=role, by=caller.by, viewers_comment=settings.viewers_comment
+        login=settings.login,
+        name=caller.person,
+        role=role,
+        by=caller.by,
+        viewers_comment=settings.allow_viewer_comments,
     )
 
 

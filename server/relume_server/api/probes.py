@@ -56,7 +56,7 @@ async def surface_array(
 
 def _require_free_camera(transfer: OpenBake) -> OpenBake:
     if transfer.camera_mode is not CameraMode.FREE:
-        raise NotFoundError("the views of this bake are fixed; bake the scene by method surface to move the eye")
+        raise NotFoundError("the views of this bake are fixed; bake the scene by method probes to move the eye")
     return transfer
 
 

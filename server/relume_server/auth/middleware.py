@@ -55,7 +55,7 @@ class AuthMiddleware:
         access: Callable[[], AuthServices],
         clock: Callable[[], float],
     ) -> None:
-        self._app, self._access, self._viewers_comment = app, access, settings.viewers_comment
+        self._app, self._access, self._viewers_comment = app, access, settings.allow_viewer_comments
         rate = settings.requests_per_second
         self._buckets = None if rate is None else TokenBuckets(rate, settings.requests_at_once, clock)
 

@@ -54,12 +54,12 @@ class Quotas:
     @contextmanager
     def session(self, user: str) -> Iterator[None]:
         """One live session of somebody. Raises BusyError, QuotaError: enough are open."""
-        max_total, max_each = self.settings.max_sessions, self.settings.max_sessions_each
+        max_total, max_each = self.settings.max_sessions, self.settings.max_sessions_per_user
         with self._lock:
             if self._open.total() >= max_total:
                 raise BusyError(f"as many sessions are open as may be, {max_total}; close one and try again")
             if max_each is not None and self._open[user] >= max_each:
-                text = f"you have as many sessions open as may be, {max_each}; close one (RELUME_MAX_SESSIONS_EACH)"
+                text = f"you have as many sessions open as may be, {max_each}; close one (RELUME_MAX_SESSIONS_PER_USER)"
                 raise QuotaError(text)
             self._open[user] += 1
         try:
@@ -87,12 +87,12 @@ class Quotas:
     @property
     def counts_bytes(self) -> bool:
         """Whether there is a limit on them."""
-        return self.settings.max_bytes_each is not None
+        return self.settings.max_bytes_per_user is not None
 
     def check_room(self) -> None:
         """Raises NearlyFullError where the disk lacks the room that the ledger needs, to delete, too."""
         free = free_bytes(self.settings.data)
-        is_full = free < self.settings.least_free_bytes
+        is_full = free < self.settings.min_free_bytes
         with self._lock:
             was_full, self._is_full = self._is_full, is_full
         if is_full and not was_full:
@@ -105,7 +105,7 @@ class Quotas:
     def check_bytes(self, owner: str, added_bytes: int) -> None:
         """Raises QuotaError where somebody would have too much with so many bytes more; and as `check_room` does."""
         self.check_room()
-        limit_bytes = self.settings.max_bytes_each
+        limit_bytes = self.settings.max_bytes_per_user
         if limit_bytes is None:
             return
         used_bytes = self.used_bytes(owner)
@@ -114,7 +114,7 @@ class Quotas:
 
     def remaining_bytes(self, owner: str) -> int | None:
         """What somebody may still have, below zero where it is too much already; None where there is no limit."""
-        limit_bytes = self.settings.max_bytes_each
+        limit_bytes = self.settings.max_bytes_per_user
         return None if limit_bytes is None else limit_bytes - self.used_bytes(owner)
 
     def put_reserved(self, owner: str, row_id: str, num_bytes: int) -> None:
@@ -135,19 +135,19 @@ class Quotas:
         with self._sessions() as session:
             reserved_bytes = session.scalar(select(func.sum(OwnedRow.bytes)).where(OwnedRow.kind == "upload")) or 0
         disk_bytes = free_bytes(self.settings.data)
-        if disk_bytes - 2 * reserved_bytes < self.settings.least_free_bytes:
+        if disk_bytes - 2 * reserved_bytes < self.settings.min_free_bytes:
             raise NearlyFullError(
                 f"the disk of the data directory has {bytes_text(disk_bytes)} left, too little for "
                 f"{bytes_text(num_bytes)} "
                 f"more beside what else is sent now ({bytes_text(reserved_bytes - num_bytes)}); free some space"
             )
-        limit_bytes = self.settings.max_bytes_each
+        limit_bytes = self.settings.max_bytes_per_user
         if limit_bytes is not None and (used_bytes := self.used_bytes(owner)) > limit_bytes:
             raise _quota_exceeded(used_bytes - num_bytes, limit_bytes, num_bytes)
 
     def check_bakes(self, owner: str) -> None:
         """Raises QuotaError where enough bakes of somebody wait or run."""
-        max_bakes = self.settings.max_bakes_each
+        max_bakes = self.settings.max_bakes_per_user
         if max_bakes is None:
             return
         query = (
@@ -160,7 +160,7 @@ class Quotas:
             num_active = session.scalar(query) or 0
         if num_active >= max_bakes:
             raise QuotaError(
-                f"as many of your bakes wait or run as may, {max_bakes}; wait, or cancel one (RELUME_MAX_BAKES_EACH)"
+                f"{max_bakes} of your bakes wait or run, as many as may; wait, or cancel one (RELUME_MAX_BAKES_PER_USER)"
             )
 
     def used_bytes(self, owner: str) -> int:
@@ -224,5 +224,5 @@ def _quota_exceeded(used_bytes: int, limit_bytes: int, added_bytes: int) -> Quot
     return QuotaError(
         f"you have {bytes_text(used_bytes)} of at most {bytes_text(limit_bytes)}, and this takes "
         f"{bytes_text(added_bytes)}; "
-        "delete a scene, a bake, a material or a render of yours first (RELUME_MAX_BYTES_EACH)"
+        "delete a scene, a bake, a material or a render of yours first (RELUME_MAX_BYTES_PER_USER)"
     )

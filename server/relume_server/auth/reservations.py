@@ -54,7 +54,7 @@ class Reservation:
     def max_import_bytes(self) -> int:
         """How large what is made of the upload may be, now."""
         remaining_bytes, settings = self._quotas.remaining_bytes(self.owner), self._quotas.settings
-        disk_bytes = (free_bytes(settings.data) - settings.least_free_bytes) // MAX_CONCURRENT_IMPORTS
+        disk_bytes = (free_bytes(settings.data) - settings.min_free_bytes) // MAX_CONCURRENT_IMPORTS
         return max(0, disk_bytes if remaining_bytes is None else min(disk_bytes, remaining_bytes + self.bytes))
 
     def too_large_error(self, limit_bytes: int) -> QuotaError | NearlyFullError:
@@ -66,7 +66,7 @@ class Reservation:
         return QuotaError(
             f"the file unpacks to more than the {bytes_text(limit_bytes)} that you may still have; delete a scene, a "
             f"bake, a "
-            "material or a render of yours first (RELUME_MAX_BYTES_EACH)"
+            "material or a render of yours first (RELUME_MAX_BYTES_PER_USER)"
         )
 
     def convert(self, kind: OwnedKind, object_id: str, num_bytes: int) -> None:

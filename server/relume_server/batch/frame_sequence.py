@@ -34,7 +34,7 @@ def check_animation(request: Animation, view: str, transfer: OpenBake) -> Sequen
     """
     path, num_frames = request.path, request.num_frames
     if path is not None and transfer.camera_mode is not CameraMode.FREE and not _has_fixed_camera(path):
-        allowed = "no path, or bake by method surface: this bake is seen from where it was baked alone"
+        allowed = "no path, or bake by method probes: this bake is seen from where it was baked alone"
         raise ParameterError("path", _path_text(path), allowed)
     if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
         raise ParameterError("frames", request.frames, f"{path.turntable}, as the turntable says, or nothing")

@@ -51,7 +51,9 @@ class Intake:
 
     def __init__(self, settings: Settings, ledger: Ledger, quotas: Quotas, importers: Importers) -> None:
         self._settings, self._ledger, self._quotas, self.importers = settings, ledger, quotas, importers
-        self._slots = Slots(MAX_CONCURRENT_IMPORTS, 1 if settings.login else MAX_CONCURRENT_IMPORTS, settings.turns)
+        self._slots = Slots(
+            MAX_CONCURRENT_IMPORTS, 1 if settings.login else MAX_CONCURRENT_IMPORTS, settings.fair_shares
+        )
 
     @asynccontextmanager
     async def reserving(self, owner: str, num_bytes: int) -> AsyncIterator[Reservation]:

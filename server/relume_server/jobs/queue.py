@@ -163,7 +163,7 @@ class JobQueue(ABC, Generic[Request]):
             raise BusyError(f"{text} (RELUME_MAX_QUEUED)")
         if sum((queued_client or "") == client for queued_client in clients) >= quota.max_per_client:
             text = f"as many {self.noun}s of yours wait or run as may, {quota.max_per_client}; wait, or stop one"
-            raise QuotaError(f"{text} (RELUME_MAX_QUEUED_EACH)")
+            raise QuotaError(f"{text} (RELUME_MAX_QUEUED_PER_USER)")
 
     def get(self, identity: str) -> Job[Request]:
         """A row. Raises NotFoundError."""

@@ -148,7 +148,7 @@ class MessageReceiver:
     def _set_camera(self, message: protocol.CameraMessage, received_s: float) -> None:
         """Take note of an eye; a number that is not newer than the last says nothing."""
         if self._transfer.camera_mode is not CameraMode.FREE:
-            raise ParameterError("view", message.view, "a view whose eye is free; bake the scene by method surface")
+            raise ParameterError("view", message.view, "a view whose eye is free; bake the scene by method probes")
         self._check_view(message.view)
         width, height = message.size
         if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_EYE_PIXELS):

@@ -24,7 +24,7 @@ class _CacheCollector(Collector):
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
         """One gauge."""
-        gauge = GaugeMetricFamily("relume_memory_bytes", "Bytes made from bakes, by kind", labels=["kind", "bake"])
+        gauge = GaugeMetricFamily("relume_cache_bytes", "Bytes in the cache, by kind and bake", labels=["kind", "bake"])
         for owner, num_bytes in self._bytes_by_owner().items():
             gauge.add_metric(owner, num_bytes)
         yield gauge
@@ -38,7 +38,7 @@ class _JobCollector(Collector):
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
         """One gauge."""
-        gauge = GaugeMetricFamily("relume_work", "Long work by kind and state", labels=["kind", "state"])
+        gauge = GaugeMetricFamily("relume_jobs", "Jobs by kind and state", labels=["kind", "state"])
         with suppress(*DATABASE_ERRORS):
             for labels, count in self._count_jobs().items():
                 gauge.add_metric(labels, count)
@@ -61,16 +61,22 @@ class Metrics:
         )
         self.refused_sessions.labels("busy")  # an increase is one of what was there before
         self.request_seconds = self._histogram("relume_http_request_seconds", "Request received to answer begun")
-        self._draining = Gauge("relume_leaving", "Whether the server is being stopped, 0 or 1", registry=registry)
-        self._free = Gauge("relume_disk_free_bytes", "Room on the disk of the data directory", registry=registry)
-        self._least_free = Gauge("relume_disk_floor_bytes", "Room below which /readyz says no", registry=registry)
-        self.edit_to_socket = self._histogram("relume_edit_to_socket_seconds", "Edit received to frame handed over")
+        self._draining = Gauge(
+            "relume_draining", "Whether the server drains before it stops, 0 or 1", registry=registry
+        )
+        self._free = Gauge("relume_disk_free_bytes", "Free disk space of the data directory", registry=registry)
+        self._least_free = Gauge(
+            "relume_disk_min_free_bytes", "Free disk space below which /readyz says no", registry=registry
+        )
+        self.edit_to_socket = self._histogram("relume_edit_to_socket_seconds", "Edit received to frame sent")
         self.update = self._histogram("relume_frame_update_seconds", "Updating the picture")
         self.encode = self._histogram("relume_frame_encode_seconds", "Encoding a frame")
         self.freeze = self._histogram("relume_freeze_seconds", "Freezing a curve")
-        self._cache = Gauge("relume_frozen_cache_bytes", "Bytes of all that was made from bakes", registry=registry)
+        self._cache = Gauge(
+            "relume_frozen_cache_bytes", "Bytes in the cache of everything computed from bakes", registry=registry
+        )
         self._live_bytes = Gauge(
-            "relume_held_bytes", "Bytes of arrays that the server holds", ["holder"], registry=registry
+            "relume_component_bytes", "Bytes of arrays by component of the server", ["component"], registry=registry
         )
         self._workers = Gauge(
             "relume_workers_resident_bytes", "Memory of the server's own worker processes", registry=registry

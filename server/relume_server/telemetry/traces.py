@@ -43,7 +43,7 @@ class SpanTimes:
     def spans(self) -> Mapping[str, tuple[float, float]]:
         """Spans in a frame's: from when to when."""
         return {
-            "take": (self.received_s, self.applied_s),
+            "apply": (self.received_s, self.applied_s),
             "wait": (self.applied_s, self.started_s),
             "update": (self.started_s, self.updated_s),
             "encode": (self.updated_s, self.encoded_s),
@@ -61,7 +61,7 @@ class Traces:
         """An edit has been answered by a frame.
 
         Args:
-            name: "edit" or "eye". times: of its parts. attributes: without the prefix that all have.
+            name: "edit" or "camera". times: of its parts. attributes: without the prefix that all have.
         """
         from opentelemetry.trace import set_span_in_context
 

@@ -1,7 +1,7 @@
 """Brings a database to the newest revision of its schema, by Alembic; see docs/adr/0068-one-ledger-for-a-team.md.
 
 Revisions that only add are made when a database is opened: relumes from before them work on beside. Others wait until
-somebody says `relume ledger upgrade`.
+somebody says `relume db upgrade`.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def upgrade(engine: Engine, *, is_requested: bool) -> list[RevisionNote]:
         if not is_requested and not all(script.module.is_additive for script in missing):
             raise LedgerVersionError(
                 "the ledger is to be changed in a way that relumes from before cannot work with; stop all that use it, "
-                "run: relume backup FOLDER, then: relume ledger upgrade"
+                "run: relume backup FOLDER, then: relume db upgrade"
             )
         config = _config()
         config.attributes["connection"] = connection

@@ -155,7 +155,7 @@ class Background:
         blur = background.blur if background.kind == "blurred" else 0.0
         images = self._images
         sample_key = (self._view.name, None) if material is None else self._view.sample_key(material)
-        key = images.transfer.key, "behind surfaces", *sample_key, state.environment, blur
+        key = images.transfer.key, "background", *sample_key, state.environment, blur
         radiance = images.cache.transient.get_value(key, lambda: self._map(state.environment, material, blur))
         return np.asarray(radiance * factor, np.float32)
 

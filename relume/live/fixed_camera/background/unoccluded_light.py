@@ -48,7 +48,7 @@ class UnoccludedLight:
 
     def _unoccluded(self, geometry: LightGeometry) -> F32:
         transfer, view = self._transfer, self._images.view
-        key = transfer.key, "unhidden light", view.name, self._material.index, geometry
+        key = transfer.key, "unoccluded light", view.name, self._material.index, geometry
         return self._images.cache.transient.get_value(key, lambda: transfer.local.unoccluded(geometry, self._points))
 
     def _from_triangles(self, light: Illumination, *, is_preview: bool) -> F32:

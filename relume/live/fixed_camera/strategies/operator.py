@@ -78,7 +78,9 @@ def resum_job(target: TermTarget) -> Resum | None:
     if resum_error >= ready.rounding or resum_error > MAX_EXACT_ROUNDING * norm_of(ready.image):
         return None
     key = images.operator_key(material, live, basis, live.target_bands)
-    return Resum(target, (*key, "settled"), ready, lambda image: operator.write_image(coefficients, image), resum_error)
+    return Resum(
+        target, (*key, "resummed"), ready, lambda image: operator.write_image(coefficients, image), resum_error
+    )
 
 
 def _add_change(

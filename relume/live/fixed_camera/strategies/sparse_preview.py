@@ -174,7 +174,7 @@ class SparsePreview:
 
     def direct_only_first(self) -> SparsePreview:
         """The same of what light comes straight: that between surfaces takes some seconds where it is not known."""
-        return replace(self, key=(*self.key, "straight"), light=direct_only(self.light))
+        return replace(self, key=(*self.key, "direct"), light=direct_only(self.light))
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> list[F32]:
         """See `Job`. Returns images of all parts, (tiles, 3, samples) float32 each."""

@@ -72,7 +72,7 @@ def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], T
         "facing": lambda: _to_vec4(stored_scene.face_normal, stored_scene.uv_scale),
         "positions": lambda: _to_vec4(transfer.positions, 0),
         "normals": lambda: _to_vec4(lattice_nodes.normal[shader_nodes.lattice_node], 0).astype(np.float16),
-        "points": lambda: lattice_nodes.point[shader_nodes.lattice_node].astype(np.uint32),
+        "points": lambda: lattice_nodes.probe[shader_nodes.lattice_node].astype(np.uint32),
         "weights": lambda: lattice_nodes.weight[shader_nodes.lattice_node].astype(np.float16),
         "places": lambda: _to_vec4(probes.position, 0),
         "point_normals": lambda: _to_vec4(probes.normal, 0).astype(np.float16),
@@ -107,7 +107,7 @@ def node_arrays(probe_grid: ProbeGrid) -> NodeArrays:
     is_wide = rows > 1
     is_wide_node = np.repeat(is_wide, counts)  # nodes are in the order of sides
     narrow = first[rows == 1, None] + np.array([0, 2, 1])  # i towards the second corner, j towards the third
-    corners, corner_index = np.unique(probe_grid.node[narrow], return_inverse=True)
+    corners, corner_index = np.unique(probe_grid.node_index[narrow], return_inverse=True)
     num_wide = int(is_wide_node.sum())
     side_table = np.zeros((len(rows), 4), np.uint32)
     side_table[:, 3] = rows
@@ -116,7 +116,7 @@ def node_arrays(probe_grid: ProbeGrid) -> NodeArrays:
     sides = side_table.reshape(-1, 2, 4)
     has_none = sides[..., 3] == 0
     sides = np.where(has_none[..., None], sides[:, ::-1], sides)
-    return NodeArrays(sides, np.concatenate([probe_grid.node[is_wide_node], corners]).astype(np.uint32))
+    return NodeArrays(sides, np.concatenate([probe_grid.node_index[is_wide_node], corners]).astype(np.uint32))
 
 
 def _texture_factories(stored_scene: StoredScene, textures: Textures) -> dict[str, Callable[[], Texels]]:

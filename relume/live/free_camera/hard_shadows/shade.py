@@ -86,4 +86,4 @@ def _light_directions(stored_scene: StoredScene, light: HardShadowLight) -> F32:
         return np.tile(light.center, (len(stored_scene.lattice_nodes.normal), 1))
     directions = light.center - stored_scene.probes.position
     directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), np.float32(1e-20))
-    return np.asarray(directions[stored_scene.lattice_nodes.point[:, 0]], np.float32)
+    return np.asarray(directions[stored_scene.lattice_nodes.probe[:, 0]], np.float32)

@@ -35,7 +35,7 @@ class ProbeLightJob:
     @property
     def key(self) -> tuple[Hashable, ...]:
         """Jobs of one light are one."""
-        return self.transfer.key, "light vectors", self.light, self.has_hard_shadows
+        return self.transfer.key, "incident coefficients", self.light, self.has_hard_shadows
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> IncidentCoefficients:
         """Find it, source by source. Raises CancelledError where `is_canceled`, asked before each, said so."""

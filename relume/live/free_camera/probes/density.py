@@ -77,7 +77,7 @@ def density_from_shadows(
     steps = enumerate_nodes(probe_grid.num_rows)
     distance_power = density_from_distance(geometry, camera_positions, probe_grid).power
     probe_gradient = _light_gradient(geometry, placed_probes.probes, _neighbor_pairs(placed_probes), lights)
-    squared_gradient = probe_gradient[lattice_nodes.point[probe_grid.node, 0]] ** 2
+    squared_gradient = probe_gradient[lattice_nodes.probe[probe_grid.node_index, 0]] ** 2
     face_mean = _face_means(squared_gradient, steps, len(probe_grid.num_rows))
     blended_gradient = _OWN_WEIGHT * squared_gradient + (1 - _OWN_WEIGHT) * face_mean[steps.grid // 2]
     weight = _node_areas(geometry, probe_grid, steps) / 4.0**distance_power * (blended_gradient > 0)
@@ -112,7 +112,10 @@ def _node_positions(geometry: SceneBuffers, steps: GridSteps) -> F64:
 
 def _neighbor_pairs(placed_probes: PlacedProbes) -> NDArray[np.int64]:
     """Points that are next to each other on a face, each pair once. (pairs, 2)"""
-    lattice_node, main_probe = placed_probes.probe_grid.node, placed_probes.lattice_nodes.point[:, 0].astype(np.int64)
+    lattice_node, main_probe = (
+        placed_probes.probe_grid.node_index,
+        placed_probes.lattice_nodes.probe[:, 0].astype(np.int64),
+    )
     num, codes = len(placed_probes.probes.position), []
     for first, edges in _grids_by_size(placed_probes.probe_grid):
         probe_a, probe_b = (main_probe[lattice_node[first[:, None] + edges[:, end]]] for end in (0, 1))

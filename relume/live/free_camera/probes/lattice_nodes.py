@@ -41,12 +41,12 @@ class LatticeNodes(NamedTuple):
 
     Attributes:
         normal: unit, on the side that is seen. (V, 3) float32
-        point: those about it, unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
+        probe: those about it, unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
         weight: of each, one in sum. (V, `PROBES_PER_NODE`) float32
     """
 
     normal: F32
-    point: NDArray[np.uint32]
+    probe: NDArray[np.uint32]
     weight: F32
 
 

@@ -142,7 +142,7 @@ def place_probes(
     lattice_nodes, node_index = build_nodes(grid_nodes, probe_nodes, probe_grid)
     probes = grid_nodes.surface_points.rows(probe_nodes)._replace(seed=np.arange(len(probe_nodes), dtype=np.uint32))
     return PlacedProbes(
-        probe_grid._replace(node=node_index), lattice_nodes, probes, grid_nodes.material[probe_nodes], spacing
+        probe_grid._replace(node_index=node_index), lattice_nodes, probes, grid_nodes.material[probe_nodes], spacing
     )
 
 

@@ -163,7 +163,7 @@ def read_probes(store: StoreReader, start: int = 0, stop: int | None = None) -> 
     All have one seed: their rays go alike, so that what few rays miss changes smoothly from point to point.
     """
     position, normal, tangent = (
-        store.read(f"points/{name}", start, stop) for name in ("position", "normal", "tangent")
+        store.read(f"probes/{name}", start, stop) for name in ("position", "normal", "tangent")
     )
     return SurfacePoints(position, normal, tangent, np.zeros(len(position), np.uint32))
 
@@ -173,20 +173,20 @@ def ray_pattern(store: StoreReader, num_rays: int) -> RayPattern:
     return make_pattern(num_rays, 0, int(store.attributes["gather_seed"]) + 1)
 
 
-def read_surface(store: StoreReader) -> StoredScene:
+def read_stored_scene(store: StoreReader) -> StoredScene:
     """Read all of it.
 
     Raises:
         ChunkDamagedError: arrays of the store do not fit each other. StoreError: its description is not of this form.
     """
-    probe_grid = ProbeGrid(*(store.read(f"lattice/{name}") for name in ProbeGrid._fields))
-    lattice_nodes = LatticeNodes(*(store.read(f"vertices/{name}") for name in LatticeNodes._fields))
+    probe_grid = ProbeGrid(*(store.read(f"nodes/{name}") for name in ProbeGrid._fields))
+    lattice_nodes = LatticeNodes(*(store.read(f"nodes/{name}") for name in LatticeNodes._fields))
     face_fields = _read_faces(store)
     surface = StoredScene(
         probe_grid,
         lattice_nodes,
         read_probes(store),
-        store.read("points/material"),
+        store.read("probes/material"),
         *face_fields,
         _read_textures(store),
         face_fields[2],
@@ -199,14 +199,14 @@ def read_surface(store: StoreReader) -> StoredScene:
     fits = probe_grid.num_rows.shape == probe_grid.first.shape == (len(surface.face_material), 2)
     if (
         not fits
-        or ends.max() > len(probe_grid.node)
-        or int(probe_grid.node.max(initial=0)) >= len(lattice_nodes.normal)
+        or ends.max() > len(probe_grid.node_index)
+        or int(probe_grid.node_index.max(initial=0)) >= len(lattice_nodes.normal)
     ):
-        raise ChunkDamagedError("lattice", "its nodes do not fit the vertices")
-    if num_probes == 0 or int(lattice_nodes.point.max(initial=0)) >= num_probes:
-        raise ChunkDamagedError("vertices", "they do not fit the points")
+        raise ChunkDamagedError("nodes", "the probe grids do not fit the lattice nodes")
+    if num_probes == 0 or int(lattice_nodes.probe.max(initial=0)) >= num_probes:
+        raise ChunkDamagedError("nodes", "the lattice nodes do not fit the probes")
     if max(int(surface.material.max()), int(surface.face_material.max())) >= num_materials:
-        raise ChunkDamagedError("points", "a point has a material that the scene has not")
+        raise ChunkDamagedError("probes", "a probe has a material that the scene has not")
     return surface
 
 

@@ -25,13 +25,13 @@ class ProbeGrid(NamedTuple):
 
     Attributes:
         num_rows: R; 0 where the side has no points. (faces, 2) uint8
-        first: where its nodes begin in `node`. (faces, 2) uint32
-        node: which vertex each is. (nodes,) uint32
+        first: where its nodes begin in `node_index`. (faces, 2) uint32
+        node_index: which vertex each is. (nodes,) uint32
     """
 
     num_rows: NDArray[np.uint8]
     first: NDArray[np.uint32]
-    node: NDArray[np.uint32]
+    node_index: NDArray[np.uint32]
 
 
 class ProbeDensity(NamedTuple):

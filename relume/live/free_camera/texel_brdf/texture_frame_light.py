@@ -186,7 +186,7 @@ def node_light_numpy(
     recurrence_table, weights, probes = (
         recurrence(),
         lattice_nodes.weight[lattice_node],
-        lattice_nodes.point[lattice_node],
+        lattice_nodes.probe[lattice_node],
     )
     n, t = lattice_nodes.normal[lattice_node], tangents[probes[weights.argmax()]]
     out = np.zeros(vectors.shape[1:])

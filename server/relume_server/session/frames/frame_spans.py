@@ -1,4 +1,4 @@
-"""What a trace says of a frame that answers an edit or an eye."""
+"""Span attributes of a frame that answers an edit or a camera message."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def trace_fields(
         "view": request.view,
         "frame": request.frame,
         "revision": request.target.revision,
-        "shared": request.target.shared,
-        "hand": request.target.active_pointer or "",
+        "room_revision": request.target.shared,
+        "active_control": request.target.active_pointer or "",
         "format": request.form,
         "fidelity": painted.progress.fidelity,
         "bytes": num_bytes,
     }
-    return "edit" if request.camera_state is None else "eye", times, attributes
+    return "edit" if request.camera_state is None else "camera", times, attributes

@@ -91,7 +91,7 @@ class Precomputer:
         if running.job.state != "following":
             self._metrics.freeze.observe(time.perf_counter() - running.start_s)
         if self._traces is not None:
-            attributes = {"view": running.viewport.name, "what": running.job.label, "state": running.job.state}
+            attributes = {"view": running.viewport.name, "label": running.job.label, "state": running.job.state}
             self._traces.record_freeze(running.start_s, attributes)
         return running.viewport, running.job, running.future.result()
 

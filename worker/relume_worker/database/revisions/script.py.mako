@@ -7,7 +7,7 @@ from alembic import op
 
 revision = ${repr(up_revision)}
 down_revision = ${repr(down_revision)}
-is_additive = True  # False where a relume from before it cannot work on: then people run `relume ledger upgrade`
+is_additive = True  # False where a relume from before it cannot work on: then people run `relume db upgrade`
 
 
 def upgrade() -> None:

@@ -22,10 +22,10 @@ from websockets.asyncio.client import connect
 
 from relume.assets.environments.studio import studio
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import OPENING, SPEAKS, BakedFolder, Server, baked_folder, serving
 from relume_bench.figure import Figure
-from relume_bench.hands import SliderClient
-from relume_bench.house import OPENING, SPEAKS, House, Server, baked_house, serving
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
+from relume_bench.slider_clients import SliderClient
 
 _NAMES = ("load.aggregate_ratio", "load.frame_cost_ratio")
 _SLIDERS = tuple(
@@ -46,14 +46,14 @@ def measure(tiny: bool) -> list[Figure]:
     variants = {"one_operator": (_SLIDERS[:1], numbers), "several": (_SLIDERS, tuple(n for n in numbers if n > 2))}
     results: dict[tuple[str, int], list[tuple[float, float]]] = {}
     with (
-        baked_house(scene, Recipe("direct", ("front",), size, num_lights)) as house,
-        serving(house, settings) as server,
+        baked_folder(scene, Recipe("direct", ("front",), size, num_lights)) as data_folder,
+        serving(data_folder, settings) as server,
     ):
-        asyncio.run(_prepare_curves(server, house))
+        asyncio.run(_prepare_curves(server, data_folder))
         for _ in range(rounds):
             for kind, (sliders, some) in variants.items():
                 for number in some:
-                    rates = asyncio.run(_measure_drag(server, house, sliders, number, seconds))
+                    rates = asyncio.run(_measure_drag(server, data_folder, sliders, number, seconds))
                     results.setdefault((kind, number), []).append(rates)
     ratios: list[NDArray[np.float64]] = []
     context: dict[str, object] = {}
@@ -68,9 +68,9 @@ def measure(tiny: bool) -> list[Figure]:
     ]
 
 
-async def _prepare_curves(server: Server, house: House) -> None:
+async def _prepare_curves(server: Server, data_folder: BakedFolder) -> None:
     """Have made what is made once: pictures of the scene's own look, what each slider needs."""
-    async with _open_slider_clients(server, house, _SLIDERS, len(_SLIDERS)) as slider_clients:
+    async with _open_slider_clients(server, data_folder, _SLIDERS, len(_SLIDERS)) as slider_clients:
         for slider_client in slider_clients:
             await slider_client.drag()
             await asyncio.sleep(_WARM_S)
@@ -78,10 +78,14 @@ async def _prepare_curves(server: Server, house: House) -> None:
 
 
 async def _measure_drag(
-    server: Server, house: House, sliders: Sequence[tuple[str, tuple[float, float]]], number: int, seconds: float
+    server: Server,
+    data_folder: BakedFolder,
+    sliders: Sequence[tuple[str, tuple[float, float]]],
+    number: int,
+    seconds: float,
 ) -> tuple[float, float]:
     """Frames a second of so many hands together, and milliseconds of processor time that the server takes for each."""
-    async with _open_slider_clients(server, house, sliders, number) as slider_clients:
+    async with _open_slider_clients(server, data_folder, sliders, number) as slider_clients:
         await asyncio.gather(*(slider_client.drag() for slider_client in slider_clients))
         await asyncio.sleep(min(_WARM_S, seconds))
         frames, spent_s, start_time = _frames(slider_clients), _spent_s(server), time.perf_counter()
@@ -92,13 +96,13 @@ async def _measure_drag(
 
 @asynccontextmanager
 async def _open_slider_clients(
-    server: Server, house: House, sliders: Sequence[tuple[str, tuple[float, float]]], number: int
+    server: Server, data_folder: BakedFolder, sliders: Sequence[tuple[str, tuple[float, float]]], number: int
 ) -> AsyncIterator[list[SliderClient]]:
     """Open the sessions; each fails here where its hand does."""
     async with AsyncExitStack() as stack:
         slider_clients = []
         for k in range(number):
-            session = connect(server.session(house.bake), subprotocols=[SPEAKS], max_size=None, compression=None)
+            session = connect(server.session(data_folder.bake), subprotocols=[SPEAKS], max_size=None, compression=None)
             slider, span = sliders[k % len(sliders)]
             connection = await stack.enter_async_context(session)
             await connection.send(OPENING)

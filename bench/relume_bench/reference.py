@@ -1,4 +1,4 @@
-"""truth.mitsuba: the reference itself against Mitsuba 3, three scenes, same formulas and maps; the worst of the three.
+"""reference.mitsuba: our reference against Mitsuba 3, three scenes, same formulas and maps; the worst of the three.
 
 Both render independent passes, ours at four times the size, averaged over 4 × 4 view samples as Mitsuba's box filter
 averages over a pixel. With m_k Mitsuba's passes and o_k ours, m_k − (o_k − ō) has Mitsuba's mean and the noise of both,
@@ -31,7 +31,7 @@ from relume_bench.scenes import cook_torrance, make_sky, teapot_on_table
 from relume_bench.standard_error import compare_with_passes
 
 F32 = NDArray[np.float32]
-_NAMES = ("truth.mitsuba",)
+_NAMES = ("reference.mitsuba",)
 _FINER = 4
 
 

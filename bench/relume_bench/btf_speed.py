@@ -19,9 +19,9 @@ import numpy as np
 from relume.assets.btf.btf_store import STORE, BtfRecord
 from relume.live.free_camera.browser.material_arrays import ArrayBlock
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume_bench.btf_made import SyntheticBtf, open_values_folder
+from relume_bench.btf_synthetic import SyntheticBtf, open_values_folder
 from relume_bench.figure import Figure
-from relume_bench.moving_scene import FreeCameraScene, rotated
+from relume_bench.free_camera_scene import FreeCameraScene, rotated
 from relume_server.client_state.pending_requests import PendingRequests
 from relume_server.session.frames.painter import encode_jpeg
 

@@ -12,9 +12,9 @@ import tempfile
 from pathlib import Path
 
 from relume.assets.btf.btf_store import STORE
-from relume_bench.btf_made import SyntheticBtf, open_values_folder
 from relume_bench.btf_pictures import against_geometry, against_table
 from relume_bench.btf_sphere import against_displaced
+from relume_bench.btf_synthetic import SyntheticBtf, open_values_folder
 from relume_bench.figure import Figure
 
 _BOUND, _FINE = 0.05, 0.02  # of pictures, and of what is compared with all values

@@ -1,7 +1,7 @@
-"""glimpse.*: a picture of turned light by a few samples, against shading all of them.
+"""preview.*: a picture of turned light by a few samples, against shading all of them.
 
-The built-in scene at 640×480, 1,000 lights, the environment turned to 50°. `glimpse.speedup`: shading all materials ÷
-the median glimpse on the way there; `glimpse.error`: relative RMSE of the last glimpse against the shaded picture. The
+The built-in scene at 640×480, 1,000 lights, the environment turned to 50°. `preview.speedup`: shading all materials ÷
+the median glimpse on the way there; `preview.error`: relative RMSE of the last glimpse against the shaded picture. The
 first glimpse, which chooses the samples, is in the context.
 """
 
@@ -54,8 +54,8 @@ def measure(tiny: bool) -> list[Figure]:
         "all_s": whole,
     }
     return [
-        Figure("glimpse.speedup", whole / float(np.median(glimpses)), "ratio", context),
-        Figure("glimpse.error", error, "relative RMSE", {"size": list(size)}),
+        Figure("preview.speedup", whole / float(np.median(glimpses)), "ratio", context),
+        Figure("preview.error", error, "relative RMSE", {"size": list(size)}),
     ]
 
 

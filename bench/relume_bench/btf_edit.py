@@ -1,4 +1,4 @@
-"""btf.held_ms: how quickly a BTF at a fixed view follows a hand.
+"""btf.edit_ms: how quickly a BTF at a fixed view follows a hand.
 
 The still life at 640×480 in direct light, every surface covered with the weave: from an edit of how often it repeats to
 the exact image. `shaded` is the image from nothing, in which what arrives is found first: what an edit took while that
@@ -22,9 +22,9 @@ from relume.methods.registry import METHODS, open_transfer
 from relume.scene.examples.catalog import built_in
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
-from relume_bench.btf_made import SyntheticBtf, open_values_folder
+from relume_bench.btf_synthetic import SyntheticBtf, open_values_folder
 from relume_bench.figure import Figure
-from relume_bench.moving_scene import run_light_jobs
+from relume_bench.free_camera_scene import run_light_jobs
 
 _BOUND, _SCALE = 0.05, 4.0
 
@@ -47,7 +47,7 @@ def measure(tiny: bool) -> list[Figure]:
         repeats = [_override_with_btf(transfer, record, scale=_SCALE + 0.1 * k) for k in range(1, frames)]
         drag_ms = 1e3 * float(np.median([_edit_s(picture, look) for look in repeats]))
     context = {"size": f"{size[0]}×{size[1]}", "lights": lights, "every_surface": "woven"}
-    return [Figure("btf.held_ms", drag_ms, "ms", {**context, "shaded": 1e3 * shaded_s})]
+    return [Figure("btf.edit_ms", drag_ms, "ms", {**context, "shaded": 1e3 * shaded_s})]
 
 
 def _override_with_btf(transfer: FixedViewTransfer, record: BtfRecord, **params: float) -> Look:

@@ -1,4 +1,4 @@
-"""surface.all_vs_sun, surface.first_touch_s, surface.follow_error: eye, light and materials at once, bounces and all.
+"""probes.all_vs_sun, probes.first_edit_s, probes.incremental_error: eye, light and materials at once, bounces and all.
 
 `surface.all_vs_sun`: in every frame the eye moves, the environment turns to where nobody had it, and the exponent
 of the floor's highlight moves, whose light all other surfaces get, with as many bounces as the bake has (24), and with
@@ -25,7 +25,7 @@ import numpy as np
 from relume.core.thread_pools import num_threads
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume_bench.figure import Figure
-from relume_bench.moving_scene import Drag, FreeCameraScene, run_light_jobs, run_update_jobs
+from relume_bench.free_camera_scene import Drag, FreeCameraScene, run_light_jobs, run_update_jobs
 
 _SUN_FRAME_RATES = {13_000: 5.82, 35_700: 3.40, 62_100: 1.53}
 _FRAMES, _STEPS = 24, 8
@@ -52,7 +52,7 @@ def _all(folder: Path, context: dict[str, Any], tiny: bool) -> Figure:
             f"{1e3 * whole.median_s:.0f} ms, {1 / whole.median_s:.1f} a second, lag {1e3 * whole.lag_s:.0f} ms, "
             f"two bounces {1e3 * two.median_s:.0f} ms; Sun {sun_fps} a second"
         )
-    return Figure("surface.all_vs_sun", min(ratios), "ratio", {**size_details, **context})
+    return Figure("probes.all_vs_sun", min(ratios), "ratio", {**size_details, **context})
 
 
 def _together(scene: FreeCameraScene, frames: int, bounces: int) -> Drag:
@@ -126,9 +126,12 @@ def _measure_drags(folder: Path, tiny: bool) -> list[Figure]:
         for name, (change_error, image_error) in errors.items()
     }
     return [
-        Figure("surface.first_touch_s", max(first.values()), "s", {**first, **context}),
+        Figure("probes.first_edit_s", max(first.values()), "s", {**first, **context}),
         Figure(
-            "surface.follow_error", 100 * max(error for error, _ in errors.values()), "%", {**error_texts, **context}
+            "probes.incremental_error",
+            100 * max(error for error, _ in errors.values()),
+            "%",
+            {**error_texts, **context},
         ),
     ]
 

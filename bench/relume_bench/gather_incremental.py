@@ -1,4 +1,4 @@
-"""gather.follow_error: pictures that follow a dragged colour, or the number of bounces, before they are shaded at rest.
+"""gather.incremental_error: images that follow a dragged color, or the number of bounces, before they are exact.
 
 The room of bench/gather.py. Its red wall is dragged to blue, its floor to dark grey, and bounces from all to one, held
 by the hand; what holding makes is made before. The last frame of each drag against the same look shaded, relative RMSE
@@ -29,7 +29,7 @@ from relume_bench.points import relative_rmse
 Document = dict[str, Any]
 Edit = Callable[[Document, float], None]
 
-_NAME = "gather.follow_error"
+_NAME = "gather.incremental_error"
 
 
 def measure(tiny: bool) -> list[Figure]:

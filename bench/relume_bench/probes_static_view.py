@@ -1,4 +1,4 @@
-"""surface.rest_s, surface.rest_first_s: what somebody waits who has moved the eye and lets it rest.
+"""probes.static_view_s, probes.correction_s: what somebody waits who has moved the eye and lets it rest.
 
 The eye of the still life, 640×480, steps aside twice, and is then given the time that it needs; the median of both.
 From the eye's last move to the encoded exact picture, without the quarter of a second that a session waits before it
@@ -72,19 +72,17 @@ def measure(tiny: bool) -> list[Figure]:
     errors |= {"its_moving_error": box[0].error, "its_first_error": box[0].first_error}
     threads = {"threads": num_threads()}
     return [
-        Figure("surface.rest_s", whole.convergence_s, "s", {**context, **box_context, **threads}),
-        Figure("surface.rest_first_s", whole.first_s, "s", {**errors, "cornell_box_400": box[0].first_s, **threads}),
+        Figure("probes.static_view_s", whole.convergence_s, "s", {**context, **box_context, **threads}),
+        Figure("probes.correction_s", whole.first_s, "s", {**errors, "cornell_box_400": box[0].first_s, **threads}),
     ]
 
 
 def _measure_scene(name: str, size: tuple[int, int], tiny: bool) -> tuple[_Convergence, _Convergence]:
     """Of all light, and of that which comes straight."""
     scene = built_in(name)
-    recipe = Recipe(
-        "surface", (scene.cameras[0].name,), size, 60 if tiny else 1000, num_points=2000 if tiny else 50_000
-    )
+    recipe = Recipe("probes", (scene.cameras[0].name,), size, 60 if tiny else 1000, num_probes=2000 if tiny else 50_000)
     with tempfile.TemporaryDirectory() as folder:
-        path = bake_in_process(METHODS["surface"], scene, recipe, Path(folder) / "moving.zarr")
+        path = bake_in_process(METHODS["probes"], scene, recipe, Path(folder) / "moving.zarr")
         convergences = []
         for light_paths in ("all", "direct"):
             free_camera_bake = open_bake(path, Cache(_CACHE_BYTES))

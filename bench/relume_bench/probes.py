@@ -1,4 +1,4 @@
-"""surface.*: what somebody waits who moves the eye, a material or a light of a view that moves.
+"""probes.*: what somebody waits who moves the eye, a material or a light of a view that moves.
 
 Scenes: the Cornell box under the sky at 400×400, and the still life at 640×480, which has twice as many triangles as
 points. Times are from a message's content to the encoded bytes. `surface.view_fps`: the eye moves sideways, the
@@ -8,7 +8,7 @@ the lights stay; `edited_share` of the picture's pixels show it.
 What surfaces reflect onto each other is made beside the frames and follows `lag_ms` behind; `per_s` counts all frames,
 those among them that show it in every pixel, too. `surface.light_ms`: the environment turns, with all bounces, and
 is followed roughly, in the same way; `all_points_ms` is what all of it takes, at rest.
-`surface.against_fixed_…` is the moving view against the picture that replaces it, of a `gather` bake from the same
+`probes.against_fixed_…` is the moving view against the picture that replaces it, of a `gather` bake from the same
 place, pixels at edges of objects left out, which one side has antialiased; both spread evenly what highlights send to
 other surfaces.
 """
@@ -25,7 +25,7 @@ import numpy as np
 
 from relume.core.thread_pools import num_threads
 from relume_bench.figure import Figure
-from relume_bench.moving_scene import FreeCameraScene, rotated
+from relume_bench.free_camera_scene import FreeCameraScene, rotated
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -45,24 +45,22 @@ def measure(tiny: bool) -> list[Figure]:
         )
         exactly = {"all_points_ms": 1e3 * box.edits(3, rotated).median_s}
         return [
+            Figure("probes.bake_s", still_life.bake_s, "s", {**context, "cornell_box": box.bake_s, **still_life.sizes}),
+            Figure("probes.bytes_per_probe", still_life.num_bytes / still_life.num_probes, "bytes", context),
             Figure(
-                "surface.bake_s", still_life.bake_s, "s", {**context, "cornell_box": box.bake_s, **still_life.sizes}
-            ),
-            Figure("surface.bytes_per_point", still_life.num_bytes / still_life.num_probes, "bytes", context),
-            Figure(
-                "surface.view_fps",
+                "probes.view_fps",
                 1 / float(np.median(camera_times[still_life.name])),
                 "frames/s",
                 {**context, "size": "640×480", "cornell_box_400": 1 / float(np.median(camera_times["cornell_box"]))},
             ),
             Figure(
-                "surface.sun_fps",
+                "probes.sun_fps",
                 1 / float(np.median(sun_times[still_life.name])),
                 "frames/s",
                 {**context, "size": "640×480", "cornell_box_400": 1 / float(np.median(sun_times["cornell_box"]))},
             ),
             Figure(
-                "surface.brdf_ms",
+                "probes.brdf_ms",
                 1e3 * brdf.median_s,
                 "ms",
                 {
@@ -74,7 +72,7 @@ def measure(tiny: bool) -> list[Figure]:
                 },
             ),
             Figure(
-                "surface.light_ms",
+                "probes.light_ms",
                 1e3 * light.median_s,
                 "ms",
                 {**context, **light.summarize(), **exactly, "size": "400×400", "bounces": "all"},
@@ -84,9 +82,9 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 _MATERIALS: dict[str, list[dict[str, Any]]] = {
-    "surface.against_fixed_diffuse": [{"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}],
-    "surface.against_fixed_glossy_0.5": [{"model": "ggx", "params": {"roughness": 0.5, "f0": 0.9}, "texture": None}],
-    "surface.against_fixed_glossy_0.3": [{"model": "ggx", "params": {"roughness": 0.3, "f0": 0.9}, "texture": None}],
+    "probes.against_fixed_diffuse": [{"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}],
+    "probes.against_fixed_glossy_0.5": [{"model": "ggx", "params": {"roughness": 0.5, "f0": 0.9}, "texture": None}],
+    "probes.against_fixed_glossy_0.3": [{"model": "ggx", "params": {"roughness": 0.3, "f0": 0.9}, "texture": None}],
 }
 _EDITED = "Floor"
 _GLOSSY = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "texture": None, "params": {"exponent": 20.0}}

@@ -1,4 +1,4 @@
-"""surface.canvas_fps: pictures a second that this machine's browser draws itself while the eye moves.
+"""probes.canvas_fps: pictures a second that this machine's browser draws itself while the eye moves.
 
 The editor on the Cornell box, 40k points, 640×480; the mouse drags round and round. Headless Chromium without a GPU
 draws by its software rasteriser, with one sample a pixel, on the same cores as everything else; a browser like that is
@@ -17,12 +17,12 @@ from urllib.parse import urlencode
 
 from relume.scene.examples.catalog import built_in
 from relume.store.bake_protocol import Recipe
+from relume_bench.baked_server import baked_folder, serving
 from relume_bench.canvas import ARGUMENTS, BROWSERS
 from relume_bench.figure import Figure, skipped
-from relume_bench.house import baked_house, serving
 from relume_server.settings import Settings
 
-_NAME = "surface.canvas_fps"
+_NAME = "probes.canvas_fps"
 _READY_TIMEOUT_MS = 120_000
 _NUM_ROTATIONS = 10
 _CHOOSE = "localStorage.setItem('relume.drawnBy', '{}')"
@@ -47,9 +47,9 @@ def measure(tiny: bool) -> list[Figure]:
     size, num_probes, moves = ((64, 48), 2000, 20) if tiny else ((640, 480), 40_000, 150)
     scene = built_in("cornell_box")
     views = (scene.cameras[0].name,)
-    recipe = Recipe("surface", views, size, 100 if tiny else 500, num_points=num_probes)
-    with baked_house(scene, recipe) as house, serving(house) as server:
-        query = urlencode({"scene": house.scene, "bake": house.bake, "view": views[0]})
+    recipe = Recipe("probes", views, size, 100 if tiny else 500, num_probes=num_probes)
+    with baked_folder(scene, recipe) as data_folder, serving(data_folder) as server:
+        query = urlencode({"scene": data_folder.scene, "bake": data_folder.bake, "view": views[0]})
         url = f"http://127.0.0.1:{server.port}/?{query}"
         browser_result, server_result = (_drag(browser, url, renderer, moves) for renderer in ("browser", "server"))
     context = {

@@ -33,7 +33,7 @@ OPENING = json.dumps({"type": "open"})
 
 
 @dataclass(frozen=True)
-class House:
+class BakedFolder:
     """A data folder that holds one bake.
 
     Attributes:
@@ -47,13 +47,13 @@ class House:
 
 
 @contextmanager
-def baked_house(scene: Scene, recipe: Recipe) -> Iterator[House]:
+def baked_folder(scene: Scene, recipe: Recipe) -> Iterator[BakedFolder]:
     """Bake a scene into a temporary data folder."""
     with tempfile.TemporaryDirectory() as folder:
         with BakeService(Path(folder)) as service:
             register_scene(service.data_dir, service.ledger, scene)
             taken_s = bake_s(service, scene.id, recipe)
-        yield House(Path(folder), scene.id, bake_id(scene.id, recipe), taken_s)
+        yield BakedFolder(Path(folder), scene.id, bake_id(scene.id, recipe), taken_s)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Server:
 
 
 @contextmanager
-def serving(house: House, settings: Mapping[str, str] | None = None) -> Iterator[Server]:
+def serving(data_folder: BakedFolder, settings: Mapping[str, str] | None = None) -> Iterator[Server]:
     """Start the server; it is ready when it accepts connections.
 
     Args:
@@ -89,8 +89,8 @@ def serving(house: House, settings: Mapping[str, str] | None = None) -> Iterator
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
-    edits = house.data / "edits.txt"
-    environment = {**os.environ, "RELUME_DATA": str(house.data), "RELUME_PORT": str(port), **(settings or {})}
+    edits = data_folder.data / "edits.txt"
+    environment = {**os.environ, "RELUME_DATA": str(data_folder.data), "RELUME_PORT": str(port), **(settings or {})}
     start_time = time.perf_counter()
     process = subprocess.Popen([sys.executable, "-m", "relume_bench.recording_server", str(edits)], env=environment)
     try:

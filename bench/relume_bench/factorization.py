@@ -1,4 +1,4 @@
-"""in_out.*: how many terms the in-out factorisation of a BRDF needs, ρ(ωi, ωo) = Σ_k σ_k h_k(ωo) g_k(ωi), by its SVD.
+"""factorization.*: how many terms ρ(ωi, ωo) = Σ_k σ_k h_k(ωo) g_k(ωi), the factorization of a BRDF, needs, by its SVD.
 
 The laws of Mahajan, Tseng and Ramamoorthi 2008: 2.5 s for Phong's exponent s, and a constant over σ² for the half-angle
 Gaussian of Torrance and Sparrow (eq. 14). The norm is theirs: 99 % of the energy, both directions on the hemisphere,
@@ -35,7 +35,7 @@ def measure(tiny: bool) -> list[Figure]:
     details = {"norm": "99 % of the energy, visible hemispheres, no cosine", "angles": size}
     return [
         Figure(
-            "in_out.phong_terms_per_exponent",
+            "factorization.phong_terms_per_exponent",
             _slope(EXPONENTS, by_exponent),
             "terms",
             {
@@ -46,7 +46,7 @@ def measure(tiny: bool) -> list[Figure]:
             },
         ),
         Figure(
-            "in_out.torrance_sparrow_terms_sigma2",
+            "factorization.torrance_sparrow_terms_sigma2",
             _slope([1 / sigma**2 for sigma in SIGMAS], by_sigma),
             "terms · σ²",
             {

@@ -25,7 +25,7 @@ from relume.scene.examples.catalog import built_in
 from relume.scene.model import Scene
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
-from relume_bench.beside import BackgroundJobs
+from relume_bench.background_jobs import BackgroundJobs
 from relume_bench.timing import percentiles
 
 _MOVED = 0.01  # of the distance to the target, each frame
@@ -87,13 +87,13 @@ class FreeCameraScene:
         requested_probes = num_probes or (2000 if tiny else 50_000)
         self.name, self.folder, self.size, self._scene = name, folder, size, built_in(name)
         self.recipe = Recipe(
-            "surface", (self._scene.cameras[0].name,), size, 60 if tiny else 1000, num_points=requested_probes
+            "probes", (self._scene.cameras[0].name,), size, 60 if tiny else 1000, num_probes=requested_probes
         )
         bake_in_process(
-            METHODS["surface"], self._scene, replace(self.recipe, num_points=500), folder / f"{name}-warm.zarr"
+            METHODS["probes"], self._scene, replace(self.recipe, num_probes=500), folder / f"{name}-warm.zarr"
         )
         start_time, path = time.perf_counter(), folder / f"{name}.zarr"
-        bake_in_process(METHODS["surface"], self._scene, self.recipe, path)
+        bake_in_process(METHODS["probes"], self._scene, self.recipe, path)
         self.bake_s = time.perf_counter() - start_time
         self.num_bytes = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
         self._num_drags, self._num_uncounted = 0, 1 if tiny else _UNCOUNTED

@@ -1,6 +1,6 @@
-"""surface.rmse_*: the whole moving view against Mitsuba's whole path tracer.
+"""probes.rmse_*: the whole moving view against Mitsuba's whole path tracer.
 
-The scenes of bench/relume_bench/surface.py, all surfaces of one material: diffuse in the Cornell box under its sky, or
+The scenes of bench/relume_bench/probes.py, all surfaces of one material: diffuse in the Cornell box under its sky, or
 under one as bright whose sun is an eighth as wide,
 0.5° from its middle to its edge (`hard_sun`); nothing but a Blinn–Phong
 highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2); or metal of
@@ -60,7 +60,7 @@ _UNIT = "%"
 def measure(tiny: bool) -> list[Figure]:
     """A bake, a frame and a render for each material."""
     if (why := missing()) is not None:
-        return skipped(tuple(f"surface.rmse_{kind}" for kind in _LOOK_VARIANTS), _UNIT, why)
+        return skipped(tuple(f"probes.rmse_{kind}" for kind in _LOOK_VARIANTS), _UNIT, why)
     return [_figure(kind, tiny) for kind in _LOOK_VARIANTS]
 
 
@@ -109,9 +109,9 @@ def _figure(kind: str, tiny: bool) -> Figure:
     if kind == "hard_sun":
         scene = replace(scene, environment=sunny_sky(radius=_HARD[0], rows=_HARD[1]))
     size, spp, num_lights, num_probes = ((40, 30), 2, 60, 2000) if tiny else (size, _SPP.get(kind, 32), 1000, 50_000)
-    recipe = Recipe("surface", (scene.cameras[0].name,), size, num_lights, num_points=num_probes)
+    recipe = Recipe("probes", (scene.cameras[0].name,), size, num_lights, num_probes=num_probes)
     with tempfile.TemporaryDirectory() as folder:
-        bake = open_bake(bake_in_process(METHODS["surface"], scene, recipe, Path(folder) / "s.zarr"), Cache(4 << 30))
+        bake = open_bake(bake_in_process(METHODS["probes"], scene, recipe, Path(folder) / "s.zarr"), Cache(4 << 30))
         document = copy.deepcopy(complete({}, bake.default_look))
         for material in document["materials"].values():
             material["terms"] = copy.deepcopy(terms)
@@ -145,5 +145,5 @@ def _figure(kind: str, tiny: bool) -> Figure:
         "points": num_probes,
     }
     return Figure(
-        f"surface.rmse_{kind}", 100 * comparison.error.value, _UNIT, context, 100 * comparison.error.standard_error
+        f"probes.rmse_{kind}", 100 * comparison.error.value, _UNIT, context, 100 * comparison.error.standard_error
     )

@@ -1,4 +1,4 @@
-"""rough.rmse: surfaces as rough as maps say, against Mitsuba with the same maps as textures of its own conductors.
+"""roughness.rmse: surfaces as rough as maps say, against Mitsuba with the same maps as textures of its own conductors.
 
 A tiled floor and a spotted ball, both mirrors of another colour but for their roughness, under a sky with a sun: direct
 light alone, so that nothing but levels of roughness and triangles of light is between the two. In the row is what the
@@ -32,7 +32,7 @@ from relume_bench.standard_error import compare_with_passes
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_NAME, _UNIT = "rough.rmse", "relative RMSE"
+_NAME, _UNIT = "roughness.rmse", "relative RMSE"
 _SIZE, _FINER, _SPP, _LIGHTS = (400, 300), 2, 64, 4000
 _COLORS = {"Floor": (0.5, 0.5, 0.6), "Ball": (0.9, 0.6, 0.3)}
 

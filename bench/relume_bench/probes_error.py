@@ -1,4 +1,4 @@
-"""surface.points_rmse: what light vectors tell of single points, nothing interpolated, against brute force.
+"""probes.probe_rmse: what light vectors tell of single points, nothing interpolated, against brute force.
 
 Points of the Cornell box that the eye sees, their radiance towards it by all paths, against path tracing whose noise is
 taken off (`relume_bench.standard_error.compare_with_passes`): of the scene's own diffuse surfaces, and in the context
@@ -30,7 +30,7 @@ from relume.raytrace.visibility import trace_visibility
 from relume.reference import ReferencePoints, environment_texels, reference_radiance
 from relume.reference.path_tracing import reference_indirect
 from relume_bench.figure import Figure
-from relume_bench.moving_scene import FreeCameraScene
+from relume_bench.free_camera_scene import FreeCameraScene
 from relume_bench.standard_error import NoiseCorrectedError, compare_with_passes
 
 F32 = NDArray[np.float32]
@@ -56,7 +56,7 @@ def measure(tiny: bool) -> list[Figure]:
         details = {"glossy": glossy.summary, "direct": direct, "points": num, "of": box.num_probes, "paths": paths}
         context = {**comparison.context, **details, **box.sizes}
     return [
-        Figure("surface.points_rmse", 100 * comparison.error.value, "%", context, 100 * comparison.error.standard_error)
+        Figure("probes.probe_rmse", 100 * comparison.error.value, "%", context, 100 * comparison.error.standard_error)
     ]
 
 

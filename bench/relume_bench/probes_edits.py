@@ -1,4 +1,4 @@
-"""surface.brdf_vs_sun: how many times as soon as with Sun 2007 the picture of an edited material is there.
+"""probes.brdf_vs_sun: how many times as soon as with Sun 2007 the picture of an edited material is there.
 
     ratio = (1 / frames a second of Sun 2007, table 1, "V&B") / (median from a look to its encoded frame)
 
@@ -18,8 +18,8 @@ from typing import Any
 
 from relume.core.thread_pools import num_threads
 from relume_bench.figure import Figure
-from relume_bench.moving_scene import Drag, FreeCameraScene
-from relume_bench.surface import make_exponent_edit
+from relume_bench.free_camera_scene import Drag, FreeCameraScene
+from relume_bench.probes import make_exponent_edit
 
 _SUN_FRAME_RATES = {"tweety": (13_000, 28.73), "indoor": (35_700, 12.57), "watch": (62_100, 7.23)}
 _FLOOR, _WALLS = "Floor", "Walls"
@@ -43,7 +43,7 @@ def measure(tiny: bool) -> list[Figure]:
             "points": box.num_probes, "sun_ms": sun_frame_ms, "ratio": ratios[-1], **floor.summarize(),
             "widest": sun_frame_ms / (1e3 * widest.median_s), "moved_eye": sun_frame_ms / (1e3 * moved.median_s),
         }  # fmt: skip
-    return [Figure("surface.brdf_vs_sun", min(ratios), "×", context)]
+    return [Figure("probes.brdf_vs_sun", min(ratios), "×", context)]
 
 
 def _drag_with_camera(box: FreeCameraScene, frames: int) -> Drag:
