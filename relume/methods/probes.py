@@ -2,8 +2,8 @@
 
 The bake keeps for each probe what `gather` keeps for each view sample: the light triangles that it sees, and the
 patches that its gather rays hit. Neither depends on a BRDF or a camera. Stages: "probes" (light triangles, probes,
-patches), "visibility and gather rays" (rows of patches and of probes), "spherical harmonics", then "free-camera error", which
-reads the finished bake.
+patches), "visibility and gather rays" (rows of patches and of probes), "spherical harmonics", then "free-camera error",
+which reads the finished bake.
 
     scene/positions, faces, face_material, uvs, textures, …  relume.live.free_camera.probes.stored_scene
     lights/…                                                 as in relume.methods.view_stages

@@ -160,7 +160,7 @@ class Quotas:
             num_active = session.scalar(query) or 0
         if num_active >= max_bakes:
             raise QuotaError(
-                f"{max_bakes} of your bakes wait or run, as many as may; wait, or cancel one (RELUME_MAX_BAKES_PER_USER)"
+                f"{max_bakes} of your bakes wait or run, the most; wait, or cancel one (RELUME_MAX_BAKES_PER_USER)"
             )
 
     def used_bytes(self, owner: str) -> int:
