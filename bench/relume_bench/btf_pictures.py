@@ -54,7 +54,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     for k, (theta, phi) in enumerate(_CAMERA_ANGLES):
         plane, displaced_scene = _make_scenes(tile, theta, phi)
         bake, look = bake_with_btf(plane, record, size, folder / f"{k}.zarr", 60 if tiny else 2000)
-        rendered = render_image(bake, "eye", look)[..., :3]
+        rendered = render_image(bake, "camera", look)[..., :3]
         reference_passes = traced_by_peer(displaced_scene, size, spp, [tile.materials[0]], folder / f"peer{k}")
         errors.append(compare_with_passes(rendered.astype(np.float64), reference_passes))
     worst = max(errors, key=lambda comparison: comparison.error.value)
@@ -62,7 +62,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
         "from": [f"θ {theta}°, φ {phi}°" for theta, phi in _CAMERA_ANGLES],
         "errors": [comparison.error.value for comparison in errors],
         "biases": [comparison.bias.value for comparison in errors],
-        "kept_to": record.error[-1], "noise": worst.noise, "spp": PASSES * spp, "size": list(size),
+        "compression_error": record.error[-1], "noise": worst.noise, "spp": PASSES * spp, "size": list(size),
     }  # fmt: skip
     return Figure(name, 100 * worst.error.value, "%", context, 100 * worst.error.standard_error)
 
@@ -95,7 +95,7 @@ def bake_with_btf(plane: Scene, record: BtfRecord, size: tuple[int, int], path: 
         plane: the scene. record: of the BTF. size: of the view. path: of the store. lights: triangles of the sky.
     """
     bake = open_bake(
-        bake_in_process(METHODS["direct"], plane, Recipe("direct", ("eye",), size, lights), path), Cache(2 << 30)
+        bake_in_process(METHODS["direct"], plane, Recipe("direct", ("camera",), size, lights), path), Cache(2 << 30)
     )
     term = {**record.terms()[0], "color": [1.0, 1.0, 1.0]}
     return bake, validate({"materials": {"Cloth": {"terms": [term]}}}, bake.default_look)
@@ -112,7 +112,7 @@ def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool
     plane, _ = _make_scenes(GEOMETRIES["weave"](), *_CAMERA_ANGLES[0])
     size = (12, 12) if tiny else (96, 96)
     bake, look = bake_with_btf(plane, record, size, folder / "table.zarr", 60 if tiny else 1000)
-    view = bake.views["eye"]
+    view = bake.views["camera"]
     light = illumination_from_look(look, bake.material_names, has_bounces=False)
     lights, receivers = bake.arriving(view, 0, light, bake.cache)
     uv = _to_middles(receivers.uv, values.size)
@@ -122,7 +122,12 @@ def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool
     radiance = texel_rows(flat, lights, replace(receivers, uv=uv), 0, len(uv))
     expected = _from_table(values, lights, receivers, uv)
     error = float(np.linalg.norm(radiance - expected) / np.linalg.norm(expected))
-    context = {"samples": len(uv), "kept_to": record.error[-1], "ratio": record.ratio, "texels": list(values.size)}
+    context = {
+        "samples": len(uv),
+        "compression_error": record.error[-1],
+        "ratio": record.ratio,
+        "texels": list(values.size),
+    }
     return Figure("btf.table_rmse", 100 * error, "%", context)
 
 
@@ -168,7 +173,7 @@ def _make_scenes(tile: Any, theta: float, phi: float) -> tuple[Scene, Scene]:
     towards = np.array([np.sin(t) * np.cos(p), np.cos(t), -np.sin(t) * np.sin(p)])
     far = 60.0
     camera = look_at(
-        "eye", tuple(far * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _NUM_VISIBLE_PERIODS / far))
+        "camera", tuple(far * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _NUM_VISIBLE_PERIODS / far))
     )
     radiance = np.array(studio().radiance)
     radiance[len(radiance) // 2 :] = 0  # a BTF knows no light from below, which holes of the geometry would let through

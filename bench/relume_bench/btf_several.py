@@ -54,7 +54,7 @@ def measure(tiny: bool) -> list[Figure]:
                 session.edit(number)
         none, two, five = (1e3 * float(np.median(session.seconds)) for session in sessions)
     context = {
-        "size": f"{size[0]}×{size[1]}", "points": num_probes, "texels": f"{side}×{side}", "edits": edits,
+        "size": f"{size[0]}×{size[1]}", "probes": num_probes, "texels": f"{side}×{side}", "edits": edits,
         "none_ms": none, "two_ms": two, "five_ms": five,
     }  # fmt: skip
     return [

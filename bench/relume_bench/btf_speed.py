@@ -57,7 +57,7 @@ def _measure_free_camera(record: BtfRecord, folder: Path, tiny: bool) -> list[Fi
         still_life.edits(frames, rotate_light, is_watched=True),
     )
     frame_bytes = _light_bytes(still_life, override_with_btf, rotate_light)
-    context = {"size": "400×400", "points": still_life.num_probes, "every_surface": "woven"}
+    context = {"size": "400×400", "probes": still_life.num_probes, "every_surface": "woven"}
     return [
         Figure("btf.view_fps", 1 / float(np.median(camera_times)), "frames/s", context),
         Figure("btf.light_ms", 1e3 * light.median_s, "ms", {**context, **light.summarize(), "bounces": "all"}),

@@ -53,7 +53,7 @@ def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     size, spp = ((16, 16), 2) if tiny else ((128, 128), 64)
     smooth, displaced_scene = _make_scenes()
     bake, look = bake_with_btf(smooth, record, size, folder / "sphere.zarr", 60 if tiny else 2000)
-    rendered = render_image(bake, "eye", look)[..., :3].astype(np.float64)
+    rendered = render_image(bake, "camera", look)[..., :3].astype(np.float64)
     reference_passes = traced_by_peer(
         displaced_scene, size, spp, [GEOMETRIES["weave"]().materials[0], _BLACK], folder / "sphere"
     )
@@ -66,7 +66,7 @@ def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     whole = errors["all"]
     context: dict[str, Any] = {
         **{label: errors[label].summary for label in ("near", "rim")}, "bias": whole.bias.value, "noise": whole.noise,
-        "kept_to": record.error[-1], "periods_across": 2 * _RADIUS, "pixels": int(row_masks["all"].sum()),
+        "compression_error": record.error[-1], "periods_across": 2 * _RADIUS, "pixels": int(row_masks["all"].sum()),
         "spp": PASSES * spp, "size": list(size),
     }  # fmt: skip
     return Figure(name, 100 * whole.error.value, "%", context, 100 * whole.error.standard_error)
@@ -76,7 +76,7 @@ def _make_scenes() -> tuple[Scene, Scene]:
     """The smooth ball and the real geometry about a black one, seen from far away."""
     tile = centered_height(GEOMETRIES["weave"]())
     towards = np.array([np.sin(_SPHERE_ROTATION) * 0.8, np.sin(_SPHERE_ROTATION) * 0.6, np.cos(_SPHERE_ROTATION)])
-    camera = look_at("eye", tuple(_FAR * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _ACROSS / _FAR)))
+    camera = look_at("camera", tuple(_FAR * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _ACROSS / _FAR)))
     environment = Environment("sky", np.array(studio().radiance))
     cloth, black = Material("Cloth", tuple(map(dict, tile.materials[0]))), Material("Black", _BLACK)
     lowest = _RADIUS + float(tile.positions[:, 2].min())

@@ -54,7 +54,7 @@ def measure(tiny: bool) -> list[Figure]:
         browser_result, server_result = (_drag(browser, url, renderer, moves) for renderer in ("browser", "server"))
     context = {
         "size": list(size),
-        "points": num_probes,
+        "probes": num_probes,
         "bytes_a_picture": browser_result["bytes"] / max(1, browser_result["pictures"]),
         **browser_result["first"],
         **browser_result["turn"],

@@ -82,7 +82,7 @@ def measure(tiny: bool) -> list[Figure]:
         "merged_lights": merged.lights.num_lights,
         "view_samples": lit_samples.surface_points.num_points,
         "lights": lit_samples.lights.num_lights,
-        "visible_share": float(np.unpackbits(lit_samples.receivers.visible).mean()),
+        "visible_fraction": float(np.unpackbits(lit_samples.receivers.visible).mean()),
         "threads": num_threads(),
     }
     return [Figure("freeze.curve_switch_s", max(medians[f"{curve}_s"] for curve in curves), "s", context)]

@@ -78,7 +78,7 @@ def measure(tiny: bool) -> list[Figure]:
     ]
     return [
         Figure(name, estimate_point_error(irradiance, reference).value, _UNIT, {
-            "rays_or_cells": count, "samples": num_samples,
+            "rays_or_patches": count, "samples": num_samples,
             "without_the_worst_percent": _without_the_worst(irradiance, reference),
         }, estimate_point_error(irradiance, reference).standard_error)
         for name, irradiance, count in zip(_NAMES, estimates, [num_rays, *counts], strict=True)

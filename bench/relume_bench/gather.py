@@ -59,7 +59,7 @@ def measure(tiny: bool) -> list[Figure]:
         frames_s = edit_frames_s(transfer, picture, 5 if tiny else 120)
     p50, p95 = percentiles(frames_s)
     max_freeze_s = max(taken for name, taken in freeze_times.items() if not name.endswith("exact_s"))
-    size = {"size": list(make_recipe(tiny).size), "cells": baked.context["cells"]}
+    size = {"size": list(make_recipe(tiny).size), "patches": baked.context["patches"]}
     return [
         Figure(_NAMES[0], baked.wall_s, "s", {**baked.context, "threads": num_threads()}),
         Figure(_NAMES[1], size_mb, "MB", {**size, "rays_a_sample": transfer.store.shape("views/0/gather_hits")[1]}),
@@ -99,7 +99,7 @@ def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
     wall_s = seconds(lambda: bake_in_process(method, scene, recipe, target, note))
     num_patches = open_transfer(target, Cache(4 << 30)).store.shape("patches/material")[0]
     return Baked(
-        target, wall_s, {"cells": num_patches, "size": list(recipe.size), "lights": recipe.num_lights, **stages}
+        target, wall_s, {"patches": num_patches, "size": list(recipe.size), "lights": recipe.num_lights, **stages}
     )
 
 

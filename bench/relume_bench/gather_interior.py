@@ -24,7 +24,7 @@ def measure(tiny: bool) -> list[Figure]:
         bake(interior(), make_recipe(tiny=True), Path(folder) / "warm.zarr")
         baked = bake(interior(), recipe, Path(folder) / "interior.zarr")
         size_mb = store_mb(baked.path)
-    details = {"cells": baked.context["cells"], "size": list(recipe.size)}
+    details = {"patches": baked.context["patches"], "size": list(recipe.size)}
     return [
         Figure(_NAMES[0], baked.wall_s, "s", {**baked.context, "threads": num_threads()}),
         Figure(_NAMES[1], size_mb, "MB", details),

@@ -58,7 +58,7 @@ def measure(tiny: bool) -> list[Figure]:
     return [
         Figure(name, 1 / float(np.median(drag.frames_s)), _SPEED, {
             "ms_p50": 1e3 * float(np.median(drag.frames_s)), "ms_max": 1e3 * max(drag.frames_s),
-            "over_embreex": float(np.median(drag.frames_s)) / embreex_s, "error_before_rest": drag.error,
+            "over_embreex": float(np.median(drag.frames_s)) / embreex_s, "incremental_error": drag.error,
             "prepared_once_s": drag.prepared_s, "size": list(recipe.size),
         })
         for name, drag in zip(_NAMES, drag_results, strict=True)

@@ -54,14 +54,14 @@ def measure(tiny: bool) -> list[Figure]:
             time.sleep(0.5)
     context = {
         "alone_fps": float(np.median(unloaded_ms)),
-        "beside_fps": float(np.median(loaded_ms)),
+        "with_renders_fps": float(np.median(loaded_ms)),
         "each_ratio": [b / a for a, b in zip(unloaded_ms, loaded_ms, strict=True)],
-        "steps_done_beside": painted,
+        "steps_done": painted,
         "rounds": rounds,
         "seconds": seconds,
         "size": list(size),
     }
-    return [Figure(_NAME, context["beside_fps"] / context["alone_fps"], "ratio", context)]  # type: ignore[operator]
+    return [Figure(_NAME, context["with_renders_fps"] / context["alone_fps"], "ratio", context)]  # type: ignore[operator]
 
 
 class _SliderClient:

@@ -57,11 +57,11 @@ def measure(tiny: bool) -> list[Figure]:
         "scenes": num_scenes,
         "size": list(size),
         "lights": num_lights,
-        "rest_s": _REST_S + _MORE_S,
+        "idle_s": _REST_S + _MORE_S,
         "server_at_start": before.server / 1e6,
     }
-    readings = {"after": after, "rest": idle}
-    growth_context = {**context, "more_scenes": num_more, "floor_mb": idle.server / 1e6, "rest_mb": more.server / 1e6}
+    readings = {"after": after, "idle": idle}
+    growth_context = {**context, "more_scenes": num_more, "floor_mb": idle.server / 1e6, "idle_mb": more.server / 1e6}
     return [
         *(
             Figure(f"memory.{process_group}_{when}_mb", getattr(resident, process_group) / 1e6, "MB", context)

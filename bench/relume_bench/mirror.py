@@ -59,9 +59,7 @@ def measure(tiny: bool) -> list[Figure]:
             {**comparison.context, **details, **more},
             comparison.error.standard_error,
         )
-        for name, comparison, more in zip(
-            _NAMES, (whole, balls), ({"beside_the_balls": background.summary}, {}), strict=True
-        )
+        for name, comparison, more in zip(_NAMES, (whole, balls), ({"background": background.summary}, {}), strict=True)
     ]
 
 

@@ -53,7 +53,7 @@ def measure(tiny: bool) -> list[Figure]:
     non_linear = estimate_point_error(
         _select_rows(_image(operator, _largest(analysis(bands))), num_positions), reference
     )
-    context = {"terms": _BUDGET, "of": bands.shape[1], "drag_frames": _DRAG, "resting_frames": _REST}
+    context = {"terms": _BUDGET, "of": bands.shape[1], "drag_frames": _DRAG, "idle_frames": _REST}
     return [
         Figure("paper.fig5_incremental", incremental.value, "relative RMSE", context, incremental.standard_error),
         Figure("paper.fig5_non_linear", non_linear.value, "relative RMSE", context, non_linear.standard_error),

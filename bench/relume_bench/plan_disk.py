@@ -43,7 +43,7 @@ def measure(tiny: bool) -> list[Figure]:
     largest, smallest = max(ratios, key=ratios.__getitem__), min(ratios, key=ratios.__getitem__)
     if ratios[smallest] < 1:
         raise AssertionError(f"{smallest} takes {1 / ratios[smallest]:.2f} times what was planned")
-    context = {"size": list(size), "lights": lights, "points": num_probes, "bakes": len(ratios), "most": largest}
+    context = {"size": list(size), "lights": lights, "probes": num_probes, "bakes": len(ratios), "most": largest}
     smallest_details = {"least": smallest, "least_ratio": round(ratios[smallest], 2)}
     each = {"ratios": {label: round(ratio, 2) for label, ratio in ratios.items()}}
     return [Figure(NAME, ratios[largest], "of what is taken", {**context, **smallest_details, **each})]

@@ -50,7 +50,7 @@ def measure(tiny: bool) -> list[Figure]:
         "size": list(size),
         "view_samples": transfer.views[view].num_surface_samples,
         "first_s": first,
-        "glimpse_s": float(np.median(glimpses)),
+        "preview_s": float(np.median(glimpses)),
         "all_s": whole,
     }
     return [

@@ -38,12 +38,12 @@ def measure(tiny: bool) -> list[Figure]:
         frames = 3 if tiny else 60
         camera_times = {scene.name: scene.time_camera_moves(frames) for scene in (box, still_life)}
         sun_times = {scene.name: scene.time_camera_moves(frames, _clear) for scene in (box, still_life)}
-        context = {"threads": num_threads(), "points": {scene.name: scene.num_probes for scene in (box, still_life)}}
+        context = {"threads": num_threads(), "probes": {scene.name: scene.num_probes for scene in (box, still_life)}}
         brdf, light = (
             box.edits(frames, make_exponent_edit(_EDITED), is_watched=True),
             box.edits(max(2, frames // 6), rotated, is_watched=True),
         )
-        exactly = {"all_points_ms": 1e3 * box.edits(3, rotated).median_s}
+        exactly = {"all_probes_ms": 1e3 * box.edits(3, rotated).median_s}
         return [
             Figure("probes.bake_s", still_life.bake_s, "s", {**context, "cornell_box": box.bake_s, **still_life.sizes}),
             Figure("probes.bytes_per_probe", still_life.num_bytes / still_life.num_probes, "bytes", context),
@@ -66,7 +66,7 @@ def measure(tiny: bool) -> list[Figure]:
                 {
                     **context,
                     **brdf.summarize(),
-                    "edited_share": box.measure_visible_fraction(_EDITED),
+                    "edited_fraction": box.measure_visible_fraction(_EDITED),
                     "size": "400×400",
                     "bounces": "all",
                 },

@@ -40,8 +40,8 @@ def measure(tiny: bool) -> list[Figure]:
         ratios.append(sun_frame_ms / (1e3 * floor.median_s))
         context |= {"floor": box.measure_visible_fraction(_FLOOR), "walls": box.measure_visible_fraction(_WALLS)}
         context[name] = {
-            "points": box.num_probes, "sun_ms": sun_frame_ms, "ratio": ratios[-1], **floor.summarize(),
-            "widest": sun_frame_ms / (1e3 * widest.median_s), "moved_eye": sun_frame_ms / (1e3 * moved.median_s),
+            "probes": box.num_probes, "sun_ms": sun_frame_ms, "ratio": ratios[-1], **floor.summarize(),
+            "widest": sun_frame_ms / (1e3 * widest.median_s), "moved_camera": sun_frame_ms / (1e3 * moved.median_s),
         }  # fmt: skip
     return [Figure("probes.brdf_vs_sun", min(ratios), "×", context)]
 

@@ -53,7 +53,7 @@ def measure(tiny: bool) -> list[Figure]:
             measure_radiance_rmse(box, num, paths // _FEWER, _set_rough_highlights),
         )
         direct = 100 * measure_direct_rmse(box, num)
-        details = {"glossy": glossy.summary, "direct": direct, "points": num, "of": box.num_probes, "paths": paths}
+        details = {"glossy": glossy.summary, "direct": direct, "probes": num, "of": box.num_probes, "paths": paths}
         context = {**comparison.context, **details, **box.sizes}
     return [
         Figure("probes.probe_rmse", 100 * comparison.error.value, "%", context, 100 * comparison.error.standard_error)

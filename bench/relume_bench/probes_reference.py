@@ -133,8 +133,8 @@ def _figure(kind: str, tiny: bool) -> Figure:
     rested = compare_with_passes(fixed_camera_image.astype(np.float64), reference_passes)
     error_details = {
         "while_it_moves": 100 * compare_with_passes(plain.astype(np.float64), reference_passes).error.value,
-        "at_rest": 100 * rested.error.value,
-        "at_rest_bias": rested.context["bias"],
+        "static_view": 100 * rested.error.value,
+        "static_view_bias": rested.context["bias"],
     }
     context = {
         **comparison.context,
@@ -142,7 +142,7 @@ def _figure(kind: str, tiny: bool) -> Figure:
         "scene": scene.name,
         "size": list(size),
         "spp": PASSES * spp,
-        "points": num_probes,
+        "probes": num_probes,
     }
     return Figure(
         f"probes.rmse_{kind}", 100 * comparison.error.value, _UNIT, context, 100 * comparison.error.standard_error

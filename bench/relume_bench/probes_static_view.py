@@ -61,15 +61,15 @@ def measure(tiny: bool) -> list[Figure]:
         "size": "640×480",
         "tracing_s": whole.tracing_s,
         "direct_s": direct.convergence_s,
-        "moving_error": whole.error,
+        "free_camera_error": whole.error,
     }
     box_context = {
         "cornell_box_400": box[0].convergence_s,
         "its_tracing_s": box[0].tracing_s,
         "its_direct_s": box[1].convergence_s,
     }
-    errors = {"size": "640×480", "moving_error": whole.error, "first_error": whole.first_error}
-    errors |= {"its_moving_error": box[0].error, "its_first_error": box[0].first_error}
+    errors = {"size": "640×480", "free_camera_error": whole.error, "first_error": whole.first_error}
+    errors |= {"cornell_box_error": box[0].error, "cornell_box_first_error": box[0].first_error}
     threads = {"threads": num_threads()}
     return [
         Figure("probes.static_view_s", whole.convergence_s, "s", {**context, **box_context, **threads}),

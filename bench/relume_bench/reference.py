@@ -73,7 +73,7 @@ def _make_scenes(num_rows: int) -> dict[str, Scene]:
 
 def _terms(albedo: float, sigma: float) -> tuple[dict[str, Any], ...]:
     lambert = {"model": "lambert", "color": [albedo] * 3}
-    return tuple(complete_term(("truth",), term, None) for term in (lambert, cook_torrance(sigma)))
+    return tuple(complete_term(("reference",), term, None) for term in (lambert, cook_torrance(sigma)))
 
 
 def _disagreement(

@@ -46,7 +46,7 @@ def measure(tiny: bool) -> list[Figure]:
         "edits": num_edits,
         "frames": len(times),
         "size": list(size),
-        "share_of_picture": float(np.mean(ids == 0)),
+        "pixel_fraction": float(np.mean(ids == 0)),
         "frame_bytes_median": float(np.median([num_bytes for _, num_bytes in frames])),
         **{
             f"{stage}_ms_median": float(np.median([header["ms"][stage] for header, _ in frames]))

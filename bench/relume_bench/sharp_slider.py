@@ -79,7 +79,7 @@ def _errors(lit_samples: LitSamples, model: str, parameter: str, num: int) -> di
         "percentile_99": float(np.percentile(energy_fractions, 99)),
         "levels": float(np.max(noise_levels)),
         "levels_99": float(np.percentile(noise_levels, 99)),
-        "negative_share": max(negative),
+        "negative_fraction": max(negative),
         "nodes": along.num_columns,
     }
 

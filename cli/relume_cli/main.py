@@ -52,13 +52,13 @@ app.command("restore")(restore.restore)
 app.command("reference")(reference.reference)
 app.command("bench")(bench.bench)
 app.command("audit")(audit.audit)
-token = typer.Typer(help="Who may do what, where the server asks.", no_args_is_help=True, rich_markup_mode=None)
+token = typer.Typer(help="Access tokens and roles.", no_args_is_help=True, rich_markup_mode=None)
 token.command("add")(tokens.token_add)
 token.command("list")(tokens.token_list)
 token.command("revoke")(tokens.token_revoke)
 app.add_typer(token, name="token")
 materials = typer.Typer(
-    help="Measured materials, and textures of many views.",
+    help="Measured materials and BTFs.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -66,7 +66,7 @@ materials.command("import")(importing.material_import)
 materials.command("make-btf")(make_btf.material_make_btf)
 materials.command("export")(exporting.material_export)
 app.add_typer(materials, name="material")
-environments = typer.Typer(help="Light that a look may name.", no_args_is_help=True, rich_markup_mode=None)
+environments = typer.Typer(help="Environments that looks may use.", no_args_is_help=True, rich_markup_mode=None)
 environments.command("import")(environment_import.environment_import)
 app.add_typer(environments, name="environment")
 database = typer.Typer(help="The database of scenes, bakes and looks.", no_args_is_help=True, rich_markup_mode=None)

@@ -93,7 +93,7 @@ def place_probes(
     is_open = is_open & (area > 0)[:, None]
     total = float((is_open * area[:, None]).sum())
     if total <= 0:
-        raise PlanError("no surface of the scene has any area; there is nothing to put points on")
+        raise PlanError("no surface of the scene has any area; there is nothing to put probes on")
     finest, coarsest = density.face_extremes()
     twins = twin_faces(geometry, edges)
     finest, coarsest = np.minimum(finest, finest[twins]), np.maximum(coarsest, coarsest[twins])
