@@ -223,7 +223,7 @@ class SplitColumn:
     """A column of samples of which some were split, read as `relume.camera.external_sort.Column` is.
 
     Args:
-        name: of the column; shares of a pixel, what glass lets through, and chances change. whole: before.
+        name: of the column; weight, transmittance and alpha_sample change. whole: before.
         split: how.
     """
 
@@ -234,10 +234,10 @@ class SplitColumn:
     def __getitem__(self, rows: slice) -> NDArray[Any]:
         """Some rows that follow each other."""
         values = self._whole.take(self._split.row[rows])
-        if self._name not in ("weight", "through", "chance"):
+        if self._name not in ("weight", "transmittance", "alpha_sample"):
             return values
         weights = self._split.weights(rows)
-        if self._name == "chance":
+        if self._name == "alpha_sample":
             return weights.alpha_sample
         return np.asarray(
             values / weights.num_parts if self._name == "weight" else values * weights.channel_weights, self.dtype

@@ -42,7 +42,7 @@ def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "0001: The tables as they were before there were revisions"
     assert main(["db", "upgrade"]) == 0
-    assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the ledger is at revision {latest_revision()}"]
+    assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the database is at revision {latest_revision()}"]
 
 
 def test_a_backup_says_what_is_not_in_it_and_comes_back(

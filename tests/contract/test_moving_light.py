@@ -77,7 +77,7 @@ def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
             found = store.read(path, start, stop)
             return found[:-1] if path == "sh/weight" else found
 
-    with pytest.raises(ChunkDamagedError, match="harmonics"):
+    with pytest.raises(ChunkDamagedError, match="sh is damaged"):
         read_harmonic_light(Damaged(), read_patches(store))
 
 

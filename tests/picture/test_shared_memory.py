@@ -40,7 +40,7 @@ def test_nothing_that_grows_is_outside(gathered):
     assert memory.used_bytes > inside
     kinds = {holder.kind for holder in memory.bytes_by_owner()}
     lights = {"lights", "environment on patches", "light on patches", "local light", "indirect light", "reflectance"}
-    assert lights | {"shaded", "shadows", "neighbor filter", "background", "blurred environment"} <= kinds
+    assert lights | {"shaded term", "shadow cache", "neighbor filter", "background", "blurred environment"} <= kinds
     entries = [*memory._state.persistent.values(), *memory._state.transient.values()]
     told = [entry.num_bytes for entry in entries]  # lights find out later how wide they are, a number each
     assert [live_bytes(getattr(entry, "value", entry)) for entry in entries] == pytest.approx(told, rel=0.05)

@@ -129,7 +129,7 @@ class BakedIndirectViews(BakedFixedViews):
         mirror_visibility = (
             None
             if self.mirror_lights is None
-            else np.asarray(view.read_rows("thrown", material, sample_indices), np.uint8)
+            else np.asarray(view.read_rows("mirror_lights", material, sample_indices), np.uint8)
         )
         return replace(
             samples,
